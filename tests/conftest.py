@@ -268,14 +268,19 @@ class KeptBrowser(Browser):
     idle: ClassVar[list[Browser]] = []
 
     @classmethod
-    def start(cls) -> Browser:
+    def start(cls, page: str = "") -> Browser:
         """Return an idle browser, or a new one."""
-        return cls.idle.pop() if cls.idle and browser.find_chromium() else cls()
+        if not cls.idle or not browser.find_chromium():
+            return cls(page=page)
+        kept = cls.idle.pop()
+        if page:
+            kept.open_html(page)
+        return kept
 
     def close(self) -> None:
         """Empty the page, and keep the browser."""
         try:
-            self.visit("about:blank")
+            self.open("about:blank", "true")
         except WholebodyError:
             super().close()
         else:

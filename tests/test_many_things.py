@@ -12,12 +12,9 @@ import pytest
 import wholebody as wb
 from wholebody.assessment import all_pairs
 from wholebody.assessment.all_pairs import AllPairs
-from wholebody.geometry import proximity, single_pairs
-from wholebody.geometry.continuous import sweep, swept_depth
+from wholebody.geometry import pair_distances
 from wholebody.geometry.large_models import TABLED, geometry_model
 from wholebody.motion.checking import check
-
-MODULES = (all_pairs, proximity, single_pairs, sweep, swept_depth)
 
 
 def crowd(count: int, spread: float = 1.2) -> wb.Scene:
@@ -32,8 +29,8 @@ def crowd(count: int, spread: float = 1.2) -> wb.Scene:
 
 @pytest.fixture
 def no_pair_data(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in MODULES:
-        monkeypatch.setattr(module, "KEPT", 0)
+    monkeypatch.setattr(pair_distances, "KEPT", 0)
+    monkeypatch.setattr(all_pairs, "MANY", 0)
 
 
 def answers(scene: wb.Scene) -> dict[str, object]:
@@ -71,6 +68,45 @@ def test_no_answer_depends_on_whether_data_are_kept_for_each_pair(request: pytes
             assert single[name][1] == pytest.approx(value[1], abs=2e-6), name
         else:
             assert single[name] == pytest.approx(value, abs=1e-5), name
+
+
+@pytest.mark.parametrize("floor", [False, True])
+def test_judging_among_many_things_is_asking_coal_for_every_pair(floor: bool) -> None:
+    """Balls, turned boxes, long walls and a floor: what is near is exact, and the rest is bounded from below."""
+    rng, scene = np.random.default_rng(3), wb.Scene(wb.load("avatar"))
+    for k in range(300):
+        shape = wb.Sphere(0.05) if k % 3 else wb.Box((0.1, 0.05, 0.1 if k % 9 else 3.0))
+        turn = pin.Quaternion(pin.exp3(rng.normal(size=3))).coeffs()
+        scene.add(shape, name=f"thing {k}", at=(*rng.uniform(-2.0, 2.0, 2), rng.uniform(0.0, 2.0), *turn))
+    if floor:
+        scene.add(wb.HalfSpace(), name="floor")
+    geometry, table = scene.geometry, scene.pair_table
+    assert len(table.pairs) >= all_pairs.MANY
+    pairs, data, within = (
+        AllPairs(scene.built),
+        scene.model.createData(),
+        rng.choice([0.0, 0.02, 0.3], len(table.pairs)),
+    )
+    for shift in (0.0, 0.5, 30.0):
+        q = scene.figure.posture(scene.figure.postures[0])
+        q[:3] += shift
+        pin.forwardKinematics(scene.model, data, q)
+        exact = pin.GeometryData(geometry)
+        pin.updateGeometryPlacements(scene.model, data, geometry, exact)
+        pin.computeDistances(geometry, exact)
+        wanted = np.array([result.min_distance for result in exact.distanceResults])
+        pairs.move(q)
+        assert pairs.least == pytest.approx(wanted.min(), abs=2e-6)
+        near = pairs.nearer(within)
+        for few in (wanted < within - 2e-6, wanted < pairs.least + 1e-9):
+            assert pairs.distance[few] == pytest.approx(wanted[few], abs=2e-6)
+        assert (pairs.distance <= wanted + 2e-6).all()
+        assert (pairs.distance < 0.0).sum() == pytest.approx((wanted < 0.0).sum(), abs=1)
+        assert (
+            set(np.flatnonzero(wanted < within - 2e-6))
+            <= set(near.number)
+            <= set(np.flatnonzero(wanted < within + 2e-6))
+        )
 
 
 def test_solves_without_pair_data_are_free_and_repeatable(no_pair_data: None) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 import wholebody as wb
 from tests.needs import each
-from wholebody.geometry.memory_views import Guesses
+from wholebody.geometry.pair_distances import PairDistances
 
 FEET = ("left_foot", "right_foot")
 
@@ -133,24 +133,22 @@ def test_a_drag_goes_as_the_first_one_did(scene: wb.Scene) -> None:
 
 def test_forgotten_guesses_are_those_of_a_new_run(monkeypatch: pytest.MonkeyPatch, scene: wb.Scene) -> None:
     """With the view over coal's guesses and, where its memory is laid out in another way, without."""
-    q, model, geometry = scene.figure.posture("sitting"), scene.model, scene.geometry
+    q, model, geometry, pairs = scene.figure.posture("sitting"), scene.model, scene.geometry, scene.pair_table.pairs
     data = model.createData()
-    pin.forwardKinematics(model, data, q)
 
-    def distances(results: Any) -> list[float]:
-        pin.updateGeometryPlacements(model, data, geometry, results)
-        pin.computeDistances(geometry, results)
-        return [result.min_distance for result in results.distanceResults]
+    def distances(asked: PairDistances, q: Any) -> list[list[float]]:
+        pin.forwardKinematics(model, data, q)
+        asked.place(model, data)
+        return asked.measured(np.arange(len(pairs))).tolist()
 
-    expected = distances(pin.GeometryData(geometry))
+    new = PairDistances(geometry, pairs)
+    new.reset()
+    expected = distances(new, q)
     for seen in (True, False):
         if not seen:
-            monkeypatch.setattr("wholebody.geometry.memory_views._views", lambda requests: None)
-        used = pin.GeometryData(geometry)
-        guesses = Guesses(used)
+            monkeypatch.setattr("wholebody.geometry.pair_distances.guess_views", lambda requests: None)
+        used = PairDistances(geometry, pairs)
         for posture in ("standing", "t_pose"):
-            pin.forwardKinematics(model, data, scene.figure.posture(posture))
-            distances(used)
-        pin.forwardKinematics(model, data, q)
-        guesses.reset()
-        assert distances(used) == expected
+            distances(used, scene.figure.posture(posture))
+        used.reset()
+        assert distances(used, q) == expected

@@ -11,7 +11,6 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.assessment import all_pairs
 from wholebody.assessment.all_pairs import AllPairs, NearPairs
 from wholebody.geometry.proximity import Proximity
 
@@ -264,17 +263,6 @@ def test_a_judgement_does_not_depend_on_those_before_it(human):
     for q, expected in reversed(list(zip(postures, alone, strict=True))):
         found = wb.assess(problem, q)
         assert everything(found) == everything(expected)
-
-
-def test_it_says_the_same_where_results_cannot_be_viewed(human, monkeypatch):
-    problem, postures = cluttered(human)
-    expected = [wb.assess(problem, q) for q in postures]
-    monkeypatch.setattr(all_pairs, "distance_view", lambda results: None)
-    monkeypatch.setattr(all_pairs, "placement_view", lambda placements: None)
-    other = cluttered(human)[0]
-    for q, one in zip(postures, expected, strict=True):
-        found = wb.assess(other, q)
-        assert everything(found) == everything(one)
 
 
 def test_what_pushes_is_not_asked_for_until_somebody_wants_it(human, monkeypatch):

@@ -16,6 +16,7 @@ from typing import Any
 from wholebody.base.checks import number
 from wholebody.base.errors import WholebodyError
 from wholebody.base.files import make_folder
+from wholebody.bench.rows import only, report
 from wholebody.bench.tables import machine, write_rows, write_text
 from wholebody.cli.bench.command import listed, measuring, publish, publish_page, seed
 from wholebody.cli.bench.measuring import CLIPS, chosen, clips
@@ -185,7 +186,6 @@ def loads(arguments: argparse.Namespace) -> None:
 def clip_constants(arguments: argparse.Namespace) -> None:
     """Measure and report; --quick takes two clips."""
     from tests.audits import clip_constants as ablated
-    from wholebody.bench.rows import report
     from wholebody.figures import load
 
     only = chosen(arguments.only, ablated.USED, "--only")
@@ -198,7 +198,71 @@ def clip_constants(arguments: argparse.Namespace) -> None:
     publish("clip-constants", text, arguments, facts=facts, tables={"clip-constants": rows})
 
 
-COMMANDS = (newton, qp, human, regress, loads, clip_constants)
+@measuring(
+    "detail",
+    "levels of modelling",
+    "Solve problems with the person as spheres, capsules and hulls, with all joints and pairs and with those that a "
+    "task needs, and judge the answers in the finest model.",
+    count("--count", 8, "cases of each level"),
+    seed("of the first case"),
+)
+def detail(arguments: argparse.Namespace) -> None:
+    """The same tasks with every detail of geometry, judged in the finest model."""
+    from tests.audits import detail
+
+    facts, refused = machine(), dict[str, None]()
+    rows = list(detail.detail_rows(2 if arguments.quick else arguments.count, arguments.seed, refused.setdefault))
+    about = (
+        "Answers of `qp` that their own model calls solved, judged in the finest model with everything in it: how "
+        "many are inside something by more than 0.1 mm, and by how much the worst misses what it is asked; the effort "
+        "is held against the finest model's own answer. Medians over the cases, of the processor's time. Simplified "
+        "is `wb.simplify`."
+    )
+    shown = [row for row in detail.detail_summary(rows) if row.tool.endswith(("all", "simplified"))]
+    text = report(about, {"": only(shown, *detail.SHOWN)}, facts, list(refused))
+    publish("detail", text, arguments, facts=facts, tables={"detail": rows})
+
+
+@measuring(
+    "ablation",
+    "what each constant and mechanism of a method is worth, in counts",
+    "Change one constant or switch one mechanism off at a time, and count answers that differ.",
+    option("--method", default="qp", choices=("qp", "newton", "ccd"), help="(default: qp)"),
+    count("--count", None, "problems of every set (default: 6, 1 with --quick)"),
+)
+def ablation(arguments: argparse.Namespace) -> None:
+    """Measure and report."""
+    from tests.audits import ablation
+
+    method, facts = arguments.method, machine()
+    given = ablation.problems(arguments.count or (1 if arguments.quick else 6), method)
+    whole, rows = ablation.ablation(method, given, ablation.mechanisms(method), print)
+    text = ablation.report(method, len(given), whole, rows, ablation.constants(method)[1], facts)
+    name = f"ablation-{method}"
+    publish(name, text, arguments, facts=facts, tables={name: rows})
+
+
+@measuring(
+    "robots",
+    "load every robot description of a folder, and reach with its tips",
+    "Load every URDF and MJCF file below a folder, with an empty cache and again, and bring the tips "
+    "of each robot to where random postures free of contact have them. With --update-docs the table becomes "
+    "docs/robots.md.",
+    option("folder", type=Path, metavar="FOLDER", help="folder that holds robot descriptions"),
+)
+def robots(arguments: argparse.Namespace) -> None:
+    """Measure all descriptions; --quick makes three reaches instead of twelve."""
+    from tests.audits.robots import measure, page
+
+    facts, reaches, found = machine(), 3 if arguments.quick else 12, []
+    for row in measure(arguments.folder, reaches):
+        found.append(row)
+        told = f"{row.figures.get('solved', 'no reach')} of {reaches} solved" if row.tool != "refused" else "refused"
+        print(f"{row.case}: {told}", flush=True)
+    publish_page("robots.md", page(found, facts, reaches), arguments)
+
+
+COMMANDS = (newton, qp, human, regress, loads, clip_constants, detail, ablation, robots)
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from tests.audits.ablation import FACTORS, Constant, changed, constants_in, replaced
 from wholebody.base.arrays import Array
 from wholebody.bench.measure.clips import synthetic
 from wholebody.bench.rows import Row, measured_ms
-from wholebody.bench.suite.ablation import FACTORS, Constant, changed, constants_in, replaced
 
 Case = tuple[str, str, str, int]
 """Clip, what is worn, method, and of how many frames one is taken: a trajectory of all frames takes too long here."""

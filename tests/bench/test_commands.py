@@ -14,7 +14,7 @@ from wholebody.bench.rows import Panel, chart, shares
 from wholebody.bench.suite.adapters.registry import stepping
 from wholebody.cli.bench import run as group
 
-MARKERS = "\n".join(f"<!-- bench:{name} -->\n<!-- /bench:{name} -->" for name in ("step", "reaches", "solve"))
+MARKERS = "\n".join(f"<!-- bench:{name} -->\n<!-- /bench:{name} -->" for name in ("step", "solve"))
 
 
 def bench(*words: str) -> int:
@@ -55,13 +55,6 @@ def test_step(tmp_path: Path, docs: Path, capsys: pytest.CaptureFixture[str], mo
     assert "1342 pairs" in capsys.readouterr().out
 
 
-def test_reaches(tmp_path: Path, docs: Path) -> None:
-    words = ("--count", "2", "--first", "5", "--methods", "qp/daqp", "--out", str(tmp_path / "out"))
-    assert bench("solve", "--parts", "reaches", *words, "--update-docs", str(docs)) == 0
-    assert [row["case"] for row in csv_rows(tmp_path / "out" / "reaches.csv")] == ["seed 5", "seed 6"]
-    assert "seeds 5 to 6" in (docs / "results.md").read_text()
-
-
 def test_a_chart_that_fails_loses_no_measurement(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Tables and report are written before anything is drawn."""
 
@@ -71,9 +64,9 @@ def test_a_chart_that_fails_loses_no_measurement(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(plot_style, "save", fails)
     out = tmp_path / "out"
     with pytest.raises(RuntimeError, match="no chart"):
-        bench("solve", "--parts", "reaches", "--count", "1", "--first", "5", "--methods", "qp/daqp", "--out", str(out))
-    assert [row["case"] for row in csv_rows(out / "reaches.csv")] == ["seed 5"]
-    assert (out / "reaches.md").is_file()
+        bench("step", "--repeats", "1", "--steps", "2", "--tools", "wholebody", "--out", str(out))
+    assert len(csv_rows(out / "step-time.csv")) == len(VARIANTS)
+    assert (out / "step.md").is_file()
 
 
 SHELF = """title = "Shelf"
@@ -94,7 +87,7 @@ def test_solve(tmp_path: Path, docs: Path, root: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr("wholebody.cli.demo.packaged_tasks", lambda: {"shelf": task})
     monkeypatch.setenv("WHOLEBODY_CHROMIUM", str(tmp_path / "none"))
     words = ("--count", "1", "--methods", "qp/daqp", "--out", str(tmp_path / "out"), "--update-docs", str(docs))
-    assert bench("solve", "--parts", "task", *words) == 0
+    assert bench("solve", *words) == 0
     rows = csv_rows(tmp_path / "out" / "solve.csv")
     assert [row["problem and method"] for row in rows] == ["new", "used before"]
     assert all(float(row["median ms"]) > 0.0 and int(row["pairs"]) > 0 for row in rows)
@@ -118,7 +111,7 @@ def test_every_tool_has_a_colour_of_its_own() -> None:
     assert len(set(colors)) == len(colors)
 
 
-@pytest.mark.parametrize("words", [("step", "--repeats", "0"), ("solve", "--jobs", "0"), ("solve", "--count", "-1")])
+@pytest.mark.parametrize("words", [("step", "--repeats", "0"), ("solve", "--count", "0"), ("solve", "--count", "-1")])
 def test_counts_below_one_are_refused(words: tuple[str, ...]) -> None:
     with pytest.raises(ValueError, match="give 1 or more"):
         bench(*words)

@@ -9,7 +9,6 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench.measure.closed_forms import colliding
 from wholebody.bench.measure.drops import ENGINES, Judge, drops
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.dynamics.step_program import SKIN
@@ -30,6 +29,18 @@ def still(hand: wb.Figure, *things: tuple[wb.Shape, Any, wb.Body]) -> RigidBodie
     for k, (shape, at, body) in enumerate(things):
         scene.add(shape, name=str(k), at=at, body=body)
     return RigidBodies(scene, gravity=(0.0, 0.0, 0.0))
+
+
+def colliding(rng: np.random.Generator, at: float) -> list[tuple[wb.Shape, Any, wb.Body]]:
+    """Four things around (at, at, at) that fly towards each other, about a metre a second fast."""
+    shapes = (wb.Box((0.2, 0.3, 0.1)), wb.Sphere(0.1), wb.Capsule(0.05, 0.2), wb.Box((0.1, 0.1, 0.3)))
+    things: list[tuple[wb.Shape, Any, wb.Body]] = []
+    for k, shape in enumerate(shapes):
+        place = at + 0.5 * np.array([k % 2, k // 2, 0.0])
+        speed = -2.0 * (place - at - 0.25) + 0.2 * rng.normal(size=3)
+        body = wb.Body(velocity=tuple(speed), angular_velocity=tuple(rng.normal(size=3)))
+        things.append((shape, place, body))
+    return things
 
 
 @pytest.mark.parametrize("seed", range(2))

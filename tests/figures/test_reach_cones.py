@@ -48,7 +48,7 @@ def test_contains_agrees_with_counting_crossings_from_the_visible_point(name):
     directions = random_directions(150, 1)
     # Inside is what an arc from the visible point reaches with an even number of crossings of the edges.
     edge = boundary(cone, 300)
-    for direction, inside in zip(directions, cone.contains(directions), strict=True):
+    for direction in directions:
         if np.abs(edge @ direction).max() > np.cos(0.02):
             continue
         way = np.array([direction * (1 - t) + cone.visible * t for t in np.linspace(0, 1, 400)])
@@ -56,7 +56,7 @@ def test_contains_agrees_with_counting_crossings_from_the_visible_point(name):
             continue
         way /= np.linalg.norm(way, axis=1)[:, None]
         crossings = count_crossings(cone, way)
-        assert inside == (crossings % 2 == 0)
+        assert cone.contains(direction) == (crossings % 2 == 0)
 
 
 def count_crossings(cone, way):
@@ -80,18 +80,11 @@ def test_visible_point_is_inside_and_its_antipode_is_not(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_projection_and_angle_agree_with_a_dense_boundary(name):
+def test_the_angle_agrees_with_a_dense_boundary(name):
     cone = human_cones()[name].cone
     directions, edge = random_directions(300, 2), boundary(cone)
-    nearest, inside = cone.project(directions), cone.contains(directions)
-    angle, _ = cone.signed_angle(directions)
-    brute = np.arccos(np.clip((directions @ edge.T).max(axis=1), -1, 1))
-    assert np.abs(angle) == pytest.approx(brute, abs=2e-5)
-    assert ((angle > 0) == inside).all()
-    assert nearest[inside] == pytest.approx(directions[inside])
-    moved = np.arccos(np.clip((nearest * directions).sum(axis=1), -1, 1))
-    assert moved[~inside] == pytest.approx(brute[~inside], abs=2e-5)
-    assert np.abs(cone.signed_angle(nearest[~inside])[0]).max() < 1e-9
+    angle = np.array([cone.signed_angle(each)[0] for each in directions])
+    assert np.abs(angle) == pytest.approx(np.arccos(np.clip((directions @ edge.T).max(axis=1), -1, 1)), abs=2e-5)
 
 
 @settings(max_examples=20)
@@ -131,27 +124,15 @@ def test_left_is_the_mirror_of_right():
     flipped = directions * [1, -1, 1]
     for joint in ("shoulder", "hip"):
         left, right = cones[f"left_{joint}"].cone, cones[f"right_{joint}"].cone
-        assert left.signed_angle(directions)[0] == pytest.approx(right.signed_angle(flipped)[0], abs=1e-12)
+        for direction, mirrored in zip(directions, flipped, strict=True):
+            assert left.signed_angle(direction)[0] == pytest.approx(right.signed_angle(mirrored)[0], abs=1e-12)
 
 
 def test_spherical_triangle_of_an_octant():
     cone = ReachCone(np.eye(3), [1, 1, 1])
     directions = random_directions(500, 7)
-    assert (cone.contains(directions) == (directions > 0).all(axis=1)).all()
-    assert cone.project([-0.5, 1.0, 1.0]) == pytest.approx(np.array([0, 1, 1]) / np.sqrt(2))
-    assert cone.project([-1.0, -1.0, 5.0]) == pytest.approx([0, 0, 1])
+    assert [cone.contains(each) for each in directions] == (directions > 0).all(axis=1).tolist()
     assert cone.signed_angle([0.0, 0.0, -1.0])[0] == pytest.approx(-np.pi / 2)
-
-
-def test_one_and_many_agree():
-    cone, directions = human_cones()["right_shoulder"].cone, random_directions(20, 9)
-    angle, gradient = cone.signed_angle(directions)
-    for k, direction in enumerate(directions):
-        one, slope = cone.signed_angle(direction)
-        assert isinstance(one, float)
-        assert one == pytest.approx(angle[k])
-        assert slope == pytest.approx(gradient[k])
-        assert cone.contains(direction) is bool(cone.contains(directions)[k])
 
 
 @pytest.mark.parametrize(
@@ -174,14 +155,3 @@ def test_figure_says_where_its_cones_stand():
     assert set(figure.cones) == set(NAMES)
     assert figure.cones["left_shoulder"].reference == "thorax"
     assert figure.cones["left_hip"].limb == "left_thigh"
-
-
-@pytest.mark.parametrize("name", ["right_shoulder", "left_hip"])
-def test_one_direction_is_answered_as_many_are(name):
-    cone = load("human").cones[name].cone
-    directions = random_directions(3000, 5)
-    angles, gradients = cone.signed_angle(directions)
-    for direction, angle, gradient in zip(directions, angles, gradients, strict=True):
-        one, slope = cone.signed_angle(direction)
-        assert one == pytest.approx(angle, abs=1e-9)
-        assert slope == pytest.approx(gradient, abs=1e-6)

@@ -82,7 +82,7 @@ def _planes(hull: object) -> np.ndarray:
 
 
 def test_tips_reach_where_free_postures_have_them(robots: Path) -> None:
-    from wholebody.bench.measure.robots import tip_targets
+    from tests.audits.robots import tip_targets
 
     for name in (NAMES[0], NAMES[2]):
         figure = wb.load(robots / name)

@@ -10,7 +10,8 @@ import pytest
 import wholebody as wb
 from wholebody.geometry import large_models
 from wholebody.geometry.large_models import geometry_model
-from wholebody.geometry.proximity import COAL_ACCURACY, SINGLY
+from wholebody.geometry.pieces import COAL_ACCURACY
+from wholebody.geometry.proximity import SINGLY
 
 
 def pieces(count: int) -> list[pin.GeometryObject]:

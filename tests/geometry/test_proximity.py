@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.geometry import proximity as module
+from wholebody.geometry import pair_distances
 from wholebody.geometry.proximity import PairTable, Proximity
 
 SHAPES = {
@@ -255,7 +255,7 @@ def test_official_getters_stand_in_for_views(monkeypatch, lost):
     queries = [(random_posture(scene.figure, rng), within) for within in (0.05, 0.5, 0.05)]
     expected = [scene.contacts(q, within) for q, within in queries]
     for name in lost:
-        monkeypatch.setattr(module, name, lambda results: None)
+        monkeypatch.setattr(pair_distances, name, lambda results: None)
     slow = Proximity(scene.pair_table)
     for (q, within), wanted in zip(queries, expected, strict=True):
         found = slow.query(scene.state(q), within)

@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from tests.freeing import begun
 from wholebody.bench.measure.clips import synthetic
 from wholebody.figures.figure import Figure
 from wholebody.motion.avoidance import METHODS
 from wholebody.motion.avoider import MethodResult, Run
 from wholebody.motion.measures import excess, jerk_ratio, resolved
+from wholebody.motion.repair import smoothed
 
 DT = 1 / 30
 FRAMES = 90
@@ -97,6 +99,21 @@ def test_a_jump_of_any_method_is_repaired(planar_arm: Callable[..., Figure], jum
     assert found.report.solved, found.report.message
     np.testing.assert_allclose(found.clip.q, clip.q, atol=0.05)
     assert found.report.smoothed
+
+
+def test_only_what_is_beyond_the_bounds_is_made_smooth(planar_arm: Callable[..., Figure]) -> None:
+    """The whole clip is shifted by 0.2 rad, and one frame jumps: the window ends at frames that stay shifted."""
+    figure = planar_arm((0.5, 0.5))
+    clip = waves(figure, 0.4)
+    shifted = clip.with_q(clip.q + np.array([0.0, 0.2]))
+    q = np.array(shifted.q)
+    q[30, 1] += 0.4
+    with begun(clip, wb.Scene(figure)) as run:
+        found = smoothed(run, q, everywhere(wb.motion.MotionBounds()))
+    assert found.windows == 1
+    np.testing.assert_array_equal(found.q[60:], shifted.q[60:])
+    assert not excess(clip, clip.with_q(found.q), everywhere(wb.motion.MotionBounds())).said
+    assert np.abs(np.diff(found.q[:, 1])).max() < 0.05
 
 
 def test_what_is_not_repaired_is_not_solved(planar_arm: Callable[..., Figure]) -> None:

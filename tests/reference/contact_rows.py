@@ -8,11 +8,17 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array, Indices
 from wholebody.geometry import contact_rows as module
 from wholebody.geometry.contact_rows import ContactRowBuilder, ContactRows
-from wholebody.geometry.proximity import Contacts
+from wholebody.geometry.proximity import Contacts, PairTable
 
 
 class ReferenceRowBuilder(ContactRowBuilder):
     """The builder of rows with array code in place of its loops."""
+
+    def __init__(self, table: PairTable) -> None:
+        super().__init__(table)
+        self._points, self._point_start, self._point_count = table.points, table.first_point, np.diff(table.first_point)
+        self._faces, self._face_start, self._face_count = table.faces, table.first_face, np.diff(table.first_face)
+        self._radius, self._axis, self._is_capsule = table.radius, table.axis, table.axis.any(axis=1)
 
     def rows(self, contacts: Contacts, clearance: Array | float = 0.0) -> ContactRows:
         k = len(contacts.distance)

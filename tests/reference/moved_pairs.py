@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices
-from wholebody.geometry.continuous.moved_pairs import ARC, ENDLESS, QueryResult, distances
+from wholebody.geometry.continuous.moved_pairs import QueryResult, distances
+from wholebody.geometry.continuous.moved_pairs_kernel import ARC
+from wholebody.geometry.pieces import ENDLESS
 from wholebody.geometry.proximity import PairTable
 
 

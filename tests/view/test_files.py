@@ -87,11 +87,12 @@ def test_a_picture_does_not_depend_on_those_before(tmp_path: Path, monkeypatch: 
     with Viewer(scene) as viewer, Viewer(scene) as fresh:
         viewer.show(first, problem=problem)
         viewer.picture(tmp_path / "one.png", size=(160, 120))
+        opened.clear()
         viewer.play([first, second, first], dt=0.1)
         viewer.movie(tmp_path / "movie.gif", size=(96, 64))
         viewer.show(second, problem=problem)
         viewer.picture(tmp_path / "two.png", size=(200, 120))
-        assert len(opened) == 1
+        assert not opened
         fresh.show(second, problem=problem)
         fresh.picture(tmp_path / "fresh.png", size=(200, 120))
         assert (tmp_path / "two.png").read_bytes() == (tmp_path / "fresh.png").read_bytes()

@@ -67,7 +67,7 @@ def test_a_body_that_is_small_in_the_picture_is_drawn_with_fewer_triangles(brows
     small = browser.evaluate(f"viewer.camera.position.x = 12.0; {count}")
     surface = surface_of(figure)
     assert surface is not None
-    fine = sum(len(patch.faces) for patch in surface.patches())
-    coarse = sum(len(patch.coarse) for patch in surface.patches())
+    fine = sum(len(patch.faces) for patch in surface.patches)
+    coarse = sum(len(patch.coarse) for patch in surface.patches)
     assert near - small == fine - coarse
     assert small < 3 * coarse  # the shadow is drawn coarsely in both

@@ -19,6 +19,7 @@ BROWSING = """
 import time
 from wholebody.view.browser import Browser
 browser = Browser((64, 64))
+browser.evaluate('0')
 print(browser._pid, browser._folder, flush=True)
 time.sleep(60)
 """

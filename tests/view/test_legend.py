@@ -63,7 +63,7 @@ def test_a_notebook_shows_the_scene_in_a_frame(browser: Browser, tmp_path: Path)
         (tmp_path / "cell.html").write_text(viewer._repr_html_(), encoding="utf-8")
     framed = "document.querySelector('iframe').contentWindow"
     ready = "document.querySelector('iframe')?.contentWindow?.wholebody?.ready === true"
-    browser.visit((tmp_path / "cell.html").as_uri(), ready)
+    browser.open((tmp_path / "cell.html").as_uri(), ready)
     assert browser.evaluate(f"{framed}.document.querySelector('#panel b').textContent") == "In a notebook"
     assert browser.evaluate(f"{framed}.viewer.scene_tree.find(['figure', 'body']).object.children.length") > 0
     assert browser.evaluate(f"{framed}.viewer.capture_image().length") > 10_000

@@ -53,10 +53,18 @@ def press(browser: Browser, text: str) -> None:
     browser.evaluate(script)
 
 
+def mouse(browser: Browser, kind: str, x: float, y: float, pressed: bool = False) -> None:
+    """Send a mouse event at a pixel: "mousePressed", "mouseMoved" or "mouseReleased", of the left button."""
+    button, count = "left" if pressed or kind != "mouseMoved" else "none", int(kind != "mouseMoved")
+    browser._call(
+        "Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, buttons=int(pressed), clickCount=count
+    )
+
+
 def reached(browser: Browser, x: float, y: float) -> bool:
     """Move the mouse to a pixel; whether the page has drawn a handle there, of which its cursor tells."""
     for side in (3, 0):  # a mouse that stays tells nothing
-        browser.mouse("mouseMoved", x + side, y)
+        mouse(browser, "mouseMoved", x + side, y)
     return bool(browser.evaluate("[...document.querySelectorAll('canvas')].some(c => c.style.cursor === 'pointer')"))
 
 
@@ -68,18 +76,18 @@ def test_mouse_drags_holds_undoes_and_saves(
     monkeypatch.setattr(browser, "timeout", 240.0)
     browser.resize(SIZE)
     page.server.initial_camera.position, page.server.initial_camera.look_at = EYE, TARGET
-    browser.visit(page.url)
+    browser.open(page.url, "document.readyState === 'complete'")
     client = until(lambda: list(page.server.get_clients().values()))[0]
     until(lambda: client.camera.fov)
     until(lambda: np.allclose(client.camera.position, EYE, atol=1e-3))
     before = drag.place("right_palm")
     x, y = pixel(before, client.camera.fov)
     until(lambda: reached(browser, x, y))
-    browser.mouse("mousePressed", x, y, pressed=True)
+    mouse(browser, "mousePressed", x, y, pressed=True)
     for share in np.linspace(0.0, 1.0, 7)[1:]:
-        browser.mouse("mouseMoved", x + 12 * share, y - 24 * share, pressed=True)
+        mouse(browser, "mouseMoved", x + 12 * share, y - 24 * share, pressed=True)
     until(lambda: drag.place("right_palm")[2] > before[2] + 0.05)
-    browser.mouse("mouseReleased", x + 12, y - 24)
+    mouse(browser, "mouseReleased", x + 12, y - 24)
 
     def away() -> float:  # pixels from the mouse
         across, down = pixel(drag.place("right_palm"), client.camera.fov)
@@ -89,9 +97,9 @@ def test_mouse_drags_holds_undoes_and_saves(
     assert np.linalg.norm(drag.place("left_sole") - drag.place_at(start, "left_sole")) < 2e-3
     seen = pixel(drag.place("right_palm"), client.camera.fov)
 
-    browser.mouse("mouseMoved", *seen)
-    browser.mouse("mousePressed", *seen, pressed=True)
-    browser.mouse("mouseReleased", *seen)
+    mouse(browser, "mouseMoved", *seen)
+    mouse(browser, "mousePressed", *seen, pressed=True)
+    mouse(browser, "mouseReleased", *seen)
     until(lambda: "right_palm" in drag.held)
 
     press(browser, "save")

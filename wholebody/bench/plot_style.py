@@ -31,10 +31,7 @@ STYLE = _read()
 
 
 def method_style(name: str) -> Style:
-    """Return the style of a method, or of a tool that makes a step, of which qp is called wholebody.
-
-    One that is not known here has a style of its own, by its name.
-    """
+    """Return the style of a method, or of a tool, whose qp is called wholebody; others have one by their name."""
     method = "newton/slack" if name == "newton" else name.replace("wholebody", "qp")
     number = sha256(method.encode()).digest()[0]
     shades = STYLE["others"]["qp" if method.startswith("qp/") else "all"]
@@ -54,10 +51,7 @@ def figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, Any
 
 
 def save(chart: Any, path: Path) -> tuple[Path, Path]:
-    """Write a chart as SVG and PNG beside each other; return both paths (the suffix of `path` is replaced).
-
-    The chart is laid out once and not for each of its files, which takes as long as to draw it.
-    """
+    """Write a chart as SVG and PNG beside each other; return both paths. It is laid out once for both."""
     from matplotlib import pyplot
 
     chart.get_layout_engine().execute(chart)
@@ -90,12 +84,7 @@ def shares_and_times(
 ) -> tuple[Path, Path]:  # fmt: skip
     """A row a set: what each method solves [%] and its mean time [ms], with their intervals.
 
-    Args:
-        rows: by the title of the set and the name of the method.
-        styles: of the methods, in the order of the legend.
-        note: how failures count in the mean time.
-        heading: over the chart; "" for none.
-        path: file, whose suffix is replaced by svg and png.
+    `rows` are by the title of the set and the name of the method; `note` says how failures count in the mean time.
     """
     chart, axes = figure(1, 2, (11.0, 0.9 + 0.85 * len(rows)))
     left, right = axes[0]

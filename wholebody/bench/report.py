@@ -1,7 +1,4 @@
-"""Reports as text: templates in `templates/`, filled in with jinja2.
-
-A template has the words and the columns; who calls `render` has the figures.
-"""
+"""Reports as text: templates in `templates/`, filled in with jinja2."""
 
 from __future__ import annotations
 
@@ -84,12 +81,7 @@ def formatted(value: float, spec: str, unit: str = "", none: str = "") -> str:
 def spanned(found: Interval, spec: str, scale: float = 1.0, unit: str = "", ends: str = "") -> str:
     """A figure and its interval, such as "98.5 % [93, 99]"; nothing for one that is not a number.
 
-    Args:
-        found: the figure.
-        spec: its format.
-        scale: by which it is multiplied.
-        unit: written after it.
-        ends: format of the ends of the interval; that of the figure where it is left out.
+    It is multiplied by `scale`; `ends` is the format of the ends, that of the figure where it is left out.
     """
     if found.value != found.value:
         return ""

@@ -24,13 +24,7 @@ _R = TypeVar("_R")
 
 @dataclass(frozen=True)
 class Row:
-    """What one tool did with one case.
-
-    Attributes:
-        case: what it was asked.
-        tool: a method, a tool, a model, or whatever else was compared.
-        figures: by their names, which have the units: the columns of a table.
-    """
+    """What one tool did with one case: figures by their names, which have the units and are the columns of a table."""
 
     case: str
     tool: str
@@ -88,13 +82,7 @@ def only(rows: Sequence[Row], *names: str) -> list[Row]:
 
 
 def across(rows: Sequence[Row], *names: str, columns: str = "case") -> list[Row]:
-    """Figures of all rows as a table of two ways: a row for each tool, and a column for each case and figure.
-
-    Args:
-        rows: that have the figures; others are left out.
-        names: of the figures.
-        columns: "case", or "tool" for a row of each case and a column of each tool.
-    """
+    """Figures of rows as a table of two ways: a row a tool, a column a case and figure; or the other way round."""
     found: dict[str, dict[str, Figure]] = {}
     for row in rows:
         down, column = (row.tool, row.case) if columns == "case" else (row.case, row.tool)
@@ -126,12 +114,8 @@ def report(about: str, tables: Mapping[str, Sequence[Row]], facts: Mapping[str, 
 class Panel(NamedTuple):
     """One of the panels of a chart.
 
-    Attributes:
-        title, x, y: over it, and of its axes.
-        lines: places along x and y by label; a label has one colour in all charts.
-        log: axes with a logarithmic scale: "", "x", "y" or "xy".
-        marker: of the points; "" draws lines alone.
-        levels: heights of dashed lines.
+    `lines`: places along x and y by label, which has one colour in all charts; `log`: axes with a logarithmic scale,
+    "", "x", "y" or "xy"; `marker` "" draws lines alone; `levels`: heights of dashed lines.
     """
 
     title: str

@@ -1,8 +1,7 @@
-"""Intervals and tests that comparisons rest on. Every interval is of 95 %.
+"""Intervals of 95 % and tests that comparisons rest on.
 
 Shares have Wilson's interval (1927, "Probable inference, the law of succession, and statistical inference"); medians
-and ratios the bootstrap's percentiles (Efron 1979), problems drawn with replacement, and ratios paired by problem or by
-step.
+and ratios the bootstrap's percentiles (Efron 1979), ratios paired by problem or by step.
 """
 
 from __future__ import annotations
@@ -24,12 +23,7 @@ LEAST = 5  # problems below which nothing is said of a ratio
 
 
 class Interval(NamedTuple):
-    """A figure with its interval of 95 %.
-
-    Attributes:
-        value, low, high: NaN, minus infinity and infinity where there is nothing to compute it from.
-        cases: how many problems it rests on; 0 where that is not told.
-    """
+    """A figure with its interval of 95 %: NaN and infinite ends where there is nothing; `cases` it rests on."""
 
     value: float
     low: float
@@ -83,9 +77,8 @@ def quantile(values: Sequence[float], part: float) -> Interval:
 def shifted_geometric_mean(values: Sequence[float], shift: float = 1e-3) -> Interval:
     """`exp(mean(log(values + shift))) - shift` of times in seconds, with its interval.
 
-    The shift keeps the shortest times from deciding the mean.
-
-    Failures belong among the values, with the time after which a solve is ended.
+    The shift keeps the shortest times from deciding the mean. Failures belong among the values, with the time at the
+    end.
     """
     known = np.asarray(values, dtype=float)
     if not len(known):
@@ -105,10 +98,7 @@ def ratio(one: Mapping[tuple[str, int], float], other: Mapping[tuple[str, int], 
 
 
 def paired_difference(one: Mapping[int, bool], other: Mapping[int, bool]) -> float:
-    """p-value that two methods solve as many of the problems that both were given: McNemar's test (1947), exact.
-
-    Only problems that one of the two solves and the other does not tell anything.
-    """
+    """p-value that two methods solve as many of the problems that both were given: McNemar's test (1947), exact."""
     from scipy.stats import binomtest
 
     both = one.keys() & other.keys()
@@ -118,15 +108,10 @@ def paired_difference(one: Mapping[int, bool], other: Mapping[int, bool]) -> flo
 
 
 def quantile_ratio(one: Array, other: Array, part: float) -> Interval:
-    """A quantile of one tool's steps over that of another's in the same run: the median of the runs.
+    """A quantile of one tool's steps (runs, steps) over that of another's beside it: the median of the runs.
 
     Runs are drawn with replacement, and steps in blocks, since neighbours are alike: the circular block bootstrap
     (Politis & Romano 1992). Both tools have the same draws.
-
-    Args:
-        one: (runs, steps) times.
-        other: (runs, steps) times of the same steps, in runs beside these.
-        part: of the quantile.
     """
     runs, steps = one.shape
     random, block = np.random.default_rng(0), min(BLOCK, steps)

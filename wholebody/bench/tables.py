@@ -104,11 +104,7 @@ def flat(row: Any) -> dict[str, Any]:
 
 
 def read_rows(path: Path, kind: type[_R]) -> tuple[dict[str, str], list[_R]]:
-    """Read back what `write_rows` wrote.
-
-    Raises:
-        FileFormatError: no file, another kind of file, or a value that is none.
-    """
+    """Read back what `write_rows` wrote; FileFormatError for no file, another kind of file, or a value that is none."""
     facts: dict[str, str] = {}
     rest = read_text(path, "table")
     while rest.startswith("# "):
@@ -186,8 +182,7 @@ def summed_programs(texts: Iterable[str]) -> str:
 def replace_section(path: Path, name: str, text: str) -> None:
     """Put text between the markers ``<!-- bench:NAME -->`` and ``<!-- /bench:NAME -->`` of a page.
 
-    Raises:
-        FileFormatError: the page does not exist or does not have the markers.
+    Raises FileFormatError where the page does not exist or does not have the markers.
     """
     first, last = f"<!-- bench:{name} -->", f"<!-- /bench:{name} -->"
     if not path.is_file():

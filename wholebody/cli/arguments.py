@@ -23,7 +23,6 @@ class Parser(argparse.ArgumentParser):
     """
 
     def __init__(self, *given: Any, **settings: Any) -> None:
-        """As `argparse` does."""
         super().__init__(*given, **settings)
         self._negative_number_matcher = re.compile(r"-[\d.][\d.,eE+-]*")  # or numbers joined by commas
 
@@ -73,11 +72,7 @@ def add_person(parser: Any) -> None:
 
 
 def person_options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Return the options of `wb.load` that were given.
-
-    Raises:
-        InputError: a proportion is not a name and a number.
-    """
+    """Return the options of `wb.load` that were given; raises InputError for a proportion without name or number."""
     given = {name: value for name in PERSON if (value := getattr(arguments, name)) is not None}
     if "proportions" in given:
         proportions = {}
@@ -92,13 +87,7 @@ def person_options(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def scene_options(scene: str, overlap: str, out: str) -> tuple[Option, ...]:
-    """Options of a command that runs scenes with a scripted tracker.
-
-    Args:
-        scene: help of its first argument.
-        overlap: help of `--overlap`.
-        out: folder where `--out` is left out.
-    """
+    """Options of a command that runs scenes with a scripted tracker: help of two, and the folder if none is given."""
     return (
         option("scene", nargs="?", metavar="SCENE", help=scene),
         flag("--list", "list the scenes"),
@@ -110,11 +99,7 @@ def scene_options(scene: str, overlap: str, out: str) -> tuple[Option, ...]:
 
 
 def check_overlaps(chosen: Iterable[str]) -> None:
-    """Check ways to remove overlap.
-
-    Raises:
-        UnknownNameError: there is no such way.
-    """
+    """Check ways to remove overlap; raises UnknownNameError."""
     from wholebody.tracking.loop import OVERLAPS
 
     for overlap in chosen:
@@ -125,15 +110,8 @@ def check_overlaps(chosen: Iterable[str]) -> None:
 def scene_names(arguments: argparse.Namespace, scenes: Mapping[str, str], command: str, *, files: bool) -> list[str]:
     """Names of the scenes to run; none if the list was asked for, which is printed.
 
-    Args:
-        arguments: with scene, list and seed.
-        scenes: each scene and what it shows.
-        command: name of the command, for messages.
-        files: whether a task file may stand for a scene.
-
-    Raises:
-        InputError: no scene, or a negative seed.
-        UnknownNameError: there is no such scene.
+    `scenes` says what each shows; a task file may stand for a scene if `files`. Raises InputError for no scene or a
+    negative seed, UnknownNameError where there is no such scene.
     """
     if arguments.list:
         for name, about in scenes.items():

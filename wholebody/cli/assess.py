@@ -66,11 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
         print(result.as_json(described), end="")
     else:
         _show(judged, scores)
-    # m, rad: of limits, constraints and clearances, beyond which a posture does not hold
-    return 0 if judged.holds(1e-4) else 1
-
-
-VIOLATION = 1e-4  # m, rad: of limits, constraints and clearances, beyond which a posture does not hold
+    return 0 if judged.holds(1e-4) else 1  # m, rad: of limits, constraints and clearances
 
 
 def _show(judged: Any, scores: Any) -> None:

@@ -25,14 +25,7 @@ class Commands(Protocol):
 
 @dataclass(frozen=True)
 class Command:
-    """A command.
-
-    Attributes:
-        name: as typed.
-        help, description, epilog: as `argparse` shows them. Where they have line breaks, these stay.
-        options: in the order of the help.
-        measure: runs it.
-    """
+    """A command: its words as `argparse` shows them (line breaks stay), its options in order, and what runs it."""
 
     name: str
     help: str
@@ -53,11 +46,7 @@ class Command:
             add(parser)
 
     def run(self, arguments: argparse.Namespace) -> int:
-        """Run it, and return the exit code.
-
-        Raises:
-            InputError: an option that counts things is below one.
-        """
+        """Run it, and return the exit code; raises InputError where an option that counts things is below one."""
         for flag in arguments.counted:
             number = getattr(arguments, flag.removeprefix("--").replace("-", "_"))
             if number is not None and number < 1:
@@ -74,14 +63,7 @@ def command(
 
 @dataclass(frozen=True)
 class Group:
-    """A command that has commands of its own.
-
-    Attributes:
-        name: as typed.
-        help, description: as `argparse` shows them.
-        members: its commands, in the order of the help.
-        title: of their list in the help.
-    """
+    """A command that has commands of its own, `members`, in the order of the help; `title` is that of their list."""
 
     name: str
     help: str

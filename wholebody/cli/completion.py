@@ -22,11 +22,7 @@ examples:
   wholebody completion zsh > ~/.zfunc/_wholebody""",
 )
 def run(arguments: argparse.Namespace) -> int:
-    """Print the script.
-
-    Raises:
-        MissingPackageError: shtab is not installed.
-    """
+    """Print the script; raises MissingPackageError where shtab is not installed."""
     from wholebody.base.errors import MissingPackageError
     from wholebody.cli.main import parser
 

@@ -36,11 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def packaged_tasks() -> dict[str, Path]:
-    """Task files by name: inside an installed package, or among the examples of a checkout.
-
-    Raises:
-        WholebodyError: the installation lacks them.
-    """
+    """Task files by name: inside an installed package, or among the examples of a checkout."""
     from wholebody.figures.packaged_urdf import task_paths
 
     return task_paths()

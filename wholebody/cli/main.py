@@ -47,13 +47,9 @@ def parser(names: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line.
+    """Run the command line with arguments, by default those of the process.
 
-    Args:
-        argv: the arguments; by default those of the process.
-
-    Returns:
-        The exit code: 0, 1 or 2 (see `EXIT_CODES`), 130 after Ctrl-C.
+    Returns the exit code: 0, 1 or 2 (see `EXIT_CODES`), 130 after Ctrl-C.
     """
     try:
         if not _ready():

@@ -1,64 +1,51 @@
-"""Scene and picture of a posture, into a folder."""
+"""Viewers of problems, scene and picture of a posture, and the folder for them."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from wholebody.base import files
 from wholebody.base.errors import InputError, MissingPackageError
-from wholebody.problem import Problem
-from wholebody.taskfile.task import View
 
 if TYPE_CHECKING:
+    from wholebody.base.arrays import Array
+    from wholebody.problem import Problem
+    from wholebody.taskfile.task import View
     from wholebody.view import Viewer
+    from wholebody.view.screenshot import Screenshots
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder, before anything is computed.
-
-    Raises:
-        InputError: it cannot be made.
-    """
+    """Make a folder, before anything is computed; raises InputError."""
     try:
         files.make_folder(folder)
     except InputError as error:
         raise InputError(f"--out: {error}") from None
 
 
-def viewer_of(problem: Problem, view: View, title: str, **served: Any) -> Viewer:
-    """A viewer of the problem's scene with the task's camera; `served` is the viewer's host and port."""
+def viewer_of(problem: Problem, view: View, title: str, **settings: Any) -> Viewer:
+    """A viewer of the problem's scene with the task's camera; the settings are others of the viewer."""
     from wholebody.view import Viewer
 
-    viewer = Viewer(problem.scene, see_through=view.see_through, title=title, **served)
+    viewer = Viewer(problem.scene, see_through=view.see_through, title=title, **settings)
     if view.eye is not None:
         viewer.look(view.eye, view.target)
     return viewer
 
 
 def draw(
-    problem: Problem, q: NDArray[np.float64], view: View, folder: Path, title: str, *, picture: bool = True
+    problem: Problem, q: Array, view: View, folder: Path, title: str, screenshots: Screenshots | None
 ) -> tuple[list[Path], str]:
-    """Write scene.html and, if requested and if there is a Chromium, scene.png.
-
-    Args:
-        problem: its scene and goals are drawn.
-        q: (nq,) the posture.
-        view: the camera.
-        folder: an existing folder.
-        title: of the page.
-        picture: whether to draw scene.png.
+    """Write scene.html and, by a headless browser if there is one, scene.png.
 
     Returns:
         The files, and a sentence if the picture could not be drawn.
     """
-    with viewer_of(problem, view, title) as viewer:
+    with viewer_of(problem, view, title, screenshots=screenshots) as viewer:
         viewer.show(q, problem=problem)
         written = [viewer.save(folder / "scene.html")]
-        if not picture:
+        if screenshots is None:
             return written, ""
         try:
             written.append(viewer.picture(folder / "scene.png"))

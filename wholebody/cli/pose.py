@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from wholebody.cli.command import command, option
 from wholebody.methods import METHODS
+
+if TYPE_CHECKING:
+    from wholebody.view.screenshot import Screenshots
 
 
 @command(
@@ -39,21 +44,20 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def pose(path: Path, method: str | None, out: Path, *, as_json: bool = False, draw: bool = True) -> int:
-    """Pose the figure of a task file.
+    """Pose the figure of a task file by a method, or that of the file; write into a folder, and return the exit code.
 
-    Args:
-        path: the task file.
-        method: name of the method, None for that of the file.
-        out: folder to write to; made if absent.
-        as_json: print the result as JSON instead of tables.
-        draw: whether to draw scene.png too.
-
-    Returns:
-        The exit code.
-
-    Raises:
-        WholebodyError: the task cannot be read, or the folder cannot be written to.
+    Raises WholebodyError where the task cannot be read, or the folder cannot be written to.
     """
+    from wholebody.base.files import is_file
+    from wholebody.view.screenshot import Screenshots
+
+    with Screenshots() as screenshots:
+        if draw and is_file(path):
+            screenshots.start()  # it gets ready while the posture is found
+        return _pose(path, method, out, as_json, screenshots if draw else None)
+
+
+def _pose(path: Path, method: str | None, out: Path, as_json: bool, screenshots: Screenshots | None) -> int:
     from wholebody.base import files
     from wholebody.cli import picture
     from wholebody.methods.solve import method_named, solve
@@ -68,18 +72,14 @@ def pose(path: Path, method: str | None, out: Path, *, as_json: bool = False, dr
 
     from rich.console import Console  # needed only for tables and pictures, so imported after the result is written
 
-    console = Console()
-    notes = Console(stderr=True) if as_json else console
     if as_json:
         print(text, end="")
     else:
         from wholebody.cli import tables
 
-        tables.show_solution(console, task, solution)
-    with notes.status("drawing"):
-        written, note = picture.draw(task.problem, solution.q, task.view, out, task.title, picture=draw)
-    for file in (out / "result.json", *written):
-        notes.print(f"wrote {file}", highlight=False, soft_wrap=True)
-    if note:
-        notes.print(note, highlight=False, soft_wrap=True)
+        tables.show_solution(Console(), task, solution)
+    with Console(stderr=as_json).status("drawing"):
+        written, note = picture.draw(task.problem, solution.q, task.view, out, task.title, screenshots)
+    told = [f"wrote {file}" for file in (out / "result.json", *written)]
+    print(*told, *filter(None, [note]), sep="\n", file=sys.stderr if as_json else sys.stdout)
     return 0 if solution.solved else 1

@@ -54,25 +54,14 @@ def run(arguments: argparse.Namespace) -> int:
             task.problem, arguments.frame, low, high, step, jobs=arguments.jobs, cluster=arguments.cluster,
             progress=lambda done, total: status.update(f"{done} of {total} places"),
         )  # fmt: skip
-    console = Console()
-    console.print(str(found), highlight=False)
-    console.print(f"  {found.share:.1%} reached; reach volume {found.volume:.4g}", highlight=False)
-    for file in (
-        found.picture(out / "reach.png"),
-        found.html(out / "reach.html"),
-        found.save(out / "reach.npz"),
-        found.to_vtk(out / "reach.vtk"),
-    ):
-        console.print(f"wrote {file}", highlight=False, soft_wrap=True)
+    print(f"{found}\n  {found.share:.1%} reached; reach volume {found.volume:.4g}")
+    for write, name in ((found.picture, "png"), (found.html, "html"), (found.save, "npz"), (found.to_vtk, "vtk")):
+        print(f"wrote {write(out / f'reach.{name}')}")
     return 0 if found.reached.any() else 1
 
 
 def _numbers(text: str, what: str, count: int = 3) -> list[float]:
-    """Numbers separated by commas.
-
-    Raises:
-        InputError: they are something else.
-    """
+    """Numbers separated by commas; raises InputError where they are something else."""
     from wholebody.base.checks import shown
     from wholebody.base.errors import InputError
 

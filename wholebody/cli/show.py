@@ -81,8 +81,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _subject(what: str, options: Mapping[str, Any]) -> tuple[Problem, NDArray[np.float64], View, str]:
     """Problem, posture, view and title of the subject.
 
-    Raises:
-        InputError: options of a person for a file that has its figure in it.
+    Raises InputError for options of a person beside a file that has its figure in it.
     """
     from wholebody.base.errors import InputError
     from wholebody.figures import load

@@ -61,20 +61,17 @@ def run(arguments: argparse.Namespace) -> int:
             warm_start=asked.warm_start, jobs=arguments.jobs, cluster=arguments.cluster, folder=out,
             progress=lambda told: status.update(f"{told.done} of {told.total}"),
         )  # fmt: skip
-    console = Console()
     made = table("case", "outcome", "left", "overlap", "time")
     for one in records:
         left, overlap = f"{1e3 * one.goal_error:.2f} mm", f"{1e3 * one.penetration:.3f} mm"
         made.add_row(one.name, one.outcome, left, overlap, f"{1e3 * one.seconds:.0f} ms")
-    console.print(made)
+    Console().print(made)
     counts = ", ".join(f"{count} {outcome}" for outcome, count in records.counts().items())
-    console.print(f"{len(records)} cases: {counts}", highlight=False)
+    print(f"{len(records)} cases: {counts}")
     for one in records:
         if one.q is None:
             print(f"{one.name}: {one.message}", file=sys.stderr)
-    files = [records.to_csv(out / "cases.csv")]
+    print(f"wrote {records.to_csv(out / 'cases.csv')}")
     if arguments.parquet:
-        files.append(records.to_parquet(out / "cases.parquet"))
-    for file in files:
-        console.print(f"wrote {file}", highlight=False, soft_wrap=True)
+        print(f"wrote {records.to_parquet(out / 'cases.parquet')}")
     return 0 if all(one.solved for one in records) else 1

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from wholebody.figures.state import State
@@ -15,6 +14,8 @@ from wholebody.taskfile.result import goals_left
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from rich.progress import Progress
 
     from wholebody.assessment.posture import Assessment
     from wholebody.bench.rows import Row
@@ -33,12 +34,19 @@ _COLORS = {"solved": "green", "unreachable": "yellow", "stalled": "yellow", "inf
 
 
 def progress_bar(*, counted: bool = True, thread: bool = True) -> Progress:
-    """A bar on the terminal's error output that goes when it is done.
+    """A bar on the terminal's error output that goes when it is done; it counts things, or shows a share in percent.
 
-    Args:
-        counted: whether it counts things; it shows a share in percent otherwise.
-        thread: whether a thread redraws it; what forks needs one without, for a fork may catch a thread with a lock.
+    A thread redraws it; what forks needs one without, for a fork may catch a thread with a lock.
     """
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
     numbers = MofNCompleteColumn() if counted else TaskProgressColumn()
     columns = TextColumn("{task.description}"), BarColumn(), numbers, TimeRemainingColumn()
     console = Console(stderr=True)

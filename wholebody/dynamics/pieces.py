@@ -38,11 +38,7 @@ class PlacedProximity(Proximity):
     def placements(self, state: Kinematics) -> Array:
         """Take the placements over; `state` is `PlacedPieces`."""
         placement = cast(PlacedPieces, state).placement
-        if self._placements is not None:
-            self._placements[:] = placement
-        else:
-            for k, rows in enumerate(placement):
-                self.results.oMg[k] = pin.SE3(rows[:3].T, rows[3])
+        self.distances.put(placement)
         return placement
 
 

@@ -1,7 +1,7 @@
 """Lengths, masses and radii of a body from sex, stature and mass.
 
 Masses are fractions (de Leva 1996). Radii are linear fits to ANSUR II, ``c0 + cq sqrt(mass / stature) + cH stature``.
-Lengths of limbs, joint centres and some thicknesses are of the same form; `wholebody.figures.fit` chooses their
+Lengths of limbs, joint centres and some thicknesses are of the same form; `tests.audits.sizes` chooses their
 coefficients so that the dimensions of the model are those of ANSUR II. The tables in ``figures/data`` name the source
 of every column.
 """
@@ -29,24 +29,15 @@ STATURE = Range(1.3, 2.2, "m")
 MASS = Range(25.0, 250.0, "kg")
 PERCENTILE = Range(1.0, 99.0, "percent, such as 95")
 
-BODY_MASS_INDEX_RANGE = (13.0, 50.0)
-"""kg / m^2. Outside, no living person has this stature and mass; most likely a unit is wrong."""
-
 AGE = Range(20.0, 69.0, "years")
 """Of the adults whose ranges of motion were measured (table "age_ranges")."""
 
 _SEXES = {"male": "M", "female": "F"}
 
 _ENDS = {
-    "elbow_flexion": "upper_arm",
-    "wrist_flexion": "forearm",
-    "knee_flexion": "thigh",
-    "ankle_dorsiflexion": "shank",
-}
+    "elbow_flexion": "upper_arm", "wrist_flexion": "forearm", "knee_flexion": "thigh", "ankle_dorsiflexion": "shank",
+}  # fmt: skip
 """Joints at the ends of segments with a fitted length."""
-
-# Expected mass at a stature, log-log fit to ANSUR II: mass = a stature^b.
-
 
 FOLDER = Path(__file__).parent / "data"
 
@@ -83,10 +74,9 @@ class Person:
 
     def fitted(self, name: str) -> float:
         """Return a size of the table "fit", metres: a length of a limb, a joint centre or a thickness."""
-        row = _row("fit", "name", name)
-        c0, cq, ch = (float(row[f"{self.column}_{part}"]) for part in ("c0", "cq", "cH"))
-        size = c0 + cq * math.sqrt(self.mass / self.stature) + ch * self.stature
-        return size + sum(more for which, more in self.deviations if which == name)
+        return self._linear(_row("fit", "name", name), f"{self.column}_") + sum(
+            more for which, more in self.deviations if which == name
+        )
 
     def length(self, segment: str) -> float:
         """Length of a segment, metres."""
@@ -113,15 +103,11 @@ class Person:
 
     def _trunk_scale(self) -> float:
         """How much longer the trunk and head are than their shares of the stature, because the legs are shorter."""
-        leg = self.ankle_height + self.fitted("thigh") + self.fitted("shank")
-        shares = self.segment("left_thigh", "length") + self.segment("left_shank", "length")
-        return (self.stature - leg) / (self.stature * (1.0 - shares) - self.ankle_height)
-
-    @property
-    def ankle_height(self) -> float:
-        """Height of the ankle joint above the sole, metres."""
         toe = float(_row("joints", "name", "left_toe_extension")[f"oz_{self.column}"])
-        return (self.segment("left_toes", "radius_b") - toe) * self.stature
+        ankle = (self.segment("left_toes", "radius_b") - toe) * self.stature
+        leg = ankle + self.fitted("thigh") + self.fitted("shank")
+        shares = self.segment("left_thigh", "length") + self.segment("left_shank", "length")
+        return (self.stature - leg) / (self.stature * (1.0 - shares) - ankle)
 
     def segment_mass(self, segment: str) -> float:
         """Mass of a segment, kilograms; all of them add up to the mass of the body."""
@@ -147,8 +133,10 @@ class Person:
 
     def radius(self, part: str) -> float:
         """Radius of a body part, metres: circumference / 2 pi, or half a breadth (``*_y``) or depth (``*_x``)."""
-        row = _row("radii_ansur", "part", part)
-        c0, cq, ch = (float(row[f"{self.column}_fit_{name}"]) for name in ("c0", "cq", "cH"))
+        return self._linear(_row("radii_ansur", "part", part), f"{self.column}_fit_")
+
+    def _linear(self, row: Mapping[str, str], start: str) -> float:
+        c0, cq, ch = (float(row[start + name]) for name in ("c0", "cq", "cH"))
         return c0 + cq * math.sqrt(self.mass / self.stature) + ch * self.stature
 
 
@@ -184,13 +172,14 @@ def make_person(
         stature = 0.01 * _percentile(column, "stature", share) if stature is None else stature
         mass = _percentile(column, "mass", share) if mass is None else mass
     if mass is None and stature is not None:
+        # log-log fit to ANSUR II
         factor, exponent = {"M": (27.41, 1.999), "F": (23.00, 2.192)}[column]
         mass = factor * STATURE(stature, "stature") ** exponent
     height = STATURE(float(median["stature_m"]) if stature is None else stature, "stature")
     weight = MASS(float(median["mass_kg_same_percentile"]) if mass is None else mass, "mass")
-    index = weight / height**2
-    if not BODY_MASS_INDEX_RANGE[0] <= index <= BODY_MASS_INDEX_RANGE[1]:
-        low, high = (limit * height**2 for limit in BODY_MASS_INDEX_RANGE)
+    # kg of body mass indices, kg / m^2, outside of which nobody lives; most likely a unit is wrong
+    low, high = 13.0 * height**2, 50.0 * height**2
+    if not low <= weight <= high:
         raise InputError(
             f"mass {weight:g} kg does not go with stature {height:g} m; give a mass between {low:.0f} and {high:.0f} kg"
         )
@@ -232,12 +221,7 @@ def _row(name: str, column: str, key: str) -> Mapping[str, str]:
 
 @cache
 def table(name: str) -> tuple[Row, ...]:
-    """Return the rows of one table, each a mapping from column to text.
-
-    Args:
-        name: "joints", "segments", "radii_ansur", "percentiles", "design_cases", "spheres39", "sphere_exclusions",
-            "reach_cones", "coupled_ranges", "hand", "fit", "residuals", "dimensions", "correlations", "age_ranges" or
-            "strength".
+    """Return the rows of a table in `figures/data`, each a mapping from column to text.
 
     Raises:
         UnknownNameError: there is no such table.
@@ -246,6 +230,16 @@ def table(name: str) -> tuple[Row, ...]:
     if not path.is_file():
         raise UnknownNameError("table", name, [file.stem for file in FOLDER.glob("*.csv")])
     return packaged_table(path)
+
+
+@cache
+def named_angles(of: str) -> dict[str, dict[str, float]]:
+    """Return the angles of the table "postures", degrees by joint, of each posture of "human", "hand" or "fingers"."""
+    found: dict[str, dict[str, float]] = {}
+    for row in table("postures"):
+        if row["of"] == of:
+            found.setdefault(row["name"], {}).update({row["joint"]: float(row["degrees"])} if row["joint"] else {})
+    return found
 
 
 @cache

@@ -7,7 +7,7 @@ figure in memory and the file on disk cannot differ.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -99,7 +99,6 @@ VIRTUAL_MASS = 1e-6
 """Kilograms of a link between two joints of a ball joint: simulators refuse moving links without mass. It is taken from
 the next link outwards, so that the total is right."""
 
-
 SKIN = (0.85, 0.68, 0.55, 1.0)
 """Colour of the pieces: red, green, blue, opacity."""
 
@@ -108,11 +107,7 @@ def urdf_text(spec: BodySpec, extension: str = "") -> str:
     """Return the URDF of a body specification: metres, radians (degrees in comments), capsules marked for Pinocchio.
 
     URDF has no capsule: a cylinder is written, with Pinocchio's ``collision_checking`` tag that makes it a capsule of
-    that length between the centres of its caps.
-
-    Args:
-        spec: the body.
-        extension: text of an element at the end of the file, see `wholebody.figures.urdf.extension`.
+    that length between the centres of its caps. The extension is text at the end of the file.
     """
     lines = [
         '<?xml version="1.0" encoding="utf-8"?>',
@@ -159,9 +154,9 @@ def _link(link: Link, solids: Sequence[Solid]) -> list[str]:
         ixx, iyy, izz = link.inertia
         lines += [
             "    <inertial>",
-            f'      <origin xyz="{_numbers(link.center)}"/>',
-            f'      <mass value="{_number(link.mass)}"/>',
-            f'      <inertia ixx="{_number(ixx)}" ixy="0" ixz="0" iyy="{_number(iyy)}" iyz="0" izz="{_number(izz)}"/>',
+            f'      <origin xyz="{digits(link.center)}"/>',
+            f'      <mass value="{_digit(link.mass)}"/>',
+            f'      <inertia ixx="{_digit(ixx)}" ixy="0" ixz="0" iyy="{_digit(iyy)}" iyz="0" izz="{_digit(izz)}"/>',
             "    </inertial>",
         ]
     for tag in ("visual", "collision"):
@@ -192,8 +187,8 @@ def _joint(joint: Joint) -> list[str]:
     if joint.axis is not None:
         # URDF demands an effort and a velocity; nothing here uses them.
         lines += [
-            f'    <axis xyz="{_numbers(joint.axis)}"/>',
-            f'    <limit lower="{_number(joint.lower)}" upper="{_number(joint.upper)}" effort="1000" velocity="10"/>'
+            f'    <axis xyz="{digits(joint.axis)}"/>',
+            f'    <limit lower="{_digit(joint.lower)}" upper="{_digit(joint.upper)}" effort="1000" velocity="10"/>'
             f" <!-- {math.degrees(joint.lower):.4g} to {math.degrees(joint.upper):.4g} degrees -->",
         ]
     lines.append("  </joint>")
@@ -204,13 +199,13 @@ def _geometry(solid: Solid) -> str:
     shape, kind = solid.geometry, type(solid.geometry).__name__
     if solid.mesh is not None:
         file, scale = solid.mesh
-        return f'<mesh filename="{file}" scale="{_numbers(scale)}"/>'
+        return f'<mesh filename="{file}" scale="{digits(scale)}"/>'
     if kind == "Sphere":
-        return f'<sphere radius="{_number(shape.radius)}"/>'
+        return f'<sphere radius="{_digit(shape.radius)}"/>'
     if kind == "Capsule":
-        return f'<cylinder radius="{_number(shape.radius)}" length="{_number(2.0 * shape.halfLength)}"/>'
+        return f'<cylinder radius="{_digit(shape.radius)}" length="{_digit(2.0 * shape.halfLength)}"/>'
     if kind == "Box":
-        return f'<box size="{_numbers(2.0 * np.array(shape.halfSide))}"/>'
+        return f'<box size="{digits(2.0 * np.array(shape.halfSide))}"/>'
     raise InputError(
         f"piece {solid.name!r} is a {kind} without a mesh file; URDF knows spheres, cylinders, boxes, meshes"
     )
@@ -218,16 +213,16 @@ def _geometry(solid: Solid) -> str:
 
 def _origin(placement: pin.SE3) -> str:
     angles = pin.rpy.matrixToRpy(placement.rotation)
-    text = f'<origin xyz="{_numbers(placement.translation)}"'
-    return text + (f' rpy="{_numbers(angles)}"/>' if np.abs(angles).max() > 1e-12 else "/>")
+    text = f'<origin xyz="{digits(placement.translation)}"'
+    return text + (f' rpy="{digits(angles)}"/>' if np.abs(angles).max() > 1e-12 else "/>")
 
 
-def _numbers(values: Sequence[float] | Array) -> str:
-    return " ".join(_number(value) for value in values)
+def digits(values: Iterable[float] | Array) -> str:
+    """Numbers as the files of figures have them: twelve digits, which are the same on different processors."""
+    return " ".join(map(_digit, values))
 
 
-def _number(value: float) -> str:
-    # Twelve digits: far below a nanometre, yet stable against the last bits of different processors.
+def _digit(value: float) -> str:
     return f"{float(value):.12g}" if abs(value) > 1e-12 else "0"
 
 

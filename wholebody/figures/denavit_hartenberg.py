@@ -90,7 +90,8 @@ def denavit_hartenberg(figure: Figure, branch: str) -> DenavitHartenberg:
     axes = []
     for joint in ids:
         placement = inverse * data.oMi[joint]
-        axes.append((np.array(placement.translation), _unit(_axis(model, joint), placement)))
+        axis = _axis(model, joint)
+        axes.append((np.array(placement.translation), placement.rotation @ (axis / np.linalg.norm(axis))))
     tip = inverse * data.oMf[tip_id]
     frames = _frames(axes)
     links = [frames[k].inverse() * frames[k + 1] for k in range(len(ids))]
@@ -102,11 +103,8 @@ def denavit_hartenberg(figure: Figure, branch: str) -> DenavitHartenberg:
 
 def _link_frame(figure: Figure, joint: int) -> tuple[str, int]:
     """Name and index of the first segment frame on a joint; the world if there is none."""
-    for name in figure.segments:
-        index = figure.frame_id(name)
-        if figure.model.frames[index].parentJoint == joint:
-            return name, index
-    return "world", -1
+    frames = ((name, figure.frame_id(name)) for name in figure.segments)
+    return next((each for each in frames if figure.model.frames[each[1]].parentJoint == joint), ("world", -1))
 
 
 def _axis(model: pin.Model, joint: int) -> Array:
@@ -117,15 +115,13 @@ def _axis(model: pin.Model, joint: int) -> Array:
     return np.array(column[3:])
 
 
-def _unit(axis: Array, placement: pin.SE3) -> Array:
-    return np.asarray(placement.rotation @ (axis / np.linalg.norm(axis)))
-
-
 def _frames(axes: list[tuple[Array, Array]]) -> list[pin.SE3]:
     """DH frames 0 ... n at zero, in the reference frame: frame i has z on axis i + 1 and x on the normal to axis i."""
     point, z = axes[0]
-    x = _any_normal(z)
     # The first x and origin are free: in the plane of the reference frame nearest to its own x.
+    start = np.eye(3)[0 if abs(z[0]) < 0.9 else 1]
+    x = start - z * (z @ start)
+    x /= np.linalg.norm(x)
     frames = [_frame(point, x, z)]
     for next_point, next_z in axes[1:]:
         cross = np.cross(z, next_z)
@@ -152,12 +148,6 @@ def _frames(axes: list[tuple[Array, Array]]) -> list[pin.SE3]:
 
 def _frame(origin: Array, x: Array, z: Array) -> pin.SE3:
     return pin.SE3(np.column_stack([x, np.cross(z, x), z]), np.array(origin, dtype=float))
-
-
-def _any_normal(z: Array) -> Array:
-    start = np.array([1.0, 0.0, 0.0]) if abs(z[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
-    normal = start - z * (z @ start)
-    return np.asarray(normal / np.linalg.norm(normal))
 
 
 def _parameters(link: pin.SE3) -> tuple[float, float, float, float]:

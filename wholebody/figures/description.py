@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from itertools import combinations
 from types import MappingProxyType
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import pinocchio as pin
@@ -90,46 +91,8 @@ class Follower(NamedTuple):
         return (value - self.offset) / self.slope
 
 
-class Articulated(Protocol):
-    """The part of a `Figure` from which postures and smaller figures are made; see `Figure`."""
-
-    @property
-    def model(self) -> Any:
-        """Pinocchio's model."""
-
-    @property
-    def geometry(self) -> Any:
-        """The convex pieces and their pairs."""
-
-    @property
-    def visual(self) -> Any:
-        """The geometry that is drawn."""
-
-    @property
-    def root(self) -> str:
-        """Whether the root is "free" or "fixed"."""
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Names of the joints, without the free root."""
-
-    def joint_id(self, name: str) -> int:
-        """Index of a joint in the model."""
-
-    def posture(self, name: str) -> Array:
-        """A copy of a named posture."""
-
-    def joint_values(self, q: Array) -> dict[str, float]:
-        """The value of each one-degree joint by name."""
-
-    def with_joints(self, q: Array, values: Mapping[str, float]) -> Array:
-        """A copy of a posture with some joints at other values."""
-
-    def clamp(self, q: Array) -> Array:
-        """A copy of a posture with every joint within its limits."""
-
-    def describe(self) -> Description:
-        """Its named parts."""
+Articulated: TypeAlias = Any
+"""A `Figure`, for the functions that make its parts: the module of figures imports this one."""
 
 
 class Description(NamedTuple):
@@ -167,6 +130,15 @@ class Description(NamedTuple):
     notes: tuple[str, ...] = ()
     person: Person | None = None
     outer: Callable[[], tuple[Solid, ...]] | None = None
+
+
+def chosen_pairs(
+    solids: Sequence[Solid], reason: Callable[[Solid, Solid], str | None]
+) -> tuple[tuple[tuple[str, str], ...], tuple[ExcludedPair, ...]]:
+    """The pairs of pieces that are tested, by name, and those that are not, for which there is a reason."""
+    told = [(a.name, b.name, reason(a, b)) for a, b in combinations(solids, 2)]
+    tested = tuple((a, b) for a, b, why in told if not why)
+    return tested, tuple(ExcludedPair(a, b, why) for a, b, why in told if why)
 
 
 def limits_of(model: pin.Model) -> Limits:

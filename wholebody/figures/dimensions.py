@@ -10,10 +10,6 @@ from wholebody.figures.anthropometry import Person, keyed
 RELAXED = 0.93
 """The arm's circumferences were measured flexed; relaxed they are 5 to 8 % less (estimate)."""
 
-PALM_LENGTH = {"M": 0.603, "F": 0.600}
-"""Palm length as a fraction of hand length (ANSUR II)."""
-
-
 MIDDLE_TIP = 0.991
 """End of the stretched middle finger, in hand lengths from the wrist: the sum of its parts in the table "hand"."""
 
@@ -33,8 +29,7 @@ class Dimensions:
     def __init__(self, person: Person) -> None:
         """Compute the sizes of a person."""
         self.body = person
-        height, column = person.stature, person.column
-        self.stature = height
+        self.stature = height = person.stature
         toe = self.joint("left_toe_extension")
         self.toe_joint_x = toe[0]
         self.toe_half_height = person.segment("left_toes", "radius_b") * height
@@ -46,9 +41,16 @@ class Dimensions:
 
         self.hand_length = person.length("left_hand")
         self.hand_breadth = person.fitted("hand_breadth")
-        self.palm_length = PALM_LENGTH[column] * self.hand_length
+        self.palm_length = {"M": 0.603, "F": 0.600}[person.column] * self.hand_length  # ANSUR II
         self.palm_half_thickness = keyed_hand("palm", "depth") * self.hand_breadth
-        self.index = self._finger("index")
+        lateral, distal = FINGER_BASES["index"]
+        length = sum(keyed_hand(f"index_{part}", "length") for part in ("pp", "mp", "dp"))
+        self.index = Finger(
+            lateral * self.hand_breadth,
+            distal * self.hand_length,
+            (distal + length) * self.hand_length,
+            keyed_hand("index_mp", "width") * self.hand_breadth,
+        )
         # End of the thumb, which lies beside the index finger, in hand lengths from the wrist: 0.26 behind that
         # finger's (estimate).
         self.thumb = Finger(
@@ -61,7 +63,8 @@ class Dimensions:
         # centre of grip in ANSUR II (481 and 355 mm in 28 men).
         self.grip = 0.31 * self.hand_length
 
-        above = sum(self.joint(name)[2] for name in _UPWARD)
+        upward = ("spine1", "spine2", "spine3", "spine4", "neck1", "neck2")
+        above = sum(self.joint(f"{name}_flexion")[2] for name in upward)
         self.head_top = height - self.hip_height - above
         self.head_half_breadth = person.radius("head_y")
         self.head_half_length = person.radius("head_x")
@@ -78,25 +81,6 @@ class Dimensions:
         """Position of a joint in its parent segment's frame."""
         return self.body.origin(name)
 
-    def _finger(self, finger: str) -> Finger:
-        length = sum(keyed_hand(f"{finger}_{part}", "length") for part in ("pp", "mp", "dp"))
-        lateral, distal = FINGER_BASES[finger]
-        return Finger(
-            lateral * self.hand_breadth,
-            distal * self.hand_length,
-            (distal + length) * self.hand_length,
-            keyed_hand(f"{finger}_mp", "width") * self.hand_breadth,
-        )
-
-
-_UPWARD = (
-    "spine1_flexion",
-    "spine2_flexion",
-    "spine3_flexion",
-    "spine4_flexion",
-    "neck1_flexion",
-    "neck2_flexion",
-)
 
 FINGER_BASES = {
     "thumb": (0.27, 0.13),

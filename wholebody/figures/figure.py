@@ -15,10 +15,9 @@ from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.pool import Pool
 from wholebody.base.records import as_dict
 from wholebody.figures.body_spec import geometry_of
-from wholebody.figures.degrees import Turning
 from wholebody.figures.description import ROOT_JOINT, Description, followers_of, limits_of
-from wholebody.figures.grounding import SceneLike, grounded
-from wholebody.figures.model_check import LARGEST, check_model
+from wholebody.figures.grounding import grounded
+from wholebody.figures.model_check import LARGEST, Turning, check_model
 from wholebody.figures.reduction import reduced_parts
 from wholebody.figures.state import has_free_root
 
@@ -33,7 +32,9 @@ def _with_limits(made_from: tuple[Any, ...], limits: Mapping[str, Array]) -> Fig
 class Figure(checks.FixedAttributes):
     """An articulated body: Pinocchio's model and geometry, with named joint groups, chains, frames and postures.
 
-    It never changes, so any number of scenes and threads may share one. It can be pickled and copied.
+    It never changes, so any number of scenes and threads may share one. It can be pickled and copied. Methods that take
+    a posture raise an `InputError` if it has the wrong shape or is not finite, those that take names an
+    `UnknownNameError` with the nearest names, or an `InputError` if a name is no text.
 
     Attributes:
         name: such as "human".
@@ -45,6 +46,7 @@ class Figure(checks.FixedAttributes):
         detail: "spheres", "capsules", "hulls", or "own" for the geometry of a URDF. Spheres are too coarse to meet
             things: `outer` does.
         root: "free" (a floating base) or "fixed".
+        joints: names of the joints in the model's order, without the free root.
         groups: group to joint names, without the root.
         chains: limb to its joints from the root outwards, and the frame at its tip.
         frames: names of frames for goals.
@@ -89,16 +91,14 @@ class Figure(checks.FixedAttributes):
         self.collision_groups = MappingProxyType(dict(description.collision_groups))
         self.excluded_pairs, self.notes = description.excluded, description.notes
         self.loaded_as: tuple[str, dict[str, Any]] | None = None
-        self._data = Pool(
-            model.createData, at_most=1
-        )  # 6.5 MB for 55 freedoms, 27 MB for 95: to make one takes milliseconds
+        self._data = Pool(model.createData, at_most=1)  # 6.5 MB for 55 freedoms, 27 MB for 95
         self._description = description
         self._made: dict[str, Array] = {}
         self._outer: tuple[pin.GeometryObject, ...] | None = None
         self.root = "free" if has_free_root(model) else "fixed"
         self._frame_ids = {frame.name: index for index, frame in reversed(list(enumerate(model.frames)))}
         self._joint_ids = {name: index for index, name in enumerate(model.names) if index > 0}
-        self._joints = tuple(name for name in self._joint_ids if name != ROOT_JOINT)
+        self.joints: tuple[str, ...] = tuple(name for name in self._joint_ids if name != ROOT_JOINT)
         self.limits = limits_of(model)
         self._turning = Turning(model)
         self.followers = MappingProxyType(followers_of(model))
@@ -150,22 +150,12 @@ class Figure(checks.FixedAttributes):
         return self._outer
 
     @property
-    def joints(self) -> tuple[str, ...]:
-        """Names of the joints in the model's order, without the free root."""
-        return self._joints
-
-    @property
     def postures(self) -> tuple[str, ...]:
         """Names of the postures; the first one is the default start of a problem."""
         return tuple(self._description.postures)
 
     def posture(self, name: str) -> Array:
-        """Return a copy of a named posture, shape (nq,).
-
-        Raises:
-            UnknownNameError: with the nearest names.
-            InputError: the name is no text.
-        """
+        """Return a copy of a named posture, shape (nq,)."""
         checks.known(name, self.postures, "posture")
         if name not in self._made:
             self._made[name] = self._description.postures[name](self)
@@ -177,46 +167,25 @@ class Figure(checks.FixedAttributes):
         return self.posture(self.postures[0])
 
     def frame_id(self, name: str) -> int:
-        """Return the index of a frame, a segment or a joint in `model.frames`.
-
-        Raises:
-            UnknownNameError: with the nearest names.
-            InputError: the name is no text.
-        """
-        return int(
-            self._frame_ids[checks.known(name, self._frame_ids, "frame", offered={*self.frames, *self.segments})]
-        )
+        """Return the index of a frame, a segment or a joint in `model.frames`."""
+        offered = {*self.frames, *self.segments}
+        return int(self._frame_ids[checks.known(name, self._frame_ids, "frame", offered=offered)])
 
     def placement(self, q: Array, name: str) -> pin.SE3:
-        """Return the placement in the world, at the posture q (nq,), of a frame, a segment or a joint.
-
-        Raises:
-            UnknownNameError: there is none of that name.
-            InputError: q has the wrong shape or is not finite.
-        """
+        """Return the placement in the world, at the posture q (nq,), of a frame, a segment or a joint."""
         frame, q = self.frame_id(name), self._checked(q)
         with self._data.borrow() as data:
             pin.forwardKinematics(self.model, data, q)
             return pin.updateFramePlacement(self.model, data, frame).copy()
 
     def joint_id(self, name: str) -> int:
-        """Return the index of a joint in the model; "root" is the free root.
-
-        Raises:
-            UnknownNameError: with the nearest names.
-            InputError: the name is no text.
-        """
+        """Return the index of a joint in the model; "root" is the free root."""
         if isinstance(name, str) and name == "root" and self.root == "free":
             return 1
         return self._joint_ids[checks.known(name, self._joint_ids, "joint", offered=self.joints)]
 
     def joint_names(self, names: str | Iterable[str]) -> tuple[str, ...]:
-        """Return joint names with groups replaced by their joints, each once, in the order given.
-
-        Raises:
-            UnknownNameError: neither a joint nor a group.
-            InputError: not a list of names.
-        """
+        """Return joint names with groups replaced by their joints, each once, in the order given."""
         found: dict[str, None] = {}
         for name in [names] if isinstance(names, str) else checks.listed(names, "names", "['left_arm']"):
             if not isinstance(name, str):
@@ -233,10 +202,6 @@ class Figure(checks.FixedAttributes):
         """Return the indices in the tangent vector, ascending, of joints and groups; "root" is the six of a free root.
 
         The index of a joint that follows another (mimic) is that of the followed joint.
-
-        Raises:
-            UnknownNameError: neither a joint nor a group.
-            InputError: not a list of names.
         """
         places: set[int] = set()
         for name in self.joint_names(names):
@@ -245,11 +210,7 @@ class Figure(checks.FixedAttributes):
         return np.array(sorted(places), dtype=np.intp)
 
     def joint_values(self, q: Array) -> dict[str, float]:
-        """Return the value of each one-degree joint by name at q (nq,): radians, or metres for prismatic joints.
-
-        Raises:
-            InputError: q has the wrong shape or is not finite.
-        """
+        """Return the value of each one-degree joint by name at q (nq,): radians, or metres for prismatic joints."""
         q = self._checked(q)
         values = {}
         for name in self.joints:
@@ -263,16 +224,11 @@ class Figure(checks.FixedAttributes):
         return values
 
     def with_joints(self, q: Array, values: Mapping[str, float]) -> Array:
-        """Return a copy of the posture q with some joints at other values.
+        """Return a copy of q (nq,) with some joints at other values: radians, or metres for prismatic joints.
 
         A value of a joint that follows another (mimic) moves the followed joint.
 
-        Args:
-            q: (nq,).
-            values: joint name to radians (metres for prismatic joints).
-
         Raises:
-            UnknownNameError: a joint that does not exist.
             InputError: a value that is not finite, or a joint with more than one degree of freedom.
         """
         q = self._checked(q).copy()
@@ -306,9 +262,6 @@ class Figure(checks.FixedAttributes):
         """Return lower and upper bound, each (nv,), of the displacement of q (nq,) within the limits.
 
         Infinite without a limit. If q is beyond a limit, both bounds have the sign of the motion back.
-
-        Raises:
-            InputError: q has the wrong shape or is not finite.
         """
         q = self._checked(q)
         lower, upper = np.full(self.model.nv, -np.inf), np.full(self.model.nv, np.inf)
@@ -317,32 +270,22 @@ class Figure(checks.FixedAttributes):
         return lower, upper
 
     def within_limits(self, q: Array, tolerance: float = 1e-9) -> bool:
-        """Whether every limited joint is within its limits at q (nq,), to a tolerance for rounding, radians or metres.
-
-        Raises:
-            InputError: q has another shape, or the tolerance is negative or no number.
-        """
+        """Whether every limited joint is within its limits at q (nq,), to a tolerance in radians or metres."""
         tolerance = checks.number(tolerance, "tolerance", 0.0, LARGEST)
         value = self._checked(q)[self.limits.idx_q]
         return bool(((value >= self.limits.lower - tolerance) & (value <= self.limits.upper + tolerance)).all())
 
     def clamp(self, q: Array) -> Array:
-        """Return a copy of q (nq,) with every limited joint moved to its nearest allowed value.
-
-        Raises:
-            InputError: q has the wrong shape or is not finite.
-        """
+        """Return a copy of q (nq,) with every limited joint moved to its nearest allowed value."""
         q = self._checked(q).copy()
         idx_q, _, lower, upper = self.limits
         q[idx_q] = np.minimum(np.maximum(q[idx_q], lower), upper)
         return q
 
-    def grounded(self, q: Array, scene: SceneLike) -> Array:
-        """Return a copy of q moved vertically until the lowest segments stand on the things of a scene.
+    def grounded(self, q: Array, scene: Any) -> Array:
+        """Return a copy of q (nq,) moved vertically until the lowest segments stand on the things of a scene.
 
-        Args:
-            q: (nq,).
-            scene: a scene of this figure; things that it carries are not looked at.
+        What the figure carries is not looked at.
 
         Raises:
             InputError: the root is fixed, nothing is below the figure, or the scene has another figure.
@@ -361,13 +304,12 @@ class Figure(checks.FixedAttributes):
             posture: values of the locked joints: a name or an array (nq,); the first posture if left out.
 
         Raises:
-            UnknownNameError: neither a joint nor a group, or an unknown posture.
             InputError: no joint remains.
         """
         q = self.neutral if posture is None else self.posture(posture) if isinstance(posture, str) else posture
         self.warn_of_angles(self._checked(q), "reduced: posture")
-        parts = reduced_parts(self, self.joint_names(joints), self._checked(q))
-        return Figure(self.name, parts.model, parts.geometry, self.detail, parts.description, parts.visual)
+        model, geometry, description, visual = reduced_parts(self, self.joint_names(joints), self._checked(q))
+        return Figure(self.name, model, geometry, self.detail, description, visual)
 
     def describe(self) -> Description:
         """Return the named parts of the figure, to build another one from them."""

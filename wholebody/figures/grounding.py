@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
 import coal
 import numpy as np
@@ -12,33 +12,9 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.figures.postures import support
 
-DEEPEST_FALL = 10.0  # m: farther down nothing is looked for
 
-
-class SceneLike(Protocol):
-    """The part of a scene that is asked for."""
-
-    @property
-    def geometry(self) -> Any:
-        """The pin.GeometryModel with all pieces."""
-
-    @property
-    def piece_owner(self) -> tuple[str, ...]:
-        """The segment or thing that every piece is part of."""
-
-
-def grounded(model: pin.Model, segments: tuple[str, ...], q: Array, scene: SceneLike) -> Array:
-    """Copy (nq,) of a posture whose root is moved vertically until its lowest segments touch the things below.
-
-    Args:
-        model: of the figure, with a free root.
-        segments: its segments.
-        q: (nq,) the posture.
-        scene: the figure among things.
-
-    Raises:
-        InputError: nothing is below, or what the figure is inside of has no top near.
-    """
+def grounded(model: pin.Model, segments: tuple[str, ...], q: Array, scene: Any) -> Array:
+    """Copy (nq,) of a posture of a model with a free root; see `Figure.grounded`."""
     data = model.createData()
     pin.forwardKinematics(model, data, q)
     own = set(segments)
@@ -66,8 +42,8 @@ def grounded(model: pin.Model, segments: tuple[str, ...], q: Array, scene: Scene
         if abs(gap) <= 1e-7:  # m: gap that counts as standing
             break
         shift -= gap  # into what it overlaps the figure is no deeper than that, so it comes out after a few steps
-        if abs(shift) > DEEPEST_FALL:
-            raise InputError(f"grounded: nothing is below the figure within {DEEPEST_FALL:g} m; add wb.HalfSpace()")
+        if abs(shift) > 10.0:
+            raise InputError("grounded: nothing is below the figure within 10 m; add wb.HalfSpace()")
     result = np.array(q, dtype=float)
     result[2] += shift
     return result
@@ -79,7 +55,6 @@ def _least(soles: list[tuple[Any, pin.SE3]], things: list[tuple[Any, Any]], shif
     for shape, place in soles:
         at = coal.Transform3s(place.rotation, place.translation + up)
         for thing, where in things:
-            least = min(
-                least, float(coal.distance(shape, at, thing, where, coal.DistanceRequest(), coal.DistanceResult()))
-            )
+            gap = coal.distance(shape, at, thing, where, coal.DistanceRequest(), coal.DistanceResult())
+            least = min(least, float(gap))
     return least

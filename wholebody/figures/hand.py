@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from functools import partial
-from itertools import combinations
 
 import numpy as np
 import pinocchio as pin
@@ -17,11 +16,12 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.figures import hulls
-from wholebody.figures.anthropometry import Person, describe, keyed, make_person
+from wholebody.figures.anthropometry import Person, describe, keyed, make_person, named_angles
 from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, geometry_of, model_of, place
-from wholebody.figures.description import Articulated, Chain, Description, ExcludedPair
+from wholebody.figures.description import Articulated, Chain, Description, chosen_pairs
 from wholebody.figures.dimensions import FINGER_BASES, Dimensions, keyed_hand
 from wholebody.figures.figure import Figure
+from wholebody.figures.postures import lowest
 
 MESH = "meshes/ellipsoid.obj"
 """The unit polyhedron that the URDF scales to each part."""
@@ -34,30 +34,8 @@ _JOINT = {f"{kind}_flex": f"{kind}_flexion" for kind in ("cmc", "mcp", "pip", "d
 _JOINT |= {f"{kind}_abd": f"{kind}_abduction" for kind in ("cmc", "mcp")}
 
 
-# Degrees by kind of joint; "relaxed" is the neutral column of the table.
-POSTURES: dict[str, dict[str, float]] = {
-    "relaxed": {},
-    "open": {"mcp_flexion": 0.0, "pip_flexion": 0.0, "dip_flexion": 0.0, "ip_flexion": 0.0},
-    "pointing": {
-        "mcp_flexion": 60.0,
-        "pip_flexion": 60.0,
-        "dip_flexion": 30.0,
-        "index_mcp_flexion": 0.0,
-        "index_pip_flexion": 0.0,
-        "index_dip_flexion": 0.0,
-        "thumb_mcp_flexion": 0.0,
-        "thumb_ip_flexion": 0.0,
-    },
-    "grip": {"mcp_flexion": 45.0, "pip_flexion": 50.0, "dip_flexion": 25.0, "thumb_mcp_flexion": 10.0},
-}
-
-
 def hand_spec(side: str = "right", person: Person | None = None) -> BodySpec:
-    """Return the specification of a hand.
-
-    Args:
-        side: "left" or "right".
-        person: the hand's person; the median man if left out.
+    """Return the specification of a hand, "left" or "right", of a person, or of the median man.
 
     Raises:
         InputError: another side.
@@ -105,7 +83,7 @@ def hand_figure_of(person: Person, side: str) -> Figure:
     """Return the hand of a person; the side as for `hand_spec`."""
     spec = hand_spec(side, person)
     model = model_of(spec)
-    tested, excluded = _pairs(spec.solids)
+    tested, excluded = chosen_pairs(spec.solids, _reason)
     names = tuple(joint.name for joint in spec.joints)
     groups = {finger: tuple(name for name in names if name.startswith(f"{side}_{finger}_")) for finger in FINGERS}
     description = Description(
@@ -113,7 +91,7 @@ def hand_figure_of(person: Person, side: str) -> Figure:
         chains={finger: Chain(groups[finger], f"{side}_{finger}_tip") for finger in FINGERS},
         frames=tuple(mark.name for mark in spec.landmarks),
         segments=tuple(solid.segment for solid in spec.solids),
-        postures={name: partial(_posture, side=side, degrees=degrees) for name, degrees in POSTURES.items()},
+        postures={name: partial(_posture, side=side, degrees=own) for name, own in named_angles("hand").items()},
         excluded=excluded,
         person=spec.person,
     )
@@ -153,25 +131,14 @@ def _polyhedron(size: Dimensions, part: str) -> tuple[object, pin.SE3]:
 
 
 def finger_base(size: Dimensions, side: str, finger: str) -> pin.SE3:
-    """Placement of a finger's first joint in the hand: its knuckle, or the thumb's joint after the resting metacarpal.
-
-    Args:
-        size: of the hand's person.
-        side: "left" or "right".
-        finger: one of `FINGERS`.
-    """
+    """Placement of a finger's first joint in the hand: its knuckle, or the end of the thumb's resting metacarpal."""
     if finger == "thumb":
         return thumb_metacarpal(size, side) * place(z=-keyed_hand("thumb_mc", "length") * size.hand_length)
     return pin.SE3(np.eye(3), _knuckle(size, finger))
 
 
 def thumb_metacarpal(size: Dimensions, side: str) -> pin.SE3:
-    """Placement of the resting thumb's metacarpal in the hand, at its joint with the wrist's bones.
-
-    Args:
-        size: of the hand's person.
-        side: "left" or "right".
-    """
+    """Placement of the resting thumb's metacarpal in the hand, at its joint with the wrist's bones."""
     sign = 1.0 if side == "left" else -1.0
     # Resting direction of the thumb's metacarpal: from the fingers towards the thumb's side (estimate), and out of the
     # palm (CMC abduction of the table).
@@ -191,16 +158,7 @@ def _knuckle(size: Dimensions, finger: str) -> Array:
 
 
 def finger_joints(side: str, finger: str, key: str, parent: str, segment: str, origin: pin.SE3) -> Iterator[Joint]:
-    """The joints between a part of a finger and the part before it.
-
-    Args:
-        side: "left" or "right".
-        finger: one of `FINGERS`.
-        key: of the part in the table "hand".
-        parent: segment before it.
-        segment: of the part.
-        origin: placement of the first joint in the parent.
-    """
+    """The joints from the segment before a part of a finger to the part, whose row in the table "hand" is `key`."""
     sign = 1.0 if side == "left" else -1.0
     row = keyed("hand", "name")[key]
     kinds = [kind.strip() for kind in row["joints"].split(",")]
@@ -217,12 +175,7 @@ def finger_joints(side: str, finger: str, key: str, parent: str, segment: str, o
 
 
 def massive_links(size: Dimensions, radii: Mapping[str, tuple[float, float, float]]) -> Iterator[Link]:
-    """Links as solid ellipsoids whose mass is proportional to their volume; together they have the hand's mass.
-
-    Args:
-        size: of the hand's person.
-        radii: semi-axes of each segment's ellipsoid, which begins at the segment's origin and goes along -z.
-    """
+    """Links as solid ellipsoids along -z, of semi-axes `radii` by segment, which share the hand's mass by volume."""
     volumes = {segment: math.prod(axes) for segment, axes in radii.items()}
     total = size.body.segment_mass("left_hand")
     for segment, (a, b, c) in radii.items():
@@ -231,15 +184,8 @@ def massive_links(size: Dimensions, radii: Mapping[str, tuple[float, float, floa
         yield Link(segment, mass, (0.0, 0.0, -c), inertia)
 
 
-def _pairs(solids: tuple[Solid, ...]) -> tuple[tuple[tuple[str, str], ...], tuple[ExcludedPair, ...]]:
-    tested, excluded = [], []
-    for a, b in combinations([solid.name for solid in solids], 2):
-        reason = finger_pair(a.partition("_")[2], b.partition("_")[2])
-        if reason:
-            excluded.append(ExcludedPair(a, b, reason))
-        else:
-            tested.append((a, b))
-    return tuple(tested), tuple(excluded)
+def _reason(a: Solid, b: Solid) -> str | None:
+    return finger_pair(a.segment.partition("_")[2], b.segment.partition("_")[2])
 
 
 def is_finger(segment: str) -> bool:
@@ -248,13 +194,9 @@ def is_finger(segment: str) -> bool:
 
 
 def finger_pair(a: str, b: str) -> str | None:
-    """Why two segments of one hand are not tested against each other; None if they are.
-
-    Args:
-        a: segment without its side, such as "hand" or "index_middle".
-        b: the other one.
-    """
-    first, second = sorted((a, b), key=_order)
+    """Why two segments of one hand, named without their side, are not tested against each other; None if they are."""
+    order = list(FINGERS)
+    first, second = sorted((a, b), key=lambda name: order.index(name.partition("_")[0]) if is_finger(name) else -1)
     finger, _, part = second.partition("_")
     if finger not in FINGERS:
         return None
@@ -266,26 +208,18 @@ def finger_pair(a: str, b: str) -> str | None:
         return None
     if other == finger:
         return "neighbours that overlap at their joint"
-    order = list(FINGERS)
     beside = abs(order.index(other) - order.index(finger)) == 1 and "thumb" not in (other, finger)
     return "fingers rest side by side" if beside else None
 
 
-def _order(segment: str) -> int:
-    finger = segment.partition("_")[0]
-    return list(FINGERS).index(finger) if finger in FINGERS else -1
-
-
 def _posture(figure: Articulated, side: str, degrees: dict[str, float]) -> Array:
     """Wrist above the origin, palm down, fingers forward, lowest part on z = 0."""
-    from wholebody.figures.postures import lowest
-
     values = {
         f"{side}_{joint}": math.radians(angle)
         for joint, angle in finger_degrees(degrees).items()
         if f"{side}_{joint}" in figure.joints
     }
-    q = figure.with_joints(pin.neutral(figure.model), values)
+    q: Array = figure.with_joints(pin.neutral(figure.model), values)
     if figure.root == "free":
         down = np.column_stack([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]])
         q[3:7] = pin.Quaternion(down @ palm_axes(side).T).coeffs()
@@ -294,12 +228,7 @@ def _posture(figure: Articulated, side: str, degrees: dict[str, float]) -> Array
 
 
 def finger_degrees(degrees: Mapping[str, float]) -> dict[str, float]:
-    """The angle of every joint of the fingers, without a side, degrees.
-
-    Args:
-        degrees: by joint ("index_pip_flexion") or by kind of joint ("pip_flexion"); the others are relaxed, as in the
-            table "hand".
-    """
+    """The angle of every joint of the fingers, without a side, of a row of `named_angles`; the others are relaxed."""
     found = {}
     for finger, parts in FINGERS.items():
         for part in ("mc", *parts) if finger == "thumb" else parts:

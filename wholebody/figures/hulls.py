@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
+from wholebody.geometry.hull import hull_piece
 
 RINGS = 5
 AROUND = 10
@@ -17,8 +17,8 @@ AROUND = 10
 
 
 @lru_cache(maxsize=1)
-def unit_sphere() -> tuple[Array, NDArray[np.intp]]:
-    """Return vertices (n, 3) on the unit sphere, mirror-symmetric in y, and triangles (m, 3) seen from outside.
+def unit_sphere() -> Array:
+    """Return vertices (n, 3) on the unit sphere, mirror-symmetric in y.
 
     Every second ring is turned by half a step, so that no four vertices of the sides lie in one plane.
     """
@@ -29,42 +29,27 @@ def unit_sphere() -> tuple[Array, NDArray[np.intp]]:
             turn = 2.0 * np.pi * (k + 0.5 * (ring % 2)) / AROUND
             points.append(np.array([np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)]))
     points.append(np.array([0.0, 0.0, -1.0]))
-    vertices = np.array(points)
-    return vertices, _outward_triangles(vertices)
+    return np.array(points)
 
 
-def convex(points: Array, what: str) -> tuple[Any, pin.SE3]:
-    """Return the hull of points (n, 3) as coal's Convex about the centre of its bounding sphere, and that centre."""
-    # imported here: only building a figure needs it
-    from wholebody.geometry.hull import hull_piece
-
+def _convex(points: Array, what: str) -> tuple[Any, pin.SE3]:
+    """The hull of points (n, 3) as coal's Convex about the centre of its bounding sphere, and that centre."""
     piece = hull_piece(points, what)
     return piece.geometry, piece.placement
 
 
 def ellipsoid(radii: tuple[float, float, float], what: str) -> tuple[Any, pin.SE3]:
     """Convex polyhedron with its vertices on an ellipsoid, axes along x, y, z, centre at the origin."""
-    return convex(unit_sphere()[0] * np.array(radii), what)
+    return _convex(unit_sphere() * np.array(radii), what)
 
 
 def tapered(radius_start: float, radius_end: float, length: float, what: str) -> tuple[Any, pin.SE3]:
     """Convex polyhedron of a tapered capsule along -z: vertices on a ball at the origin and on one at -length."""
-    ball = unit_sphere()[0]
-    return convex(np.vstack([ball * radius_start, ball * radius_end - [0.0, 0.0, length]]), what)
+    ball = unit_sphere()
+    return _convex(np.vstack([ball * radius_start, ball * radius_end - [0.0, 0.0, length]]), what)
 
 
 def box(size: tuple[float, float, float], what: str) -> tuple[Any, pin.SE3]:
     """Convex polyhedron of a box about the origin: eight vertices, twelve triangles."""
     corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-    return convex(corners * np.array(size), what)
-
-
-def _outward_triangles(points: Array) -> NDArray[np.intp]:
-    """Triangles (m, 3) of the hull of points around the origin, counter-clockwise seen from outside."""
-    from scipy.spatial import ConvexHull
-
-    triangles = np.array(ConvexHull(points).simplices, dtype=np.intp)
-    a, b, c = (points[triangles[:, k]] for k in range(3))
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0.0
-    triangles[inward] = triangles[inward][:, [0, 2, 1]]
-    return triangles
+    return _convex(corners * np.array(size), what)

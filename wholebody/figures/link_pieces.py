@@ -60,12 +60,7 @@ CONCAVITY = Range(0.01, 1.0)
 
 
 def check_concavity(concavity: object, links: Iterable[str]) -> Concavity:
-    """Check the argument and return it.
-
-    Raises:
-        InputError: not None, a number from 0.01 to 1, or a mapping to such numbers.
-        UnknownNameError: an unknown link.
-    """
+    """Check the argument of `urdf_figure` and return it."""
     names = tuple(links)
     if concavity is None:
         return None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -47,21 +48,18 @@ def load(spec: str | PathLike[str], **options: Any) -> Figure:
     builders: dict[str, Callable[..., Figure]] = {"human": human_figure, "avatar": avatar_figure, "hand": hand_figure}
     name = str(path(spec, "load: spec"))
     if name in builders:
-        _check_options(builders[name], options, f"load({name!r})")
-        return _remembered(builders[name](**options), name, options)
-    if Path(name).suffix == "" and not is_file(name):
-        raise UnknownNameError("figure", name, builders, "load")
-    if Path(name).suffix and Path(name).suffix.lower() not in (".urdf", ".xml", ".xacro"):
-        raise FileFormatError(f"{name}: a figure is a URDF or MJCF file, or 'human', 'avatar', 'hand'; convert it")
-    check_file(name, "figure")
-    builder = xml_figure if Path(name).suffix.lower() == ".xml" else urdf_figure
+        known, builder = name, builders[name]
+    else:
+        ending = Path(name).suffix.lower()
+        if not ending and not is_file(name):
+            raise UnknownNameError("figure", name, builders, "load")
+        if ending not in ("", ".urdf", ".xml", ".xacro"):
+            raise FileFormatError(f"{name}: a figure is a URDF or MJCF file, or 'human', 'avatar', 'hand'; convert it")
+        check_file(name, "figure")
+        known, builder = str(Path(name).resolve()), partial(xml_figure if ending == ".xml" else urdf_figure, name)
     _check_options(builder, options, f"load({name!r})")
-    return _remembered(builder(name, **options), name, options)
-
-
-def _remembered(figure: Figure, name: str, options: dict[str, Any]) -> Figure:
-    """The figure, with what it was loaded from."""
-    figure.loaded_as = (name if name in ("human", "avatar", "hand") else str(Path(name).resolve()), dict(options))
+    figure = builder(**options)
+    figure.loaded_as = (known, dict(options))
     return figure
 
 

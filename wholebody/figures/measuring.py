@@ -9,36 +9,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from functools import cache
-from typing import Any, Protocol
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.figures.anthropometry import table
+from wholebody.figures.anthropometry import Person, table
+from wholebody.figures.body_spec import geometry_of, model_of
+from wholebody.figures.dimensions import Dimensions
+from wholebody.figures.human import capsules
+from wholebody.figures.human.spec import human_spec
 from wholebody.figures.postures import support
-
-
-class Measured(Protocol):
-    """The part of a figure that is measured."""
-
-    @property
-    def model(self) -> Any:
-        """Pinocchio's model."""
-
-    @property
-    def geometry(self) -> Any:
-        """The convex pieces."""
-
-    def with_joints(self, q: Array, values: Mapping[str, float]) -> Array:
-        """A copy of a posture with some joints at other values."""
 
 
 class _Pose:
     """A figure at one posture: frames and the extent of its pieces along the axes."""
 
-    def __init__(self, figure: Measured, degrees: Mapping[str, float]) -> None:
+    def __init__(self, figure: Any, degrees: Mapping[str, float]) -> None:
         self.figure = figure
         names = set(figure.model.names)
         values = {
@@ -69,14 +60,14 @@ class _Pose:
 UP, DOWN, FRONT, BACK, LEFT = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 THIGHS = ("left_thigh", "right_thigh")
 
+TOLERANCE = 0.005
+"""Metres: a dimension that is off by this counts as one unit of a fit."""
 
-def measure(figure: Measured) -> dict[str, float]:
-    """Return the fifteen dimensions of a person in metres, by the names of `DIMENSIONS`.
+
+def measure(figure: Any) -> dict[str, float]:
+    """Return the fifteen dimensions of a person in any detail, metres, by the names of the table "dimensions".
 
     The arm that reaches overhead is straight and vertical, with the clavicle raised as far as it goes.
-
-    Args:
-        figure: the person, in any detail.
     """
     stand = _Pose(figure, {})
     sit = _Pose(figure, {"hip_flexion": 90.0, "knee_flexion": 90.0})
@@ -109,13 +100,23 @@ def measure(figure: Measured) -> dict[str, float]:
     }
 
 
+def measured(person: Person, deviations: tuple[tuple[str, float], ...] = ()) -> dict[str, float]:
+    """Return the dimensions of a person, metres, with some of the fitted sizes changed."""
+    person = replace(person, deviations=deviations, age=None)
+    model = model_of(human_spec(person))
+    geometry = geometry_of(model, capsules.solids(Dimensions(person)), ())
+
+    def with_joints(q: Array, values: Mapping[str, float]) -> Array:
+        q = q.copy()
+        for name, value in values.items():
+            q[model.joints[model.getJointId(name)].idx_q] = value
+        return q
+
+    return measure(SimpleNamespace(model=model, geometry=geometry, with_joints=with_joints))
+
+
 @cache
 def ansur(sex: str, percentile: int) -> dict[str, float]:
-    """Return ANSUR II's value of each dimension, metres.
-
-    Args:
-        sex: "male" or "female".
-        percentile: 5, 50 or 95.
-    """
+    """Return ANSUR II's value of each dimension at a percentile of 5, 50 or 95, metres."""
     column = f"{'M' if sex == 'male' else 'F'}{percentile}"
     return {row["name"]: float(row[column]) for row in table("dimensions")}

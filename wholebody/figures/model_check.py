@@ -1,10 +1,12 @@
-"""Numbers of a model that lead to postures with NaN: refused before a figure is made of it."""
+"""Numbers of a model that lead to NaN are refused; angles that were probably meant in degrees are told."""
 
 from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
 
+from wholebody.base.arrays import Array
+from wholebody.base.checks import MOST_TURNED, warn
 from wholebody.base.errors import InputError
 
 HEAVIEST = 1e9
@@ -14,16 +16,7 @@ LARGEST = 1e6
 
 
 def check_model(model: pin.Model, name: str) -> None:
-    """Refuse a model with impossible numbers, which would lead to postures with NaN.
-
-    Args:
-        model: Pinocchio's model.
-        name: of the figure, for the message.
-
-    Raises:
-        InputError: a mass is negative or beyond `HEAVIEST`, a position, an inertia or a limit is not a number, or a
-            lower limit is above the upper one.
-    """
+    """Refuse impossible masses, positions, inertias and limits by an `InputError`; `name` is the figure's."""
     for joint in range(1, model.njoints):
         inertia, at = model.inertias[joint], model.jointPlacements[joint]
         where = f"{name}, joint {model.names[joint]!r}"
@@ -45,3 +38,57 @@ def check_model(model: pin.Model, name: str) -> None:
         joint = next(j for j in model.joints if j.idx_v <= wrong[0] < j.idx_v + j.nv)
         speed = model.velocityLimit[wrong[0]]
         raise InputError(f"{name}, joint {model.names[joint.id]!r}: its velocity limit is {speed:g}; give 0 or more")
+
+
+FAR_OUT = 1.0
+"""Radians beyond a limit from which a value was probably meant in degrees."""
+
+
+class Turning:
+    """The joints of a model that turn by one number, with their limits."""
+
+    def __init__(self, model: pin.Model) -> None:
+        """Look them up; a joint without a limit has two turns as its limit here."""
+        every = list(zip(model.joints, model.names, strict=True))[1:]  # but the world's, whose numbers are not set
+        joints = [(j, n) for j, n in every if j.nq == j.nv == 1]
+        found = [(j.idx_q, str(name)) for j, name in joints if not j.shortname().startswith("JointModelP")]  # prismatic
+        self._places = np.array([place for place, _ in found], dtype=np.intp)
+        self._names = [name for _, name in found]
+        low, high = model.lowerPositionLimit[self._places], model.upperPositionLimit[self._places]
+        self._limits = low, high
+        self._low = np.where(np.isfinite(low), low, -MOST_TURNED)
+        self._high = np.where(np.isfinite(high), high, MOST_TURNED)
+        self._least, self._most = np.full(model.nq, -np.inf), np.full(model.nq, np.inf)  # beyond them something is said
+        self._least[self._places], self._most[self._places] = self._low - FAR_OUT, self._high + FAR_OUT
+
+    def warn(self, q: Array, what: str) -> bool:
+        """Warn of the joint that is farthest out in a posture (nq,) or several (n, nq); whether it was said."""
+        if q.ndim == 1 and ((q >= self._least) & (q <= self._most)).all():  # at every step of a tracker
+            return False
+        rows = np.atleast_2d(q)
+        if not len(rows) or not len(self._places):
+            return False
+        least, most = rows.min(axis=0)[self._places], rows.max(axis=0)[self._places]  # no copy of a clip of hours
+        beyond = np.maximum(self._low - least, most - self._high)
+        column = int(np.argmax(beyond))
+        if not float(beyond[column]) > FAR_OUT:
+            return False
+        values = rows[:, self._places[column]]
+        frame = int(np.argmax(np.maximum(self._low[column] - values, values - self._high[column])))
+        where = f"{what}: joint {self._names[column]!r}" + (f" of frame {frame}" if np.ndim(q) > 1 else "")
+        warn(self._told(where, float(values[frame]), column))
+        return True
+
+    def warn_of(self, name: str, value: float, place: int, q: Array) -> None:
+        """Warn where a value of a joint, which is at a place of the posture q (nq,), is far out."""
+        for column in np.flatnonzero(self._places == place).tolist():
+            if not self._low[column] - FAR_OUT <= q[place] <= self._high[column] + FAR_OUT:
+                warn(self._told(f"joint {name!r}", value, column))
+
+    def _told(self, what: str, value: float, column: int) -> str:
+        """What is told of an angle [rad] that is far out of its limits."""
+        low, high = (float(limits[column]) for limits in self._limits)
+        if low <= np.radians(value) <= high:
+            out = "far out of its limits" if np.isfinite(low) or np.isfinite(high) else "more than two turns"
+            return f"{what} is {value:g} rad, {out}; {value:g} degrees are {np.radians(value):.4g}"
+        return f"{what} is {value:g} rad, far out of its limits, which are {low:.4g} and {high:.4g} rad"

@@ -12,6 +12,7 @@ from collections.abc import Collection, Mapping
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.figures.anthropometry import table
@@ -46,11 +47,7 @@ class EllipseAxis(NamedTuple):
 
 
 class EllipticRange(NamedTuple):
-    """Up to three angles a share one range: the sum of their squares, each as a share of its own limit, is at most 1.
-
-    Attributes:
-        axes: the angles.
-    """
+    """Up to three angles share one range: the sum of their squares, each as a share of its own limit, is at most 1."""
 
     axes: tuple[EllipseAxis, ...]
 
@@ -100,19 +97,13 @@ AAOS). That they end on an ellipsoid is an ESTIMATE: rotation decreases with fle
 al. 1996).
 """
 
-
 INTERNAL_ROTATION = ((80.0, 70.0), (120.0, 0.0))
 """Elevations in the frontal plane, and the most inward rotation of the upper arm there, degrees: 70 up to 80 (AAOS, of
 the abducted arm), none at 120, for the greater tubercle would meet the acromion: ESTIMATE."""
 
 
 def human_ranges(sex: str, joints: Collection[str]) -> dict[str, MotionRange]:
-    """Return the ranges of motion of a person whose joints are these.
-
-    Args:
-        sex: "male" or "female".
-        joints: names of the joints.
-    """
+    """Return the ranges of motion of a person of a sex whose joints are these."""
     column = "F" if sex == "female" else "M"
     found: dict[str, MotionRange] = {}
     for side in ("left", "right"):
@@ -162,14 +153,10 @@ def shoulder_twist(side: str) -> TwistRange:
 def swing(elevation: float, plane: float, outward: float) -> Array:
     """Return the rotation (3, 3) of a hanging arm that is raised without twist.
 
-    Args:
-        elevation: degrees from hanging.
-        plane: degrees of the plane in which it is raised, from straight ahead outwards.
-        outward: 1 for the left arm, -1 for the right one.
+    Degrees: from hanging, and of the plane in which it is raised, from straight ahead outwards; `outward` is 1 for the
+    left arm, -1 for the right one.
     """
     angle, turn = math.radians(elevation), math.radians(plane)
     # From -z towards (cos, +-sin, 0): about the level axis that is square to both.
-    axis = np.array([outward * math.sin(turn), -math.cos(turn), 0.0])
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    cross = pin.skew(np.array([outward * math.sin(turn), -math.cos(turn), 0.0]))
     return np.asarray(np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross)

@@ -19,11 +19,7 @@ def urdf_folder() -> Path:
     Raises:
         WholebodyError: the installation lacks it.
     """
-    package = Path(__file__).resolve().parents[1]
-    for folder in (package / "urdf", package.parent / "urdf"):
-        if (folder / "human.urdf").is_file():
-            return folder
-    raise WholebodyError(f"there is no urdf folder in or beside {package}; install wholebody again")
+    return _folder("urdf", "urdf", "human.urdf")
 
 
 def urdf_path(name: str) -> Path:
@@ -32,10 +28,9 @@ def urdf_path(name: str) -> Path:
     Raises:
         UnknownNameError: there is no such file.
     """
-    folder = urdf_folder()
-    path = folder / f"{name}.urdf"
+    path = urdf_folder() / f"{name}.urdf"
     if not path.is_file():
-        raise UnknownNameError("packaged URDF", name, [file.stem for file in folder.glob("*.urdf")])
+        raise UnknownNameError("packaged URDF", name, [file.stem for file in path.parent.glob("*.urdf")])
     return path
 
 
@@ -45,11 +40,16 @@ def task_paths() -> dict[str, Path]:
     Raises:
         WholebodyError: the installation lacks them.
     """
+    return {path.stem: path for path in sorted(_folder("examples", "examples/tasks", "shelf.toml").glob("*.toml"))}
+
+
+def _folder(inside: str, beside: str, file: str) -> Path:
+    """The first of two folders, in the package and beside it, that has a file."""
     package = Path(__file__).resolve().parents[1]
-    for folder in (package / "examples", package.parent / "examples" / "tasks"):
-        if (folder / "shelf.toml").is_file():
-            return {path.stem: path for path in sorted(folder.glob("*.toml"))}
-    raise WholebodyError(f"there are no examples in or beside {package}; install wholebody again")
+    for folder in (package / inside, package.parent / beside):
+        if (folder / file).is_file():
+            return folder
+    raise WholebodyError(f"there is no {inside} folder in or beside {package}; install wholebody again")
 
 
 def write_human(path: str | os.PathLike[str], person: Person, hands: str = "rigid") -> None:
@@ -64,41 +64,5 @@ def write_human(path: str | os.PathLike[str], person: Person, hands: str = "rigi
     from wholebody.figures.urdf.extension import extension_text
 
     target, spec = checked_ending(path, "write_human: path", "a person", (".urdf",)), human_spec(person, hands=hands)
-    _write(target, urdf_text(spec, extension_text(figure_of(spec, "capsules", person.sex))))
-
-
-def packaged_files() -> dict[str, str]:
-    """Return the text of every packaged file below ``urdf/``: the median man, his avatar and his right hand."""
-    from wholebody.figures.body_spec import urdf_text
-    from wholebody.figures.hand import MESH, hand_figure, hand_spec
-    from wholebody.figures.human.figure import avatar_figure, avatar_spec, human_figure
-    from wholebody.figures.human.spec import human_spec
-    from wholebody.figures.urdf.extension import extension_text
-
-    return {
-        "human.urdf": urdf_text(human_spec(), extension_text(human_figure())),
-        "avatar.urdf": urdf_text(avatar_spec(), extension_text(avatar_figure())),
-        "hand.urdf": urdf_text(hand_spec(), extension_text(hand_figure())),
-        MESH: ellipsoid_obj(),
-    }
-
-
-def write_packaged(folder: str | os.PathLike[str]) -> None:
-    """Write every packaged file below a folder."""
-    for name, text in packaged_files().items():
-        _write(Path(folder) / name, text)
-
-
-def ellipsoid_obj() -> str:
-    """Return the unit polyhedron of the hand's parts as an OBJ; of STL files MuJoCo reads binary ones only."""
-    from wholebody.figures import hulls
-
-    vertices, triangles = hulls.unit_sphere()
-    lines = [f"v {' '.join(f'{value + 0.0:.12g}' for value in vertex)}" for vertex in vertices.round(15)]
-    lines += [f"f {' '.join(str(k + 1) for k in triangle)}" for triangle in triangles.tolist()]
-    return "\n".join(lines) + "\n"
-
-
-def _write(path: Path, text: str) -> None:
-    make_folder(path.parent)
-    write(path, text)
+    make_folder(target.parent)
+    write(target, urdf_text(spec, extension_text(figure_of(spec, "capsules", person.sex))))

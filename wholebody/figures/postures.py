@@ -1,10 +1,10 @@
-"""Named postures of the person, in degrees, and the placement of the root for them."""
+"""Named postures of the person: overlaps are parted, and the root is placed."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -16,66 +16,21 @@ GAP = 0.004
 """Least distance of any two pieces in a named posture, metres; arms and legs move outwards if a build needs it."""
 
 
-class Attitude(NamedTuple):
-    """Joint angles in degrees and the pitch of the pelvis; the lowest piece is then put on the ground.
-
-    A name without a side, such as "shoulder_abduction", means both sides.
-    """
-
-    degrees: Mapping[str, float]
-    pitch: float = 0.0
-
-
-_ARMS = {"shoulder_abduction": 11.0, "elbow_flexion": 15.0}
-
-HUMAN: dict[str, Attitude] = {
-    "standing": Attitude(_ARMS),
-    "a_pose": Attitude({"shoulder_abduction": 45.0}),
-    "t_pose": Attitude({"shoulder_abduction": 90.0}),
-    "arms_forward": Attitude({"shoulder_flexion": 90.0}),
-    "hands_up": Attitude({"shoulder_flexion": 165.0, "elbow_flexion": 10.0}),
-    "sitting": Attitude(
-        {
-            "hip_flexion": 90.0,
-            "knee_flexion": 90.0,
-            "hip_abduction": 6.0,
-            "shoulder_abduction": 16.0,
-            "elbow_flexion": 20.0,
-        }
-    ),
-    "squatting": Attitude(
-        {
-            "hip_flexion": 105.0,
-            "knee_flexion": 110.0,
-            "ankle_dorsiflexion": 30.0,
-            "spine1_flexion": 10.0,
-            "spine2_flexion": 10.0,
-            "shoulder_flexion": 80.0,
-            "elbow_flexion": 15.0,
-        },
-        pitch=25.0,
-    ),
-    "kneeling": Attitude({"knee_flexion": 90.0, "ankle_dorsiflexion": -50.0, **_ARMS}),
-    "prone": Attitude({"shoulder_abduction": 25.0, "elbow_flexion": 0.0, "ankle_dorsiflexion": -50.0}, pitch=90.0),
-    "supine": Attitude({"shoulder_abduction": 25.0, "elbow_flexion": 0.0, "ankle_dorsiflexion": -20.0}, pitch=-90.0),
-}
-
-
-def stand(figure: Articulated, attitude: Attitude) -> Array:
-    """Return the posture (nq,) of an attitude: pelvis above the origin, lowest piece on z = 0, no overlap.
+def stand(figure: Articulated, degrees: Mapping[str, float]) -> Array:
+    """Return the posture (nq,) of a row of `named_angles`: pelvis above the origin, lowest piece on z = 0, no overlap.
 
     Very stout builds (body mass index above about 45) cannot squat: their thighs, spread to the limit,
     overlap the belly.
     """
     q = pin.neutral(figure.model)
     values: dict[str, float] = {}
-    for name, degrees in attitude.degrees.items():
+    for name, angle in degrees.items():
         for joint in (name, f"left_{name}", f"right_{name}"):
             if joint in figure.joints:
-                values[joint] = math.radians(degrees)
+                values[joint] = math.radians(angle)
     q = figure.clamp(figure.with_joints(q, values))
     spread = [name for name in figure.joints if name.endswith(("shoulder_abduction", "hip_abduction"))]
-    free = q
+    free: Array = q
     for _ in range(45):
         close = _close_segments(figure, free)
         if not close:
@@ -87,7 +42,7 @@ def stand(figure: Articulated, attitude: Attitude) -> Array:
         }
         free = figure.clamp(figure.with_joints(free, moved))
     if figure.root == "free":
-        half = math.radians(attitude.pitch) / 2.0
+        half = math.radians(degrees.get("pelvis_pitch", 0.0)) / 2.0
         free[3:7] = 0.0, math.sin(half), 0.0, math.cos(half)
         free[2] = -lowest(figure, free)
     return free

@@ -18,14 +18,13 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import known, shown
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Range
-from wholebody.figures.anthropometry import Person, table
-from wholebody.figures.fit import DIRECT, PRIORS, TOLERANCE, measured
+from wholebody.figures.anthropometry import Person, keyed, table
+from wholebody.figures.measuring import TOLERANCE, measured
 
 DIMENSION = Range(0.0, 3.0, "m")
 
 FARTHEST = 4.0
 """Standard deviations beyond which nobody is made: one in 16,000 people is outside."""
-
 
 SIZES = {"hand_length": "hand", "hand_breadth": "hand_breadth", "foot_length": "foot_length"}
 """Dimensions that are sizes of the body themselves, with the names of the sizes. Others are measured."""
@@ -37,11 +36,7 @@ def dimension_names() -> tuple[str, ...]:
 
 
 def proportioned(person: Person, proportions: Mapping[str, float] | None) -> Person:
-    """Return a person with stated dimensions, of the same stature and mass.
-
-    Args:
-        person: sex, stature and mass.
-        proportions: metres by name of a dimension, see `dimension_names`; None or none for the person as it is.
+    """Return a person with stated dimensions, metres by the names of `dimension_names`, of the same stature and mass.
 
     Raises:
         InputError: a dimension that nobody of this stature and mass has, or dimensions that do not go together.
@@ -62,7 +57,7 @@ def proportioned(person: Person, proportions: Mapping[str, float] | None) -> Per
 @lru_cache(maxsize=64)
 def _proportioned(person: Person, stated: tuple[tuple[str, float], ...]) -> Person:
     names = dimension_names()
-    usual = _usual(replace(person, age=None))
+    usual = _measured(replace(person, age=None))
     which = [names.index(name) for name, _ in stated]
     change = likely_change(person, which, np.array([value - usual[name] for name, value in stated]))
     wanted = {name: usual[name] + float(change[k]) for k, name in enumerate(names)}
@@ -82,15 +77,9 @@ def _proportioned(person: Person, stated: tuple[tuple[str, float], ...]) -> Pers
 
 
 def likely_change(person: Person, which: list[int], change: Array) -> Array:
-    """Return by how much all dimensions differ from the usual ones, given the difference of some.
+    """Return by how much all dimensions (n,) differ from those usual for a person's stature and mass, metres.
 
-    Args:
-        person: whose stature and mass the usual dimensions belong to.
-        which: (k,) indices of the given dimensions in `dimension_names`.
-        change: (k,) metres.
-
-    Returns:
-        (n,) metres.
+    Given is the change (k,) of some, by their indices (k,) in `dimension_names`.
 
     Raises:
         InputError: the differences are those of nobody.
@@ -98,7 +87,7 @@ def likely_change(person: Person, which: list[int], change: Array) -> Array:
     names, covariance = dimension_names(), residual_covariance(person.column)
     spread = np.sqrt(np.diag(covariance))[which]
     people = f"{'men' if person.column == 'M' else 'women'} of {person.stature:g} m and {person.mass:.3g} kg"
-    usual = _usual(replace(person, age=None, deviations=()))
+    usual = _measured(replace(person, age=None, deviations=()))
     for k, deviation in enumerate(change / spread):
         if abs(deviation) > FARTHEST:
             name = names[which[k]]
@@ -125,11 +114,7 @@ def likely_change(person: Person, which: list[int], change: Array) -> Array:
 
 @cache
 def residual_covariance(column: str) -> Array:
-    """Return the covariance (n, n) of the dimensions of people of one stature and mass, m^2.
-
-    Args:
-        column: "M" or "F".
-    """
+    """Return the covariance (n, n) of the dimensions of people of one stature and mass and a sex, "M" or "F", m^2."""
     rows = table("correlations")
     names = [row["name"] for row in rows]
     correlation = np.array([[float(row[name]) for name in names] for row in rows])
@@ -160,21 +145,18 @@ def _spread(name: str, dimension: str, column: str) -> float:
 
 
 @lru_cache(maxsize=64)
-def _usual(person: Person) -> Mapping[str, float]:
-    return _measured(person)
-
-
-def _measured(person: Person) -> dict[str, float]:
+def _measured(person: Person) -> Mapping[str, float]:
     return measured(person, person.deviations) | {name: person.fitted(size) for name, size in SIZES.items()}
 
 
 def _sized(person: Person, sizes: Mapping[str, float], wanted: Mapping[str, float], stated: set[str]) -> Person:
     """The person whose measured dimensions are nearest to the wanted ones: Gauss and Newton with one Jacobian."""
-    free = [name for name in PRIORS if name not in DIRECT]
+    priors = keyed("priors", "name")
+    free = list(priors)
     names = list(wanted)
     # Metres: a stated dimension that is off by this counts as one unit, one that follows counts by `TOLERANCE`.
     unit = np.array([0.0002 if name in stated else TOLERANCE for name in names])
-    pull = np.diag([1.0 / PRIORS[name].spread for name in free])
+    pull = np.diag([1.0 / float(priors[name]["spread"]) for name in free])
 
     def made(x: Array) -> Person:
         changes = {**sizes, **dict(zip(free, map(float, x), strict=True))}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -13,25 +12,14 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.base.records import with_values
 from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, ExcludedPair
-from wholebody.figures.motion_ranges import CoupledRange, EllipseAxis, EllipticRange, MotionRange
+from wholebody.figures.motion_ranges import CoupledRange, EllipticRange, MotionRange
 from wholebody.figures.self_pairs import drop_pairs
 
 
-class ReducedParts(NamedTuple):
-    """The parts from which a smaller figure is made."""
-
-    model: pin.Model
-    geometry: pin.GeometryModel
-    visual: pin.GeometryModel
-    description: Description
-
-
-def reduced_parts(figure: Articulated, keep: tuple[str, ...], q: Array) -> ReducedParts:
-    """Return the parts of a figure of which only the joints in `keep` move; see `Figure.reduced`.
-
-    Raises:
-        InputError: `keep` is empty.
-    """
+def reduced_parts(
+    figure: Articulated, keep: tuple[str, ...], q: Array
+) -> tuple[pin.Model, pin.GeometryModel, Description, pin.GeometryModel]:
+    """Model, pieces, named parts and what is drawn of a figure of which only some joints move; see `Figure.reduced`."""
     if not keep:
         raise InputError("a reduced figure needs at least one joint; name joints, groups or 'root'")
     model = figure.model
@@ -70,7 +58,7 @@ def reduced_parts(figure: Articulated, keep: tuple[str, ...], q: Array) -> Reduc
         person=old.person,
         outer=old.outer,
     )
-    return ReducedParts(small, geometry, visual, description)
+    return small, geometry, description, visual
 
 
 def _ranges(
@@ -86,15 +74,15 @@ def _ranges(
                 found[name] = CoupledRange(moving, part.bound - still)
         elif isinstance(part, EllipticRange):
             if any(joint in kept for axis in part.axes for joint in axis.joints):
-                found[name] = EllipticRange(tuple(_without_locked(axis, kept, values) for axis in part.axes))
+                axes = []
+                for axis in part.axes:
+                    still = sum(values[joint] for joint in axis.joints if joint not in kept)
+                    moving_joints = tuple(joint for joint in axis.joints if joint in kept)
+                    axes.append(with_values(axis, joints=moving_joints, offset=axis.offset + still))
+                found[name] = EllipticRange(tuple(axes))
         elif frames[part.reference].parentJoint != frames[part.limb].parentJoint:
             found[name] = part
     return found
-
-
-def _without_locked(axis: EllipseAxis, kept: set[str], values: Mapping[str, float]) -> EllipseAxis:
-    still = sum(values[joint] for joint in axis.joints if joint not in kept)
-    return with_values(axis, joints=tuple(joint for joint in axis.joints if joint in kept), offset=axis.offset + still)
 
 
 def drop_rigid_pairs(geometry: pin.GeometryModel) -> list[ExcludedPair]:

@@ -14,22 +14,17 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.figures.description import ExcludedPair, limits_of
 from wholebody.figures.self_pairs import drop_pairs, random_postures
-from wholebody.figures.state import State
+from wholebody.figures.state import State, has_free_root
 from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 
 APART = 1e-3
 """Least distance of two pieces in the posture, metres."""
-
 
 LONGEST_STEP = 0.25
 """Largest change of a joint in one correction, radians or metres."""
 
 DAMPING = 1e-4
 """Square metres added to the diagonal of the normal equations; larger = shorter steps along singular directions."""
-
-
-BACK = (1.0, 0.5, 0.25)
-"""Shares of the motion back to zero that are tried for each joint, while the posture stays free."""
 
 UNPARTED = "overlap at zero, and no posture was found that parts them"
 
@@ -51,13 +46,7 @@ class RestPosture(NamedTuple):
 
 
 def rest_posture(model: pin.Model, geometry: pin.GeometryModel, seed: int) -> RestPosture:
-    """Find a posture near zero that is free of self-contact; pairs that cannot be separated are removed.
-
-    Args:
-        model: Pinocchio's model.
-        geometry: its pieces and the pairs that can touch.
-        seed: of the random starts.
-    """
+    """Find a posture near zero that is free of self-contact; pairs that cannot be separated are removed."""
     limits = limits_of(model)
     zero = pin.neutral(model)
     zero[limits.idx_q] = np.clip(zero[limits.idx_q], limits.lower, limits.upper)
@@ -102,7 +91,7 @@ class _Parting:
         self.proximity, self.state = Proximity(PairTable(model, geometry)), State(model)
         self.limits = limits_of(model)
         self.movable = np.ones(model.nv, dtype=bool)
-        if model.njoints > 1 and model.joints[1].nq == 7:
+        if has_free_root(model):
             self.movable[:6] = False
 
     def contacts(self, q: Array, within: float) -> Contacts:
@@ -131,7 +120,7 @@ class _Parting:
         """Move every joint back towards zero while the posture stays free, ignoring the pairs that are left out."""
         way = np.asarray(pin.difference(self.model, self.zero, q))
         for place in np.argsort(-np.abs(way), kind="stable").tolist():
-            for share in BACK:
+            for share in (1.0, 0.5, 0.25):
                 trial = way.copy()
                 trial[place] *= 1.0 - share
                 if abs(way[place]) > 1e-9 and self._free(np.asarray(pin.integrate(self.model, self.zero, trial)), left):

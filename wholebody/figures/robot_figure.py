@@ -16,6 +16,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError, InputError, WholebodyError
+from wholebody.base.records import with_values
 from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, JointCone
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, LinkShape, link_pieces
@@ -61,20 +62,14 @@ class Robot(NamedTuple):
 
 
 def robot_figure(robot: Robot, samples: int, seed: int) -> Figure:
-    """Return the figure of a robot.
-
-    Args:
-        robot: as its file has it.
-        samples: number of random postures for choosing the pairs.
-        seed: of those postures.
-    """
+    """Return the figure of a robot; its pairs are chosen by a number of random postures of a seed."""
     model, geometry, links = robot.model, robot.geometry, robot.links
     excluded = choose_pairs(model, geometry, samples, seed)
     if robot.untested is not None:
         told = [robot.untested(pair.first, pair.second) for pair in geometry.collisionPairs]
-        for reason in sorted(set(filter(None, told))):
-            told_now = [robot.untested(pair.first, pair.second) for pair in geometry.collisionPairs]
-            excluded += tuple(drop_pairs(geometry, [k for k, why in enumerate(told_now) if why == reason], reason))
+        gone = drop_pairs(geometry, [k for k, why in enumerate(told) if why], "")
+        named = [with_values(pair, reason=why) for pair, why in zip(gone, filter(None, told), strict=True)]
+        excluded += tuple(sorted(named, key=lambda pair: pair.reason))
     rest = rest_posture(model, geometry, seed)
     if robot.place is not None:
         rest.q[:7] = rest.zero[:7] = pin.SE3ToXYZQUAT(robot.place)
@@ -112,27 +107,20 @@ def _told(rest: RestPosture) -> list[str]:
 
 
 def check_size(model: pin.Model, path: Path) -> None:
-    """Refuse a model that needs more memory than this machine has.
+    """Refuse by an `InputError` a model that needs more memory than this machine has.
 
     Pinocchio's data has four tables of the cube of the degrees of freedom: 0.26 GB for 200 of them, 108 GB for 1,500.
-
-    Raises:
-        InputError: too many degrees of freedom.
     """
     needed = 4 * 4 * 8 * model.nv**3  # a scene with one problem has four of Pinocchio's data objects
-    if needed > machine_memory():
+    try:
+        memory = float(os.sysconf("SC_PAGE_SIZE")) * float(os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, ValueError, OSError):
+        return  # the system does not report it
+    if needed > memory:
         raise InputError(
             f"{path}: {model.nv} degrees of freedom need {needed / 1e9:.0f} GB, since Pinocchio keeps tables of their "
-            f"cube, and this machine has {machine_memory() / 1e9:.0f} GB; make joints fixed that need not move"
+            f"cube, and this machine has {memory / 1e9:.0f} GB; make joints fixed that need not move"
         )
-
-
-def machine_memory() -> float:
-    """Return the bytes of memory of this machine; inf if the system does not report it."""
-    try:
-        return float(os.sysconf("SC_PAGE_SIZE")) * float(os.sysconf("SC_PHYS_PAGES"))
-    except (AttributeError, ValueError, OSError):
-        return float("inf")
 
 
 def link_chains(model: pin.Model, links: Iterable[str]) -> dict[str, Chain]:
@@ -149,10 +137,9 @@ def link_chains(model: pin.Model, links: Iterable[str]) -> dict[str, Chain]:
 
 
 def visual_of_links(model: pin.Model, visuals: Iterable[LinkVisual]) -> pin.GeometryModel | None:
-    """Return what is drawn of links; None without anything.
+    """Return what is drawn of links, named by link and number; None without anything.
 
-    An object has the name of its link and a number. A mesh is named by its `meshPath` and scaled by its `meshScale`; it
-    is read when it is drawn, as that takes seconds.
+    A mesh is named by its `meshPath`; it is read when it is drawn, as that takes seconds.
     """
     made = []
     for number, (shape, color) in enumerate(visuals):
@@ -163,9 +150,7 @@ def visual_of_links(model: pin.Model, visuals: Iterable[LinkVisual]) -> pin.Geom
             file, scale = str(shape.file), np.array(shape.size)
         else:
             size = [max(length, SMALLEST) for length in shape.size]
-            solid = {"box": coal.Box, "sphere": coal.Sphere, "cylinder": coal.Cylinder, "capsule": coal.Capsule}[
-                shape.kind
-            ](*size)
+            solid = getattr(coal, shape.kind.capitalize())(*size)
         paint = np.array(COLOR if color is None else color)
         made.append(
             pin.GeometryObject(
@@ -176,14 +161,6 @@ def visual_of_links(model: pin.Model, visuals: Iterable[LinkVisual]) -> pin.Geom
     return geometry_model(made) if made else None
 
 
-class LinkGeometry(NamedTuple):
-    """The convex pieces of links; one sentence on each change; number of the shape that each piece belongs to."""
-
-    geometry: pin.GeometryModel
-    notes: tuple[str, ...]
-    shapes: tuple[int, ...]
-
-
 def geometry_of_links(
     model: pin.Model,
     shapes: Iterable[LinkShape],
@@ -191,13 +168,13 @@ def geometry_of_links(
     path: Path,
     named: bool = False,
     colors: Mapping[str, tuple[float, float, float, float]] = MappingProxyType({}),
-) -> LinkGeometry:
-    """Return the convex pieces of links, and one sentence on each change.
+) -> tuple[pin.GeometryModel, tuple[str, ...], tuple[int, ...]]:
+    """Return the convex pieces of links, sentences on changes, and the number of the shape of each piece.
 
     Args:
         model: Pinocchio's model.
         shapes: of the links.
-        concavity: see `link_pieces`.
+        concavity: see `urdf_figure`.
         path: of the file, for errors.
         named: whether a piece has the name of its shape in the file, and not "<link>:<k>".
         colors: link to red, green, blue, alpha; the pieces of other links have the colour of a robot.
@@ -228,4 +205,4 @@ def geometry_of_links(
             piece.overrideMaterial = shape.link in colors  # Pinocchio's sign that a viewer shall use this colour
             made.append(piece)
             numbers.append(number)
-    return LinkGeometry(geometry_model(made), tuple(notes), tuple(numbers))
+    return geometry_model(made), tuple(notes), tuple(numbers)

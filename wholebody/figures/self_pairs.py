@@ -13,7 +13,6 @@ from wholebody.figures.description import ExcludedPair
 SELDOM = 0.02
 """Share of the sampled postures: pairs that are free in at most this share are left out, as nested shells."""
 
-
 UNLIMITED = np.pi
 """Range in both directions for sampling joints without limits: radians, or metres for prismatic joints."""
 
@@ -23,16 +22,7 @@ def choose_pairs(model: pin.Model, geometry: pin.GeometryModel, samples: int, se
 
     Pairs of pieces on one link or joint are left out, and pairs of neighbours (no piece on any joint between them).
     Pairs that touch or overlap in nearly all of a number of random postures within the limits are left out too: they
-    are nested shells, which almost no posture separates.
-
-    Args:
-        model: Pinocchio's model.
-        geometry: its pieces; the pairs are replaced.
-        samples: number of random postures.
-        seed: of those postures.
-
-    Returns:
-        The pairs left out, with the reason.
+    are nested shells, which almost no posture separates. Returned are the pairs left out, with the reason.
     """
     geometry.removeAllCollisionPairs()
     joint = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
@@ -40,7 +30,6 @@ def choose_pairs(model: pin.Model, geometry: pin.GeometryModel, samples: int, se
     first, second = np.triu_indices(geometry.ngeoms, 1)
     a, b = joint[first], joint[second]
     together, neighbours = a == b, (above[a] == b) | (above[b] == a)
-    gone: list[int] = []
     tested = np.flatnonzero(~together & ~neighbours)
     names = [piece.name for piece in geometry.geometryObjects]
     excluded = [
@@ -50,14 +39,14 @@ def choose_pairs(model: pin.Model, geometry: pin.GeometryModel, samples: int, se
     for i, j in zip(first[tested].tolist(), second[tested].tolist(), strict=True):
         geometry.addCollisionPair(pin.CollisionPair(i, j))
     postures = random_postures(model, samples, seed)
-    for number, seldom in _seldom_free(model, geometry, postures).items():
+    touching = _seldom_free(model, geometry, postures)
+    for number, seldom in touching.items():
         reason = "touch or overlap in every sampled posture"
         if seldom:
             reason = f"touch or overlap in all but {seldom} of {samples} sampled postures"
         pair = geometry.collisionPairs[number]
         excluded.append(ExcludedPair(names[pair.first], names[pair.second], reason))
-        gone.append(number)
-    drop_pairs(geometry, gone, "")
+    drop_pairs(geometry, touching, "")
     return tuple(excluded)
 
 

@@ -70,6 +70,7 @@ class State:
         self._joints = placement_view(self.data.oMi)
         self._frames: dict[int, pin.SE3] = {}
         self._center_of_mass: Array | None = None
+        self._spare: pin.Data | None = None
         self._companions: dict[object, State] = {}
         self.update(self.q)
 
@@ -127,16 +128,7 @@ class State:
         return placement
 
     def rows(self, wrenches: Array, joint: NDArray[np.intp], against: NDArray[np.intp]) -> Array:
-        """Jacobian rows of k wrenches, each between its own two joints.
-
-        Args:
-            wrenches: (k, 6).
-            joint: (k,) joints that carry what moves.
-            against: (k,) joints it moves relative to; 0 is the world.
-
-        Returns:
-            (k, nv) rows for the tangent displacement of the posture.
-        """
+        """Jacobian rows (k, nv) of k wrenches (k, 6), each between its own two joints (k,), see `Wrench`."""
         return self.folded((wrenches @ self.jacobian) * (self.support[joint] - self.support[against]))
 
     def wrench_jacobian(self, wrench: Wrench) -> Array:
@@ -172,12 +164,9 @@ class State:
 
         Works on data of its own, because Pinocchio's routine overwrites the joint Jacobians.
         """
-        return np.array(pin.jacobianCenterOfMass(self.model, self._spare(), self.q)).reshape(3, -1)
-
-    def _spare(self) -> pin.Data:
-        if not hasattr(self, "_spare_data"):
-            self._spare_data = self.model.createData()
-        return self._spare_data
+        if self._spare is None:
+            self._spare = self.model.createData()
+        return np.array(pin.jacobianCenterOfMass(self.model, self._spare, self.q)).reshape(3, -1)
 
 
 def _restored(model: pin.Model, q: Array) -> State:

@@ -7,8 +7,8 @@ from collections.abc import Collection
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.geometry.pair_distances import SinglePairs
 from wholebody.geometry.proximity import Contacts, PairTable
-from wholebody.geometry.single_pairs import SinglePairs
 
 AT_ONCE = 1_000_000  # pairs of boxes that are compared in one go; more = more memory, 50 bytes each
 

@@ -18,11 +18,11 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
-from wholebody.geometry.proximity import COAL_ACCURACY, Contacts, PairTable
+from wholebody.geometry.pieces import COAL_ACCURACY
+from wholebody.geometry.proximity import Contacts, PairTable
 
 BAND = 0.02  # m: swept points this much farther than the witness point still make a row; wider = more rows
 LEVER_DISTANCE = 0.025  # m: pairs that are this much farther apart than they must be get their witness row only
@@ -68,18 +68,12 @@ class ContactRowBuilder:
         self.table, self.most_ends = table, most_ends
         self._lengths = LENGTHS.copy()
         self._lengths[4] = same_normal
-        shapes = table.swept
-        self._points = np.vstack([swept.points for swept in shapes] or [np.zeros((0, 3))])
-        self._point_count = np.array([len(swept.points) for swept in shapes], dtype=np.intp)
-        self._point_start = np.concatenate([[0], np.cumsum(self._point_count)])[:-1].astype(np.intp)
-        self._faces = np.vstack([swept.faces for swept in shapes] or [np.zeros((0, 4))])
-        self._face_count = np.array([len(swept.faces) for swept in shapes], dtype=np.intp)
-        self._face_start = np.concatenate([[0], np.cumsum(self._face_count)])[:-1].astype(np.intp)
-        self._radius = np.array([swept.radius for swept in shapes])
-        self._axis = np.array([swept.axis for swept in shapes]).reshape(-1, 3)
-        self._is_capsule: NDArray[np.bool_] = np.asarray(self._axis.any(axis=1))
-        flat = (self._point_count >= 2) | np.isinf(table.reach)
+        flat = (np.diff(table.first_point) >= 2) | np.isinf(table.reach)
         self._extended = flat[table.pairs].all(axis=1)
+        self._arrays = (
+            self._extended, table.joint, self._lengths, table.points, table.first_point, table.faces, table.first_face,
+            table.radius, table.axis,
+        )  # fmt: skip
         self._kernel = compiled_kernel()
 
     def rows(self, contacts: Contacts, clearance: Array | float = 0.0) -> ContactRows:
@@ -106,31 +100,22 @@ class ContactRowBuilder:
         wrench, gap = np.empty((most, 6)), np.empty(most)
         contact, joints = np.empty(most, dtype=np.intp), np.empty((most, 2), dtype=np.intp)
         asked = np.full(contacts.distance.shape, clearance, dtype=float)  # not a view: numba takes it for another type
-        count = self.write(contacts, asked, wrench, gap, contact, joints)
+        count = self.write(contacts, asked, (wrench, gap, contact, joints))
         return ContactRows(
             gap[:count].copy(), wrench[:count].copy(), contact[:count].copy(), joints[:count, 0].copy(),
             joints[:count, 1].copy(),
         )  # fmt: skip
 
-    def write(
-        self, contacts: Contacts, clearance: Array, wrench: Array, gap: Array, contact: Indices, joints: Indices
-    ) -> int:
+    def write(self, contacts: Contacts, clearance: Array, room: tuple[Array, Array, Indices, Indices]) -> int:
         """Write the rows of all contacts into arrays with room for ``k * (1 + most_ends)`` rows; how many there are.
 
         Args:
             contacts: the near pairs of the same pieces.
             clearance: (k,) distance asked of each, metres.
-            wrench: (rows, 6) room.
-            gap: (rows,) room.
-            contact: (rows,) room for the contact that a row belongs to.
-            joints: (rows, 2) room for the joints of its first and second piece.
+            room: for the wrenches (rows, 6), the gaps (rows,), the contact that each row belongs to (rows,), and the
+                joints of its first and second piece (rows, 2).
         """
-        count: int = self._kernel.contact_rows(
-            contacts.pair, contacts.distance, contacts.normal, contacts.point_a, contacts.point_b, contacts.number,
-            contacts.placements, clearance, self._extended, self.table.joint, self._points, self._point_start,
-            self._point_count, self._faces, self._face_start, self._face_count, self._radius, self._axis,
-            self._is_capsule, self._lengths, self.most_ends, wrench, gap, contact, joints,
-        )  # fmt: skip
+        count: int = self._kernel.contact_rows(contacts[:], clearance, self._arrays, self.most_ends, room)
         return count
 
 
@@ -139,11 +124,10 @@ def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
     from wholebody.geometry import patch_kernel
 
-    none, points, lengths = np.zeros(0, dtype=np.intp), np.zeros((0, 3)), np.zeros(0)
+    none, points, lengths, yes = np.zeros(0, dtype=np.intp), np.zeros((0, 3)), np.zeros(0), np.zeros(0, dtype=bool)
     pair, faces, placement = np.zeros((0, 2), dtype=np.intp), np.zeros((0, 4)), np.zeros((0, 4, 3))
-    patch_kernel.contact_rows(
-        pair, lengths, points, points, points, none, placement, lengths, np.zeros(0, dtype=bool), none, points, none,
-        none, faces, none, none, lengths, points, np.zeros(0, dtype=bool), LENGTHS, MOST_ENDS, np.zeros((0, 6)),
-        lengths, none, pair,
-    )  # fmt: skip
+    contacts = pair, lengths, points, points, points, none, placement
+    table = yes, none, LENGTHS, points, none, faces, none, lengths, points
+    room = np.zeros((0, 6)), lengths, none, pair
+    patch_kernel.contact_rows(contacts, lengths, table, MOST_ENDS, room)
     return patch_kernel

@@ -41,6 +41,12 @@ def geometry_model(pieces: Sequence[pin.GeometryObject], pairs: Indices | None =
     return geometry
 
 
+def pairs_of(geometry: pin.GeometryModel) -> Indices:
+    """(k, 2) the two pieces of each collision pair."""
+    listed = [(pair.first, pair.second) for pair in geometry.collisionPairs]
+    return np.array(listed, dtype=np.intp).reshape(-1, 2)
+
+
 def add_pairs(geometry: pin.GeometryModel, pairs: Indices) -> None:
     """Add pairs (k, 2) that a model does not have, the lesser index first."""
     tabled = geometry.collisionPairMapping.size == geometry.ngeoms**2

@@ -1,17 +1,8 @@
 """Numpy views of Pinocchio's own vectors, which read hundreds of results without a Python loop.
 
 Reading `distanceResults[k].min_distance` for 760 pairs one by one takes 205 us; through the view it takes 5 us.
-Both layouts are checked entry by entry when a view is made. If a check fails (another build of Pinocchio), the
-caller gets None and reads through the official getters instead.
-
-coal's cached guesses: for each pair, the end of its last search for the nearest points.
-
-A search that begins there is a fifth faster. It ends within 1e-6 m of the result of any other search, but not at
-exactly the same number. Code that must be repeatable clears these guesses first.
-
-coal also keeps one decision for the whole process: whether boxes have their exact size, or 1 + 1e-10 times that. The
-first query of a box decides it, by whether its direction has a zero component (coal 3.0.2, a static variable of its
-support functions of boxes: one for half-spaces, another for GJK). `fix_box_inflation` makes that first query for each.
+The layouts are checked when a view is made. If a check fails (another build of Pinocchio), the caller gets None and
+reads through the official getters instead.
 """
 
 from __future__ import annotations
@@ -32,6 +23,7 @@ RESULT_NORMAL = 64  # offset of its normal; the distance is in the 8 bytes befor
 RESULT_DOUBLES = RESULT_STRIDE // 8
 RESULT_FIRST = RESULT_NORMAL // 8 - 1  # of these: distance, normal, nearest point of the first, of the second
 RESULT_FIELDS = 10
+REQUEST_STRIDE = 128  # bytes of a coal.DistanceRequest
 
 
 def address(array: NDArray[Any]) -> int:
@@ -59,11 +51,15 @@ def placement_view(placements: Any) -> Array | None:
     return np.lib.stride_tricks.as_strided(first, (count, 4, 3), (SE3_STRIDE, 24, 8))
 
 
+def computed_first(count: int) -> list[int]:
+    """The results that `result_view` compares, of so many: compute these before it is called."""
+    return sorted({0, count // 3, count // 2, count - 1}) if count else []
+
+
 def result_view(results: Any) -> Array | None:
     """View of a StdVec_DistanceResult as (n, 20) doubles without gaps, of which `fields` have a meaning.
 
-    Call it after every pair was computed once, so that the contents can be checked. Returns None if the layout in
-    memory is not as expected.
+    Returns None if the layout in memory is not as expected.
     """
     count = len(results)
     if count == 0:
@@ -74,7 +70,7 @@ def result_view(results: Any) -> Array | None:
             return None
     buffer = (ctypes.c_char * (RESULT_STRIDE * count)).from_address(base - RESULT_NORMAL)
     view: Array = np.ndarray((count, RESULT_DOUBLES), float, buffer=memoryview(buffer))
-    for i in {0, count // 3, count // 2, count - 1}:
+    for i in computed_first(count):
         if not np.array_equal(fields(view)[i], read_result(results[i]), equal_nan=True):
             return None
     return view
@@ -85,52 +81,13 @@ def fields(view: Array) -> Array:
     return view[:, RESULT_FIRST : RESULT_FIRST + RESULT_FIELDS]
 
 
-def distance_view(results: Any) -> Array | None:
-    """The `fields` (n, 10) of a StdVec_DistanceResult, or None: see `result_view`."""
-    view = result_view(results)
-    return None if view is None else fields(view)
-
-
 def read_result(result: Any) -> Array:
-    """One DistanceResult through its official getters, as the row of `distance_view`."""
+    """One DistanceResult through its official getters, as a row of `fields`."""
     return np.concatenate([[result.min_distance], result.normal, result.getNearestPoint1(), result.getNearestPoint2()])
 
 
-REQUEST_STRIDE = 128  # bytes of a coal.DistanceRequest
-FIRST_DIRECTION = (1.0, 0.0, 0.0)  # coal's own guess for a pair it has not seen
-
-
-class Guesses:
-    """The guesses of all pairs of a pin.GeometryData, as arrays if their layout in memory is as expected."""
-
-    def __init__(self, results: Any) -> None:
-        """Make views of the guesses; the views do not own the memory, so a reference to the data is kept."""
-        self._requests = results.distanceRequests
-        self._views = _views(self._requests)
-
-    def reset(self) -> None:
-        """Reset the guess of every pair to coal's initial guess."""
-        if self._views is not None:
-            directions, vertices = self._views
-            directions[:] = FIRST_DIRECTION
-            vertices[:] = 0
-            return
-        for request in self._requests:
-            request.cached_gjk_guess = np.array(FIRST_DIRECTION)
-            request.cached_support_func_guess = np.zeros(2, dtype=np.int32)
-
-
-def fix_box_inflation() -> None:
-    """Make coal use the exact size of boxes in this process, whatever queries follow."""
-    direction = np.full(3, 3.0**-0.5)
-    turned = coal.Transform3s(pin.exp3(direction), np.full(3, 3.0))
-    here, box = coal.Transform3s(), coal.Box(1.0, 1.0, 1.0)
-    for other in (coal.Halfspace(direction, 0.0), coal.Ellipsoid(1.0, 1.0, 1.0)):
-        coal.distance(other, here, box, turned, coal.DistanceRequest(), coal.DistanceResult())
-
-
-def _views(requests: Any) -> tuple[NDArray[np.float64], NDArray[np.int32]] | None:
-    """Views (n, 3) of the directions and (n, 2) of the vertices; None if the layout in memory is not as expected."""
+def guess_views(requests: Any) -> tuple[NDArray[np.float64], NDArray[np.int32]] | None:
+    """Views of coal's guesses, (n, 3) directions and (n, 2) vertices; None if their layout is not as expected."""
     count = len(requests)
     if count == 0:
         return np.zeros((0, 3)), np.zeros((0, 2), dtype=np.int32)
@@ -148,3 +105,17 @@ def _views(requests: Any) -> tuple[NDArray[np.float64], NDArray[np.int32]] | Non
         np.lib.stride_tricks.as_strided(direction, (count, 3), (REQUEST_STRIDE, 8)),
         np.lib.stride_tricks.as_strided(vertices, (count, 2), (REQUEST_STRIDE, 4)),
     )
+
+
+def fix_box_inflation() -> None:
+    """Make coal use the exact size of boxes in this process, whatever queries follow.
+
+    Otherwise the first query of a box decides for the whole process whether boxes have their exact size or 1 + 1e-10
+    times that, by whether its direction has a zero component (coal 3.0.2, a static variable of its support functions of
+    boxes: one for half-spaces, another for GJK).
+    """
+    direction = np.full(3, 3.0**-0.5)
+    turned = coal.Transform3s(pin.exp3(direction), np.full(3, 3.0))
+    here, box = coal.Transform3s(), coal.Box(1.0, 1.0, 1.0)
+    for other in (coal.Halfspace(direction, 0.0), coal.Ellipsoid(1.0, 1.0, 1.0)):
+        coal.distance(other, here, box, turned, coal.DistanceRequest(), coal.DistanceResult())

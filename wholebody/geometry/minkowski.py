@@ -15,7 +15,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
-from wholebody.geometry.proximity import COAL_ACCURACY
+from wholebody.geometry.pieces import COAL_ACCURACY
 from wholebody.geometry.swept_points import SweptPoints, swept_points
 
 Placed: TypeAlias = tuple[Any, pin.SE3]

@@ -2,41 +2,42 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from typing import TypeAlias
 
-from wholebody.base.arrays import Array, Indices
+import numpy as np
+
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
+
+ContactArrays: TypeAlias = tuple[Indices, Array, Array, Array, Array, Indices, Array]
+"""A `Contacts` as a plain tuple, which numba reads at no cost; a named one takes it 2 us a call."""
+
+ShapeArrays: TypeAlias = tuple[Array, Indices, Array, Indices, Array, Array]
+"""`points`, `first_point`, `faces`, `first_face`, `radius` and `axis` of the pair table."""
+
+TableArrays: TypeAlias = tuple[Mask, Indices, Array, Array, Indices, Array, Indices, Array, Array]
+"""Whether both pieces of a pair have more than one swept point (pairs,), and the joint of each piece (n,); lever
+distance, band, inset, shortest lever, cosine of the same normal, room for it and setback; the arrays of the shapes."""
+
+RowArrays: TypeAlias = tuple[Array, Array, Indices, Indices]
+"""Room for the wrench (m, 6), gap (m,), contact (m,) and both joints (m, 2) of each row."""
 
 
 @compiled(inner=True)
-def snap_normals(
-    wide: Indices,
-    pair: Indices,
-    distance: Array,
-    normal: Array,
-    placement: Array,
-    points: Array,
-    point_start: Indices,
-    point_count: Indices,
-    faces: Array,
-    face_start: Indices,
-    face_count: Indices,
-    radius: Array,
-    near: float,
-    accuracy: float,
-) -> None:
-    """Put the exact normal of a face where coal's is that normal but for rounding; `normal` is changed in place."""
+def _snap_normals(wide: Indices, contacts: ContactArrays, shapes: ShapeArrays, near: float, accuracy: float) -> None:
+    """Put the exact normal of a face where coal's is that normal but for rounding; normals are changed in place."""
+    pair, distance, normal, _, _, _, placement = contacts
+    points, first_point, faces, first_face, radius, _ = shapes
     direction, turned = np.empty(3), np.empty(3)
     for c in wide:
         found = False
         for side in range(2):
             own, other = pair[c, side], pair[c, 1 - side]
-            if found or radius[own] > 0.0 or point_count[other] == 0:
+            if found or radius[own] > 0.0 or first_point[other] == first_point[other + 1]:
                 continue
             sign = 1.0 if side == 0 else -1.0
             _to_frame(placement[own], normal[c], sign, turned)
-            for f in range(face_start[own], face_start[own] + face_count[own]):
+            for f in range(first_face[own], first_face[own + 1]):
                 if faces[f, 0] * turned[0] + faces[f, 1] * turned[1] + faces[f, 2] * turned[2] < near:
                     continue
                 base = faces[f, 3]
@@ -49,7 +50,7 @@ def snap_normals(
                     base += direction[k] * (placement[own, 3, k] - placement[other, 3, k])
                 _to_frame(placement[other], direction, 1.0, turned)
                 least = np.inf
-                for p in range(point_start[other], point_start[other] + point_count[other]):
+                for p in range(first_point[other], first_point[other + 1]):
                     height = points[p, 0] * turned[0] + points[p, 1] * turned[1] + points[p, 2] * turned[2]
                     least = min(least, height)
                 if least - base - radius[other] >= distance[c] - accuracy:
@@ -68,38 +69,19 @@ def _to_frame(placement: Array, vector: Array, sign: float, turned: Array) -> No
 
 
 @compiled(inner=True)
-def patch_ends(
-    wide: Indices,
-    pair: Indices,
-    distance: Array,
-    normal: Array,
-    point_a: Array,
-    point_b: Array,
-    placement: Array,
-    points: Array,
-    point_start: Indices,
-    point_count: Indices,
-    faces: Array,
-    face_start: Indices,
-    face_count: Indices,
-    radius: Array,
-    axis: Array,
-    is_capsule: NDArray[np.bool_],
-    band: float,
-    inset: float,
-    shortest: float,
-    setback: float,
-    most_ends: int,
+def _patch_ends(
+    wide: Indices, contacts: ContactArrays, shapes: ShapeArrays, lengths: Array, most_ends: int
 ) -> tuple[Indices, Array, Array]:
-    """Ends of the patches of the contacts `wide`, at most `most_ends` each; arguments as in `ContactRowBuilder`.
-
-    Returns:
-        Contact (m,), point (m, 3) and gap (m,) of each row.
-    """
+    """Ends of the patches of the contacts `wide`, at most `most_ends` each: contact (m,), point (m, 3) and gap (m,)."""
+    pair, distance, normal, point_a, point_b, _, placement = contacts
+    points, first_point, faces, first_face, radius, axis = shapes
+    band, inset, shortest, setback = lengths[1], lengths[2], lengths[3], lengths[6]
     most, most_points = 0, 0
     for c in wide:
-        most += point_count[pair[c, 0]] + point_count[pair[c, 1]]
-        most_points = max(most_points, point_count[pair[c, 0]], point_count[pair[c, 1]])
+        for side in range(2):
+            points_of_one = first_point[pair[c, side] + 1] - first_point[pair[c, side]]
+            most += points_of_one
+            most_points = max(most_points, points_of_one)
     contact = np.empty(most, dtype=np.intp)
     place = np.empty((most, 3))
     gap = np.empty(most)
@@ -115,6 +97,7 @@ def patch_ends(
             sign = 1.0 if side == 0 else -1.0
             witness = point_a[c] if side == 0 else point_b[c]
             facing = point_b[c] if side == 0 else point_a[c]
+            capsule = axis[other, 0] != 0.0 or axis[other, 1] != 0.0 or axis[other, 2] != 0.0
             begun = filled
             whole = True
             half_width = np.sqrt(2.0 * radius[other] * inset)
@@ -126,7 +109,7 @@ def patch_ends(
             _to_frame(placement[own], normal[c], sign, down)
             count = 0
             longest = 0.0
-            for number in range(point_start[own], point_start[own] + point_count[own]):
+            for number in range(first_point[own], first_point[own + 1]):
                 height = above + points[number, 0] * down[0] + points[number, 1] * down[1] + points[number, 2] * down[2]
                 if -height - radius[own] >= band:
                     continue
@@ -149,7 +132,7 @@ def patch_ends(
                         + placement[other, i, 1] * lever[1, e]
                         + placement[other, i, 2] * lever[2, e]
                     )
-            for f in range(face_start[other], face_start[other] + face_count[other] if count else 0):
+            for f in range(first_face[other], first_face[other + 1] if count else 0):
                 x, y, z = faces[f, 0], faces[f, 1], faces[f, 2]
                 room = faces[f, 3] - x * base[0] - y * base[1] - z * base[2]
                 if room < longest:  # else no lever leads out of this face
@@ -161,7 +144,7 @@ def patch_ends(
             for e in range(count):
                 reach = 1.0 / worst[e]
                 sag = 0.0
-                if is_capsule[other]:
+                if capsule:
                     _to_frame(placement[other], normal[c], sign, shift)
                     across0 = axis[other, 1] * shift[2] - axis[other, 2] * shift[1]
                     across1 = axis[other, 2] * shift[0] - axis[other, 0] * shift[2]
@@ -232,38 +215,20 @@ def _farthest_first(place: Array, gap: Array, witness: Array, distance: float, s
 
 
 @compiled()
-def contact_rows(
-    pair: Indices,
-    distance: Array,
-    normal: Array,
-    point_a: Array,
-    point_b: Array,
-    number: Indices,
-    placement: Array,
-    clearance: Array,
-    extended: NDArray[np.bool_],
-    joint: Indices,
-    points: Array,
-    point_start: Indices,
-    point_count: Indices,
-    faces: Array,
-    face_start: Indices,
-    face_count: Indices,
-    radius: Array,
-    axis: Array,
-    is_capsule: NDArray[np.bool_],
-    lengths: Array,
-    most_ends: int,
-    wrench: Array,
-    gap: Array,
-    contact: Indices,
-    joints: Indices,
-) -> int:
+def contact_rows(contacts: ContactArrays, clearance: Array, table: TableArrays, most_ends: int, room: RowArrays) -> int:
     """Write the rows of all contacts, as `ContactRowBuilder.write` does; how many there are.
 
-    `lengths` holds the lever distance, band, inset, shortest lever, cosine of the same normal, room for it and setback;
-    the other arguments are as in `ContactRowBuilder` and `Contacts`.
+    Args:
+        contacts: the near pairs.
+        clearance: (k,) distance asked of each, metres.
+        table: of the pieces.
+        most_ends: rows of one contact beside the witness row.
+        room: for the rows.
     """
+    pair, distance, normal, point_a, _, number, _ = contacts
+    extended, joint, lengths, points, first_point, faces, first_face, radius, axis = table
+    shapes = points, first_point, faces, first_face, radius, axis
+    wrench, gap, contact, joints = room
     count = len(distance)
     wide = np.empty(count, dtype=np.intp)
     found = 0
@@ -273,20 +238,14 @@ def contact_rows(
             found += 1
     wide = wide[:found]
     if found:
-        snap_normals(
-            wide, pair, distance, normal, placement, points, point_start, point_count, faces, face_start, face_count,
-            radius, lengths[4], lengths[5],
-        )  # fmt: skip
+        _snap_normals(wide, contacts, shapes, lengths[4], lengths[5])
     for c in range(count):
         gap[c], contact[c] = distance[c], c
         joints[c, 0], joints[c, 1] = joint[pair[c, 0]], joint[pair[c, 1]]
         _wrench(normal[c], point_a[c], wrench[c])
     if not found:
         return count
-    owner, place, open_by = patch_ends(
-        wide, pair, distance, normal, point_a, point_b, placement, points, point_start, point_count, faces, face_start,
-        face_count, radius, axis, is_capsule, lengths[1], lengths[2], lengths[3], lengths[6], most_ends,
-    )  # fmt: skip
+    owner, place, open_by = _patch_ends(wide, contacts, shapes, lengths, most_ends)
     for e in range(len(owner)):
         c, row = owner[e], count + e
         gap[row], contact[row] = open_by[e], c

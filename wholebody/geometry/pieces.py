@@ -12,6 +12,10 @@ from wholebody.base.arrays import Array
 SMALLEST = 1e-4
 """Least extent of a piece, metres: below 1e-5 m coal reads gaps as zero, and at 1e-6 m it loses the depth."""
 
+COAL_ACCURACY = 1e-6  # m: of coal's distances
+
+ENDLESS = 1e9  # m: what counts for the reach of a half-space, and half the size of its box
+
 LARGEST = 1e4
 """Greatest extent of a piece, metres: coal's distances are still right to micrometres there."""
 

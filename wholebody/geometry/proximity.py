@@ -15,19 +15,17 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.checks import number
-from wholebody.geometry.memory_views import RESULT_DOUBLES, Guesses, fields, placement_view, read_result, result_view
-from wholebody.geometry.single_pairs import KEPT, SinglePairs, pair_data
+from wholebody.geometry.large_models import pairs_of
+from wholebody.geometry.memory_views import RESULT_DOUBLES, fields
+from wholebody.geometry.pair_distances import PairDistances
+from wholebody.geometry.pieces import COAL_ACCURACY, ENDLESS
 from wholebody.geometry.swept_points import swept_points
 
-COAL_ACCURACY = 1e-6  # m: of coal's distances
 PENETRATION = 1e-5  # m: deeper than this a pair is called inside of each other; what touches is solved to it
 
 SINGLY = 3000
 """Pairs of a scene from which on those that survive are asked one by one: to go through all that are not asked takes
 Pinocchio 1 ns for each of them, to be called 200 ns for each that is."""
-
-AWAY = 10.0  # m: between pieces that stand anywhere
-ENDLESS = 1e9  # m: what counts for the reach of a half-space, and half the size of its box
 
 
 class Contacts(NamedTuple):
@@ -89,6 +87,7 @@ class _ContactBuffer:
         vectors: (3, size, 3) normals, points on the first and on the second piece.
         number: (size,).
         pair: (size, 2).
+        arrays: these four.
     """
 
     def __init__(self, size: int) -> None:
@@ -96,6 +95,7 @@ class _ContactBuffer:
         self.size = size
         self.distance, self.vectors = np.empty(size), np.empty((3, size, 3))
         self.number, self.pair = np.empty(size, dtype=np.intp), np.empty((size, 2), dtype=np.intp)
+        self.arrays = self.distance, self.vectors, self.number, self.pair
         self._front: dict[int, Contacts] = {}
 
     def contacts(self, count: int, placements: Array) -> Contacts:
@@ -124,6 +124,9 @@ class PairTable:
         points: (m, 3) swept points of all pieces, one piece after the other, each in its piece's frame.
         first_point: (n + 1,) where those of each piece begin.
         radius: (n,) around them, metres.
+        axis: (n, 3) unit direction of a capsule in its own frame; zero for everything else.
+        faces: (f, 4) outward planes of all pieces, see `SweptPoints.faces`.
+        first_face: (n + 1,) where those of each piece begin.
         points_meet: (pairs,) distance at and below which coal's normal means nothing, metres; -inf for most pairs.
     """
 
@@ -140,23 +143,25 @@ class PairTable:
         """
         self.model, self.geometry = model, geometry
         self.swept = [swept_points(piece.geometry) for piece in geometry.geometryObjects]
-        if pairs is None:
-            listed = [[pair.first, pair.second] for pair in geometry.collisionPairs]
-            pairs = np.array(listed, dtype=np.intp).reshape(-1, 2)
-        self.pairs: Indices = pairs
+        self.pairs: Indices = pairs_of(geometry) if pairs is None else pairs
         self.joint: Indices = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
         self.reach = np.array([swept.reach for swept in self.swept]).reshape(-1)
         self.half = np.minimum(np.array([swept.half for swept in self.swept]).reshape(-1, 3), ENDLESS)
         width = np.array([swept.width for swept in self.swept]).reshape(-1)
         self.widths: Array = width[self.pairs].sum(axis=1)
         radius = self.radius = np.array([swept.radius for swept in self.swept]).reshape(-1)
-        self.points = np.concatenate([np.zeros((0, 3)), *(swept.points for swept in self.swept)])
-        counts = [len(swept.points) for swept in self.swept]
-        self.first_point: Indices = np.cumsum([0, *counts], dtype=np.intp)
+        self.axis: Array = np.array([swept.axis for swept in self.swept]).reshape(-1, 3)
+        self.points, self.first_point = _joined([np.zeros((0, 3)), *(swept.points for swept in self.swept)])
+        self.faces, self.first_face = _joined([np.zeros((0, 4)), *(swept.faces for swept in self.swept)])
         # where round pieces' swept points meet, coal's normal is zero or noise along an axis
         self.points_meet = np.where(
             (radius[self.pairs] > 0.0).all(axis=1), COAL_ACCURACY - radius[self.pairs].sum(axis=1), -np.inf
         )
+
+
+def _joined(parts: list[Array]) -> tuple[Array, Indices]:
+    """The rows of all parts, the first of which is empty, and where those of each part begin."""
+    return np.concatenate(parts), np.cumsum([len(part) for part in parts], dtype=np.intp)
 
 
 class Kinematics(Protocol):
@@ -183,6 +188,7 @@ class Proximity:
         geometry: the geometry model with the pieces' own placements.
         seconds: what all queries have taken together.
         asked: how many distances coal was asked for.
+        distances: what asks it, and `results`, Pinocchio's data.
     """
 
     def __init__(self, table: PairTable) -> None:
@@ -191,49 +197,38 @@ class Proximity:
         self.geometry = table.geometry.copy()  # shapes are shared
         self.seconds = 0.0
         self.asked = 0
-        self.results = pair_data(self.geometry, len(table.pairs))
-        self._guesses = Guesses(self.results)
+        self.distances = PairDistances(self.geometry, table.pairs)
+        self.results = self.distances.data
         self._kernel = compiled_kernel()
         count, pairs = self.geometry.ngeoms, len(table.pairs)
-        self._singly = pairs >= SINGLY
-        self._index, self._changed = np.zeros((2, pairs), dtype=np.intp)
-        self._marked, self._count = np.zeros(pairs, dtype=np.intp), 0
-        self._travelled, self._bound = np.zeros(count), np.full(pairs, -np.inf)
-        self._endless = np.full(pairs, np.inf)
+        self._marks, self._count = np.zeros((3, pairs), dtype=np.intp), 0
+        self._travelled, self._endless = np.zeros(count), np.full(pairs, np.inf)
+        self._bound = np.array([self._endless, table.points_meet])
         self._placed, self._buffer = np.zeros((count, 4, 3)), _ContactBuffer(64)
-        self._last, self._extent = np.zeros((count, 4, 3)), np.zeros((count, 3))
-        self._lay_views()
+        self._looked = (
+            table.pairs, table.reach, table.half, np.zeros((count, 4, 3)), self._travelled, self._bound,
+            np.zeros((count, 3)), self._marks,
+        )  # fmt: skip
+        self._gathered = table.pairs, self._travelled, self._bound
+        # memory that is never written takes none
+        self._read = None if self.distances.kept else np.zeros((pairs, RESULT_DOUBLES))
+        self.reset()
 
     def reset(self) -> None:
         """Forget how near each pair was and where coal ended for it: the same queries give the same answers again."""
-        self._guesses.reset()
+        self.distances.reset()
         self._ask_nothing()
         self._travelled[:] = 0.0
-        self._bound[:] = -np.inf
+        self._bound[0] = -np.inf
 
     def place_piece(self, index: int, placement: pin.SE3) -> None:
         """Place a piece anew in its joint's frame."""
         self.geometry.geometryObjects[index].placement = placement
 
-    def _lay_views(self) -> None:
-        for k in range(self.geometry.ngeoms):  # anywhere apart: views are laid over results that were computed
-            self.results.oMg[k] = pin.SE3(np.eye(3), np.array([AWAY * k, 0.0, 0.0]))
-        self._kept, self._single = len(self.table.pairs) <= KEPT, SinglePairs(self.geometry)
-        if self._kept:
-            pin.computeDistances(self.geometry, self.results)
-            self._distances = result_view(self.results.distanceResults)
-        else:  # memory that is never written takes none
-            pin.updateGeometryPlacements(self.table.model, self.table.model.createData(), self.geometry, self.results)
-            self._distances = np.zeros((len(self.table.pairs), RESULT_DOUBLES))
-        self._placements = placement_view(self.results.oMg)
-        self.reset()
-
     def placements(self, state: Kinematics) -> Array:
         """Placements (n, 4, 3) of the pieces with the joints as in `state`; see `Contacts.placements`."""
-        pin.updateGeometryPlacements(self.table.model, state.data, self.geometry, self.results)
-        if self._placements is not None:
-            return np.array(self._placements)
-        return np.array([[*M.rotation.T, M.translation] for M in self.results.oMg], dtype=float).reshape(-1, 4, 3)
+        self.distances.place(self.table.model, state.data)
+        return np.array(self.distances.placed)
 
     def query(self, state: Kinematics, within: float, most: Array | None = None) -> Contacts:
         """Every pair nearer than `within` metres with the joints as in `state`, in the order of the pairs.
@@ -252,12 +247,9 @@ class Proximity:
     def query_views(self, state: Kinematics, within: float, most: Array | None = None) -> Contacts:
         """What `query` returns, in arrays that the next call of this overwrites."""
         began = time.perf_counter()
-        if self._placements is None:
-            placements = self.placements(state)
-        else:
-            pin.updateGeometryPlacements(self.table.model, state.data, self.geometry, self.results)
-            placements = self._placed
-            placements[:] = self._placements
+        self.distances.place(self.table.model, state.data)
+        placements = self._placed
+        placements[:] = self.distances.placed
         most = self._endless if most is None else most
         index = self._asked(placements, within, most)
         if len(index) > self._buffer.size:
@@ -268,51 +260,41 @@ class Proximity:
 
     def _asked(self, placements: Array, within: float, most: Array) -> Indices:
         """Compute with coal the distances of all pairs that can be nearer than `within`; their indices."""
-        table, kernel = self.table, self._kernel
         results = self.results
         try:
-            count, gone, came = kernel.look(
-                placements, self._last, table.pairs, table.reach, table.half, self._travelled, self._bound,
-                self._extent, within, most, self._index, self._marked, self._count, self._changed,
-            )  # fmt: skip
+            count, gone, came = self._kernel.look(placements, self._looked, within, most, self._count)
             self._count = count
             self.asked += count
-            if not self._kept:
-                numbers = self._index[:count]
-                assert self._distances is not None
-                fields(self._distances)[numbers] = self._single.measured(placements, table.pairs[numbers])
-                return numbers
-            if self._singly:
-                for number in self._index[:count].tolist():
+            numbers: Indices = self._marks[0, :count]
+            if self._read is not None:
+                fields(self._read)[numbers] = self.distances.measured(numbers)
+            elif len(self.table.pairs) >= SINGLY:
+                for number in numbers.tolist():
                     pin.computeDistance(self.geometry, results, number)
-                return self._index[:count]
-            if gone or came:
-                changed = self._changed[: gone + came].tolist()
-                for number in changed[:gone]:
-                    results.deactivateCollisionPair(number)
-                for number in changed[gone:]:
-                    results.activateCollisionPair(number)
-            if count:
-                pin.computeDistances(self.geometry, results)
+            else:
+                if gone or came:
+                    changed = self._marks[2, : gone + came].tolist()
+                    for number in changed[:gone]:
+                        results.deactivateCollisionPair(number)
+                    for number in changed[gone:]:
+                        results.activateCollisionPair(number)
+                if count:
+                    pin.computeDistances(self.geometry, results)
         except BaseException:  # Ctrl-C between what is noted and what Pinocchio is told: begin again from no pairs
             self._ask_nothing()
             raise
-        return self._index[:count]
+        return numbers
 
     def _ask_nothing(self) -> None:
         self.results.deactivateAllCollisionPairs()
         self._count = 0
 
     def _gather(self, room: _ContactBuffer, placements: Array, index: Indices, within: float, most: Array) -> Contacts:
-        results, known = self._distances, self.table
+        table, results = self.table, self.distances.results if self._read is None else self._read
         if results is None:
-            results = np.zeros((len(known.pairs), RESULT_DOUBLES))
-            for number in index.tolist():
-                fields(results)[number] = read_result(self.results.distanceResults[number])
-        count, broken = self._kernel.gather(
-            results, index, known.pairs, known.points_meet, self._travelled, self._bound, 10.0 * COAL_ACCURACY, within,
-            most, room.distance, room.vectors, room.number, room.pair,
-        )  # fmt: skip
+            results = np.zeros((len(table.pairs), RESULT_DOUBLES))
+            fields(results)[index] = self.distances.read(index)
+        count, broken = self._kernel.gather(results, index, self._gathered, within, most, room.arrays)
         contacts = room.contacts(count, placements)
         if broken:
             self._repair_normals(contacts)
@@ -342,12 +324,9 @@ def compiled_kernel() -> Any:
 
     placement, one, none = np.zeros((1, 4, 3)), np.zeros(1), np.zeros(0)
     index, pairs = np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp)
-    proximity_kernel.look(
-        placement, placement.copy(), pairs, one, np.zeros((1, 3)), one.copy(), none, np.zeros((1, 3)), 0.0, none, index,
-        index, 0, index,
-    )  # fmt: skip
-    proximity_kernel.gather(
-        np.zeros((0, RESULT_DOUBLES)), index, pairs, none, one, none, 0.0, 0.0, none, none, np.zeros((3, 0, 3)), index,
-        pairs,
-    )  # fmt: skip
+    lines, bound, marks = np.zeros((1, 3)), np.zeros((2, 0)), np.zeros((3, 0), dtype=np.intp)
+    known = pairs, one, lines, placement.copy(), one.copy(), bound, lines, marks
+    proximity_kernel.look(placement, known, 0.0, none, 0)
+    room = none, np.zeros((3, 0, 3)), index, pairs
+    proximity_kernel.gather(np.zeros((0, RESULT_DOUBLES)), index, (pairs, one, bound), 0.0, none, room)
     return proximity_kernel

@@ -7,6 +7,7 @@ import numpy as np
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
 from wholebody.geometry.memory_views import RESULT_FIRST
+from wholebody.geometry.pieces import COAL_ACCURACY
 
 
 @compiled(inner=True)
@@ -62,107 +63,40 @@ def outer_gap(placement: Array, reach: Array, extent: Array, a: int, b: int) -> 
     return gap
 
 
-@compiled(inner=True)
-def cull(
-    placement: Array,
-    pairs: Indices,
-    reach: Array,
-    half: Array,
-    travelled: Array,
-    bound: Array,
-    extent: Array,
-    within: float,
-    most: Array,
-    index: Indices,
-) -> int:
-    """Pairs that may be nearer than `within`, in the order of the pairs: their places go to the front of `index`.
-
-    A pair is left out where one of three lower bounds of its signed distance is not below that: the bound when it
-    was last looked at, less what both pieces have moved since; the gap between spheres about the pieces; the gap
-    between boxes along the world's axes about them. All three bound the distance in penetration too.
-
-    Args:
-        placement: (n, 4, 3) where the pieces are.
-        pairs: (pairs, 2) their pieces.
-        reach: (n,) radius of each piece about its origin; may be infinite.
-        half: (n, 3) half the size of a box about each piece's origin, along its own axes.
-        travelled: (n,) see `travel`.
-        bound: (pairs,) lower bound of the distance when the pair was last looked at, plus what both had travelled then;
-            renewed for pairs that the spheres or boxes leave out.
-        extent: (n, 3) room for the sizes of the boxes.
-        within: metres.
-        most: (pairs,) for one pair each, in place of `within` where it is less.
-        index: (pairs,) room for the answer.
-
-    Returns:
-        How many there are.
-    """
-    bound_by_boxes(placement, half, extent)
-    count = 0
-    for p in range(len(pairs)):
-        a, b = pairs[p, 0], pairs[p, 1]
-        way = travelled[a] + travelled[b]
-        near = min(within, most[p])
-        if bound[p] - way >= near:
-            continue
-        gap = outer_gap(placement, reach, extent, a, b)
-        if gap >= near:
-            bound[p] = gap + way
-            continue
-        index[count] = p
-        count += 1
-    return count
-
-
 @compiled()
 def gather(
-    results: Array,
-    index: Indices,
-    pairs: Indices,
-    points_meet: Array,
-    travelled: Array,
-    bound: Array,
-    accuracy: float,
-    within: float,
-    most: Array,
-    nearest: Array,
-    vectors: Array,
-    number: Indices,
-    pair: Indices,
-) -> tuple[int, bool]:
+    results: Array, index: Indices, known: tuple[Indices, Array, Array], within: float, most: Array,
+    room: tuple[Array, Array, Indices, Indices],
+) -> tuple[int, bool]:  # fmt: skip
     """Copy the results of the pairs nearer than `within`, and remember the distances of all that were asked.
 
     Args:
         results: (pairs, 20) of coal; see `memory_views.result_view`.
         index: (k,) the pairs that were asked.
-        pairs: (pairs, 2) their pieces.
-        points_meet: (pairs,) distance at and below which coal may have no normal.
-        travelled: (n,) see `travel`.
-        bound: (pairs,) see `cull`; renewed.
-        accuracy: metres to which a distance is known, and share of it.
+        known: `pairs`, `travelled` and `bound`, as for `look`; bounds are renewed.
         within: metres.
-        most: (pairs,) see `cull`.
-        nearest: (k,) room for distances.
-        vectors: (3, k, 3) room for normals and the nearest points on first and second pieces.
-        number: (k,) room for the places of the pairs.
-        pair: (k, 2) room for their pieces.
+        most: (pairs,) see `look`.
+        room: for distances (k,), for normals and the nearest points on first and second pieces (3, k, 3), for the
+            places of the pairs (k,), and for their pieces (k, 2).
 
     Returns:
         How many are near, and whether one of them needs its normal repaired.
     """
+    pairs, travelled, bound = known
+    nearest, vectors, number, pair = room
     count = 0
     broken = False
     for p in index:
         a, b = pairs[p, 0], pairs[p, 1]
         distance = results[p, RESULT_FIRST]
-        bound[p] = distance - accuracy * (1.0 + abs(distance)) + travelled[a] + travelled[b]
+        bound[0, p] = distance - 10.0 * COAL_ACCURACY * (1.0 + abs(distance)) + travelled[a] + travelled[b]
         if not distance < min(within, most[p]):
             continue
         nearest[count], number[count] = distance, p
         for k in range(9):
             vectors[k // 3, count, k % 3] = results[p, RESULT_FIRST + 1 + k]
         pair[count, 0], pair[count, 1] = a, b
-        broken = broken or distance <= points_meet[p]
+        broken = broken or distance <= bound[1, p]
         count += 1
     return count, broken
 
@@ -195,27 +129,45 @@ def renew(marked: Indices, before: int, index: Indices, count: int, changed: Ind
 
 @compiled()
 def look(
-    placement: Array,
-    last: Array,
-    pairs: Indices,
-    reach: Array,
-    half: Array,
-    travelled: Array,
-    bound: Array,
-    extent: Array,
-    within: float,
-    most: Array,
-    index: Indices,
-    marked: Indices,
-    before: int,
-    changed: Indices,
-) -> tuple[int, int, int]:
-    """`travel`, `cull` and `renew`.
+    placement: Array, known: tuple[Indices, Array, Array, Array, Array, Array, Array, Indices], within: float,
+    most: Array, before: int,
+) -> tuple[int, int, int]:  # fmt: skip
+    """Pairs that may be nearer than `within`, in the order of the pairs: their places go to the front of `marks[0]`.
+
+    A pair is left out where one of three lower bounds of its signed distance is not below that: the bound when it
+    was last looked at, less what both pieces have moved since; the gap between spheres about the pieces; the gap
+    between boxes along the world's axes about them. All three bound the distance in penetration too.
+
+    Args:
+        placement: (n, 4, 3) where the pieces are; see `Contacts.placements`.
+        known: `pairs`, `reach` and `half` of the pair table; `last` (n, 4, 3), where the pieces were when this was
+            asked last; `travelled` (n,), how far each can have moved since the beginning, see `travel`; `bound`
+            (2, pairs), a lower bound of the distance when a pair was last looked at, plus what both had travelled
+            then, and the distance at and below which coal may have no normal; room (n, 3) for the sizes of the boxes;
+            `marks` (3, pairs), room for the answer, the pairs of the last one, and those that differ, see `renew`.
+        within: metres.
+        most: (pairs,) for one pair each, in place of `within` where it is less.
+        before: how many the last answer had.
 
     Returns:
         How many pairs may be near, how many of those that were marked are so no longer, and how many are newly.
     """
+    pairs, reach, half, last, travelled, bound, extent, marks = known
+    index = marks[0]
     travel(placement, last, reach, travelled)
-    count = cull(placement, pairs, reach, half, travelled, bound, extent, within, most, index)
-    gone, came = renew(marked, before, index, count, changed)
+    bound_by_boxes(placement, half, extent)
+    count = 0
+    for p in range(len(pairs)):
+        a, b = pairs[p, 0], pairs[p, 1]
+        way = travelled[a] + travelled[b]
+        near = min(within, most[p])
+        if bound[0, p] - way >= near:
+            continue
+        gap = outer_gap(placement, reach, extent, a, b)
+        if gap >= near:
+            bound[0, p] = gap + way
+            continue
+        index[count] = p
+        count += 1
+    gone, came = renew(marks[1], before, index, count, marks[2])
     return count, gone, came

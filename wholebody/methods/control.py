@@ -67,12 +67,15 @@ class Control:
         undefined_at: the iteration of that step.
     """
 
-    def __init__(self, time_limit: float | None = None, progress: Progress | None = None) -> None:
+    def __init__(
+        self, time_limit: float | None = None, progress: Progress | None = None, longest: float = LONGEST
+    ) -> None:
         """Start the clock.
 
         Args:
-            time_limit: seconds on the clock; None for `LONGEST` of processor time, infinity for no limit.
+            time_limit: seconds on the clock; None for `longest`, infinity for no limit.
             progress: see `Progress`.
+            longest: seconds of processor time.
 
         Raises:
             InputError: `progress` cannot be called.
@@ -82,7 +85,7 @@ class Control:
         self.reason = ""
         self.undefined: UndefinedTermError | None = None
         self.undefined_at, self._told = 0, 0
-        self._time_limit, self._progress = time_limit, progress
+        self._time_limit, self._progress, self._longest = time_limit, progress, longest
         self._began, self._began_at = self._now(), time.monotonic()
         self._handler: Any = None
 
@@ -90,14 +93,14 @@ class Control:
     def over(self) -> bool:
         """Whether the solve has to end now."""
         if not self.reason and self._may_be_over and self._passed > 1.0:
-            limit, kind = (LONGEST, " of processor time") if self._time_limit is None else (self._time_limit, "")
+            limit, kind = (self._longest, " of processor time") if self._time_limit is None else (self._time_limit, "")
             self.reason = f"the time limit of {limit:g} s{kind} ended it"
         return bool(self.reason) or BUDGET.spent > 1.0
 
     @property
     def _may_be_over(self) -> bool:
         """Whether so much time went by; the clock is read at a fraction of the cost of a thread's processor time."""
-        return self._time_limit is not None or time.monotonic() - self._began_at > LONGEST
+        return self._time_limit is not None or time.monotonic() - self._began_at > self._longest
 
     @property
     def spent(self) -> float:
@@ -106,7 +109,7 @@ class Control:
 
     @property
     def _passed(self) -> float:
-        return (self._now() - self._began) / (LONGEST if self._time_limit is None else self._time_limit)
+        return (self._now() - self._began) / (self._longest if self._time_limit is None else self._time_limit)
 
     def _now(self) -> float:
         return time.thread_time() - compile_seconds() if self._time_limit is None else time.monotonic()

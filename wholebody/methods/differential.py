@@ -15,7 +15,7 @@ import pinocchio as pin
 
 from wholebody.assessment.posture import goal_errors, largest_violation
 from wholebody.base.arrays import Array
-from wholebody.geometry.proximity import COAL_ACCURACY
+from wholebody.geometry.pieces import COAL_ACCURACY
 from wholebody.methods.control import Control
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace

@@ -311,25 +311,33 @@ class LoadChange:
         return found
 
     @property
-    def kept(self) -> bool:
-        """Whether no load is beyond its bound."""
-        return float(self.beyond.max(initial=0.0)) <= TORQUE and float(self.farther.max(initial=0.0)) <= PLACE
+    def missed(self) -> list[str]:
+        """Sentences on loads that are beyond their bounds: which, by how much, where, and what is allowed."""
+        said, joint, frame = list[str](), int(np.argmax(self.beyond)), int(np.argmax(self.farther))
+        if self.beyond[joint] > TORQUE:
+            (lower, upper), torque = self.bounds, self.after.torque[:, joint]
+            high = torque.max() / upper[joint] >= torque.min() / lower[joint]
+            needed, bound = (torque.max(), upper[joint]) if high else (torque.min(), lower[joint])
+            at = int(np.argmax(torque == needed)) * self.after.dt
+            said.append(
+                f"{self.before.joint_of(joint)} needs {abs(needed):.4g} N m at {at:.2f} s, {self.beyond[joint]:.1%} "
+                f"more than its bound of {abs(bound):.4g} N m, where {TORQUE:.0%} are allowed"
+            )
+        if self.farther[frame] > PLACE:
+            said.append(
+                f"the zero moment point is {1e3 * self.farther[frame]:.3g} mm farther outside of the feet than before "
+                f"at {frame * self.after.dt:.2f} s, where {1e3 * PLACE:g} mm are allowed, and too far in "
+                f"{int((self.farther > PLACE).sum())} frames"
+            )
+        return said
 
     def __str__(self) -> str:
         """One sentence."""
         was, now = self.before, self.after
-        said = (
+        return (
             f"most torque {was.largest_share:.0%} of a strength before, {now.largest_share:.0%} after; zero moment "
             f"point up to {1e3 * was.outside.max():.0f} mm outside before, {1e3 * now.outside.max():.0f} mm after"
         )
-        if self.kept:
-            return said
-        joint, frame = int(np.argmax(self.beyond)), int(np.argmax(self.farther))
-        if self.beyond[joint] > TORQUE:
-            said += f"; {self.before.joint_of(joint)} needs {self.beyond[joint]:.0%} more than its bound"
-        if self.farther[frame] > PLACE:
-            said += f"; in frame {frame} the zero moment point is {1e3 * self.farther[frame]:.0f} mm farther outside"
-        return said
 
 
 def load_change(

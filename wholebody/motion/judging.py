@@ -135,9 +135,8 @@ def judged(
     timed = terms if result.times is None else terms.at(times)
     seen = excess(before.with_q(timed.q), after, filled(asked, largest=timed.largest))
     missed, said = _missed(timed, after)
-    held = not said and (loads is None or loads.kept)
-    if loads is not None and not loads.kept:
-        said.append("loads are beyond their bounds")
+    said += [] if loads is None else loads.missed
+    held = not said
     solved = now.free and held and not seen.said
     left = [result.message] if result.message else []
     left += [*_collisions(now), *said, *seen.said]

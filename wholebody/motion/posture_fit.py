@@ -108,7 +108,7 @@ class Fitter:
             return found
         directions = np.array([self._directions() for posture in q if self._state.update(posture)])
         for row, cone in enumerate(self._cones):
-            found |= cone.cone.signed_angle(directions[:, row])[0] < -CONE_SLACK
+            found |= np.array([cone.cone.signed_angle(each)[0] for each in directions[:, row]]) < -CONE_SLACK
         return found
 
     def _directions(self) -> Array:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array
 from wholebody.motion.avoider import Run
 from wholebody.motion.faults import Faults, dip_depth, dips
 from wholebody.motion.measures import MotionBounds, excess
@@ -149,12 +149,11 @@ def smoothed(run: Run, q: Array, asked: MotionBounds) -> Smoothed:
     found = run.faults(terms.q)
     for time in (None, 0.2, 0.4):  # s: the smoothness of the method "trajectory", and more where its jerk is beyond
         windows = ClipRun(run, terms.q, time)
-        changed: Mask = beyond | (q != terms.q).any(axis=1)
-        for window in run.windows(changed, 0.5):
+        for window in run.windows(beyond, 0.5):
             frames = slice(window.first, window.end)
-            if beyond[frames].any() and not run.ended:
+            if not run.ended:
                 told = run.watch.teller(1.0, 0.0, f"frames {window.first} to {window.end - 1} are made smooth")
-                smooth = windows.window(window, found, told, q[frames])
+                smooth = windows.window(window, found, told, q)
                 if not smooth.missed and not run.ended:
                     q[frames], count = smooth.q, count + 1
         beyond = excess(clip, clip.with_q(q), asked).beyond

@@ -35,9 +35,8 @@ class ConstraintValues:
         """The values (c,) where a state is; overwritten by the next call."""
         plan, value = self._plan, self._value
         self._kernel.linearise(
-            state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,
-            NO_WRENCHES, NO_JOINTS, 0, self._wrench, value, self._jacobian, self._box, self._measure,
-            self._no_squares,
+            (state.joints, state.columns, state.q), plan[:4], 0, (NO_WRENCHES, NO_JOINTS),
+            (self._wrench, value, self._jacobian, self._box, self._measure, self._no_squares),
         )  # fmt: skip
         for term, evaluate, row, rows in plan.others:
             part = np.atleast_1d(evaluate(state))

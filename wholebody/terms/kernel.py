@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -48,6 +50,9 @@ from wholebody.terms.entries import (
 )
 from wholebody.terms.residual_kernel import axis_errors, cones, planes, residuals, twists
 
+Plan: TypeAlias = tuple[Array, Integers, Integers, NDArray[np.int8]]
+"""Floats, integers, layout and support of a `TermPlan`."""
+
 
 @compiled(inner=True)
 def _floats(flat: Array, layout: Integers, table: int) -> Array:
@@ -61,47 +66,35 @@ def _integers(flat: Integers, layout: Integers, table: int) -> Integers:
     return flat[start : start + rows * columns].reshape((rows, columns))
 
 
+@compiled(inner=True)
+def _table(plan: Plan, table: int) -> tuple[Array, Integers]:
+    floats, integers, layout, _ = plan
+    return _floats(floats, layout, table), _integers(integers, layout, table)
+
+
 @compiled(error_model="numpy")
 def linearise(
-    joints: Array,
-    columns: Array,
-    support: NDArray[np.int8],
-    q: Array,
-    floats: Array,
-    integers: Integers,
-    layout: Integers,
-    gap_wrench: Array,
-    gap_joints: Integers,
-    gaps: int,
-    wrench: Array,
-    value: Array,
-    jacobian: Array,
-    box: Array,
-    measure: Array,
-    squares: Array,
-) -> None:
+    state: tuple[Array, Array, Array], plan: Plan, gaps: int, contacts: tuple[Array, Integers],
+    room: tuple[Array, Array, Array, Array, Array, Array],
+) -> None:  # fmt: skip
     """Values and Jacobian rows of all terms of a plan, then the Jacobian rows of contacts; bounds and measures.
 
     Args:
-        joints: (njoints, 4, 3) placements of the joints; see `placement_view`.
-        columns: (n, 6) columns of the joint Jacobian, in the world.
-        support: (njoints, n) 1 where a column moves a joint.
-        q: (nq,) the posture.
-        floats: of the plan.
-        integers: of the plan.
-        layout: of the plan.
-        gap_wrench: (gaps or more, 6) wrenches of the contacts' rows.
-        gap_joints: (gaps or more, 2) joints of the first and second piece of each.
-        gaps: how many.
-        wrench: (terms' rows, 6) room.
-        value: (terms' rows,) room for the values.
-        jacobian: (terms' rows + gaps, nv) room for all rows.
-        box: (2, nv) room for the bounds on the displacement.
-        measure: (2, nv + 1) room for the gradient and the value, and for the curvature; with squares a third row is
-            for their part of the curvature.
-        squares: (s, nv) room for the rows S of measures that are sums of squares, whose second derivative is S' S;
-            (0, nv) if they are not asked for.
+        state: placements of the joints (njoints, 4, 3), see `placement_view`; columns of the joint Jacobian (n, 6), in
+            the world; the posture (nq,).
+        plan: of the terms.
+        gaps: how many rows contacts have.
+        contacts: of these rows, wrenches (gaps or more, 6) and joints of first and second piece (gaps or more, 2).
+        room: for the terms' wrenches (terms' rows, 6) and values (terms' rows,), for all rows (terms' rows + gaps, nv),
+            for the bounds on the displacement (2, nv), for the gradient and the value of the measures and for their
+            curvature (2, nv + 1), and for the rows S (s, nv) of measures that are sums of squares, whose second
+            derivative is S' S: (0, nv) if they are not asked for, otherwise a third row of the measures' room is for
+            their part of the curvature.
     """
+    joints, columns, q = state
+    gap_wrench, gap_joints = contacts
+    wrench, value, jacobian, box, measure, squares = room
+    floats, integers, layout, support = plan
     nv = jacobian.shape[1]
     terms = len(value)
     column, bodies = _integers(integers, layout, COLUMN), _integers(integers, layout, BODY)
@@ -109,16 +102,13 @@ def linearise(
     wrench[:] = 0.0
     residuals(_floats(floats, layout, RESIDUAL), _integers(integers, layout, RESIDUAL), joints, wrench, value)
     if layout[PLANE, 1]:
-        planes(_floats(floats, layout, PLANE), _integers(integers, layout, PLANE), joints, wrench, value)
+        planes(*_table(plan, PLANE), joints, wrench, value)
     if layout[AXIS, 1]:
-        axis_errors(_floats(floats, layout, AXIS), _integers(integers, layout, AXIS), joints, wrench, value)
+        axis_errors(*_table(plan, AXIS), joints, wrench, value)
     if layout[CONE, 1]:
-        cones(
-            _floats(floats, layout, CONE), _integers(integers, layout, CONE), _floats(floats, layout, EDGE), joints,
-            wrench, value,
-        )  # fmt: skip
+        cones(*_table(plan, CONE), _floats(floats, layout, EDGE), joints, wrench, value)
     if layout[TWIST, 1]:
-        twists(_floats(floats, layout, TWIST), _integers(integers, layout, TWIST), joints, wrench, value)
+        twists(*_table(plan, TWIST), joints, wrench, value)
     for table, rows in ((RESIDUAL, 0), (PLANE, 1), (AXIS, 2), (CONE, 1), (TWIST, 1)):
         entries = _integers(integers, layout, table)
         for e in range(len(entries)):
@@ -129,28 +119,25 @@ def linearise(
     for r in range(gaps):
         jacobian[terms + r] = 0.0
         _row(gap_wrench[r], gap_joints[r, 1], gap_joints[r, 0], columns, bodies, column, jacobian[terms + r])
-    centers = _floats(floats, layout, MASS_CENTER)
-    if len(centers):
+    if layout[MASS_CENTER, 1]:
         _mass_centers(
-            centers, _integers(integers, layout, MASS_CENTER), _floats(floats, layout, BODY), bodies, column, joints,
-            columns, value, jacobian,
-        )  # fmt: skip
+            _table(plan, MASS_CENTER),
+            _floats(floats, layout, BODY),
+            joints,
+            (columns, column, bodies),
+            value,
+            jacobian,
+        )
     if layout[COORDINATE, 1]:
-        coordinates(
-            _floats(floats, layout, COORDINATE), _integers(integers, layout, COORDINATE), q, value, jacobian
-        )  # fmt: skip
+        coordinates(*_table(plan, COORDINATE), q, value, jacobian)
     if layout[TURN, 1]:
-        turns(_floats(floats, layout, TURN), _integers(integers, layout, TURN), q, value, jacobian)
+        turns(*_table(plan, TURN), q, value, jacobian)
     if layout[ROOT, 1]:
-        roots(_floats(floats, layout, ROOT), _integers(integers, layout, ROOT), q, value, jacobian)
+        roots(*_table(plan, ROOT), q, value, jacobian)
     if layout[COUPLED, 1]:
-        coupled_ranges(
-            _floats(floats, layout, COUPLED), _integers(integers, layout, COUPLED), q, value, jacobian
-        )  # fmt: skip
+        coupled_ranges(*_table(plan, COUPLED), q, value, jacobian)
     if layout[ELLIPSE, 1]:
-        elliptic_ranges(
-            _floats(floats, layout, ELLIPSE), _integers(integers, layout, ELLIPSE), q, value, jacobian
-        )  # fmt: skip
+        elliptic_ranges(*_table(plan, ELLIPSE), q, value, jacobian)
     _box(_floats(floats, layout, LIMIT), _integers(integers, layout, LIMIT), _floats(floats, layout, BOX), q, box)
     constant = _floats(floats, layout, CURVATURE)
     for v in range(nv):
@@ -160,35 +147,27 @@ def linearise(
     if len(squares):
         measure[2] = 0.0
     _measures(
-        _floats(floats, layout, DISTANCE), _integers(integers, layout, DISTANCE), _floats(floats, layout, DISCOMFORT),
-        _integers(integers, layout, DISCOMFORT), q, measure,
-    )  # fmt: skip
-    root_distances(_floats(floats, layout, ROOT_DISTANCE), _integers(integers, layout, ROOT_DISTANCE), q, measure)
+        _floats(floats, layout, DISTANCE),
+        _integers(integers, layout, DISTANCE),
+        _floats(floats, layout, DISCOMFORT),
+        _integers(integers, layout, DISCOMFORT),
+        q,
+        measure,
+    )
+    if layout[ROOT_DISTANCE, 1]:
+        root_distances(*_table(plan, ROOT_DISTANCE), q, measure)
     if layout[ELEVATION, 1] + layout[LUMBAR, 1]:
-        rhythms(
-            _floats(floats, layout, ELEVATION), _integers(integers, layout, ELEVATION), _floats(floats, layout, LUMBAR),
-            _integers(integers, layout, LUMBAR), q, measure, squares,
-        )  # fmt: skip
+        rhythms(*_table(plan, ELEVATION), *_table(plan, LUMBAR), q, measure, squares)
     if layout[BALL, 1]:
-        balls(
-            _floats(floats, layout, BALL), _integers(integers, layout, BALL), q, measure, squares,
-            layout[ELEVATION, 1] + layout[LUMBAR, 1],
-        )  # fmt: skip
+        balls(*_table(plan, BALL), q, measure, squares, layout[ELEVATION, 1] + layout[LUMBAR, 1])
     if layout[HEIGHT, 1]:
-        heights(
-            _floats(floats, layout, HEIGHT), _integers(integers, layout, HEIGHT), joints, columns, support, column,
-            measure,
-        )  # fmt: skip
+        heights(*_table(plan, HEIGHT), joints, columns, support, column, measure)
 
 
 @compiled(error_model="numpy")
-def wrench_rows(
-    wrench: Array, joint: int, against: int, columns: Array, integers: Integers, layout: Integers, rows: Array
-) -> None:
-    """Write the Jacobian rows (m, nv) of wrenches (m, 6) that work on the motion of a joint relative to another.
-
-    `columns`, `integers` and `layout` are as for `linearise`.
-    """
+def wrench_rows(wrench: Array, joint: int, against: int, columns: Array, plan: Plan, rows: Array) -> None:
+    """Write the Jacobian rows (m, nv) of wrenches (m, 6) that work on the motion of a joint relative to another."""
+    _, integers, layout, _ = plan
     column, bodies = _integers(integers, layout, COLUMN), _integers(integers, layout, BODY)
     rows[:] = 0.0
     for r in range(len(wrench)):
@@ -223,17 +202,16 @@ def _row(
 
 @compiled(inner=True, error_model="numpy")
 def _mass_centers(
-    tables: Array,
-    entries: Integers,
+    table: tuple[Array, Integers],
     bodies: Array,
-    parents: Integers,
-    column: Integers,
     joints: Array,
-    columns: Array,
+    tree: tuple[Array, Integers, Integers],
     value: Array,
     jacobian: Array,
 ) -> None:
     """Rows of the centre of mass: what hangs on a joint moves with it, so each column needs its subtree's moment."""
+    tables, entries = table
+    columns, column, parents = tree
     count = len(bodies)
     moment = np.zeros((count, 4))  # mass, and mass times centre in the world
     for j in range(1, count):

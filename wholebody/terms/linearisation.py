@@ -258,15 +258,15 @@ class Lineariser:
         clearance = self.clearances[contacts.number]
         if len(clearance) * (1 + MOST_ENDS) > len(self._gap):
             self._grow(2 * len(clearance))
-        count = self.workspace.rows.write(contacts, clearance, self._wrench, self._gap, self._contact, self._joints)
+        count = self.workspace.rows.write(contacts, clearance, self._room)
         return contacts, clearance, count
 
     def _terms(self, count: int, value: Array, jacobian: Array, box: Array, measure: Array, squares: Array) -> None:
         """Write all terms where the state is, and the Jacobian of `count` rows of contacts."""
         state, plan = self.state, self._plan
         self._kernel.linearise(
-            state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,
-            self._wrench, self._joints, count, self._term_wrench, value, jacobian, box, measure, squares,
+            (state.joints, state.columns, state.q), plan[:4], count, self._contact_rows,
+            (self._term_wrench, value, jacobian, box, measure, squares),
         )  # fmt: skip
         if plan.others:
             self._evaluate(plan.others, value, jacobian)
@@ -315,6 +315,10 @@ class Lineariser:
         rows = contacts * (1 + MOST_ENDS)
         self._wrench, self._gap = np.zeros((rows, 6)), np.zeros(rows)
         self._contact, self._joints = np.zeros(rows, dtype=np.intp), np.zeros((rows, 2), dtype=np.intp)
+        self._room, self._contact_rows = (
+            (self._wrench, self._gap, self._contact, self._joints),
+            (self._wrench, self._joints),
+        )
         self._packed = None
 
     def _evaluate(self, others: Sequence[OtherTerm], value: Array, jacobian: Array) -> None:
@@ -334,9 +338,7 @@ class Lineariser:
     def _write_rows(self, wrench: Wrench, rows: Array) -> None:
         """Write the rows (m, nv) of a wrench."""
         wrenches, joint, against = np.ascontiguousarray(wrench.rows, dtype=float), wrench.joint, wrench.against
-        self._kernel.wrench_rows(
-            wrenches, joint, against, self.state.columns, self._plan.integers, self._plan.layout, rows
-        )
+        self._kernel.wrench_rows(wrenches, joint, against, self.state.columns, self._plan[:4], rows)
 
     def _bound(self, bounds: Sequence[Bound], box: Array) -> None:
         for bound in bounds:
@@ -359,13 +361,11 @@ def compiled_kernel() -> Any:
 
     state = State(pin.buildSampleModelManipulator())
     plan = make_plan(NO_LIMITS, Terms(), None, state)
-    nv = state.model.nv
+    rows = np.zeros((0, state.model.nv))
+    box, measure = np.zeros((2, state.model.nv)), np.zeros((2, state.model.nv + 1))
     term_kernel.linearise(
-        state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,
-        NO_WRENCHES, NO_JOINTS, 0, np.zeros((0, 6)), np.zeros(0), np.zeros((0, nv)),
-        np.zeros((2, nv)), np.zeros((2, nv + 1)), np.zeros((0, nv)),
+        (state.joints, state.columns, state.q), plan[:4], 0, (NO_WRENCHES, NO_JOINTS),
+        (NO_WRENCHES, np.zeros(0), rows, box, measure, rows),
     )  # fmt: skip
-    term_kernel.wrench_rows(
-        np.zeros((0, 6)), 0, 0, state.columns, plan.integers, plan.layout, np.zeros((0, nv))
-    )  # fmt: skip
+    term_kernel.wrench_rows(NO_WRENCHES, 0, 0, state.columns, plan[:4], rows)
     return term_kernel

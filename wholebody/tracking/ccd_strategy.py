@@ -18,19 +18,14 @@ from wholebody.tracking.frame import Resolution
 
 
 class CCDStrategy:
-    """Follows tracked postures by the loop of Schmidl and Lin (`wholebody.methods.ccd.resolver`)."""
+    """Follows tracked postures by the loop of Schmidl and Lin (`wholebody.methods.ccd.resolver`), from a shown posture.
+
+    Frames take `dt` seconds; the seed is that of the order of the chains.
+    """
 
     sweep_tolerance = 8e-4
 
     def __init__(self, scene: Scene, shown: Array, dt: float, seed: int) -> None:
-        """Prepare for frames of `dt` seconds.
-
-        Args:
-            scene: the figure among things.
-            shown: (nq,) the present posture.
-            dt: seconds from frame to frame.
-            seed: of the order of the chains.
-        """
         self.scene = scene
         # largest velocity, rad/s, with which a joint moves away from the tracked one or returns to it: fast
         # enough to return from 2 rad in half a second, and slow enough not to look like a jump
@@ -65,17 +60,12 @@ class RigidTranslation:
     Schmidl and Lin find that "even a complicated object, such as an articulated hand, can be handled in this way": the
     fingers follow the glove, and the hand with its present fingers is displaced by pure translation. PD_g is the sum of
     pd_i^2 n_i over the sum of pd_i (their equation 1), with n_i out of the obstacle; it is computed again until nothing
-    overlaps.
+    overlaps. Raises InputError for a figure that is fixed to the world.
     """
 
     sweep_tolerance = 2e-4
 
     def __init__(self, scene: Scene) -> None:
-        """Prepare the strategy.
-
-        Raises:
-            InputError: the figure is fixed to the world.
-        """
         if scene.figure.root != "free":
             raise InputError(f"{scene.figure.name} is fixed to the world and cannot be displaced; leave rigid out")
         self.scene, self.model, self._workspace = scene, scene.model, scene.workspace()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from typing import Any, Generic, TypeVar, overload
+from typing import Any, Generic, NamedTuple, TypeVar, overload
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from wholebody.base.errors import InputError
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import GRAZE, is_free
 from wholebody.methods.base import Method, Step, Tracker, goal_error, judged
-from wholebody.methods.control import within_budget
+from wholebody.methods.control import BUDGET, within_budget
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.assembly_solution import AssemblySolution
 from wholebody.methods.solve import method_for_motions
@@ -26,16 +26,62 @@ from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import Collision, FrameMotion
 from wholebody.scene.workspace import NotCopyable, Workspace
 from wholebody.solution import Solution
-from wholebody.tracking.assembly_drag import AssemblyDrag, DragFrame, GoalMoves
 from wholebody.tracking.frame import FRAME
-from wholebody.tracking.moving_goals import copied, interpolated_target, moving_goal, retarget
-from wholebody.tracking.warm_start import warm_started
+from wholebody.tracking.moving_goals import copied, interpolated_target, moving_goal, retarget, warm_started
 
 Answer = TypeVar("Answer", Solution, AssemblySolution)
 
 
+class DragFrame(NamedTuple):
+    """Answer of one frame of a drag.
+
+    Attributes:
+        q: (nq,) the posture, of an assembly that of its `scene`.
+        error: largest remaining goal error, metres or radians.
+        iterations: iterations of the method.
+        seconds: wall time.
+        collisions: what things that move (`Scene.move` with `over`) passed through, or are inside of.
+        path: shares of the frame, from 0 to 1, and the postures (nq,) there, if things moved; otherwise empty. Straight
+            from one to the next nothing was passed but the collisions.
+    """
+
+    q: Array
+    error: float
+    iterations: int
+    seconds: float
+    collisions: tuple[Collision, ...] = ()
+    path: tuple[tuple[float, Array], ...] = ()
+
+    def __repr__(self) -> str:
+        hit = f", {len(self.collisions)} collisions" if self.collisions else ""
+        return f"DragFrame: error {self.error:.3g}, {self.iterations} iterations, {1e3 * self.seconds:.3g} ms{hit}"
+
+
+class GoalMoves:
+    """How far the goal moves in a frame: all the way, or as far as its budget was enough for lately."""
+
+    def __init__(self) -> None:
+        self._most, self._error = np.inf, 0.0
+
+    def shares(self, error: float) -> Iterator[float]:
+        """Shares of the way to a goal that is `error` m or rad away, tried until a motion is free or time is up."""
+        self._error = error
+        moves = (self._most, *(move for move in (0.01, 0.002) if move < self._most))  # m, rad
+        for turn, move in enumerate(moves):
+            if turn == 0 or (move < error and BUDGET.spent < 1.0):
+                yield min(1.0, move / error) if error else 1.0
+
+    def end(self, error: float) -> None:
+        """End a frame that left an error: the next goes twice as far, or half as far if the budget was not enough."""
+        asked = min(self._most, self._error)
+        if BUDGET.spent < 0.5 or self._error - error > 0.5 * asked:
+            self._most *= 2.0
+        elif BUDGET.spent > 1.0:
+            self._most = max(0.5 * asked, 0.002)  # m, rad
+
+
 class ProblemDrag:
-    """Follows a goal of a problem; see `Drag`.
+    """Follows a goal of a problem; see `Drag`, which raises the same.
 
     Attributes:
         problem: to be solved; its goals are replaced as they move.
@@ -44,12 +90,6 @@ class ProblemDrag:
     """
 
     def __init__(self, problem: Problem, method: str | Method, *, goal: int, dt: float, budget: float) -> None:
-        """Begin a drag at the problem's start.
-
-        Raises:
-            InputError: there is no such goal, or it is of another kind.
-            UnknownNameError: there is no such method.
-        """
         self.problem, self.dt = copied(problem), time_step(dt, "dt")
         self.method = method_for_motions(method)
         self.tracker = self.method.tracker(self.problem, self.dt)
@@ -61,11 +101,7 @@ class ProblemDrag:
         self.q: Array = problem.scene.figure.clamp(problem.start)
 
     def to(self, target: Any) -> DragFrame:
-        """Move the goal to a position (or a placement, for a `Frame`), and make one frame towards it.
-
-        Raises:
-            InputError: the target is not one.
-        """
+        """See `Drag.to`."""
         began = time.perf_counter()
         with self._alone, within_budget(self._seconds):
             retarget(self.problem, self._number, target)
@@ -87,16 +123,16 @@ class ProblemDrag:
             return DragFrame(self.q, error, iterations, time.perf_counter() - began, collisions, path)
 
     def finish(self) -> Solution:
-        """Meet the present goal with the method's full accuracy, and assess the posture."""
+        """See `Drag.finish`."""
         with self._alone:
             solution = warm_started(self.problem, self.tracker, self.q)
             self.q = solution.q
             return solution
 
     def _followed(self) -> int:
-        """Move by the longest of `GoalMoves` towards the goal for which the motion is free; returns the iterations.
+        """Move by the longest of `GoalMoves` for which the motion is free, or out of a thing moved into the figure.
 
-        If a thing was moved into the figure, move out of it.
+        Returns the iterations.
         """
         spent, tried, deep = 0, list[Array](), self._came_in()
         for step in self._frames():
@@ -140,8 +176,7 @@ class ProblemDrag:
     def _leave(self, tried: list[Array], deep: float) -> None:
         """Move out of an overlap of `deep` metres, after no motion that was tried was free and led out.
 
-        The candidates are the tracker's ways out and the postures (nq,) that were tried. A free motion is better than
-        one that gets deeper first; among these the shallower end is better.
+        A free motion is better than one that gets deeper first; among these the shallower end is better.
         """
         ends = [*self.tracker.overlap_resolutions(self.q), *tried]
         depths = [_depth(self._workspace, q) for q in ends]
@@ -159,6 +194,54 @@ def _depth(workspace: Workspace, q: Array) -> float:
     return float(-workspace.near(q, 0.0).distance.min(initial=0.0))
 
 
+class AssemblyDrag:
+    """Follows a goal of an assembly that is moved from frame to frame; it moves the assembly's bodies.
+
+    If joints or contacts do not hold after a frame's few Newton steps, or its motion passes through something, the
+    bodies go back to where they were and the goal moves by a shorter distance, or not in that frame.
+
+    Raises InputError where there is no such goal.
+    """
+
+    def __init__(self, assembly: Assembly, goal: int, seconds: float) -> None:
+        self._goal, self._seconds, self._moves = assembly.goal_index(goal), seconds, GoalMoves()
+        self.assembly = assembly.prepare()
+
+    @property
+    def q(self) -> Array:
+        """(nq,) the placements of the bodies as a posture of the assembly's `scene`."""
+        return self.assembly.q
+
+    def to(self, target: Any) -> DragFrame:
+        """Make one frame towards a position, or a placement; raises InputError where the target is neither."""
+        began, spent, collisions = time.perf_counter(), 0, tuple[Collision, ...]()
+        path: tuple[tuple[float, Array], ...] = ()
+        made, goal = self.assembly, self._goal
+        made.retarget(goal, target)
+        error = made.goal_error(goal)
+        try:
+            with within_budget(self._seconds):
+                for share in self._moves.shares(error):
+                    if share < 1.0:
+                        made.interpolate_goal(goal, share, target)
+                    step = made.step()
+                    spent, collisions = spent + step.iterations, collisions or step.collisions
+                    path = step.path or path
+                    if step.taken:
+                        break
+                self._moves.end(made.goal_error(goal))
+        finally:
+            made.retarget(goal, target)
+        left = max(made.goal_error(number) for number in range(len(made.goals)))
+        if path and not np.array_equal(path[-1][1], made.q):
+            path = (*path, (1.0, made.q))
+        return DragFrame(made.q, left, spent, time.perf_counter() - began, collisions, path)
+
+    def finish(self) -> AssemblySolution:
+        """Meet the present goals with full accuracy."""
+        return self.assembly.solve()
+
+
 class Drag(NotCopyable, Generic[Answer]):
     """Follows a goal that is moved from frame to frame, of a problem by any method or of an assembly.
 
@@ -167,9 +250,7 @@ class Drag(NotCopyable, Generic[Answer]):
     postures. If the motion to a posture penetrates something, the goal moves by a shorter distance, or not in that
     frame. If a thing was moved into the figure, the figure first leaves it. Of things that move (`Scene.move` with
     `over`) "qp" gets out of the way as they come; the others meet them where they end. What they could not avoid is
-    named in the answer.
-
-    A drag of an assembly moves the assembly itself, by a few Newton steps a frame.
+    named in the answer. A drag of an assembly moves the assembly itself, by a few Newton steps a frame.
 
     With a budget a frame ends with what it has found by then, and the next goes on from there. Where it was not enough
     to get half as far as the goal went, the goal goes half as far next, down to 2 mm; otherwise it goes twice as far.
@@ -224,11 +305,7 @@ class Drag(NotCopyable, Generic[Answer]):
 
     @property
     def q(self) -> Array:
-        """(nq,) the present posture; of an assembly that of its `scene`.
-
-        Raises:
-            InputError: it is set to another shape, to a value that is not finite, or for an assembly.
-        """
+        """(nq,) the present posture, of an assembly that of its `scene`, where it cannot be set."""
         return self._run.q
 
     @q.setter
@@ -250,8 +327,7 @@ class Drag(NotCopyable, Generic[Answer]):
     def to(self, target: Any) -> DragFrame:
         """Move the goal to a position (or a placement, for a `Frame`), and make one frame towards it.
 
-        Raises:
-            InputError: the target is not one.
+        Raises InputError where the target is neither.
         """
         return self._run.to(target)
 

@@ -57,7 +57,6 @@ class Dragged:
     paths: tuple[tuple[tuple[float, Array], ...], ...] = ()
 
     def __len__(self) -> int:
-        """Return the number of frames, without start and end."""
         return len(self.targets)
 
 
@@ -84,11 +83,7 @@ class DragJudgement:
 
 
 def present_position(problem: Problem, goal: int = 0) -> Array:
-    """Position of a goal's frame (or of its point) at the problem's start, (3,) metres.
-
-    Raises:
-        InputError: the goal is not a `Point` or a `Frame`.
-    """
+    """Position (3,), metres, of the frame or point of a goal at the start; raises InputError for other goals."""
     term = moving_goal(problem, goal)
     here: Array = target_position(problem, goal) + term.error(problem.scene.state(problem.start))[:3]
     return here
@@ -116,14 +111,10 @@ def drag_along(
     Args:
         problem: with the goal that moves, a `Point` or a `Frame`, which keeps its orientation.
         places: (n, 3) metres.
-        method: see `Drag`.
+        method: see `Drag`, as for what is raised.
         goal: index of the goal that moves.
         dt: seconds from frame to frame.
         progress: called after each frame with the number of frames done.
-
-    Raises:
-        InputError: the goal or the positions are invalid.
-        UnknownNameError: there is no such method.
     """
     given = array(places, "places", "places of shape (n, 3), metres")
     if given.ndim != 2 or given.shape[1] != 3 or not len(given):

@@ -1,9 +1,8 @@
 """Two limbs that hold each other back from a tracked posture: one of them gives way.
 
-Tracked limbs pass through each other, shown ones go around each other. When the tracked posture is free again, the
-shown limbs may be on the wrong sides: each holds the other, and no small motion of both brings them nearer. The nearest
-posture by equal weights is then a local minimum. With a lower weight of one limb it is none, as the other limb pushes
-it aside.
+Tracked limbs pass through each other, shown ones go around each other. When the tracked posture is free again, each
+may hold the other on the wrong side, and no small motion of both brings them nearer. With a lower weight of one limb
+the other pushes it aside.
 """
 
 from __future__ import annotations
@@ -19,16 +18,12 @@ from wholebody.scene.workspace import Workspace
 
 
 class Entanglement:
-    """Looks whether two limbs hold each other, and which of them gives way."""
+    """Looks whether two limbs hold each other, and which of them gives way.
+
+    `largest_motion` (nv,) is that of each degree of freedom in a frame, radians and metres.
+    """
 
     def __init__(self, scene: Scene, workspace: Workspace, largest_motion: Array) -> None:
-        """Prepare.
-
-        Args:
-            scene: the figure among things.
-            workspace: of the run.
-            largest_motion: (nv,) largest motion of each degree of freedom in a frame, radians and metres.
-        """
         self._model, self._workspace, self._largest_motion = scene.model, workspace, largest_motion
         limb_of = np.full(scene.model.njoints, -1)
         self._dofs: list[Array] = []
@@ -58,14 +53,7 @@ class Entanglement:
         return factors
 
     def update(self, before: Array, shown: Array, tracked: Array, contacts: Contacts) -> None:
-        """Look at a frame that led from `before` to `shown`.
-
-        Args:
-            before: (nq,) posture of the frame before.
-            shown: (nq,) posture of this frame.
-            tracked: (nq,) the tracked posture.
-            contacts: the pairs that touch at `shown`.
-        """
+        """Look at a frame that led from `before` to `shown`, at which the contacts touch; all postures are (nq,)."""
         pairs = self._limb[contacts.pair]
         pairs = pairs[(pairs >= 0).all(axis=1) & (pairs[:, 0] != pairs[:, 1])]
         if not len(pairs):

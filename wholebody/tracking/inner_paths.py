@@ -19,14 +19,7 @@ NEAR = 1e-3  # m, rad: from the track to a posture of a path at its time
 
 
 class Timed(NamedTuple):
-    """Postures at times.
-
-    Attributes:
-        q: (nq,) each.
-        times: (n,) seconds, ascending.
-        frames: (n,) the frame that each is in.
-        shares: (n,) the share of the frame, from 0 to 1.
-    """
+    """Postures (nq,) at ascending times (n,), seconds; of each the frame that it is in, and its share of the frame."""
 
     q: list[Array]
     times: Array
@@ -44,14 +37,8 @@ class Timed(NamedTuple):
 def timed(postures: Sequence[Array], paths: Sequence[Sequence[tuple[float, Array]]], dt: float) -> Timed:
     """The postures of a motion, and those on the ways between them.
 
-    Args:
-        postures: (nq,) one a frame.
-        paths: of each frame, shares of it and the postures (nq,) there, from the posture before to its own; empty where
-            the way is straight. No paths at all are as many empty ones.
-        dt: seconds from frame to frame.
-
-    Raises:
-        InputError: there are not as many paths as postures.
+    `paths` has for each frame shares of it and the postures (nq,) there, from the posture before to its own; it is
+    empty where the way is straight. Raises InputError where there are paths, and not as many as postures.
     """
     if len(paths) not in (0, len(postures)):
         raise InputError(f"the motion has {len(paths)} paths and {len(postures)} postures; give as many")

@@ -73,8 +73,7 @@ class LiveDrag:
         """Begin at the problem's start, or where the assembly's bodies are.
 
         Raises:
-            InputError: the problem's scene changed, the assembly has no bodies or is to be solved by another method
-                than Newton's, or neither of the two is given.
+            InputError: the scene changed, the assembly has no bodies or another method than Newton's, or it is neither.
             UnknownNameError: there is no such method.
         """
         self._subject: LiveSubject = live_subject(problem)
@@ -97,11 +96,7 @@ class LiveDrag:
     # ---- what the mouse and the buttons do
 
     def take(self, name: str) -> None:
-        """Take the handle of a frame or a thing.
-
-        Raises:
-            UnknownNameError: there is no such handle.
-        """
+        """Take the handle of a frame or a thing; raises UnknownNameError where there is none."""
         known(name, {*self.handles, *self.things}, "handle")
         self._undo.append((self.q.copy(), self._subject.remembered()))
         del self._undo[:-100]  # postures that are remembered
@@ -113,13 +108,10 @@ class LiveDrag:
         self.taken, self._drag, self._trouble = "", None, ""
 
     def move(self, place: Array) -> LiveFrame:
-        """Move the handle that was taken to a place (3,), and make one frame.
+        """Move the handle that was taken to a place (3,), and make one frame; raises InputError where none was taken.
 
         A frame has a budget of the processor's time, see `Drag`; moved to the same place again, the figure goes on. A
         figure that cannot follow keeps its posture, and the status says why.
-
-        Raises:
-            InputError: no handle was taken, or the place is not three finite numbers.
         """
         if not self.taken:
             raise InputError("no handle was taken; take one first")
@@ -140,11 +132,7 @@ class LiveDrag:
         return with_values(self._report(error, time.perf_counter() - began), path=path)
 
     def toggle(self, name: str) -> bool:
-        """Hold a frame where it is, or release it; whether it is held now.
-
-        Raises:
-            UnknownNameError: there is no such handle.
-        """
+        """Hold a frame where it is, or release it; whether it is held now. Raises UnknownNameError for other names."""
         known(name, self.handles, "handle")
         self.held ^= {name}
         if self.taken:
@@ -154,9 +142,7 @@ class LiveDrag:
     def choose(self, method: str | Method) -> None:
         """Follow by another method; its name is one of `methods` then.
 
-        Raises:
-            UnknownNameError: there is no such method.
-            InputError: an assembly is to be solved by another method than Newton's.
+        Raises UnknownNameError where there is none, InputError for an assembly and another method than Newton's.
         """
         if isinstance(self.problem, Assembly) and method != "newton":
             raise InputError(f"an assembly is dragged by Newton steps, not by {shown(method)}; leave method out")
@@ -193,11 +179,7 @@ class LiveDrag:
         return self._report(0.0, 0.0)
 
     def stated(self, goals: object = ()) -> Problem:
-        """The problem with the present posture as its start, and the present holds.
-
-        Raises:
-            InputError: an assembly is dragged.
-        """
+        """The problem with the present posture as its start, and the holds; raises InputError for an assembly."""
         return self._subject.stated(self.q, goals, self.held - {self.taken})
 
     def _restart(self) -> None:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Collection, Mapping, Set
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Collection, Set
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -33,48 +33,6 @@ class Handle(NamedTuple):
     local: pin.SE3
 
 
-class LiveSubject(Protocol):
-    """A problem or an assembly that is dragged."""
-
-    @property
-    def scene(self) -> Scene:
-        """A copy of its own; its things are moved."""
-
-    @property
-    def q(self) -> Array:
-        """(nq,) the posture of the scene at the beginning."""
-
-    @property
-    def handles(self) -> Mapping[str, Handle]:
-        """Name to place, of what can be dragged."""
-
-    @property
-    def held(self) -> Set[str]:
-        """Names of handles that are held at the beginning."""
-
-    def drag(self, q: Array, followed: str, place: Array, held: Collection[str], method: Method) -> Drag[Any]:
-        """What follows a handle from the posture q (nq,), while others are held where they are."""
-
-    def move(self, name: str, at: pin.SE3, over: float | None = None) -> None:
-        """Move a thing."""
-
-    def arrived(self) -> None:
-        """Note that what follows has made a frame."""
-
-    def remembered(self) -> Any:
-        """What `restore` goes back to."""
-
-    def restore(self, remembered: Any) -> None:
-        """Go back to where things and bodies were."""
-
-    def stated(self, q: Array, goals: object, held: Collection[str]) -> Problem:
-        """The problem with the start q (nq,), goals, and holds.
-
-        Raises:
-            InputError: it is no problem.
-        """
-
-
 def things_of(scene: Scene) -> tuple[str, ...]:
     """Names of the things that can be dragged: those that stand around and have an end."""
     return tuple(
@@ -90,14 +48,18 @@ def handle_frames(frames: Collection[str]) -> list[str]:
 
 
 class LiveProblem:
-    """The figure of a problem. Its holds can be released; its goals and other constraints stay."""
+    """The figure of a problem. Its holds can be released; its goals and other constraints stay.
+
+    Raises InputError where the problem's scene changed. `LiveAssembly` has the same attributes and methods.
+
+    Attributes:
+        scene: a copy of its own; its things are moved.
+        q: (nq,) the posture of the scene at the beginning.
+        handles: name to place, of what can be dragged.
+        held: names of handles that are held at the beginning.
+    """
 
     def __init__(self, problem: Problem) -> None:
-        """Copy the scene.
-
-        Raises:
-            InputError: the problem's scene changed.
-        """
         problem.check_fresh()
         self.problem, self.scene = problem, copy.copy(problem.scene)
         self.q: Array = np.array(problem.start)
@@ -127,18 +89,18 @@ class LiveProblem:
         )
 
     def drag(self, q: Array, followed: str, place: Array, held: Collection[str], method: Method) -> Drag[Any]:
-        """See `LiveSubject.drag`."""
+        """What follows a handle from the posture q (nq,), while others are held where they are."""
         return Drag(self.stated(q, [Point(followed, place), *self.problem.goals], held), method, budget=BUDGET)
 
     def move(self, name: str, at: pin.SE3, over: float | None = None) -> None:
-        """See `LiveSubject.move`."""
+        """Move a thing."""
         self.scene.move(name, at=at, over=over)
 
     def arrived(self) -> None:
-        """Nothing to note."""
+        """Note that what follows has made a frame: nothing."""
 
     def remembered(self) -> Any:
-        """The placements of the things."""
+        """What `restore` goes back to: the placements of the things."""
         return {name: self.scene.objects[name].placement for name in things_of(self.scene)}
 
     def restore(self, remembered: Any) -> None:
@@ -151,11 +113,6 @@ class LiveAssembly:
     """The bodies of an assembly, and the hands, feet and so on of its figures. A body that is held is fixed."""
 
     def __init__(self, assembly: Assembly) -> None:
-        """Copy the assembly.
-
-        Raises:
-            InputError: it has no bodies.
-        """
         self._still = copy.copy(assembly)  # without holds
         self._dragged: Assembly | None = None
         self.scene, self.q, self.held = self._still.scene, self._still.q, frozenset[str]()
@@ -171,7 +128,7 @@ class LiveAssembly:
                 self.handles[f"{name}/{frame}"] = Handle(int(joint), own.placement)
 
     def drag(self, q: Array, followed: str, place: Array, held: Collection[str], method: Method) -> Drag[Any]:
-        """See `LiveSubject.drag`; the method is Newton's, whatever is asked."""
+        """As of a problem; the method is Newton's, whatever is asked."""
         made = self._dragged = copy.copy(self._still)
         for name in held:
             made.fixed("world", name)
@@ -179,7 +136,7 @@ class LiveAssembly:
         return Drag(made, goal=len(made.goals) - 1, budget=BUDGET)
 
     def move(self, name: str, at: pin.SE3, over: float | None = None) -> None:
-        """See `LiveSubject.move`."""
+        """Move a thing."""
         self._still.move(name, at=at)
         if self._dragged is not None:
             self._dragged.move(name, at=at, over=over)
@@ -203,20 +160,15 @@ class LiveAssembly:
             self._still.move(name, at=at)
 
     def stated(self, q: Array, goals: object, held: Collection[str]) -> Problem:
-        """No problem.
-
-        Raises:
-            InputError: always.
-        """
+        """Raise InputError."""
         raise InputError("an assembly is no problem, so it has no task file; keep assembly.variables() instead")
 
 
-def live_subject(given: Problem | Assembly) -> LiveProblem | LiveAssembly:
-    """What a problem or an assembly is when it is dragged.
+LiveSubject = LiveProblem | LiveAssembly
 
-    Raises:
-        InputError: it is neither, has no bodies, or its scene changed.
-    """
+
+def live_subject(given: Problem | Assembly) -> LiveSubject:
+    """What a problem or an assembly is when it is dragged; raises InputError for anything else."""
     if isinstance(given, Assembly):
         return LiveAssembly(given)
     if isinstance(given, Problem):

@@ -43,11 +43,7 @@ SHARES = (0.5, 0.25)
 
 
 def check_scene(scene: object, what: str) -> None:
-    """Check that the argument is a scene.
-
-    Raises:
-        InputError: it is not.
-    """
+    """Check that the argument is a scene; raises InputError."""
     instance(scene, Scene, f"{what}: scene", "make one with wb.Scene(figure)")
 
 
@@ -112,13 +108,9 @@ class FrameLoop(NotCopyable):
         self._kept_from_passing(self._strategy.resolve(self.shown, self.shown))  # one-time set-up
 
     def frame(self, tracked: ArrayLike) -> Frame:
-        """Show one frame.
+        """Show one frame towards a tracked posture (nq,).
 
-        If the tracked posture is invalid (a sensor that failed), the figure keeps its posture, and the note of the
-        frame reports it.
-
-        Args:
-            tracked: (nq,) the tracked posture.
+        If that is invalid (a sensor that failed), the figure keeps its posture, and the note of the frame reports it.
         """
         began = _clocks()
         goal = array(tracked, "tracked", f"{self.scene.model.nq} numbers")
@@ -170,9 +162,8 @@ class FrameLoop(NotCopyable):
     def _kept_from_passing(self, resolution: Resolution) -> Resolution:
         """The first posture to which the motion is free; otherwise a share of the motion, or the posture shown.
 
-        A motion that the resolution swept is not swept again. This is the interpolation with the last posture without
-        overlap of algorithm 1, step 4. Only a share whose whole motion is free is taken. Motions up to a contact are
-        not taken, because they would creep into it.
+        This is the interpolation with the last posture without overlap of algorithm 1, step 4. Motions up to a contact
+        are not taken, because they would creep into it.
         """
         if resolution.swept:
             return resolution
@@ -197,8 +188,7 @@ class FrameLoop(NotCopyable):
     ) -> tuple[Resolution, tuple[Collision, ...]]:
         """The first posture to which the motion is free of things that move meanwhile, or else the least deep.
 
-        Returns:
-            The resolution with this posture, and what could not be avoided, which its note names.
+        Returns the resolution with this posture, and what could not be avoided, which its note names.
         """
         began, start = time.perf_counter(), (0.0, self.shown)
         nearest = resolution.candidates[-1]
@@ -247,11 +237,9 @@ def _clocks() -> tuple[float, float]:
 def frame_placements(
     scene: Scene, moves: Mapping[str, Sequence[PlacementLike]] | None, count: int, what: str
 ) -> dict[str, tuple[pin.SE3, ...]]:
-    """Placements of things at the ends of `count` frames, checked.
+    """Placements of things at the ends of `count` frames.
 
-    Raises:
-        InputError: not a mapping, not as many placements as frames, or one that cannot be read.
-        UnknownNameError: there is no such thing.
+    Raises InputError for what has none for each frame, UnknownNameError where there is no such thing.
     """
     if moves is None:
         return {}
@@ -269,8 +257,7 @@ def frame_placements(
 def free_start(scene: Scene, q: Array, rigid: bool) -> tuple[Array, str]:
     """The posture q, or the nearest one without overlap, with a note of the change.
 
-    Raises:
-        InputError: no posture near it is free of overlap.
+    Raises InputError where no posture near it is free of overlap.
     """
     q = scene.figure.clamp(pin.normalize(scene.model, q))
     deepest = deepest_overlap(scene, q)

@@ -1,4 +1,4 @@
-"""Copies of problems with moving goals or other starts, which leave the caller's problem unchanged."""
+"""Problems whose goals move: copies that leave the caller's problem unchanged, and solutions from where one is."""
 
 from __future__ import annotations
 
@@ -8,20 +8,26 @@ from typing import Any
 
 import pinocchio as pin
 
+from wholebody.assessment.posture import assess
 from wholebody.base.arrays import Array
 from wholebody.base.checks import whole
 from wholebody.base.errors import InputError
+from wholebody.geometry.continuous.moved_pairs import QueryResult
+from wholebody.geometry.continuous.passing_through import passes_through
+from wholebody.methods.base import Tracker
 from wholebody.methods.inputs import check_problem
 from wholebody.problem import Problem
+from wholebody.solution import Solution
 from wholebody.tasks import Frame, Point
 from wholebody.tasks.base import Goal
+
+PASSING = 1e-3  # m: if the motion to a solution gets deeper, a nearer solution is tried
 
 
 def copied(problem: Problem) -> Problem:
     """A copy whose goals can be moved without changing the caller's problem.
 
-    Raises:
-        InputError: it is no problem, or objects were added to or removed from its scene.
+    Raises InputError where it is no problem, or objects were added to or removed from its scene.
     """
     check_problem(problem, "problem")
     problem.check_fresh()
@@ -29,11 +35,7 @@ def copied(problem: Problem) -> Problem:
 
 
 def moving_goal(problem: Problem, number: int) -> Point | Frame:
-    """The goal of this index, which must be a `Point` or a `Frame`.
-
-    Raises:
-        InputError: there is no such goal, or it is of another kind.
-    """
+    """The goal of this index; raises InputError where there is none, or it is no `Point` and no `Frame`."""
     if not problem.goals:
         raise InputError("the problem has no goals; give it a Point or a Frame")
     number = whole(number, "the number of the goal", 0, len(problem.goals) - 1)
@@ -44,11 +46,7 @@ def moving_goal(problem: Problem, number: int) -> Point | Frame:
 
 
 def retarget(problem: Problem, number: int, target: Any) -> None:
-    """Move a problem's goal, a `Point` or `Frame`, to another target.
-
-    Raises:
-        InputError: there is no such goal, it is of another kind, or the target is not one.
-    """
+    """Move a problem's goal, a `Point` or `Frame`, to another target; raises InputError where one of them is none."""
     goals: list[Goal] = list(problem.goals)
     goals[number] = replace(moving_goal(problem, number), target=target)
     problem.retarget(goals)
@@ -62,3 +60,30 @@ def interpolated_target(goal: Point | Frame, error: Array, share: float) -> Any:
     here = pin.SE3(pin.exp3(error[3:]) @ target.rotation, target.translation + error[:3])
     turned = here.rotation @ pin.exp3(share * pin.log3(here.rotation.T @ target.rotation))
     return pin.SE3(turned, here.translation + share * (target.translation - here.translation))
+
+
+def warm_started(problem: Problem, tracker: Tracker, q: Array) -> Solution:
+    """Solve from the posture q (nq,); the posture is kept if the motion to the solution passes through something.
+
+    If the motion to the best answer penetrates something, the nearest answer is preferred; if neither meets the goal,
+    the posture is kept too. The tracker is that of a method for this problem.
+    """
+    solution = tracker.solve(q)
+    if problem.scene.sweep(q, solution.q, PASSING) is None:
+        return solution
+    near = tracker.nearest(q)
+    if (near.solved or not solution.solved) and problem.scene.sweep(q, near.q, PASSING) is None:
+        return replace(near, assessment=assess(problem, near.q))
+    if solution.solved and not _passes_through(problem, q, solution.q):
+        return solution
+    judgement = assess(problem.with_start(q), q)
+    message = "the posture that was found lies beyond something in the way; the figure stays"
+    return replace(solution, q=q, status="unreachable", assessment=judgement, message=message)
+
+
+def _passes_through(problem: Problem, before: Array, after: Array) -> bool:
+    """Whether the motion between two postures (nq,) passes through something."""
+    with problem.borrow() as workspace:
+        within = 0.06  # m: larger = more distances and fewer sweeps
+        first, last = (QueryResult(workspace.near(q, within), within) for q in (before, after))
+        return passes_through(workspace, first, last, before, after)

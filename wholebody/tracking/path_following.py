@@ -25,8 +25,7 @@ from wholebody.solution import Solution
 from wholebody.tasks import Point
 from wholebody.tasks.inputs import FARTHEST, point
 from wholebody.tracking.frame import FRAME
-from wholebody.tracking.moving_goals import copied, moving_goal, retarget
-from wholebody.tracking.warm_start import warm_started
+from wholebody.tracking.moving_goals import copied, moving_goal, retarget, warm_started
 
 SPACING = 0.05  # m between intermediate goals; smaller = more solves, each from a nearer start
 MOST_GOALS = 10_000

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,13 +18,6 @@ from wholebody.tracking.tracks import MOST_FRAMES
 
 SPEED = 0.5  # m/s: of the goal, if the number of frames is not given
 LARGEST = 100.0  # m: a point farther from the origin is refused as a wrong unit
-
-
-class Line(NamedTuple):
-    """A line of a file: its number, counted from one, and its text."""
-
-    number: int
-    text: str
 
 
 def circle(center: ArrayLike, radius: float, normal: ArrayLike = (1.0, 0.0, 0.0)) -> Array:
@@ -51,23 +42,18 @@ def circle(center: ArrayLike, radius: float, normal: ArrayLike = (1.0, 0.0, 0.0)
 
 
 def read_path(path: str | os.PathLike[str]) -> Array:
-    """Read points from a text file: x, y and z in metres, one point a line, separated by commas or spaces.
+    """Read points (k, 3) from a text file: x, y and z in metres, one point a line, separated by commas or spaces.
 
-    Empty lines, comments after #, and a first line of names are ignored.
-
-    Returns:
-        (k, 3) points, at least one.
-
-    Raises:
-        FileFormatError: the file cannot be read or a line is no point; the line is named.
+    Empty lines, comments after #, and a first line of names are ignored. Raises FileFormatError for a file without
+    points, or a line that is none and is named.
     """
     path = checked_path(path, "path")
     text = read_text(path, "path")
-    lines = [Line(number, said.partition("#")[0].strip()) for number, said in enumerate(text.splitlines(), start=1)]
-    lines = [line for line in lines if line.text]
-    if lines and not any(is_number(word) for word in _words(lines[0].text)):
-        lines = lines[1:]
-    places = [_place(path, line) for line in lines]
+    lines = {number: said.partition("#")[0].strip() for number, said in enumerate(text.splitlines(), start=1)}
+    told = [(f"{path}, line {number}", said) for number, said in lines.items() if said]
+    if told and not any(is_number(word) for word in _words(told[0][1])):
+        told = told[1:]
+    places = [_place(*line) for line in told]
     if not places:
         raise FileFormatError(f"{path}: there is no place in it; give x y z in metres, one place a line")
     return np.array(places)
@@ -103,11 +89,11 @@ def _words(text: str) -> list[str]:
     return text.replace(",", " ").replace(";", " ").split()
 
 
-def _place(path: Path, line: Line) -> list[float]:
-    words, where = _words(line.text), f"{path}, line {line.number}"
+def _place(where: str, text: str) -> list[float]:
+    words = _words(text)
     if len(words) != 3 or not all(map(is_number, words)):
-        raise FileFormatError(f"{where}: {shown(line.text)} is not a place; give x y z in metres")
+        raise FileFormatError(f"{where}: {shown(text)} is not a place; give x y z in metres")
     values = [float(word) for word in words]
     if not all(abs(value) <= LARGEST for value in values):
-        raise FileFormatError(f"{where}: {shown(line.text)} is no place within {LARGEST:g} m; give metres")
+        raise FileFormatError(f"{where}: {shown(text)} is no place within {LARGEST:g} m; give metres")
     return values

@@ -28,11 +28,9 @@ CLEARANCE = 1e-3
 class Attraction(DistanceMeasure):
     """Weighted squared distance from the tracked posture: ``sum_i w_i d_i^2``, d the tangent vector from there.
 
-    Unlike other terms it and the motion limit change between steps, because the tracker is read in every frame.
-
-    Its unconstrained minimum is the tracked posture itself, which one program reaches in one step without contact. In
-    contact the minimum is the nearest posture that touches. A goal would behave differently: it is met at any cost in
-    the other joints, and its force does not grow with the distance.
+    It and the motion limit change between steps, because the tracker is read in every frame. Its unconstrained minimum
+    is the tracked posture itself, which one program reaches in one step without contact. A goal would be met at any
+    cost in the other joints, and its force does not grow with the distance.
     """
 
     def __init__(self, q: Array, weights: Array) -> None:
@@ -73,20 +71,15 @@ class FrameMotionLimit(Bound):
 
 
 class QPStrategy:
-    """Follows tracked postures by a tracker of `QP`."""
+    """Follows tracked postures by a tracker of `QP`, in frames of `dt` seconds, from an overlap-free start (nq,).
+
+    A `rigid` figure is displaced as a whole while its joints follow the tracker. It may touch the things in `touching`;
+    from all others it keeps `CLEARANCE`.
+    """
 
     sweep_tolerance = 5e-5
 
     def __init__(self, scene: Scene, start: Array, dt: float, rigid: bool, touching: Sequence[str] = ()) -> None:
-        """Prepare for frames of `dt` seconds, from the overlap-free posture `start`, (nq,).
-
-        Args:
-            scene: the figure among things.
-            start: (nq,) the present posture.
-            dt: seconds from frame to frame.
-            rigid: whether the figure is displaced as a whole while its joints follow the tracker.
-            touching: things that the figure may touch; from all others it keeps `CLEARANCE`.
-        """
         self.scene, self.dt = scene, dt
         most = largest_motions(scene, dt)
         self._motion_limit = FrameMotionLimit(scene.model, most)
@@ -102,12 +95,7 @@ class QPStrategy:
         self._into_cones = OverlapResolver(scene, scene.workspace()).into_cones if cones else np.array
 
     def resolve(self, shown: Array, tracked: Array) -> Resolution:
-        """One frame: from the shown posture towards the tracked one, as near as possible.
-
-        Args:
-            shown: (nq,) of the frame before, overlap-free.
-            tracked: (nq,) the tracked posture.
-        """
+        """One frame: from the overlap-free posture `shown` towards `tracked`, both (nq,), as near as possible."""
         workspace = self._tracker.workspace
         proximity = workspace.proximity
         began, queried = time.perf_counter(), proximity.seconds

@@ -77,7 +77,6 @@ class Recording:
         )
 
     def __len__(self) -> int:
-        """Return the number of frames."""
         return len(self.q)
 
 

@@ -9,17 +9,35 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 
+import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.checks import known
 from wholebody.figures.figure import Figure
+from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Sphere
 from wholebody.scene.scene import Scene
-from wholebody.tracking import rooms
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.scripts import Keys, Place, ScenePlan, standing_at
-from wholebody.tracking.tracks import Track
+from wholebody.tracking.tracks import Track, check_figure
+
+Color = tuple[float, float, float, float]
+
+WALL: Color = (0.86, 0.85, 0.82, 1.0)
+OAK: Color = (0.60, 0.48, 0.36, 1.0)
+STONE: Color = (0.72, 0.72, 0.70, 1.0)
+BRONZE: Color = (0.55, 0.42, 0.26, 1.0)
+BLUE: Color = (0.30, 0.42, 0.58, 1.0)
+
+HALF_WIDTH = 2.5  # m: of a room, along y
+LENGTH = 5.0  # m: of a room, along x; the rooms meet at x = 0
+HEIGHT = 2.6
+DOOR_WIDTH, DOOR_HEIGHT = 1.0, 2.1
+
+TABLE: Place = (-2.5, 1.2, 0.74)  # m: middle of the top of the long table
+TABLE_SIZE = (1.6, 0.8, 0.04)
 
 
 @dataclass(frozen=True)
@@ -27,13 +45,10 @@ class InteractionScene:
     """A scene with a tracker.
 
     Attributes:
-        name: its name on the command line.
-        about: one sentence.
-        scene: figure and things.
-        track: the tracked postures.
+        name, about: its name on the command line, and one sentence.
+        scene, track: figure and things, and the tracked postures.
         rigid: whether the figure is displaced as a whole, such as a hand.
-        eye: position of the camera, metres.
-        target: the point in the middle of the picture, metres.
+        eye, target: position of the camera, and the point in the middle of the picture, metres.
         see_through: things to draw transparent.
     """
 
@@ -57,16 +72,89 @@ def build_scene(name: str, *, frames: int | None = None, seed: int = 0, dt: floa
         dt: seconds from frame to frame.
 
     Raises:
-        UnknownNameError: there is no such scene.
-        InputError: fewer than one frame.
+        UnknownNameError, InputError: there is no such scene; fewer than one frame.
     """
     known(name, _PLANS, "scene")
     plan = _PLANS[name]
     figure, track = plan.played(name, frames=frames, seed=seed, dt=dt)
-    scene = rooms.gallery(figure)
+    scene = gallery(figure)
     return InteractionScene(
         name, plan.about, scene, track, plan.figure == "hand", plan.eye, plan.target, plan.see_through
     )
+
+
+def gallery(figure: Figure) -> Scene:
+    """A scene with a figure in a gallery: a west room (x from -5 to 0), an east room (0 to 5), and a door between them.
+
+    Walls, a door with a lintel, a niche in the east room, tables, a bench, pedestals, and sculptures on them: a torus,
+    split into convex pieces, a sphere, an egg, an obelisk and a figure of capsules. All of them are fixed.
+    """
+    scene = Scene(check_figure(figure, "gallery"))
+    scene.add(HalfSpace(), name="floor")
+    _walls(scene)
+    _furniture(scene)
+    _sculptures(scene)
+    return scene
+
+
+def _walls(scene: Scene) -> None:
+    t, h, middle = 0.15, HEIGHT, 0.5 * HEIGHT  # thickness
+    outside = 2.0 * (LENGTH + t)
+    scene.add(Box((t, 2.0 * HALF_WIDTH, h)), name="west wall", at=(-LENGTH - 0.5 * t, 0.0, middle), color=WALL)
+    scene.add(Box((t, 2.0 * HALF_WIDTH, h)), name="east wall", at=(LENGTH + 0.5 * t, 0.0, middle), color=WALL)
+    scene.add(Box((outside, t, h)), name="north wall", at=(0.0, HALF_WIDTH + 0.5 * t, middle), color=WALL)
+    scene.add(Box((outside, t, h)), name="south wall", at=(0.0, -HALF_WIDTH - 0.5 * t, middle), color=WALL)
+    side = HALF_WIDTH - 0.5 * DOOR_WIDTH
+    for name, sign in (("wall left of the door", 1.0), ("wall right of the door", -1.0)):
+        scene.add(Box((t, side, h)), name=name, at=(0.0, sign * (0.5 * DOOR_WIDTH + 0.5 * side), middle), color=WALL)
+    lintel = h - DOOR_HEIGHT
+    scene.add(Box((t, DOOR_WIDTH, lintel)), name="lintel", at=(0.0, 0.0, DOOR_HEIGHT + 0.5 * lintel), color=WALL)
+    scene.add(Box((1.2, t, h)), name="niche", at=(LENGTH - 0.6, -0.9, middle), color=WALL)
+
+
+def _furniture(scene: Scene) -> None:
+    x, y, top = TABLE
+    length, width, thick = TABLE_SIZE
+    scene.add(Box(TABLE_SIZE), name="table", at=(x, y, top - 0.5 * thick), color=OAK)
+    leg = top - thick
+    for name, sign in (("table's west leg", -1.0), ("table's east leg", 1.0)):
+        at = (x + sign * (0.5 * length - 0.1), y, 0.5 * leg)
+        scene.add(Box((0.06, 0.8 * width, leg)), name=name, at=at, color=OAK)
+    scene.add(_cylinder(0.45, 0.03), name="round table", at=(2.2, 1.4, 0.735), color=OAK)
+    scene.add(_cylinder(0.06, 0.72), name="round table's foot", at=(2.2, 1.4, 0.36), color=OAK)
+    scene.add(Box((1.4, 0.4, 0.45)), name="bench", at=(-2.5, -1.4, 0.225), color=OAK)
+
+
+def _sculptures(scene: Scene) -> None:
+    for name, x, y, height in (
+        ("torus's pedestal", -0.9, 1.9, 0.9),
+        ("sphere's pedestal", -4.3, -1.8, 1.0),
+        ("egg's pedestal", 1.2, -1.8, 1.0),
+    ):
+        scene.add(Box((0.4, 0.4, height)), name=name, at=(x, y, 0.5 * height), color=STONE)
+    upright = (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
+    scene.add(_torus(), name="torus", at=(-0.9, 1.9, 0.9 + 0.37, *upright), color=BRONZE)
+    scene.add(Sphere(0.2), name="sphere", at=(-4.3, -1.8, 1.2), color=BLUE)
+    scene.add(Ellipsoid((0.14, 0.14, 0.24)), name="egg", at=(1.2, -1.8, 1.24), color=BLUE)
+    obelisk = [(s * a, t * a, z) for a, z in ((0.2, 0.0), (0.12, 1.7)) for s in (-1, 1) for t in (-1, 1)]
+    scene.add(Hull(np.array([*obelisk, (0.0, 0.0, 1.9)])), name="obelisk", at=(3.2, -1.8, 0.0), color=STONE)
+    scene.add(Capsule(radius=0.12, length=1.2), name="column", at=(4.4, 1.9, 0.72), color=STONE)
+
+
+def _cylinder(radius: float, height: float) -> Hull:
+    angle = np.linspace(0.0, 2.0 * math.pi, 25)[:-1]
+    ring = radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(len(angle))])
+    half = np.array([0.0, 0.0, 0.5 * height])
+    return Hull(np.vstack([ring - half, ring + half]))
+
+
+@cache
+def _torus() -> Mesh:
+    """A ring of 37 cm radius; splitting it takes seconds, so every gallery shares it."""
+    import trimesh
+
+    ring = trimesh.creation.torus(0.28, 0.09, major_sections=24, minor_sections=12)
+    return Mesh((ring.vertices, ring.faces))
 
 
 # ---- the hand: position of the wrist, and the glove
@@ -80,7 +168,7 @@ def _hand(figure: Figure, at: Place, yaw: float, glove: str) -> Array:
 
 
 def _hand_on_table(figure: Figure) -> Keys:
-    x, y, top = rooms.TABLE
+    x, y, top = TABLE
     high, deep = top + 0.20, top + 0.01  # the wrist, some 6 cm above the lowest finger
 
     def at(along: float, height: float, glove: str) -> Array:
@@ -101,7 +189,7 @@ def _hand_on_table(figure: Figure) -> Keys:
 
 
 def _hand_in_corner(figure: Figure) -> Keys:
-    west, north = -rooms.LENGTH, rooms.HALF_WIDTH
+    west, north = -LENGTH, HALF_WIDTH
 
     def at(dx: float, dy: float, z: float, yaw: float, glove: str = "relaxed") -> Array:
         return _hand(figure, (west + dx, north - dy, z), yaw, glove)
@@ -127,7 +215,7 @@ _REACHING = {"shoulder_flexion": 85.0, "elbow_flexion": 12.0, "shoulder_abductio
 
 
 def _two_arms(figure: Figure) -> Keys:
-    wall = -rooms.LENGTH
+    wall = -LENGTH
 
     def at(distance: float, arms: Mapping[str, float], y: float = 0.2) -> Array:
         return standing_at(figure, wall + distance, y, math.pi, arms)
@@ -181,7 +269,7 @@ def _self_collision(figure: Figure) -> Keys:
 
 
 def _two_arms_and_leg(figure: Figure) -> Keys:
-    wall = -rooms.LENGTH
+    wall = -LENGTH
 
     def at(distance: float, degrees: Mapping[str, float], y: float = -0.3) -> Array:
         return standing_at(figure, wall + distance, y, math.pi, degrees)
@@ -211,7 +299,7 @@ def _arm_in_corner(figure: Figure) -> Keys:
             "right_shoulder_flexion": flexion, "right_shoulder_abduction": abduction, "right_elbow_flexion": elbow,
             "right_wrist_flexion": 10.0,
         }  # fmt: skip
-        return standing_at(figure, rooms.LENGTH + x, y, 0.0, arm)
+        return standing_at(figure, LENGTH + x, y, 0.0, arm)
 
     return [
         (0.0, at(-1.20, -0.25, 30.0, 12.0, 50.0)),

@@ -28,16 +28,7 @@ WAVES = 5
 
 @dataclass(frozen=True)
 class ScenePlan:
-    """What a scene with a scripted tracker is made of.
-
-    Attributes:
-        about: one sentence.
-        figure: name of the figure.
-        keys: the script of a figure; see `script`.
-        eye: position of the camera, metres.
-        target: the point in the middle of the picture, metres.
-        see_through: things to draw transparent.
-    """
+    """What a scene with a scripted tracker is made of; see `InteractionScene` and, for keys, `script`."""
 
     about: str
     figure: str
@@ -49,8 +40,7 @@ class ScenePlan:
     def played(self, name: str, *, frames: int | None, seed: int, dt: float) -> tuple[Figure, Track]:
         """The figure, and the script as its track; cut or repeated to a number of frames, unless that is None.
 
-        Raises:
-            InputError: fewer than one frame, or a seed or a time step out of range.
+        Raises InputError for fewer than one frame, or a seed or a time step out of range.
         """
         if frames is not None:
             frames = whole(frames, "frames", 1, MOST_FRAMES)

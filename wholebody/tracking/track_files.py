@@ -98,8 +98,7 @@ def _without_names(
 ) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
     """Names for the columns of a file that has none, and its lines with times; a warning says what was taken.
 
-    Raises:
-        FileFormatError: there are not as many columns as the figure has.
+    Raises FileFormatError where there are not as many columns as the figure has.
     """
     if len(first) != len(wanted) - 1:
         raise FileFormatError(

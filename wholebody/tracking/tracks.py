@@ -24,15 +24,9 @@ MOST_FRAMES = 1_000_000  # of a track: ten hours at 30 frames a second; more wou
 
 
 def check_frames(q: Array, what: str, place: Callable[[int], str]) -> None:
-    """Check the values of frames.
+    """Check values (frames, columns) of what is named; `place` is what a column is called.
 
-    Args:
-        q: (frames, columns) values.
-        what: what they are of, in the sentence.
-        place: what a column is called.
-
-    Raises:
-        InputError: a value is not finite or far too large; the frame is named.
+    Raises InputError for a value that is not finite or far too large, and names its frame.
     """
     if not (q.min(initial=0.0) >= -LARGEST and q.max(initial=0.0) <= LARGEST):  # false of NaN, and without copies of q
         bad = np.argwhere(~(np.abs(q) <= LARGEST))
@@ -44,11 +38,7 @@ def check_frames(q: Array, what: str, place: Callable[[int], str]) -> None:
 
 
 def check_figure(figure: object, what: str) -> Figure:
-    """A figure.
-
-    Raises:
-        InputError: it is something else.
-    """
+    """A figure; raises InputError where it is something else."""
     return instance(figure, Figure, f"{what}: figure", "load one with wb.load('human')")
 
 
@@ -74,7 +64,6 @@ class Track:
     name: str = "track"
 
     def __post_init__(self) -> None:
-        """Check the values."""
         text(self.name, "the name of a track")
         q = array(self.q, f"{self.name}: q", "postures, shape (frames, nq)").copy()
         if q.ndim != 2 or not len(q):
@@ -94,7 +83,6 @@ class Track:
         object.__setattr__(self, "q", q)
 
     def __len__(self) -> int:
-        """Return the number of frames."""
         return len(self.q)
 
     @classmethod
@@ -103,11 +91,7 @@ class Track:
         return cls(q, dt, check_figure(figure, "Track.of").joints, name)  # type: ignore[arg-type]
 
     def part(self, first: int, last: int) -> Track:
-        """Frames `first` to `last`, without the last one.
-
-        Raises:
-            InputError: there is no frame among them.
-        """
+        """Frames `first` to `last`, without the last one; raises InputError where there is none among them."""
         first = whole(first, "first", 0, len(self))
         last = whole(last, "last", 0, len(self))
         if not first < last:
@@ -115,11 +99,7 @@ class Track:
         return Track(self.q[first:last], self.dt, self.joints, self.name)
 
     def repeated(self, frames: int) -> Track:
-        """A track of a given number of frames: the first ones, or all of them repeatedly.
-
-        Raises:
-            InputError: the number is less than one.
-        """
+        """A track of as many frames, at least one: the first ones, or all of them repeatedly."""
         frames = whole(frames, f"{self.name}: frames", 1, MOST_FRAMES)
         return Track(self.q[np.arange(frames) % len(self)], self.dt, self.joints, self.name)
 

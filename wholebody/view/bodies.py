@@ -26,8 +26,7 @@ class Body:
     """One drawn piece.
 
     Attributes:
-        carrier: the node of the joint.
-        path: node of the piece, below the carrier.
+        carrier, path: nodes of its joint, and of the piece below it.
         joint: index of the joint.
         thing: name of its object; None for a piece of the figure.
         color: its color without contact.
@@ -84,16 +83,12 @@ class DrawnFigure(NamedTuple):
 
 
 class Bodies:
-    """All pieces of a scene in the scene graph, in the order of its geometry model."""
+    """All pieces of a scene in the scene graph, in the order of its geometry model.
+
+    `see_through` names things to draw transparent; `pieces` draws a figure's pieces even if it has a surface.
+    """
 
     def __init__(self, scene: ViewedScene, see_through: Collection[str], pieces: bool) -> None:
-        """Read the scene.
-
-        Args:
-            scene: the scene to draw.
-            see_through: names of things to draw transparent.
-            pieces: draw the figure's pieces even if its body has a surface or visuals.
-        """
         self.scene = scene
         self.see_through = frozenset(see_through)
         self.revision = scene.revision

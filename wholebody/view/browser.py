@@ -18,26 +18,14 @@ from wholebody.base.errors import MissingPackageError, WholebodyError
 from wholebody.base.files import Scratch
 
 _FLAGS = (
-    "--headless",
     "--no-sandbox",  # a container has no sandbox; the only page is our own, and it has no network
-    "--disable-gpu",
-    "--enable-unsafe-swiftshader",
-    "--disable-dev-shm-usage",
-    "--disable-quic",
-    "--no-first-run",
-    "--no-default-browser-check",
-    "--disable-extensions",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--disable-features=Translate,OptimizationHints,MediaRouter",
-    "--hide-scrollbars",
-    "--mute-audio",
-    "--force-device-scale-factor=1",
-    "--force-color-profile=srgb",
-    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
-    "--remote-debugging-pipe",
+    *("--headless", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage", "--disable-quic"),
+    *("--no-first-run", "--no-default-browser-check", "--disable-extensions", "--disable-background-networking"),
+    *("--disable-component-update", "--disable-sync", "--disable-features=Translate,OptimizationHints,MediaRouter"),
+    *("--hide-scrollbars", "--mute-audio", "--force-device-scale-factor=1", "--force-color-profile=srgb"),
+    *("--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1", "--remote-debugging-pipe"),
 )
+_READY = "window.wholebody !== undefined && window.wholebody.ready"
 
 
 class BrowserError(WholebodyError):
@@ -49,35 +37,31 @@ def find_chromium() -> str | None:
     named = os.environ.get("WHOLEBODY_CHROMIUM")
     if named:
         return shutil.which(named)
-    names = (
-        "chromium",
-        "chromium-browser",
-        "google-chrome",
-        "google-chrome-stable",
-        "chrome",
-        "chromium-headless-shell",
-    )
-    return next((path for name in names if (path := shutil.which(name))), None)
+    names = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
+    return next((path for name in (*names, "chromium-headless-shell") if (path := shutil.which(name))), None)
 
 
 class Browser:
     """One headless Chromium with one page.
+
+    It starts at once, and is waited for at the first call of a method, which raises BrowserError if it did not start.
 
     Attributes:
         errors: JavaScript errors of the page since it was opened.
         requests: addresses that the page requested since it was opened.
     """
 
-    def __init__(self, size: tuple[int, int] = (960, 720), timeout: float = 60.0) -> None:
+    def __init__(self, size: tuple[int, int] = (960, 720), timeout: float = 60.0, page: str = "") -> None:
         """Start Chromium.
 
         Args:
             size: width and height of the page, pixels.
             timeout: longest wait for any answer, seconds.
+            page: HTML of the page of a `Viewer` that it opens, as a file without network; "" for none.
 
         Raises:
             MissingPackageError: there is no Chromium.
-            BrowserError: it did not start.
+            BrowserError: it cannot be started.
         """
         executable = find_chromium()
         if executable is None:
@@ -88,6 +72,7 @@ class Browser:
         self.timeout = timeout
         self.errors: list[str] = []
         self.requests: list[str] = []
+        self._size, self._opens = size, bool(page)
         self._number = 0
         self._partial = b""
         self._session: str | None = None
@@ -96,32 +81,21 @@ class Browser:
         self._pid: int | None = None
         self._scratch = Scratch()
         self._folder = self._scratch.path
-        self._start(executable)
+        self._start(executable, self._written(page) if page else "about:blank")
         atexit.register(self.close)
-        try:
-            target = self._call("Target.createTarget", url="about:blank")["targetId"]
-            self._session = self._call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
-            for domain in ("Page", "Runtime", "Network"):
-                self._call(f"{domain}.enable")
-            self.resize(size)
-        except BaseException:
-            self.close()
-            raise
 
-    def _start(self, executable: str) -> None:
+    def _start(self, executable: str, url: str) -> None:
         """Start Chromium with the reading end of one pipe as descriptor 3, the writing end of another as 4."""
         theirs_in, self._out = os.pipe()
         self._in, theirs_out = os.pipe()
-        high_in = fcntl.fcntl(
-            theirs_in, fcntl.F_DUPFD_CLOEXEC, 10
-        )  # other numbers than 3 and 4, so that no dup2 overwrites the other
-        high_out = fcntl.fcntl(theirs_out, fcntl.F_DUPFD_CLOEXEC, 10)
+        # other numbers than 3 and 4, so that no dup2 overwrites the other
+        high_in, high_out = (fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 10) for end in (theirs_in, theirs_out))
         actions = [
             (os.POSIX_SPAWN_OPEN, fd, os.devnull, flag, 0)
             for fd, flag in ((0, os.O_RDONLY), (1, os.O_WRONLY), (2, os.O_WRONLY))
         ]
         actions += [(os.POSIX_SPAWN_DUP2, high_in, 3), (os.POSIX_SPAWN_DUP2, high_out, 4)]  # type: ignore[list-item]
-        command = [executable, *_FLAGS, f"--user-data-dir={self._folder / 'profile'}", "about:blank"]
+        command = [executable, *_FLAGS, f"--user-data-dir={self._folder / 'profile'}", url]
         try:
             self._pid = os.posix_spawn(executable, command, os.environ, file_actions=actions, setpgroup=0)
         except OSError as error:
@@ -130,17 +104,34 @@ class Browser:
             for descriptor in (theirs_in, theirs_out, high_in, high_out):
                 os.close(descriptor)
 
+    def _attach(self) -> None:
+        """Wait for the page that Chromium opened when it started, and listen to it."""
+        pages: list[Any] = []
+        end = time.monotonic() + self.timeout
+        while not pages and time.monotonic() < end:
+            found = self._ask("Target.getTargets", None)["targetInfos"]
+            pages = [target["targetId"] for target in found if target["type"] == "page"]
+            time.sleep(0.0 if pages else 0.01)
+        if not pages:
+            raise BrowserError(f"the browser opened no page within {self.timeout:g} s")
+        self._session = self._ask("Target.attachToTarget", None, targetId=pages[0], flatten=True)["sessionId"]
+        for domain in ("Page", "Runtime", "Network"):
+            self._call(f"{domain}.enable")
+        self._call("Page.bringToFront")
+        self.resize(self._size)
+        if self._opens:
+            self.until(_READY)
+
     def resize(self, size: tuple[int, int]) -> None:
         """Change the width and height of the page, pixels."""
         self._call(
             "Emulation.setDeviceMetricsOverride", width=size[0], height=size[1], deviceScaleFactor=1, mobile=False
         )
 
-    def open(self, url: str) -> None:
-        """Open an address and wait until the page of a `Viewer` has drawn all commands.
+    def open(self, url: str, ready: str = _READY) -> None:
+        """Open an address, and wait until a JavaScript expression is true: that the page of a `Viewer` has drawn all.
 
-        Raises:
-            BrowserError: the page did not load, or has an error.
+        Raises BrowserError where the page does not load, or has an error.
         """
         self.errors.clear()
         self.requests.clear()
@@ -150,39 +141,19 @@ class Browser:
         end = time.monotonic() + self.timeout
         while not self._loaded:
             self._receive(end)
-        self.until("window.wholebody !== undefined && window.wholebody.ready")
-
-    def visit(self, url: str, ready: str = "document.readyState === 'complete'") -> None:
-        """Open a page that is no viewer's, and wait until a JavaScript expression is true."""
-        self.errors.clear()
-        if error := self._call("Page.navigate", url=url).get("errorText"):
-            raise BrowserError(f"the browser could not open {url}: {error}")
         self.until(ready)
 
-    def mouse(self, kind: str, x: float, y: float, pressed: bool = False) -> None:
-        """Send a mouse event at a pixel: "mousePressed", "mouseMoved" or "mouseReleased", of the left button."""
-        button = "left" if pressed or kind != "mouseMoved" else "none"
-        count = 0 if kind == "mouseMoved" else 1
-        self._call(
-            "Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, buttons=int(pressed), clickCount=count
-        )
-
-    def screenshot(self) -> bytes:
-        """PNG of the whole page, controls included."""
-        return base64.b64decode(self._call("Page.captureScreenshot", format="png")["data"])
-
     def open_html(self, page: str) -> None:
-        """Open a page from its HTML, as a file without network."""
+        """Open a page of a `Viewer` from its HTML, as a file without network."""
+        self.open(self._written(page))
+
+    def _written(self, page: str) -> str:
         path = self._folder / "page.html"
         path.write_text(page, encoding="utf-8")
-        self.open(path.as_uri())
+        return path.as_uri()
 
     def until(self, condition: str) -> None:
-        """Wait until a JavaScript expression is true.
-
-        Raises:
-            BrowserError: it did not become true in time, or the page has an error.
-        """
+        """Wait until a JavaScript expression is true; raises BrowserError for a page that has an error or is slow."""
         end = time.monotonic() + self.timeout
         while not self.evaluate(condition):
             if self.errors:
@@ -192,23 +163,14 @@ class Browser:
             time.sleep(0.02)
 
     def evaluate(self, expression: str) -> Any:
-        """Value of a JavaScript expression in the page; promises are awaited.
-
-        Raises:
-            BrowserError: it throws.
-        """
+        """Value of a JavaScript expression in the page; promises are awaited. Raises BrowserError where it throws."""
         answer = self._call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
         if "exceptionDetails" in answer:
             raise BrowserError(f"the page failed: {_message(answer['exceptionDetails'])}")
         return answer["result"].get("value")
 
     def capture(self, first: str = "0", *, legend: bool = False) -> bytes:
-        """PNG of the drawing, without the controls on top of it.
-
-        Args:
-            first: JavaScript to run before it in the same call, so that the page draws only once.
-            legend: whether the title, the status and the meaning of the colours stand in a corner.
-        """
+        """PNG of the drawing without controls, after JavaScript that comes first; with the panel in a corner or not."""
         if self.errors:
             raise BrowserError(f"the page failed: {self.errors[0]}")
         data: str = self.evaluate(f"{first}; wholebody.capture({json.dumps(legend)})")
@@ -228,23 +190,32 @@ class Browser:
         if not _ended(pid, 3.0):
             os.killpg(pid, signal.SIGKILL)
             _ended(pid, 3.0)
+        end = time.monotonic() + 3.0
         self._scratch.close()
+        while self._folder.exists() and time.monotonic() < end:  # its last processes may still write there
+            time.sleep(0.01)
+            self._scratch.close()
 
     def __enter__(self) -> Browser:
-        """Return the browser."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Close it."""
         self.close()
 
     # ---- the protocol: JSON messages, each ended by a zero byte
 
     def _call(self, method: str, **params: Any) -> dict[str, Any]:
+        """The page's answer."""
+        if self._session is None:
+            self._attach()
+        return self._ask(method, self._session, **params)
+
+    def _ask(self, method: str, session: str | None, **params: Any) -> dict[str, Any]:
+        """The answer of a page, or of the browser."""
         self._number += 1
         message: dict[str, Any] = {"id": self._number, "method": method, "params": params}
-        if self._session is not None:
-            message["sessionId"] = self._session
+        if session is not None:
+            message["sessionId"] = session
         rest = memoryview(json.dumps(message).encode() + b"\0")
         try:
             while rest:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.view.server import Command, Op
-from wholebody.view.surface import Patch
+from wholebody.view.style import LOOK
+
+if TYPE_CHECKING:
+    from wholebody.view.surface import Patch
 
 
 def floats(values: Any) -> Any:
@@ -29,14 +32,7 @@ def set_object(path: str, three: Mapping[str, Any]) -> Command:
 
 
 def label(path: str, text: str, color: str, size: float) -> Command:
-    """Put a text at a node, upright and of the same size at every distance.
-
-    Args:
-        path: the node.
-        text: one line.
-        color: of the letters, as in CSS.
-        size: height, as a fraction of the distance from the camera.
-    """
+    """Put a line of text at a node, upright; `size` is its height as a fraction of the distance from the camera."""
     return Command(
         Op.OBJECT, path, "", pack({"type": "label", "path": path, "text": text, "color": color, "size": size})
     )
@@ -67,14 +63,9 @@ def set_skeleton(
 
 
 def set_skin(path: str, skeleton: str, patch: Patch, color: tuple[float, ...], unit: float) -> Command:
-    """Put a patch of a body's surface at a node.
+    """Put a patch of a body's surface at a node, behind that of its skeleton; positions are rounded to `unit` metres.
 
-    Args:
-        path: the node.
-        skeleton: node of its skeleton, which is put before it.
-        patch: the patch; at most 65,536 vertices and 256 bones.
-        color: red, green, blue, alpha.
-        unit: metres; positions are rounded to it.
+    A patch has at most 65,536 vertices and 256 bones.
     """
     weights = np.round(255.0 * patch.weights).astype(int)
     weights[:, 0] += 255 - weights.sum(axis=1)  # the strongest takes the rounding: the page adds them up unscaled
@@ -115,6 +106,24 @@ def delete(path: str) -> Command:
     return Command(Op.DELETE, path, "", pack({"type": "delete", "path": path}))
 
 
+def look_from(eye: Array, target: Array) -> Command:
+    """Turn the camera at `eye` (3,) to a target (3,)."""
+    return _look(eye=np.asarray(eye, dtype=float).tolist(), target=np.asarray(target, dtype=float).tolist())
+
+
+def look_at(points: Array, direction: Sequence[float], margin: float) -> Command:
+    """Turn the camera to the middle of points (n, 3), from a direction (3,) so far away that all are in the picture.
+
+    `margin` is the width of the picture relative to the points; 1 is exact.
+    """
+    target = (points.min(axis=0) + points.max(axis=0)) / 2
+    return _look(direction=list(direction), target=target.tolist(), points=floats(points), margin=margin)
+
+
+def _look(**how: Any) -> Command:
+    return Command(Op.CAMERA, "", "", pack({"type": "look", "fov": LOOK.field_of_view, **how}))
+
+
 class Track(NamedTuple):
     """Values of one property of one node over time.
 
@@ -145,13 +154,7 @@ class Track(NamedTuple):
 
 
 def set_animation(tracks: Sequence[Track], times: Array, repetitions: float) -> Command:
-    """Let the page play a motion by its own clock.
-
-    Args:
-        tracks: the changing properties.
-        times: (n,) of the frames, seconds, ascending.
-        repetitions: number of times it is played; infinity for ever.
-    """
+    """Let the page play a motion by its own clock: tracks at times (n,), seconds, ascending; as often as is said."""
     clips: dict[str, list[dict[str, Any]]] = {}
     for track in tracks:
         clips.setdefault(track.path, []).append(track.lower(times))

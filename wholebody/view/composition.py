@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,10 +13,8 @@ from wholebody.dynamics.overlaps import Overlap
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.proximity import PENETRATION
-from wholebody.tracking.inner_paths import Timed
-from wholebody.view import drawing
+from wholebody.view import commands, drawing
 from wholebody.view.bodies import Bodies
-from wholebody.view.camera import camera_on
 from wholebody.view.contact_markers import color_contacts, mark_blockers, mark_contacts, mark_overlaps
 from wholebody.view.goal_markers import Goals, mark_frames
 from wholebody.view.scene_graph import Keyframe, Marker, SceneGraph
@@ -24,22 +22,20 @@ from wholebody.view.server import Command
 from wholebody.view.style import LOOK, Color
 from wholebody.view.viewed_scene import ViewedScene
 
+if TYPE_CHECKING:
+    from wholebody.tracking.inner_paths import Timed
+
 
 class Composition:
-    """A scene in a scene graph."""
+    """A scene in a scene graph; nothing is drawn before the first posture.
+
+    Pieces nearer than `contact_distance` metres are shown as touching; `see_through` names things to draw transparent,
+    and `names` writes the names of things beside them.
+    """
 
     def __init__(
         self, scene: ViewedScene, graph: SceneGraph, contact_distance: float, see_through: Collection[str], names: bool
     ) -> None:
-        """Store the options; nothing is drawn before the first posture.
-
-        Args:
-            scene: the shown scene.
-            graph: the scene graph.
-            contact_distance: pieces nearer than this are shown as touching, metres.
-            see_through: names of things to draw transparent.
-            names: whether to write the names of things beside them.
-        """
         self.scene, self._graph = scene, graph
         self._contact_distance, self._see_through, self._names = contact_distance, see_through, names
         self._state = State(scene.model)
@@ -52,11 +48,7 @@ class Composition:
 
     @property
     def figure(self) -> Figure:
-        """The figure.
-
-        Raises:
-            InputError: there is none: the scene is of parts alone.
-        """
+        """The figure; raises InputError where there is none: the scene is of parts alone."""
         if self.scene.figure is None:
             raise InputError("the scene has no figure, so it has no frames to show and no segments to color")
         figure: Figure = self.scene.figure
@@ -76,11 +68,7 @@ class Composition:
         return drawn
 
     def checked(self, q: Any) -> Array:
-        """Copy of a posture (nq,).
-
-        Raises:
-            InputError: it has the wrong shape or is not finite.
-        """
+        """Copy of a posture (nq,); raises InputError where it has the wrong shape or is not finite."""
         return np.array(self._state.update(q).q)
 
     def keyframe(
@@ -123,8 +111,7 @@ class Composition:
     def moving_ghost(self, keyframes: Sequence[Keyframe], postures: Any, color: Color, played: Timed) -> list[Array]:
         """Add a moving ghost, one posture a frame, to a motion's keyframes; return its first posture.
 
-        Raises:
-            InputError: not as many postures as keyframes, or one has the wrong shape or is not finite.
+        Raises InputError where there are not as many postures as frames, or one is none.
         """
         checked, count = [self.checked(q) for q in postures], played.frames[-1] + 1
         if len(checked) != count:
@@ -143,4 +130,9 @@ class Composition:
             things.append(self.bodies.corners(state.data, things=True))
             if self._goals is not None:
                 figure.append(self._goals.targets(state))
-        return camera_on(np.concatenate(figure), np.concatenate(things))
+        seen, around = np.concatenate(figure), np.concatenate(things)
+        if not len(seen):
+            seen = around if len(around) else np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 2.0]])
+        # m: distance from the figure within which things are kept in the picture
+        near = np.clip(around, seen.min(axis=0) - 0.3, seen.max(axis=0) + 0.3)
+        return commands.look_at(np.concatenate([seen, near]), LOOK.direction, LOOK.margin)

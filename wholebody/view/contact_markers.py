@@ -16,12 +16,12 @@ from wholebody.view import drawing
 from wholebody.view.bodies import Bodies
 from wholebody.view.scene_graph import Keyframe, Marker
 from wholebody.view.style import LOOK
-from wholebody.view.viewed_scene import ViewedContacts, ViewedScene
+from wholebody.view.viewed_scene import ViewedScene
 
 _DEPTH = Marker("arrow", LOOK.depth, 1.3)
 
 
-def color_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts) -> None:
+def color_contacts(keyframe: Keyframe, bodies: Bodies, contacts: Any) -> None:
     """Give every piece in contact the colour of its state; penetration takes precedence over contact."""
     for pairs, state in (
         (contacts.pair, LOOK.contact),
@@ -31,11 +31,10 @@ def color_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts)
             bodies.paint(keyframe, int(index), state)
 
 
-def mark_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts) -> None:
+def mark_contacts(keyframe: Keyframe, bodies: Bodies, contacts: Any) -> None:
     """Mark witness points and normals; for penetrations the vector that moves the figure's piece out.
 
-    A normal starts at the first piece's witness point and points to the second piece. A penetration vector is as long
-    as the depth, but at least `LOOK.shortest_depth`; the deepest ones are labelled with their depth.
+    A penetration vector is as long as the depth, but at least `LOOK.shortest_depth`; the deepest ones are labelled.
     """
     # number of the nearest contacts with markers; a page with thousands of nodes is slow
     witness, touch = Marker("ball", LOOK.witness, LOOK.witness_radius), Marker("arrow", LOOK.normal, 0.8)
@@ -61,11 +60,7 @@ def mark_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts) 
 
 
 def checked_overlaps(given: object, what: str) -> list[Overlap]:
-    """Overlaps of an argument of this name.
-
-    Raises:
-        InputError: they are none.
-    """
+    """Overlaps of an argument of this name; raises InputError where they are none."""
     found = checks.listed(given, what, "frame.overlaps")
     return [checks.instance(one, Overlap, what, "give those of a WorldFrame") for one in found]
 
@@ -73,7 +68,7 @@ def checked_overlaps(given: object, what: str) -> list[Overlap]:
 def mark_overlaps(keyframe: Keyframe, overlaps: Sequence[Overlap]) -> None:
     """Draw PD_g of every two objects: an arrow for each of them that may move, and its length in words.
 
-    The arrows are as long as the moves, but at least `LOOK.shortest_depth`. Where both may move, each has a half.
+    Where both may move, each arrow has half of it, but at least `LOOK.shortest_depth`.
     """
     for number, one in enumerate(overlaps):
         root = f"{LOOK.contact_node}/overlap {number}"
@@ -88,17 +83,10 @@ def mark_overlaps(keyframe: Keyframe, overlaps: Sequence[Overlap]) -> None:
         keyframe.markers[f"{root}/text"] = (label, drawing.point_placement(one.point))
 
 
-def mark_blockers(
-    keyframe: Keyframe, scene: ViewedScene, state: State, contacts: ViewedContacts, blockers: Sequence[Any]
-) -> None:
-    """Mark each of the strongest blockers by a ball and its name.
+def mark_blockers(keyframe: Keyframe, scene: ViewedScene, state: State, contacts: Any, blockers: Sequence[Any]) -> None:
+    """Mark each of the strongest blockers of an assessment, strongest first, by a ball and its name.
 
-    Args:
-        keyframe: the keyframe to which the markers are added.
-        scene: the scene.
-        state: of the figure at the shown posture.
-        contacts: near pairs at that posture.
-        blockers: `Blocker`s of an assessment, the strongest first.
+    `contacts` are the near pairs at the shown posture, of which `state` is.
     """
     # most blockers that are marked, the strongest; more labels hide each other
     for number, blocker in enumerate(blockers[:4]):
@@ -115,7 +103,7 @@ def mark_blockers(
         keyframe.markers[f"{root}/text"] = (label, above)
 
 
-def _place(scene: ViewedScene, state: State, contacts: ViewedContacts, blocker: Any) -> Array | None:
+def _place(scene: ViewedScene, state: State, contacts: Any, blocker: Any) -> Array | None:
     """Position of a blocker (3,), or None for one without a position, such as a balance."""
     if blocker.kind == "contact":
         owners = scene.piece_owner

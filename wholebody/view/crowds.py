@@ -42,17 +42,9 @@ class Instances(NamedTuple):
 
 
 class Crowd:
-    """Pieces of one form that stand in the world."""
+    """Pieces of one form that stand in the world; `members` (k,) are their indices among all pieces."""
 
     def __init__(self, path: str, members: Indices, pieces: Sequence[Any], colors: Sequence[Color]) -> None:
-        """Store which pieces they are.
-
-        Args:
-            path: node.
-            members: (k,) indices of the pieces.
-            pieces: all pieces of the geometry model.
-            colors: of all pieces.
-        """
         self.path, self.members = path, members
         forms = [_form(pieces[index].geometry) for index in members.tolist()]
         self._scales = np.array([scale for _, scale in forms])
@@ -70,14 +62,7 @@ class Crowd:
 
 
 def crowds(folder: str, standing: Sequence[int], pieces: Sequence[Any], colors: Sequence[Color]) -> tuple[Crowd, ...]:
-    """What is drawn together; nothing where there are few pieces.
-
-    Args:
-        folder: node of things.
-        standing: indices of the opaque pieces of things in the world.
-        pieces: all pieces of the geometry model.
-        colors: of all pieces.
-    """
+    """What is drawn together of the opaque pieces of things in the world; nothing where there are few of them."""
     if len(standing) < MANY:
         return ()
     alike: dict[Any, list[int]] = {}

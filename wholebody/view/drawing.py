@@ -23,7 +23,7 @@ def piece(geometry: Any, name: str, color: Color) -> Three:
 
     Args:
         geometry: coal's Sphere, Capsule, Box, Ellipsoid, Convex, Halfspace, Cylinder, Cone or a BVHModel.
-        name: an identifier that nothing else in the page has.
+        name: an identifier that nothing else in the page has, as everywhere here.
         color: red, green, blue, alpha.
 
     Raises:
@@ -43,13 +43,9 @@ def unit(geometry: Any) -> Any:
 
 
 def instances(form: Any, name: str, places: Array, colors: Array) -> Three:
-    """Opaque pieces of one form as one object; balls have the fewer triangles the more there are.
+    """Opaque pieces of one form as one object, at (k, 4, 4) placements with scales, in (k, 3) colours.
 
-    Args:
-        form: a coal shape, as for `piece`.
-        name: an identifier that nothing else in the page has.
-        places: (k, 4, 4) placement of each, with its scale.
-        colors: (k, 3) red, green, blue of each.
+    Balls have the fewer triangles the more there are.
     """
     shape, _, _, flat = _shape(form, name)
     if shape["type"] == "SphereGeometry":
@@ -68,14 +64,7 @@ def instances(form: Any, name: str, places: Array, colors: Array) -> Three:
 
 
 def mesh(vertices: Array, faces: NDArray[Any], name: str, color: Color) -> Three:
-    """Triangles seen from both sides, as the faces of robots' meshes wind either way.
-
-    Args:
-        vertices: (n, 3) in the coordinates of the node.
-        faces: (m, 3) indices of vertices.
-        name: an identifier that nothing else in the page has.
-        color: red, green, blue, alpha.
-    """
+    """Vertices (n, 3) and faces (m, 3), seen from both sides, as the faces of robots' meshes wind either way."""
     material = {**_material(color, flat=True), "side": 2}  # three.js: both
     return _mesh(name, _triangles(vertices, faces, None), material, shadow=color[3] == 1.0)
 
@@ -172,15 +161,10 @@ def capsule_surface(radius: float, half_length: float) -> tuple[Array, NDArray[n
 
 
 def revolved(profile: Array, normals: Array, around: int = _AROUND) -> tuple[Array, NDArray[np.uint32], Array]:
-    """Surface of revolution about z.
+    """Surface of revolution about z of a profile (n, 2): distance from the axis and height, from the top down.
 
-    Args:
-        profile: (n, 2) distance from the axis and height, from the top down.
-        normals: (n, 2) the same of the outward normal.
-        around: steps of a turn.
-
-    Returns:
-        Vertices (n * around, 3), faces (m, 3) that wind outwards, normals (n * around, 3).
+    `normals` (n, 2) are outward, `around` the steps of a turn. Returns vertices (n * around, 3), faces (m, 3) that wind
+    outwards, and normals (n * around, 3).
     """
     angle = np.arange(around) * 2 * np.pi / around
     turn = np.column_stack([np.cos(angle), np.sin(angle)])

@@ -31,16 +31,12 @@ def write_filmstrip(
     Args:
         viewer: shows the postures one after the other, and the last one afterwards.
         postures: each (nq,).
-        path: of the file.
+        path: of the file, which is returned.
         size: width and height of each picture, pixels.
         ghosts: as many postures, each (nq,), shown transparent beside the others; those of the viewer stay if left out.
 
-    Returns:
-        The path.
-
     Raises:
-        InputError: there is no posture, one has the wrong shape, there are more or less ghosts, or the file cannot be
-            written.
+        InputError: no posture, one of a wrong shape, another number of ghosts, or a file that cannot be written.
         MissingPackageError: there is no Chromium.
     """
     from PIL import Image

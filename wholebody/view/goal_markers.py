@@ -23,14 +23,9 @@ FARTHEST_LOOK = 1.0
 
 
 class Goals:
-    """The goals of a problem, drawn at any posture."""
+    """The resolved goals of a `wholebody.Problem`, drawn at any posture; raises InputError for what is no problem."""
 
     def __init__(self, scene: ViewedScene, problem: Any) -> None:
-        """Use the resolved goals of a `wholebody.Problem`.
-
-        Raises:
-            InputError: it is no problem.
-        """
         self.scene = scene
         goals = getattr(problem, "goals", None)
         if not isinstance(goals, (tuple, list)):

@@ -38,13 +38,9 @@ def legend(keyframes: Sequence[Keyframe]) -> list[tuple[str, Any]]:
 
 
 def status(keyframes: Sequence[Keyframe], count: int, dt: float, found: Assessment | None) -> str:
-    """One line about what is shown.
+    """One line about what is shown: `count` postures `dt` seconds apart, and the ways between them, as keyframes.
 
-    Args:
-        keyframes: of the postures that are shown, and of the ways between them.
-        count: number of the postures.
-        dt: seconds from one to the next.
-        found: assessment of the only posture, where a problem is shown.
+    `found` is the assessment of the only posture, where a problem is shown.
     """
     said = [f"{count} postures, {(count - 1) * dt:.2f} s"] if count > 1 else []
     if found is not None and found.goal_errors:

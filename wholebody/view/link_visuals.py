@@ -32,15 +32,7 @@ _log = logging.getLogger(__name__)
 
 
 class Drawn(NamedTuple):
-    """One object of a link.
-
-    Attributes:
-        link: name of the link.
-        joint: name of the joint that carries it.
-        placement: (4, 4) relative to the joint.
-        shape: coal's shape, or vertices (n, 3) and faces (m, 3).
-        color: red, green, blue, alpha.
-    """
+    """One object of a link: (4, 4) relative to a joint, coal's shape or vertices (n, 3) and faces (m, 3)."""
 
     link: str
     joint: str
@@ -53,12 +45,10 @@ class LinkVisuals:
     """The visuals of a figure. A link with a mesh that cannot be read is left out: its pieces are drawn.
 
     Attributes:
-        links: names of the links that are drawn.
-        joints: names of the joints that carry them.
+        links, joints: names of the links that are drawn, and of the joints that carry them.
     """
 
     def __init__(self, figure: Any) -> None:
-        """Read the meshes."""
         names, frames = figure.model.names, figure.model.frames
         made: list[Drawn] = []
         broken = set()
@@ -84,13 +74,7 @@ class LinkVisuals:
         self.joints = tuple(dict.fromkeys(one.joint for one in self._drawn))
 
     def build(self, graph: SceneGraph, carriers: Mapping[str, str], color: Color | None) -> list[Skinned]:
-        """Put the visuals in the scene graph.
-
-        Args:
-            graph: the scene graph.
-            carriers: node of each joint in `joints`.
-            color: of all; each one's own if None.
-        """
+        """Put the visuals below the nodes of their joints; all in one colour if there is one."""
         found = []
         for number, one in enumerate(self._drawn):
             path = f"{carriers[one.joint]}/visual {number}"
@@ -112,8 +96,7 @@ MeshParts = tuple[tuple[Array, NDArray[np.int64], Color | None], ...]
 def mesh_parts(path: str, scale: tuple[float, ...]) -> MeshParts:
     """The parts of a mesh file by colour: vertices (n, 3), faces (m, 3), and red, green, blue, alpha if it has any.
 
-    Raises:
-        WholebodyError: the file cannot be read.
+    Raises WholebodyError where the file cannot be read.
     """
     place = Path(path)
 

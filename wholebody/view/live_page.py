@@ -33,16 +33,9 @@ class LivePage:
     """
 
     def __init__(self, drag: LiveDrag, save_to: Path, port: int = 8080, save: Callable[[Path], Path] | None = None):
-        """Open the page.
+        """Open the page at the port, or the next free one; its button "save" writes the posture to `save_to`.
 
-        Args:
-            drag: what is dragged.
-            save_to: file that the button "save" writes.
-            port: of the page on this machine; the next free one if it is taken.
-            save: writes the present posture to a file.
-
-        Raises:
-            MissingPackageError: viser is not installed.
+        Raises MissingPackageError where viser is not installed.
         """
         self.drag, self.frames = drag, 0
         self._save_to, self._save = save_to, save

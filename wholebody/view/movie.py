@@ -41,14 +41,8 @@ def check_movie(path: str | os.PathLike[str]) -> Path:
 def frame_times(path: Path, count: int, dt: float, fps: float | None) -> tuple[list[float], float]:
     """Times of the pictures of a movie, seconds from the motion's beginning, and the rate per second.
 
-    Args:
-        path: of the movie; its ending limits the default rate.
-        count: number of postures of the motion.
-        dt: seconds from one to the next.
-        fps: pictures per second, or None for the motion's own if the kind of file allows it.
-
-    Raises:
-        InputError: the rate is out of range.
+    The motion has `count` postures, `dt` seconds apart. If `fps` is None the rate is the motion's own where the kind of
+    file allows it. Raises InputError where it is out of range.
     """
     if fps is None:
         fps = min(1 / dt, FASTEST[path.suffix.lower()])
@@ -65,11 +59,7 @@ def counted(pictures: Iterable[bytes], total: int, progress: Callable[[int, int]
 
 
 def movie(suffix: str, pictures: Iterable[bytes], fps: float) -> bytes:
-    """Pictures (PNG) as a movie, GIF or MP4 by the ending of its file.
-
-    Raises:
-        WholebodyError: ffmpeg failed.
-    """
+    """Pictures (PNG) as a movie, GIF or MP4 by the ending of its file; raises WholebodyError where ffmpeg failed."""
     return _gif(pictures, fps) if suffix.lower() == ".gif" else _mp4(pictures, fps)
 
 
@@ -101,25 +91,14 @@ def _swatch(frames: Sequence[Any]) -> NDArray[np.uint8]:
 
 
 def _mp4(pictures: Iterable[bytes], fps: float) -> bytes:
-    command = [
-        "ffmpeg",
-        "-y",
-        "-loglevel",
-        "error",
-        "-f",
-        "image2pipe",
-        "-c:v",
-        "png",
-        "-framerate",
-        f"{fps:g}",
-        "-i",
-        "-",
-    ]
-    command += ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264", "-crf", "20", "-pix_fmt", "yuv420p"]
+    options = (
+        f"-y -loglevel error -f image2pipe -c:v png -framerate {fps:g} -i - "
+        "-vf pad=ceil(iw/2)*2:ceil(ih/2)*2 -c:v libx264 -crf 20 -pix_fmt yuv420p -movflags +faststart"
+    )
     with Scratch() as folder, tempfile.TemporaryFile() as log:
         path = folder / "movie.mp4"  # ffmpeg moves the index to the front at the end, which requires a file
         process = subprocess.Popen(
-            [*command, "-movflags", "+faststart", str(path)], stdin=subprocess.PIPE, stdout=log, stderr=log
+            ["ffmpeg", *options.split(), str(path)], stdin=subprocess.PIPE, stdout=log, stderr=log
         )
         try:
             assert process.stdin is not None

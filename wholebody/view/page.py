@@ -52,12 +52,7 @@ def live_page(title: str = "wholebody") -> str:
 
 
 def static_page(commands: list[Command], title: str = "wholebody") -> str:
-    """HTML of a page that contains its scene and makes no network requests.
-
-    Args:
-        commands: the drawing commands, in order (`Store.commands`).
-        title: of the browser's tab.
-    """
+    """HTML of a page that contains its scene, drawn by these commands in order, and makes no network requests."""
     data = base64.b64encode(bundle([command.payload for command in commands])).decode("ascii")
     return _page(title, f'<script id="picture" type="application/octet-stream">{data}</script>')
 

@@ -21,13 +21,7 @@ from wholebody.view.viewed_scene import Colored
 
 
 class Part(NamedTuple):
-    """One shape of a part.
-
-    Attributes:
-        shape: the shape.
-        at: its placement in the part's frame.
-        color: red, green, blue, alpha; chosen by the viewer if left out.
-    """
+    """One shape of a part, its placement in the part's frame, and its color: chosen by the viewer if left out."""
 
     shape: Shape
     at: PlacementLike = (0.0, 0.0, 0.0)
@@ -47,7 +41,7 @@ class _Nothing(NamedTuple):
 class Parts:
     """Free rigid parts, for `Viewer(Parts(...))`; a posture is the placements of all of them, see `posture`.
 
-    Contacts are not computed.
+    Contacts are not computed. Raises InputError where there is no part, or one has no shape or a wrong placement.
 
     Example:
         >>> import wholebody as wb
@@ -59,11 +53,6 @@ class Parts:
     revision = 0
 
     def __init__(self, parts: Mapping[str, Iterable[Part]]) -> None:
-        """Store the shapes of each part, by the part's name.
-
-        Raises:
-            InputError: there is no part, or one has no shape or a placement that cannot be read.
-        """
         if not isinstance(parts, Mapping):
             raise InputError(
                 f"Parts: parts is {checks.shown(parts)}; give shapes by name, such as {{'board': [Part(shape)]}}"
@@ -96,9 +85,7 @@ class Parts:
     def posture(self, placements: Mapping[str, Any]) -> Array:
         """The posture (7 n,) of all parts from a placement for each name, such as `AssemblySolution.placements`.
 
-        Raises:
-            UnknownNameError: a part has no placement.
-            InputError: a placement cannot be read.
+        Raises UnknownNameError where a part has no placement, InputError where one cannot be read.
         """
         if not isinstance(placements, Mapping):
             raise InputError(

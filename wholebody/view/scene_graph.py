@@ -62,7 +62,6 @@ class SceneGraph:
     """The page's content. Without a connection it is only stored, for saving."""
 
     def __init__(self) -> None:
-        """Make an empty scene graph."""
         self.store = Store()
         self._sender: Sender | None = None
         self._waiting: list[Command] = []

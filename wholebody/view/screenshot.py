@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from typing import Any
 
 from wholebody.base.checks import listed, shown, whole
-from wholebody.base.errors import InputError
+from wholebody.base.errors import InputError, MissingPackageError
 from wholebody.view import commands
 from wholebody.view.browser import Browser
 from wholebody.view.page import picture_page
@@ -16,11 +17,7 @@ from wholebody.view.style import LOOK
 
 
 def check_size(size: Any) -> tuple[int, int]:
-    """Width and height of a picture, pixels.
-
-    Raises:
-        InputError: not two whole numbers, or out of range.
-    """
+    """Width and height of a picture, pixels; raises InputError for what is not two whole numbers in range."""
     given = listed(size, "size", "(960, 720), pixels")
     if len(given) != 2:
         raise InputError(f"size is {shown(size)}; give width and height, pixels")
@@ -31,11 +28,8 @@ def check_size(size: Any) -> tuple[int, int]:
 def changes(before: Store, wanted: Sequence[Command]) -> list[Command] | None:
     """The commands among the wanted ones that a page lacks; None where it must be built anew.
 
-    That is so where a node is to go, or where a body changes, because the bones of its surface hold its nodes.
-
-    Args:
-        before: what the page shows.
-        wanted: the commands that build the wanted picture in an empty page, in order.
+    That is so where a node is to go, or where a body changes, because the bones of its surface hold its nodes. The
+    wanted ones build the picture in an empty page, in order; `before` is what the page shows.
     """
     after = Store()
     for command in wanted:
@@ -61,19 +55,21 @@ def changes(before: Store, wanted: Sequence[Command]) -> list[Command] | None:
 
 
 class Screenshots:
-    """A headless browser that takes pictures."""
+    """A headless browser that takes pictures; one can serve several viewers."""
 
     def __init__(self) -> None:
-        """Prepare; the first picture starts the browser."""
         self._browser: Browser | None = None
         self._shown: Store | None = None
+
+    def start(self) -> None:
+        """Start the browser, if there is a Chromium, without waiting for it."""
+        with suppress(MissingPackageError):
+            self._started()
 
     def picture(self, wanted: Sequence[Command], size: Any, *, legend: bool = False) -> bytes:
         """PNG of what these commands draw in an empty page, of this width and height; with the panel if wanted.
 
-        Raises:
-            InputError: the size is out of range.
-            MissingPackageError: there is no Chromium.
+        Raises InputError for a size out of range, MissingPackageError where there is no Chromium.
         """
         return self._draw(wanted, size).capture(legend=legend)
 
@@ -82,29 +78,28 @@ class Screenshots:
         browser = self._draw(wanted, size)
         return (browser.capture(f"wholebody.seek({time!r})") for time in times)
 
-    def page(self, page: str, size: Any) -> bytes:
-        """PNG of a page (HTML) that has its scene in it; raises like `picture`."""
-        browser = self._sized(check_size(size))
-        self._shown = None
-        browser.open_html(page)
-        return browser.capture()
-
     def close(self) -> None:
         """End the browser. Calling it again does nothing."""
         if self._browser is not None:
             self._browser.close()
         self._browser = self._shown = None
 
-    def _sized(self, size: tuple[int, int]) -> Browser:
+    def __enter__(self) -> Screenshots:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _started(self) -> Browser:
         if self._browser is None:
-            self._browser = Browser()
-        self._browser.resize(size)
+            self._browser, self._shown = Browser(page=picture_page()), Store()
         return self._browser
 
     def _draw(self, wanted: Sequence[Command], size: Any) -> Browser:
         """Bring the page to what the commands draw."""
         width, height = check_size(size)
-        browser, before = self._sized((width, height)), self._shown
+        browser, before = self._started(), self._shown
+        browser.resize((width, height))
         self._shown = None  # until all is drawn: after an error the next picture is drawn whole
         lacking = None if before is None else changes(before, wanted)
         if lacking is None or before is None:

@@ -22,11 +22,7 @@ from wholebody.view.server import Command, Op
 
 
 def seconds(timeout: object) -> float:
-    """Seconds to wait, which may be infinite.
-
-    Raises:
-        InputError: they are negative, or no number.
-    """
+    """Seconds to wait, which may be infinite; raises InputError where they are negative or no number."""
     if isinstance(timeout, float) and math.isinf(timeout) and timeout > 0.0:
         return timeout
     return checks.number(timeout, "timeout", 0.0, 1e9, "s, or math.inf")
@@ -44,12 +40,7 @@ class Sender:
     """
 
     def __init__(self, page: str, host: str = "127.0.0.1", port: int = 0) -> None:
-        """Start the server.
-
-        Args:
-            page: HTML to serve.
-            host: name or address of this machine to listen at.
-            port: the port; 0 for the first free one.
+        """Serve the HTML of a page at a name or address of this machine; port 0 is the first free one.
 
         Raises:
             InputError: the port is taken, or the host is no address of this machine.
@@ -91,8 +82,7 @@ class Sender:
     def send(self, commands: Iterable[Command]) -> None:
         """Send commands to the server in one write; open tabs carry them out together.
 
-        Raises:
-            ViewerClosedError: the server process has ended.
+        Raises ViewerClosedError where the server process has ended.
         """
         self._write(b"".join(command.pack() for command in commands) + Command(Op.PUSH).pack())
 

@@ -8,17 +8,16 @@ default, and ends when its input ends or its parent has ended.
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
-import ipaddress
 import json
 import os
 import re
-import socket
 import struct
 import sys
 from os import _exit
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    import asyncio
 
 HEADER = struct.Struct("<cHHI")
 LOCAL = ("127.0.0.1", "localhost", "::1")
@@ -62,7 +61,6 @@ class Store:
     """The commands that show the present picture in a new page: the last value of everything, without history."""
 
     def __init__(self) -> None:
-        """Begin with an empty picture."""
         self.nodes: dict[str, _Node] = {}
         self.camera: bytes | None = None
         self.animation: bytes | None = None
@@ -105,11 +103,7 @@ class Store:
         return command.op == Op.OBJECT and node.object == command.payload
 
     def commands(self, *, motion: bool = True) -> list[Command]:
-        """Commands that build the picture in an empty page; the animation last, when all its nodes exist.
-
-        Args:
-            motion: include the animation.
-        """
+        """Commands that build the picture in an empty page; the animation last, when all its nodes exist."""
         commands: list[Command] = []
         for path, node in self.nodes.items():
             if node.object is not None:
@@ -133,7 +127,6 @@ class Queue:
     """The pending commands of one tab. A new transform or property replaces the pending one, so no tab lags."""
 
     def __init__(self) -> None:
-        """Make an empty queue."""
         self.waiting: list[bytes] = []
         self._place: dict[tuple[bytes, str, str], int] = {}
 
@@ -166,7 +159,6 @@ class Hub:
     """The picture, the page and the open tabs."""
 
     def __init__(self) -> None:
-        """Begin without tabs."""
         self.store = Store()
         self.page = ""
         self.tabs: set[Any] = set()
@@ -174,6 +166,8 @@ class Hub:
 
     async def listen(self, reader: asyncio.StreamReader) -> None:
         """Read commands until the input ends."""
+        import asyncio
+
         while True:
             try:
                 op, path, key, size = HEADER.unpack(await reader.readexactly(HEADER.size))
@@ -215,7 +209,8 @@ class Guard:
     """
 
     def __init__(self, host: str) -> None:
-        """Accept the names of this machine at which a server at `host` can be reached."""
+        import socket
+
         names = {*LOCAL, host.lower()}
         if host not in LOCAL:
             names |= {socket.gethostname().lower(), socket.getfqdn().lower()}
@@ -235,6 +230,8 @@ class Guard:
 
 def is_address(name: str) -> bool:
     """Whether a name is an IP address, for which DNS rebinding is impossible."""
+    import ipaddress
+
     try:
         ipaddress.ip_address(name)
     except ValueError:
@@ -296,6 +293,7 @@ def make_application(hub: Hub, host: str) -> Any:
 
 async def serve(parent: int, host: str, port: int) -> None:
     """Serve until the input ends or the parent has ended; port 0 takes the first free one."""
+    import asyncio
     import logging
 
     from tornado.httpserver import HTTPServer
@@ -325,6 +323,9 @@ async def serve(parent: int, host: str, port: int) -> None:
 
 
 if __name__ == "__main__":
-    with contextlib.suppress(KeyboardInterrupt, BrokenPipeError):
-        asyncio.run(serve(int(sys.argv[1]), sys.argv[2], int(sys.argv[3])))
+    from asyncio import run
+    from contextlib import suppress
+
+    with suppress(KeyboardInterrupt, BrokenPipeError):
+        run(serve(int(sys.argv[1]), sys.argv[2], int(sys.argv[3])))
     _exit(0)

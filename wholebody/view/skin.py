@@ -26,17 +26,10 @@ class Skinned(NamedTuple):
 
 
 class Skin:
-    """A figure's surface, whose bones are found among the figure's joints."""
+    """A figure's surface, whose bones are found among the figure's joints; some figures lack segments of the body."""
 
     def __init__(self, surface: Surface, figure: Any) -> None:
-        """Find each bone's joint.
-
-        Args:
-            surface: of the figure's body.
-            figure: the figure; it may lack segments of the body, as a reduced one or an avatar does not move all.
-        """
         self._surface = surface
-        self.patches = surface.patches()
         self._places: list[tuple[str, Array]] = []
         for bone in surface.bones:
             segment, extra = bone.segment, np.eye(4)
@@ -48,14 +41,7 @@ class Skin:
         self.joints = tuple(dict.fromkeys(name for name, _ in self._places))
 
     def build(self, graph: SceneGraph, root: str, carriers: Mapping[str, str], color: Color | None) -> list[Skinned]:
-        """Put the surface in the scene graph.
-
-        Args:
-            graph: the scene graph.
-            root: node of the surface.
-            carriers: node of each joint in `joints`.
-            color: of all patches; each patch's own if None.
-        """
+        """Put the surface at a node, moved by the nodes of its joints; in a colour, or each patch in its own."""
         bones = self._surface.bones
         whole = {bone.segment: number for number, bone in enumerate(bones) if bone.parent is None}
         halves = [
@@ -73,7 +59,7 @@ class Skin:
             )
         )
         drawn = []
-        for patch in self.patches:
+        for patch in self._surface.patches:
             shown: Color = (*patch.color, 1.0) if color is None else color
             path = f"{root}/{patch.name}"
             # metres: positions are sent as whole multiples of it, in half of the bytes

@@ -5,22 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
 from wholebody.base.checks import a
 from wholebody.base.errors import InputError
 from wholebody.geometry.proximity import Contacts
-from wholebody.methods.newton.assembly import Assembly
 from wholebody.scene.geometry_model import SceneGeometry
 from wholebody.scene.moving_scene import MovingScene
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace
 from wholebody.view.style import LOOK, Color
+
+if TYPE_CHECKING:
+    from wholebody.methods.newton.assembly import Assembly
 
 
 @dataclass(frozen=True)
@@ -31,20 +32,15 @@ class Colored:
 
 
 class ViewedAssembly:
-    """The bodies and things that an assembly has now.
+    """The bodies and things that an assembly has now, and its `figures`, each with the color that it was given.
 
-    A posture is `assembly.q`, `solution.q` or a row of `solution.path`. Bodies without shapes are not drawn. People are
-    drawn with their surface, as in a scene.
-
-    Attributes:
-        figures: each figure by name, and the color that it was given.
+    A posture is `assembly.q`, `solution.q` or a row of `solution.path`. Bodies without shapes are not drawn.
     """
 
     figure = None
     revision = 0
 
     def __init__(self, assembly: Assembly) -> None:
-        """Read shapes and colors."""
         self._scene = assembly.scene
         self.model, self.geometry = self._scene.model, self._scene.geometry
         self.piece_owner = self._scene.piece_owner
@@ -67,11 +63,11 @@ def _color(assembly: Assembly, owner: str) -> Color | None:
 
 
 def checked_scene(scene: Any) -> Any:
-    """Check the argument of a viewer.
+    """The scene that a viewer is given; raises InputError for what is none, and says how to show it."""
+    if isinstance(scene, Scene):
+        return scene
+    from wholebody.methods.newton.assembly import Assembly
 
-    Raises:
-        InputError: it is no scene; for some other types the message says how to show them.
-    """
     if isinstance(scene, Assembly) and scene.has_shapes:
         return ViewedAssembly(scene)
     if isinstance(getattr(scene, "model", None), pin.Model) and callable(getattr(scene, "contacts", None)):
@@ -85,30 +81,6 @@ def checked_scene(scene: Any) -> Any:
     else:
         correction = "make one with wb.Scene(figure)"
     raise InputError(f"Viewer: scene is {a(type(scene))}, not a Scene; {correction}")
-
-
-class ViewedContacts(Protocol):
-    """Near pairs of pieces; k rows each."""
-
-    @property
-    def pair(self) -> NDArray[np.intp]:
-        """(k, 2) indices of the two pieces."""
-
-    @property
-    def distance(self) -> Array:
-        """(k,) signed distance, metres."""
-
-    @property
-    def normal(self) -> Array:
-        """(k, 3) unit vector from the first piece to the second."""
-
-    @property
-    def point_a(self) -> Array:
-        """(k, 3) witness point on the first piece."""
-
-    @property
-    def point_b(self) -> Array:
-        """(k, 3) witness point on the second piece."""
 
 
 class ViewedScene(Protocol):
@@ -138,12 +110,12 @@ class ViewedScene(Protocol):
     def revision(self) -> int:
         """A number that changes when things are added or removed."""
 
-    def contacts(self, q: Array, within: float = ...) -> ViewedContacts:
-        """Pairs nearer than `within` metres at the posture q, nearest first."""
+    def contacts(self, q: Array, within: float = ...) -> Any:
+        """Pairs nearer than `within` metres at the posture q, nearest first, as `Contacts` has them."""
 
 
 class ViewedWorld:
-    """A figure, the things that stay, and things that move.
+    """A figure, the things that stay, and things that move, which have joints here.
 
     A posture is what `configuration` makes of one of the figure's and the placements of the things that move. So
     `Viewer(ViewedWorld(scene, names)).play(configurations, dt)` shows all of them move.
@@ -152,11 +124,6 @@ class ViewedWorld:
     revision = 0
 
     def __init__(self, scene: Scene, names: Iterable[str]) -> None:
-        """Give joints to the things that move.
-
-        Raises:
-            UnknownNameError: there is no such thing.
-        """
         self._moving = MovingScene(scene.built, names)
         self.figure, self.objects = scene.figure, scene.objects
         self.model, self.geometry = self._moving.model, self._moving.geometry

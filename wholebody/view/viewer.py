@@ -9,7 +9,7 @@ import sys
 import webbrowser
 from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,13 +21,10 @@ from wholebody.base.errors import InputError
 from wholebody.base.files import checked_target, write
 from wholebody.dynamics.overlaps import Overlap
 from wholebody.geometry.placement import FARTHEST
-from wholebody.methods.newton.assembly import Assembly
 from wholebody.problem import Problem
-from wholebody.tracking.inner_paths import timed
-from wholebody.view.camera import look
+from wholebody.view import commands
 from wholebody.view.composition import Composition
 from wholebody.view.contact_markers import checked_overlaps
-from wholebody.view.gltf import posture_glb
 from wholebody.view.legend import panel
 from wholebody.view.movie import check_movie, counted, frame_times, movie
 from wholebody.view.page import live_page, static_page
@@ -37,6 +34,9 @@ from wholebody.view.sender import Sender, seconds
 from wholebody.view.server import Command, Op
 from wholebody.view.style import LOOK, Color
 from wholebody.view.viewed_scene import ViewedScene, checked_scene
+
+if TYPE_CHECKING:
+    from wholebody.methods.newton.assembly import Assembly
 
 SAVED = (".glb", ".htm", ".html", ".png")  # endings of the files that `Viewer.save` writes
 
@@ -68,6 +68,7 @@ class Viewer:
         title: str = "wholebody",
         host: str = "127.0.0.1",
         port: int = 0,
+        screenshots: Screenshots | None = None,
     ) -> None:
         """Prepare to show a scene.
 
@@ -80,6 +81,7 @@ class Viewer:
             host: name or address of this machine at which the live page is served. Any other than 127.0.0.1 allows
                 access from other machines.
             port: port of the live page; 0 for the first free one from 7000.
+            screenshots: a browser for the pictures of several viewers, which `close` leaves open; its own if left out.
 
         Raises:
             InputError: not a scene, or a value of the wrong kind or out of range.
@@ -96,15 +98,13 @@ class Viewer:
         self.title = title
         self._graph = SceneGraph()
         self._composition = Composition(viewed, self._graph, contact_distance, tuple(see_through), names)
-        self._screenshots = Screenshots()
+        self._screenshots, self._shares = screenshots or Screenshots(), screenshots is not None
         self._sender: Sender | None = None
         self._camera: Command | None = None
         self._seen: list[Array] = []
         self._ghosts: list[Array] = []
         self._motion: tuple[int, float] | None = None
         self._shown: tuple[Array, Any, Sequence[Overlap]] | None = None
-
-    # ---- content
 
     def show(
         self, q: ArrayLike, *, problem: Any = None, pieces: bool = False, overlaps: Sequence[Overlap] = ()
@@ -164,6 +164,8 @@ class Viewer:
                 f"overlaps has {len(marked)} entries and the motion {len(postures)} postures; give as many"
             )
         marked = [checked_overlaps(one, f"overlaps[{number}]") for number, one in enumerate(marked)]
+        from wholebody.tracking.inner_paths import timed
+
         made, played = self._composition.keyframe, timed(postures, getattr(motion, "paths", ()), step)
         keyframes = [made(q, problem, overlaps=marked[k]) for q, k in zip(played.q, played.frames, strict=True)]
         if ghost is not None:
@@ -257,13 +259,11 @@ class Viewer:
             here, there = checks.numbers(eye, (3,), "eye"), checks.numbers(target, (3,), "target")
             if max(np.abs(here).max(), np.abs(there).max()) > FARTHEST or np.linalg.norm(here - there) < 1e-6:
                 raise InputError("look takes two different places; give an eye and a target, metres")
-            camera = look(there, LOOK.field_of_view, eye=here)
+            camera = commands.look_from(here, there)
         self._camera = camera
         if self._seen:
             self._graph.do(self._camera_command())
             self._graph.flush()
-
-    # ---- live
 
     @property
     def url(self) -> str:
@@ -271,8 +271,7 @@ class Viewer:
 
         Raises:
             InputError: the port is taken, or the host is no address of this machine.
-            ViewerClosedError: the server could not be started. `open`, `wait`, `wait_until_closed` and `sync` raise the
-                same, and an InputError for a time that is negative or no number.
+            ViewerClosedError: the server could not be started; `open`, `sync` and those that wait raise it too.
         """
         return self._live().url
 
@@ -294,20 +293,20 @@ class Viewer:
         """Wait up to `timeout` seconds until every open tab has drawn everything; return whether it has."""
         return self._live().sync(seconds(timeout))
 
-    # ---- files
-
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the scene as one HTML file that opens in any browser without a network, FILE.glb as glTF.
 
         HTML has the motion, glTF pieces and things at the posture, or at its beginning. FILE.png is `picture`, which
         raises the same; other endings are refused. Returns the path.
         """
-        place, commands = checked_target(path, "save: path", "a scene", SAVED), self._commands()
-        gltf = place.suffix.lower() == ".glb"
+        place, drawn = checked_target(path, "save: path", "a scene", SAVED), self._commands()
         if place.suffix.lower() == ".png":
             return self.picture(place)
-        made = posture_glb(self._composition.scene, self._seen[0]) if gltf else static_page(commands, self.title)
-        return write(place, made)
+        if place.suffix.lower() == ".glb":
+            from wholebody.view.gltf import posture_glb
+
+            return write(place, posture_glb(self._composition.scene, self._seen[0]))
+        return write(place, static_page(drawn, self.title))
 
     def _repr_html_(self) -> str:
         """The scene in a notebook: a frame with the page that `save` writes; a sentence if nothing is shown yet."""
@@ -370,7 +369,8 @@ class Viewer:
         if self._sender is not None:
             self._sender.close()
         self._sender = None
-        self._screenshots.close()
+        if not self._shares:
+            self._screenshots.close()
 
     def __enter__(self) -> Viewer:
         """Return the viewer."""
@@ -379,8 +379,6 @@ class Viewer:
     def __exit__(self, *_: object) -> None:
         """Close it."""
         self.close()
-
-    # ---- internals
 
     def _live(self) -> Sender:
         if self._sender is None:

@@ -14,17 +14,12 @@ _STARTING = threading.Lock()
 
 
 def viser_server(port: int, label: str) -> Any:
-    """A running viser.ViserServer on 127.0.0.1.
+    """A running viser.ViserServer on 127.0.0.1 at the port, or the next free one; the label is the title of its page.
 
     viser passes no check of requests on to the library websockets, which serves its page: so what it calls to serve is
     another function while the server starts, which adds the check. If viser does not call that, there is no server.
 
-    Args:
-        port: of the page; the next free one if it is taken.
-        label: title of the page.
-
-    Raises:
-        MissingPackageError: viser is not installed, or in a version that serves its page in another way.
+    Raises MissingPackageError where viser is not installed, or in a version that serves its page in another way.
     """
     try:
         import rich

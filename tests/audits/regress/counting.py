@@ -56,27 +56,32 @@ def counting() -> Iterator[Counts]:
 
         return passed
 
-    def judged(self: AllPairs, q: Any) -> None:
-        judging[0] = True
-        try:
-            move(self, q)
-        finally:
-            judging[0] = False
+    def judged(name: str) -> Callable[..., None]:
+        def asked(self: AllPairs, what: Any) -> None:
+            before, judging[0] = judging[0], True
+            try:
+                asks[name](self, what)
+            finally:
+                judging[0] = before
+
+        return asked
 
     passes = ("forwardKinematics", "framesForwardKinematics", "computeJointJacobians")
     instead = {"computeDistances": all_distances, "computeDistance": one_distance}
     instead |= {name: kinematics(name) for name in passes}
     whole = {name: getattr(pin, name) for name in instead}
-    move = AllPairs.move
+    asks = {name: getattr(AllPairs, name) for name in ("move", "ask")}
     try:
         for name, function in instead.items():
             setattr(pin, name, function)
-        AllPairs.move = judged  # type: ignore[method-assign]
+        for name in asks:
+            setattr(AllPairs, name, judged(name))
         yield counts
     finally:
         for name, function in whole.items():
             setattr(pin, name, function)
-        AllPairs.move = move  # type: ignore[method-assign]
+        for name, ask in asks.items():
+            setattr(AllPairs, name, ask)
 
 
 def peak_bytes(call: Callable[[], object]) -> int:

@@ -18,7 +18,7 @@ import wholebody as wb
 from tests.audits.regress.counting import counting, peak_bytes
 from wholebody.bench.measure.scaling import assembly_chain
 from wholebody.bench.measure.track import track
-from wholebody.bench.suite.adapters.own import WholebodyTool
+from wholebody.bench.suite.adapters.own import OwnTool
 from wholebody.bench.suite.problem_sets.registry import problem_set
 from wholebody.bench.suite.stability.case import Posed
 from wholebody.bench.suite.stability.catalogue import cases
@@ -123,7 +123,7 @@ def _solve(method: Method, problem: Problem) -> Counted:
 def _reach(name: str) -> Counted:
     """The reach of `wholebody bench step`, its beginning; memory at its end, where all buffers have been made."""
     course = track(name, STEPS)
-    tool = WholebodyTool(course)
+    tool = OwnTool(course)
     tool.reset(course.start)
     with counting() as counts:
         for target in course.targets[:-MEASURED]:

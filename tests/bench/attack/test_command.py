@@ -39,7 +39,6 @@ def test_counts_failures_and_page_are_written(tmp_path: Path) -> None:
     page = (docs / "reliability.md").read_text()
     assert "\nold\n" not in page
     assert "calls with odd arguments" in page
-    assert (out / "README.md").is_file()
 
 
 def test_other_runs_are_counted_too(tmp_path: Path) -> None:

@@ -13,10 +13,10 @@ from tests.csv_rows import csv_rows
 from wholebody.base.errors import InputError
 from wholebody.bench.measure.step import taking
 from wholebody.bench.measure.track import SETTING, Track, figure_tracks, judge
-from wholebody.bench.suite.adapters.registry import installed_tools, make_tool
+from wholebody.bench.suite.adapters.registry import chosen_tools, make_tool
 from wholebody.cli import main
 
-TOOLS = [name for name in ("wholebody", "placo", "placo/pruned", "pink", "mink") if name in installed_tools()]
+TOOLS = [name for name in ("wholebody", "placo", "placo/pruned", "pink", "mink") if name in chosen_tools()]
 LINK = '<link name="{}"><collision><geometry><sphere radius="0.02"/></geometry></collision></link>'
 JOINT = (
     '<joint name="{1}" type="revolute"><parent link="{0}"/><child link="{1}"/><origin xyz="0.3 0 0"/>'

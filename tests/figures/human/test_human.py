@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.audits.packaged import packaged_files
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures import load, urdf_path
 from wholebody.figures.anthropometry import design_cases, make_person, table
-from wholebody.figures.packaged_urdf import packaged_files
 
 CASES = tuple(design_cases())
 DETAILS = ("spheres", "capsules", "hulls")
@@ -366,7 +366,7 @@ def test_levels_of_the_spine_share_a_motion_as_their_ranges_do(angle: str, mean:
 def test_packaged_files_are_the_builders_output():
     folder = urdf_path("human").parent
     for name, text in packaged_files().items():
-        assert (folder / name).read_text(encoding="utf-8") == text, f"{name} is stale: write it again by write_packaged"
+        assert (folder / name).read_text(encoding="utf-8") == text, f"{name} is stale: python -m tests.audits.packaged"
 
 
 @pytest.mark.parametrize("name", ["human", "avatar", "hand"])

@@ -52,7 +52,7 @@ def test_groups_states_and_pairs_are_read(tmp_path: Path) -> None:
 
 def test_a_wrong_srdf_is_one_sentence(tmp_path: Path) -> None:
     urdf, srdf = files(tmp_path, SRDF.replace('value="0.5"', 'value="0,5"'))
-    with pytest.raises(FileFormatError, match=r"state 'home': joint 'j1' has the value '0,5'"):
+    with pytest.raises(FileFormatError, match=r"state 'home': joint 'j1': .*'0,5'"):
         wb.load(urdf, srdf=srdf)
     srdf.write_text("<mujoco/>")
     with pytest.raises(FileFormatError, match="give an SRDF"):

@@ -176,13 +176,13 @@ def test_bounds_hold_for_every_point() -> None:
         q0 = pin.integrate(arena.model, pin.neutral(arena.model), rng.normal(size=arena.model.nv))
         velocity = rng.normal(size=arena.model.nv) * (rng.random(arena.model.nv) < 0.6)
         sweep._place(q0, velocity)
-        bounds.update(sweep._data, velocity, np.array([m.translation for m in sweep._results.oMg]))
+        bounds.update(sweep._data, velocity, np.array([m.translation for m in sweep._places]))
         for first, second in ((5, 0), (0, 5), (4, 6), (3, 1)):
             point = sweep._swept[first].points[0]
             h, places = 1e-3, []
             for t in 0.3 + h * np.arange(-1, 2):
                 sweep._place(pin.integrate(arena.model, q0, t * velocity), velocity)
-                oMg = sweep._results.oMg
+                oMg = sweep._places
                 places.append(oMg[second].actInv(oMg[first].act(point)))
             pair = np.array([first]), np.array([second])
             far = np.linalg.norm(places[1]) + 1.0

@@ -11,7 +11,6 @@ import pytest
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.geometry.continuous import swept_depth as module
 from wholebody.geometry.continuous.swept_depth import COARSE, SHARP, Depths, SweptDepth
 
 DEPTH = 1e-4
@@ -161,16 +160,3 @@ def test_a_clip_asks_the_same_when_it_is_looked_at_again() -> None:
 
     first, second = run(), run()
     assert all(np.array_equal(a.depth, b.depth) for a, b in zip(first, second, strict=True))
-
-
-def test_views_may_be_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = wb.Scene(wb.load("hand"))
-    q = np.array([scene.figure.neutral, scene.figure.clamp(scene.figure.neutral + 0.4)])
-    q[:, 3:7] = scene.figure.neutral[3:7]
-    usual = along(scene, q)
-    monkeypatch.setattr(module, "distance_view", lambda results: None)
-    monkeypatch.setattr(module, "placement_view", lambda placements: None)
-    plain = along(scene, q)
-    for a, b in zip(usual[0] + usual[1], plain[0] + plain[1], strict=True):
-        assert np.array_equal(a.number, b.number)
-        assert np.allclose(a.depth, b.depth, atol=1e-9)

@@ -20,11 +20,14 @@ def test_a_polygon_is_the_figures_cone(name: str, human: wb.Figure) -> None:
     polygon = Polygon(cone)
     rows = np.random.default_rng(4).normal(size=(3000, 3))
     rows /= np.linalg.norm(rows, axis=1)[:, None]
-    inside = cone.contains(rows)
-    assert [polygon.contains(tuple(row)) for row in rows.tolist()] == inside.tolist()
-    nearest = np.array([polygon.nearest(tuple(row)) for row in rows[~inside].tolist()])
-    assert nearest == pytest.approx(cone.project(rows[~inside]), abs=2e-6)
-    assert cone.contains(nearest).all()
+    angles = np.array([cone.signed_angle(row)[0] for row in rows])
+    assert [polygon.contains(tuple(row)) for row in rows.tolist()] == (angles >= 0.0).tolist()
+    nearest = np.array([polygon.nearest(tuple(row)) for row in rows[angles < 0.0].tolist()])
+    turned = np.linalg.norm(np.cross(rows[angles < 0.0], nearest), axis=1)
+    assert np.arctan2(turned, (rows[angles < 0.0] * nearest).sum(axis=1)) == pytest.approx(
+        -angles[angles < 0.0], abs=2e-6
+    )
+    assert all(cone.contains(each) for each in nearest)
 
 
 @pytest.mark.parametrize("chain", ["right_arm", "left_leg"])

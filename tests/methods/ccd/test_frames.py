@@ -203,3 +203,33 @@ def test_a_forearm_that_lies_on_a_table_keeps_its_direction_while_it_is_held_the
     assert shown.translation[2] - tracked.translation[2] > 0.03
     assert max(turns) < 0.1
     assert np.ptp(turns[-10:]) < 0.01
+
+
+@pytest.mark.parametrize(("shoulder", "elbow"), [(0.0, 0.6), (-0.2, 0.5)])
+def test_a_hanging_forearm_that_a_thing_moves_aside_keeps_its_direction(
+    shoulder: float, elbow: float, avatar: wb.Figure
+) -> None:
+    """A plate flush with the forearm moves it 5 cm towards the body: it is translated, however often."""
+    start = avatar.posture("standing").copy()
+    turns = {"shoulder_flexion": shoulder, "shoulder_abduction": 0.2, "elbow_flexion": elbow - 0.17}
+    for joint, turn in turns.items():
+        start[avatar.model.joints[avatar.joint_id(f"right_{joint}")].idx_q] += turn
+    joint, wrist = (avatar.placement(start, name).translation for name in ("right_forearm", "right_hand"))
+    along = (wrist - joint) / np.linalg.norm(wrist - joint)
+    out = np.array([0.0, -1.0, 0.0]) + along[1] * along
+    out /= np.linalg.norm(out)
+    axes, middle = np.stack([out, np.cross(along, out), along], axis=1), joint + 0.45 * (wrist - joint)
+    scene = wb.Scene(avatar).add(wb.Box((0.04, 0.5, 0.16)), name="plate")
+    low, high = 0.0, 0.3
+    for _ in range(25):
+        scene.move("plate", at=pin.SE3(axes, middle + 0.5 * (low + high) * out))
+        touches = len(scene.contacts(start, 1e-4).distance) > 0
+        low, high = (0.5 * (low + high), high) if touches else (low, 0.5 * (low + high))
+    q, rng, most = start, np.random.default_rng(0), 0.0
+    for frame in range(40):
+        scene.move("plate", at=pin.SE3(axes, middle + (high - 0.05 * min(frame / 30, 1.0)) * out))
+        q = resolve_overlap(scene, q, start, rng).q
+        shown, tracked = (avatar.placement(posture, "right_forearm") for posture in (q, start))
+        most = max(most, float(np.degrees(np.linalg.norm(pin.log3(shown.rotation.T @ tracked.rotation)))))
+    assert np.linalg.norm(shown.translation - tracked.translation) > 0.03
+    assert most < 0.4

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import wholebody as wb
 from wholebody.bench.suite.problem_sets.registry import problem_set
+from wholebody.methods import control
+from wholebody.methods.qp.method import LONGEST
 
 
 def test_feet_get_onto_a_board_that_they_begin_under() -> None:
@@ -37,3 +40,16 @@ def test_goals_out_of_reach_are_not_tried_from_all_starts() -> None:
     solution = wb.solve(wb.Problem(scene, "standing", goals=[goal], constraints=feet))
     assert solution.status == "unreachable"
     assert sum(entry.note.startswith("before contact") for entry in solution.trace) <= 3 * 40
+
+
+def test_the_clock_does_not_change_the_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A machine on which half of the processor time that a solve may take passes at once finds what another finds."""
+    problem = problem_set("drivers").make(13, 0).problem
+    quick = wb.solve(problem, wb.QP(measures=False))
+    clock = iter([0.0])
+    monkeypatch.setattr(control.time, "thread_time", lambda: next(clock, 0.9 * LONGEST))
+    monkeypatch.setattr(control.time, "monotonic", lambda: 0.0)
+    slow = wb.solve(problem, wb.QP(measures=False))
+    assert quick.solved
+    assert "before contact" in quick.message
+    np.testing.assert_array_equal(quick.q, slow.q)

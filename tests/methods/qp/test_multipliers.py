@@ -7,7 +7,8 @@ import pytest
 
 import wholebody as wb
 from wholebody.base.records import with_values
-from wholebody.bench.measure.solve import reach
+from wholebody.bench.suite.problem_sets.bodies import TIPS
+from wholebody.bench.suite.problem_sets.reaching import reach_among
 from wholebody.bench.suite.stability.catalogue import cases
 from wholebody.methods.qp.active_set import room_for
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
@@ -91,6 +92,7 @@ def test_elastic_rows_count_by_their_names():
 
 def test_steps_do_not_swing_across_a_curved_constraint():
     """Judged by the measures alone, steps of this reach grew from one to the next until one was rejected, 88 in all."""
-    solution = wb.QP().solve(reach(26)[0])
+    problem, _ = reach_among(wb.load("human"), TIPS[0], np.random.default_rng(26))
+    solution = wb.QP().solve(problem)
     assert solution.solved
     assert solution.iterations < 60

@@ -16,12 +16,12 @@ TIME, DT = 0.1, 0.05
 @pytest.mark.parametrize("seams", [(True, True), (False, True), (True, False), (False, False)])
 def test_the_objective_is_its_formula(seams: tuple[bool, bool]) -> None:
     random = np.random.default_rng(0)
-    x, weights = random.normal(size=(7, 3)), np.array([1.0, 2.0, 0.5])
-    padded = np.vstack([*([np.zeros((2, 3))] if seams[0] else []), x, *([np.zeros((2, 3))] if seams[1] else [])])
+    x, weights, ends = random.normal(size=(7, 3)), np.array([1.0, 2.0, 0.5]), random.normal(size=(4, 3))
+    padded = np.vstack([*([ends[:2]] if seams[0] else []), x, *([ends[2:]] if seams[1] else [])])
     acceleration = np.diff(padded, n=2, axis=0) / DT**2
     expected = 0.5 * (weights * (x**2).sum(axis=0)).sum()
     expected += 0.5 * TIME**4 * (weights * (acceleration**2).sum(axis=0)).sum()
-    assert Objective(7, weights, TIME, DT, seams).value(x) == pytest.approx(expected, rel=1e-12)
+    assert Objective(7, weights, TIME, DT, seams, ends).value(x) == pytest.approx(expected, rel=1e-12)
 
 
 def brought_back(

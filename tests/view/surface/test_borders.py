@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from wholebody.view.surface.borders import Bound, divided
+from wholebody.view.surface.borders import Bound, divided, strongest
 
 SIDE = 9
 
@@ -59,7 +59,7 @@ def test_borders_are_where_two_segments_count_alike(segments: int, seed: int) ->
             assert cut.strength[k, a] == pytest.approx(cut.strength[k, b], abs=0.05)
             count += 1
     assert count > 5 or segments > 2
-    bones, weights = cut.strongest()
+    bones, weights = strongest(cut.weights)
     assert bones.shape == (len(cut.vertices), min(4, segments))
     np.testing.assert_allclose(weights.sum(axis=1), 1.0)
 

@@ -29,12 +29,8 @@ KINDS = tuple(dict.fromkeys(PATTERN))
 class Verdict(NamedTuple):
     """What came of a case.
 
-    Attributes:
-        outcome: "right"; "refused", where an input was refused by one sentence; "gave up", where an answer says that it
-            is none although there is one; "wrong".
-        words: what was asked and found, in one line.
-        seconds: CPU time of the call under attack.
-        status: what the answer says of itself; "" where it says nothing.
+    `outcome`: "refused" where an input was refused by one sentence, "gave up" where an answer says that it is none
+    although there is one; `words` in one line; `seconds` of the processor; `status` that the answer gives itself.
     """
 
     outcome: Outcome
@@ -44,13 +40,7 @@ class Verdict(NamedTuple):
 
 
 class Case(NamedTuple):
-    """One case.
-
-    Attributes:
-        seed: of the attack.
-        number: of the case.
-        kind: of what is attacked.
-    """
+    """One case, by the seed of the attack, its number and its kind."""
 
     seed: int
     number: int

@@ -23,10 +23,7 @@ from wholebody.tracking.loop import FrameLoop
 
 
 def weights(rng: np.random.Generator, folder: Path) -> Verdict:
-    """Follow goals of one frame, as it is in a posture near the start, with weights from 1 to a million.
-
-    They have to be met in at most three times the frames of equal weights.
-    """
+    """Follow goals of one frame with weights from 1 to 1e6: met in at most three times the frames of equal ones."""
     figure = body(rng, folder)
     frame = str(rng.choice(figure.frames))
     there = figure.figure.placement(figure.near(figure.standing, float(rng.choice([0.2, 0.5, 1.0])), rng), frame)
@@ -150,10 +147,7 @@ def sleeper(rng: np.random.Generator, folder: Path) -> Verdict:
 
 
 def slept(scene: wb.Scene, places: Sequence[tuple[float, ...]], *, over: bool) -> Verdict:
-    """Judge a body that sleeps while its support moves, by coal: whether it floats or stays inside.
-
-    `over` says whether the support moves during the frames, rather than between them.
-    """
+    """Judge whether a body floats or stays inside while its support moves, within frames if `over`, else between."""
     world, frames = World(scene), 90
     if not any(_sleeping(world.step()) for _ in range(frames)):
         return Verdict("gave up", f"the body does not sleep after {frames} frames")

@@ -1,8 +1,4 @@
-"""Inputs that are not what they should be: mutated files of every kind, paths to nothing, and odd arguments.
-
-Mutations change bytes, lines, numbers, words and encodings, or put in what parsers have stumbled over. An odd argument
-of a public callable has to be taken, or refused by a WholebodyError.
-"""
+"""Inputs that are not what they should be: mutated files of every kind, paths to nothing, and odd arguments."""
 
 from __future__ import annotations
 
@@ -155,12 +151,7 @@ ROBOT = {"robot.urdf": "robot.urdf", "part.obj": "box.obj"}
 
 
 class Reader(NamedTuple):
-    """A way to read a file.
-
-    Attributes:
-        read: reads the file at a path, and what lies beside it.
-        files: what it reads, by names; the first one is mutated, another one now and then.
-    """
+    """What reads the file at a path, and the files that lie beside each other, of which mostly the first is mutated."""
 
     read: Callable[[Path], Any]
     files: Mapping[str, bytes]
@@ -279,10 +270,7 @@ def argument(rng: np.random.Generator, folder: Path) -> Verdict:
 
 
 def called(name: str, given: dict[str, str], folder: Path) -> Verdict:
-    """Call a public callable with arguments, as Python by their names; "*" for one without.
-
-    What the call makes is used: what is refused late is refused too.
-    """
+    """Call a public callable with arguments, as Python by their names ("*" without one), and use what it makes."""
     (folder / "robot.urdf").write_bytes((CORPUS / "two-links.urdf").read_bytes())
     robot = folder / "robot.urdf"
     figure = wb.load(robot)

@@ -1,9 +1,7 @@
 """The judge: distances of all pairs by plain calls of coal, limits and goals by Pinocchio.
 
-It shares nothing with the package's own assessment but what the user wrote: the terms as they were given, the shapes of
-the things and where they stand. Pairs are the figure's own, and every piece of the figure that can move with every
-piece of every thing; the outer pieces of a figure that has some. Balance, reach cones and ranges of motion, which are
-constructions of the package's own, are read from their terms; a person has them without being told.
+It shares with the package's own assessment only the terms as they were given, the shapes of things and where they
+stand. Balance, reach cones and ranges of motion, constructions of the package's own, are read from their terms.
 """
 
 from __future__ import annotations
@@ -25,17 +23,11 @@ from wholebody.scene.scene import Scene
 
 @dataclass(frozen=True)
 class Judged:
-    """What a posture measures.
+    """What a posture measures, metres and radians.
 
-    Attributes:
-        finite: whether it is made of numbers.
-        goal: largest goal error [m, rad].
-        least: least signed distance of any pair [m]; inf without pairs.
-        shortfall: by how much the worst pair misses its required distance [m].
-        closest: the worst pair.
-        limits: how far out of its limits the worst joint is [rad, m].
-        constraints: how far the worst constraint is from holding [m, rad].
-        unit: how far quaternions are from unit length.
+    `goal`: largest error; `least`: least signed distance of any pair, inf without pairs; `shortfall`: by how much the
+    worst pair, `closest`, misses its required distance; `limits`, `constraints`: the worst violation; `unit`: how far
+    quaternions are from unit length.
     """
 
     finite: bool = True
@@ -91,19 +83,13 @@ class Pairs:
         return found
 
     def asked(self, start: Array, clearance: float) -> Array:
-        """Distance (pairs,) asked of every pair: the clearance, or what a resting pair has at the start.
-
-        A pair that begins more than 1 µm deep begins inside, and is asked for the whole clearance.
-        """
+        """Distance (pairs,) asked of every pair: the clearance, or what a pair that rests has at the start."""
         began = self.distances(start)
         return np.where(began >= -1e-6, np.minimum(clearance, np.maximum(began, 0.0)), clearance)
 
 
 def judge(problem: Problem, goals: Sequence[Any], constraints: Sequence[Any], q: Array) -> Judged:
-    """Measure a posture (nq,) against goals, constraints and bounds as they were given.
-
-    Of the problem only the scene, the start, the clearance and its balance, reach cones and ranges of motion are read.
-    """
+    """Measure a posture (nq,) against goals and constraints as they were given."""
     scene, start = problem.scene, problem.start
     q = np.asarray(q, dtype=float)
     if q.shape != (scene.model.nq,) or not np.isfinite(q).all():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -67,21 +66,3 @@ def keep(case: Case, verdict: Verdict, folder: Path) -> None:
     place = folder / case.name
     write_text(place / "repeat.py", render("repeat.py", case=case) + "\n")
     write_text(place / "found.txt", verdict.words + "\n")
-
-
-def index(rows: Sequence[Row], folder: Path) -> None:
-    """Write the list of failures, alike ones together, the most frequent kind of wrong answers first."""
-    alike: dict[tuple[str, str], list[Row]] = {}
-    for one in (one for one in rows if is_slow(one) or one["outcome"] == "wrong"):
-        alike.setdefault((one.tool, _signature(one["words"]) if one["outcome"] == "wrong" else "slow"), []).append(one)
-    lines = ["# Failures", "Each folder has a repeat.py that repeats its failure: `python FOLDER/repeat.py`."]
-    for (kind, _), found in sorted(alike.items(), key=lambda item: (KINDS.index(item[0][0]), -len(item[1]))):
-        names = ", ".join(one.case for one in found[:5])
-        lines.append(f"- **{kind}**, {len(found)} times: {found[0]['words']} ({found[0]['seconds']:.2f} s): {names}")
-    write_text(folder / "README.md", "\n\n".join(lines) + "\n")
-
-
-def _signature(words: str) -> str:
-    """Words without their numbers and names, by which alike failures are found."""
-    quoted = re.sub(r"'[^']*'|\"[^\"]*\"|\([^)]*\)", "...", words.partition(";")[0])
-    return re.sub(r"-?\d+\.?\d*(?:e[-+]?\d+)?", "#", quoted)[:120]

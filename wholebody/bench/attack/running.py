@@ -40,9 +40,8 @@ def attack(
 ) -> Iterator[tuple[Case, Verdict]]:
     """Run cases, `jobs` at a time, and return them as they end; no more are begun once `going` says no.
 
-    The libraries of a process have one thread, whose CPU time is what a call takes on an idle machine. A case that
-    takes longer than the deadline, seconds of the processor, or ten times that by the clock, is run once more before it
-    counts as one that hangs.
+    A case that takes longer than the deadline, seconds of the processor, or ten times that by the clock, is run once
+    more before it counts as one that hangs.
     """
     again: deque[Case] = deque()
     repeated: set[Case] = set()
@@ -82,12 +81,9 @@ def _attacked(case: Case, deadline: float) -> Verdict:
 
 
 def run(case: Case, folder: Path) -> Verdict:
-    """Make a case from its seed and number, write its files into a folder, run it, and return its verdict.
+    """Run a case in a folder; "wrong" for an error that is none of ours, and where anything reaches standard output.
 
-    "wrong" for an error that is none of ours, and where anything reaches standard output, whoever writes it.
-
-    Raises:
-        UnknownNameError: there is no such kind.
+    Raises UnknownNameError where there is no such kind.
     """
     if case.kind not in CASES:
         raise UnknownNameError("kind of case", case.kind, KINDS)

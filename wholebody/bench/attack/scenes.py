@@ -18,13 +18,7 @@ from wholebody.figures.packaged_urdf import task_paths, urdf_path
 
 @dataclass(frozen=True)
 class Body:
-    """A figure.
-
-    Attributes:
-        figure: loaded.
-        size: metres by which things about it are measured.
-        people: whether it is a person or an avatar, who stands.
-    """
+    """A figure, metres by which things about it are measured, and whether it is a person or an avatar, who stands."""
 
     figure: wb.Figure
     size: float
@@ -43,11 +37,7 @@ class Body:
     def near(self, q: Array, share: float, rng: np.random.Generator, free: list[int] | None = None) -> Array:
         """Return a posture (nq,) within the limits, off from q by a share of what joints can do.
 
-        Args:
-            q: (nq,).
-            share: 0 to 1.
-            rng: of the posture.
-            free: places in the tangent that may differ; all but a free root's if left out.
+        `free` are places in the tangent that may differ; all but a free root's if left out.
         """
         model, limits = self.figure.model, self.figure.limits
         way = rng.uniform(-share * np.pi, share * np.pi, model.nv)
@@ -161,12 +151,7 @@ def _numbers(values: Array) -> str:
 
 @dataclass(frozen=True)
 class Thing:
-    """A thing.
-
-    Attributes:
-        shape: what it is.
-        at: (7,) where it stands.
-    """
+    """A shape, and where it stands (7,)."""
 
     shape: wb.Shape
     at: tuple[float, ...]

@@ -1,7 +1,4 @@
-"""Solves: figures inside things by micrometres to half a metre, goals that can be met, cannot be, or contradict.
-
-The verdict is on what an answer says of itself, against what the judge finds.
-"""
+"""Solves: figures inside things by micrometres to half a metre, goals that can be met, cannot be, or contradict."""
 
 from __future__ import annotations
 
@@ -31,12 +28,7 @@ FARTHEST = 99.0  # m: goals farther than 100 m are refused
 
 @dataclass
 class Terms:
-    """Goals and constraints, while they are being made up.
-
-    Attributes:
-        goals, constraints: of a problem.
-        feasible: whether the witness fits all of it.
-    """
+    """Goals and constraints, while they are being made up, and whether the witness fits them."""
 
     goals: list[wb.Goal] = field(default_factory=list)
     constraints: list[Any] = field(default_factory=list)
@@ -195,10 +187,7 @@ def _hold(
 def verdict(
     problem: Problem, found: Judged, solution: Solution, *, tolerance: float, witness: bool, seconds: float
 ) -> Verdict:
-    """Judge what was answered in seconds of CPU time, from what the judge found.
-
-    `witness` says whether the problem was made from a posture that solves it.
-    """
+    """Judge an answer; `witness` says whether the problem was made from a posture that solves it."""
     words, said = _words(found), f"{solution.method} says {solution.status!r}"
     wrongs = _wrongs(problem, solution, found, tolerance)
     if wrongs:

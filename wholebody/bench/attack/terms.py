@@ -1,8 +1,7 @@
 """Terms: contacts against the place that they find, and terms of one's own that are not finite or answer something odd.
 
-A contact term leaves the place open, so its answer costs no more than that of a point or a frame at the place found.
-Of terms of one's own the goal leads into a part of the space where they are not finite, or answer something odd. No
-answer may lie in it, and an odd answer is refused by one sentence.
+A contact term leaves the place open, so its answer costs no more than that of a point or a frame at the place found. No
+answer may lie where a term of one's own is not finite, and an odd answer is refused by one sentence.
 """
 
 from __future__ import annotations
@@ -118,10 +117,7 @@ def at_the_place(problem: Problem, solution: Solution, frames: Sequence[str]) ->
 
 
 def contact_verdict(problem: Problem, solution: Solution, frames: Sequence[str], seconds: float) -> Verdict:
-    """Judge what a contact costs beside its place; the frames are those that make it.
-
-    Wrong is what costs 2 % more.
-    """
+    """Judge whether a contact costs 2 % more than its place; the frames are those that make it."""
     if solution.status != "solved":
         return Verdict("right", f"{solution.status}", seconds, solution.status)
     other = wb.solve(at_the_place(problem, solution, frames))
@@ -139,13 +135,8 @@ USERS = "users"  # module of the terms below: answers are checked of classes fro
 class Asked(NamedTuple):
     """A request, and which answer of a term is bad.
 
-    Attributes:
-        frame: that moves.
-        way: (3,) from where it starts to its goal, metres.
-        reach: along the way, metres; beyond it the answer is bad.
-        part: "error" or "jacobian" of the goal, "value" or "slope" of the constraint, "measure", its "gradient" or
-            "curvature".
-        bad: number of which the part consists there, or what it answers.
+    `frame` is to move by `way` (3,) [m]. Beyond `reach` [m] along it the `part` (error, jacobian, value, slope,
+    measure, gradient or curvature) consists of the number `bad`, or is that answer.
     """
 
     frame: str

@@ -1,7 +1,4 @@
-"""Ways between postures: sweeps with thin things across them, and streams of goals and things that move.
-
-A sweep is judged by a fine subdivision of its way, a stream step by step.
-"""
+"""Sweeps across thin things, judged by a fine subdivision, and streams of moving goals, judged step by step."""
 
 from __future__ import annotations
 

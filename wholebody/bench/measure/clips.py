@@ -95,11 +95,7 @@ def recorded(path: Path, figure: Figure) -> Clip:
 
 
 def recordings(folder: Path | None) -> tuple[Path, ...]:
-    """The recordings of a folder, by name.
-
-    Raises:
-        InputError: there is no such folder, or no recording in it.
-    """
+    """The recordings of a folder, by name; InputError where there is none."""
     if folder is None:
         return ()
     found = sorted(path for path in folder.glob("*") if path.suffix == ".bvh") if folder.is_dir() else []
@@ -113,9 +109,5 @@ EQUIPMENT = (NOTHING, *READY)
 
 
 def chosen(wanted: Sequence[str] | None, known: Sequence[str], option: str) -> tuple[str, ...]:
-    """The names that an option chooses; all of them where it is left out.
-
-    Raises:
-        UnknownNameError: one is not known.
-    """
+    """The names that an option chooses, all of them where it is left out; UnknownNameError for others."""
     return tuple(known) if wanted is None else tuple(checks.known(name, known, "name", option) for name in wanted)

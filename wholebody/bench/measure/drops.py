@@ -22,16 +22,10 @@ GRAVITY = 9.81  # m/s2
 
 @dataclass(frozen=True)
 class Drop:
-    """Boxes and balls above a floor at z = 0.
+    """Boxes and balls above a floor at z = 0, on which wood slides on wood (table 1 of Schmidl and Lin).
 
-    Attributes:
-        name: of the case.
-        sizes: full lengths (3,) of a box, or the radius (1,) of a ball.
-        places: (n, 3) of the centres at the start, metres.
-        velocity: (3,) of all at the start, m/s.
-        frame: seconds.
-        seconds: how long it lasts.
-        friction, restitution: wood on wood, table 1 of Schmidl and Lin.
+    `sizes`: full lengths (3,) of a box, or the radius (1,) of a ball; `places` (n, 3) of the centres [m]; `velocity`
+    (3,) of all at the start; `frame` and `seconds`: of a frame and of the whole.
     """
 
     name: str
@@ -65,17 +59,13 @@ class Drop:
 
 def drops() -> tuple[Drop, ...]:
     """All cases."""
-    return (ball(), slide(), stack(10), grid("27 balls", 3), grid("216 balls", 6), pile(20, 1 / 60), pile(100, 1 / 30))
+    slide = Drop("slide", ((0.2, 0.2, 0.1),), np.array([[0.0, 0.0, 0.0501]]), (2.0, 0.0, 0.0), 1 / 60, 1.5)
+    return (ball(), slide, stack(10), grid("27 balls", 3), grid("216 balls", 6), pile(20, 1 / 60), pile(100, 1 / 30))
 
 
 def ball() -> Drop:
     """A ball that falls from a metre and bounces."""
     return Drop("ball", ((0.05,),), np.array([[0.0, 0.0, 1.0]]), (0.0, 0.0, 0.0), 1 / 60, 3.0)
-
-
-def slide() -> Drop:
-    """A box that slides until friction has stopped it."""
-    return Drop("slide", ((0.2, 0.2, 0.1),), np.array([[0.0, 0.0, 0.0501]]), (2.0, 0.0, 0.0), 1 / 60, 1.5)
 
 
 def stack(count: int) -> Drop:
@@ -110,11 +100,10 @@ class Engine(Protocol):
         """Positions with quaternions x, y, z, w (n, 7); velocities, angular ones along the world's axes too (n, 6)."""
 
 
-class Own:
+class _Own:
     """wholebody."""
 
     def __init__(self, drop: Drop) -> None:
-        """Put everything into a scene, far from a hand."""
         from wholebody.dynamics.rigid_bodies import RigidBodies
 
         scene = wb.Scene(wb.load("hand")).add(wb.HalfSpace(), name="floor")
@@ -126,21 +115,18 @@ class Own:
         self._engine, self._time, self._away = RigidBodies(scene), drop.frame, away
 
     def frame(self) -> None:
-        """Advance by a frame."""
         self._engine.advance(self._time)
 
     def state(self) -> tuple[Array, Array]:
-        """Poses and velocities; see `Engine`."""
         poses = [pin.SE3ToXYZQUAT(self._engine.placement(name)) for name in self.names]
         velocities = [self._engine.twist(name) for name in self.names]
         return np.array(poses) - np.append(self._away, np.zeros(4)), np.array(velocities)
 
 
-class Mujoco:
+class _Mujoco:
     """MuJoCo with its default contacts, which are soft and know no restitution, in steps of 1/480 s."""
 
     def __init__(self, drop: Drop) -> None:
-        """Write a model and read it."""
         import mujoco
 
         bodies = []
@@ -163,12 +149,11 @@ class Mujoco:
         self._steps = round(480.0 * drop.frame)
 
     def frame(self) -> None:
-        """Advance by a frame."""
         for _ in range(self._steps):
             self._mujoco.mj_step(self._model, self._data)
 
     def state(self) -> tuple[Array, Array]:
-        """Poses and velocities; see `Engine`. MuJoCo's angular velocities are those of the body's axes."""
+        # MuJoCo's angular velocities are those of the body's axes.
         q, v = self._data.qpos.reshape(-1, 7), self._data.qvel.reshape(-1, 6).copy()
         poses = np.column_stack([q[:, :3], q[:, 4:], q[:, 3]])
         for k, pose in enumerate(poses):
@@ -176,11 +161,10 @@ class Mujoco:
         return poses, v
 
 
-class Rapier:
+class _Rapier:
     """Rapier with its defaults, in steps of a frame."""
 
     def __init__(self, drop: Drop) -> None:
-        """Put everything into a world."""
         import rapier3d
 
         surface = {"friction": drop.friction, "restitution": drop.restitution, "density": DENSITY}
@@ -197,11 +181,9 @@ class Rapier:
             self._bodies.append(self._world.add_body(body, colliders=[shape]))
 
     def frame(self) -> None:
-        """Advance by a frame."""
         self._world.step()
 
     def state(self) -> tuple[Array, Array]:
-        """Poses and velocities; see `Engine`."""
         poses, velocities = [], []
         for handle in self._bodies:
             body = self._world.rigid_bodies[handle]
@@ -211,7 +193,7 @@ class Rapier:
         return np.array(poses), np.array(velocities)
 
 
-ENGINES: Mapping[str, Callable[[Drop], Engine]] = {"wholebody": Own, "mujoco": Mujoco, "rapier": Rapier}
+ENGINES: Mapping[str, Callable[[Drop], Engine]] = {"wholebody": _Own, "mujoco": _Mujoco, "rapier": _Rapier}
 """All engines by name."""
 
 

@@ -1,7 +1,4 @@
-"""`wholebody bench motion`: clips freed of collisions by each method, with each piece of equipment, and judged.
-
-Each case runs in a process of its own; what was measured is kept in a file, where a run that was ended goes on.
-"""
+"""`wholebody bench motion`: clips freed of collisions by each method, with each piece of equipment, and judged."""
 
 from __future__ import annotations
 
@@ -32,21 +29,12 @@ Case = tuple[str, str, str]
 
 
 def measured(worn: str, method: str, path: str, most: float) -> dict[str, Figure]:
-    """Measure one case; a job of a process of its own.
+    """Measure one case, in a process of its own that has `most` seconds of the processor.
 
-    Args:
-        worn: equipment.
-        method: of avoidance, or `CHECKED`.
-        path: of the clip.
-        most: seconds of the processor that it has.
-
-    Returns:
-        "outcome": "free"; "left" where something overlaps still, or a limit or what is held is missed; else why there
-        is no clip. "s a second": the processor's seconds of the method, or of the check, for each second of motion.
-        Frames in collision before and "after", "dips" between two free frames, "deepest mm" in any frame and "between
-        mm" at any time, the largest excess over a joint limit, the deviation from the clip before (root mean square of
-        the joints, and of their centres), the "jerk" in parts of that before, by how much standing feet slide more, and
-        the counts of posture solves and of programs.
+    "outcome": "free"; "left" where something overlaps still, or a limit or what is held is missed; else why there is no
+    clip. "s a second": the processor's seconds for each second of motion. "dips": between two free frames. "deepest mm"
+    in a frame, "between mm" at any time. The deviation is the root mean square of the joints, and of their centres;
+    "jerk" is in parts of that before; "feet slide": by how much more standing feet do.
     """
     from wholebody.figures import load
     from wholebody.motion.avoidance import avoid
@@ -118,18 +106,8 @@ def run(
 ) -> list[Row]:
     """Measure all cases, and keep what was measured in `motion.csv`, where a run that was ended goes on.
 
-    Args:
-        clips: name to its recording; None for a synthetic clip.
-        cases: clips, equipment and methods.
-        folder: where clips and results are kept.
-        facts: of the machine.
-        jobs: cases at a time.
-        tell: is told what was done.
-        slowest: seconds of the processor after which a case is ended, from the seconds of its clip.
-
-    Raises:
-        FileFormatError: `motion.csv` is of another command.
-        InputError: the folder cannot be written.
+    `clips` name their recordings, None for a synthetic one; `slowest` has the seconds of the processor after which a
+    case is ended, from those of its clip. Raises FileFormatError where `motion.csv` is of another command.
     """
     kept = folder / "motion.csv"
     make_folder(folder / "clips")

@@ -1,7 +1,4 @@
-"""`wholebody bench scaling`: time of a step and of a solve against joints, pieces and things.
-
-A chain 2 m long, of any number of joints, reaches among any number of things: one size grows and the rest stays.
-"""
+"""`wholebody bench scaling`: a chain 2 m long reaches among things; joints, pieces or things grow, the rest stays."""
 
 from __future__ import annotations
 
@@ -36,15 +33,9 @@ SIMPLIFIED = "qp, simplified"
 
 
 def chain(joints: int, pieces: int, segments: int | None = None) -> wb.Figure:
-    """A chain that lies along x, its joints about z and y in turn.
+    """A chain along x, joints about z and y in turn; so many of its links, evenly spread, have boxes: all where None.
 
-    Args:
-        joints: how many.
-        pieces: boxes of each segment that has any.
-        segments: how many of the links have pieces, evenly spread; all where None.
-
-    Raises:
-        InputError: no joints, or more segments than links.
+    Raises InputError for no joints, or more segments than links.
     """
     if joints < 1 or not 1 <= (segments or joints) <= joints:
         raise InputError(f"a chain of {joints} joints cannot have {segments} segments; give 1 to {joints}")
@@ -85,12 +76,10 @@ def _boxes(length: float, count: int) -> str:
 
 
 def task(figure: wb.Figure, things: int, seed: int) -> tuple[wb.Scene, Array]:
-    """A scene in which the chain reaches among things, not built yet, and where its tip is asked to go.
+    """A scene in which the chain reaches among things, not built yet, and where its tip is to go.
 
-    The first ten things stand within 2.4 m of the base; more of them are as dense, and go farther out.
-
-    Raises:
-        InputError: no free posture was found.
+    The first ten things stand within 2.4 m of the base; more of them are as dense, and go farther out. Raises
+    InputError where no free posture was found.
     """
     rng = np.random.default_rng([seed, figure.model.nq, things])
     witness = _free_posture(figure, rng)
@@ -222,8 +211,7 @@ def _step_ms(problem: wb.Problem, method: str) -> float:
 def exponent(sizes: Sequence[float], spent: Sequence[float]) -> tuple[float, float]:
     """Exponent of time ~ size**e over the upper range, and the size that range begins at.
 
-    The line is fitted to the logarithms of the sizes from a tenth of the largest on, where what grows outweighs what
-    does not; of three sizes at least.
+    The line is fitted to the logarithms of the sizes from a tenth of the largest on; of three sizes at least.
     """
     size, duration = np.asarray(sizes, dtype=float), np.asarray(spent, dtype=float)
     order = np.argsort(size)

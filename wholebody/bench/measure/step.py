@@ -25,12 +25,8 @@ others evicted from the caches; these are 2 %, so that they do not make the p95.
 class Run:
     """One run of one tool.
 
-    Attributes:
-        wall: (steps,) by the clock [us].
-        cpu: (steps,) of the processor [us].
-        setup: seconds.
-        postures: (steps, nq) after each step.
-        tool: which went there.
+    `wall`, `cpu`: (steps,) microseconds by the clock and of the processor; `setup`: seconds; `postures`: (steps, nq)
+    after each step.
     """
 
     def __init__(self, track: Track, name: str) -> None:
@@ -62,12 +58,10 @@ Runs = Mapping[str, Sequence[Run]]
 def measure(
     track: Track, tools: Sequence[str], repeats: int, say: Callable[[str], None] = lambda text: None
 ) -> dict[str, list[Run]]:
-    """Let every tool make a reach a number of times; `say` takes a line about each repeat.
+    """Let every tool make a reach a number of times, each from a fresh set-up; `say` takes a line about each.
 
-    In every repeat each tool makes the whole reach once, from a fresh set-up and from standing. They take turns of
-    `TURN` steps, so that the machine is as fast for one as for the other; their order rotates from turn to turn. One
-    step of each set-up is made before the clock starts. A first round, in which code and data come into the caches, is
-    not counted.
+    Tools take turns of `TURN` steps, so that the machine is as fast for one as for the other; their order rotates. One
+    step of each set-up is made before the clock starts, and a first round is not counted.
     """
     runs: dict[str, list[Run]] = {name: [] for name in tools}
     for repeat in range(repeats + 1):
@@ -139,10 +133,7 @@ def result_rows(track: Track, runs: Runs) -> list[Row]:
 
 
 def taking(track: Track, tools: Sequence[str]) -> tuple[list[str], dict[str, str]]:
-    """The tools that take a reach, and the sentences of those that do not.
-
-    A tool takes it if it can be set up and makes a first step.
-    """
+    """The tools that can be set up for a reach and make a first step, and the sentences of those that cannot."""
     taken, refused = [], {}
     for name in tools:
         try:
@@ -175,15 +166,7 @@ def panels(found: Mapping[str, Runs], tracks: Mapping[str, Track]) -> list[Panel
 def step_report(
     spent: Sequence[Row], judged: Sequence[Row], facts: Mapping[str, str], figures: bool, notes: Sequence[str]
 ) -> str:
-    """The tables of the tracking steps.
-
-    Args:
-        spent: times of every reach by every tool.
-        judged: what they came to.
-        facts: of the machine.
-        figures: whether reaches are of figures from files.
-        notes: on the tools.
-    """
+    """The tables of the tracking steps; `figures` says whether reaches are of figures from files."""
     human = (
         "the standing human (55 degrees of freedom) among 20 convex objects (none in the reach alone), both feet held"
     )

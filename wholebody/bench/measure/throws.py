@@ -1,8 +1,7 @@
 """Things that fly at a person who stands, walks or is dragged, and ten minutes of things that move by themselves.
 
-With swift limits the person may move as fast as the thing comes, so a free posture is within reach in every frame:
-going along with it is one. With human limits there may be none. Depths are found by fine subdivision in a scene of
-their own.
+With swift limits the person may move as fast as the thing comes, so a free posture is within reach in every frame.
+Depths are found by fine subdivision in a scene of their own.
 """
 
 from __future__ import annotations
@@ -37,11 +36,7 @@ SHAPES = {
 class Throw:
     """A thing that flies towards the body of a standing person with constant velocity, and turns.
 
-    Attributes:
-        scene: the person, the floor and the "thing".
-        truth: the same scene once more, for judgements; `instants` moves its thing.
-        at: where the thing is.
-        frames: until it is past.
+    `truth` is the scene once more, for judgements; `at`: where the thing is; `frames`: until it is past.
     """
 
     def __init__(self, rng: np.random.Generator, shape: wb.Shape, speed: float, turn: float = 3.0) -> None:
@@ -161,10 +156,10 @@ AWAY = np.array([20.0, 0.0, 0.0])  # from the hand that a scene needs
 
 
 def long_run(minutes: float, seed: int = 0) -> Row:
-    """Run it.
+    """Things in a pen, kicked now and then.
 
-    The drift is of the stack that nothing can reach, from where it lay after the first ten seconds; "outside" are
-    things that left the pen, or are not finite.
+    The drift is of the stack that nothing can reach, from where it lay after ten seconds; "outside" are things that
+    left the pen, or are not finite.
     """
     engine, names, pillar = _engine(seed)
     rng = np.random.default_rng(seed)

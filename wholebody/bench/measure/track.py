@@ -1,11 +1,8 @@
 """The reach that every tool makes: 200 steps of a fingertip, both feet held, among twenty convex objects.
 
-Two ways for the fingertip: "free" passes the body and the objects and comes near many without having to touch any;
-"contact" asks for a place inside a box, which nobody can reach, and then for one before the chest. "alone" is the free
-way without the objects: far fewer pairs, which tells what a tool's time is made of.
-
-What a tool does is judged by the judge of all motions, and by where the tip and the feet are: no tool's own distances
-are believed, ours included.
+"free" passes the body and the objects and comes near many without having to touch any; "contact" asks for a place
+inside a box and then for one before the chest; "alone" is the free way without the objects. No tool's own distances are
+believed, ours included.
 """
 
 from __future__ import annotations
@@ -32,12 +29,9 @@ VARIANTS = ("free", "contact", "alone")
 class Setting(NamedTuple):
     """What every tool is told of a reach.
 
-    Attributes:
-        dt: of a step [s].
-        clearance: that every pair keeps [m].
-        within: pairs nearer than this [m] count for every tool that has such a setting.
-        joint_speed, root_speed, root_turn: most that a joint [rad/s] and the root [m/s], [rad/s] may move.
-        posture_cost: of a radian, where a metre of the goal costs 1; tools square it.
+    A step takes `dt` [s]; every pair keeps `clearance` [m], and pairs nearer than `within` [m] count; the rest bounds a
+    joint [rad/s] and the root [m/s], [rad/s]. `posture_cost` is that of a radian, where a metre of the goal costs 1;
+    tools square it.
     """
 
     dt: float = 0.01
@@ -61,14 +55,8 @@ def _given() -> Any:
 class Track:
     """One reach, the same for every tool.
 
-    Attributes:
-        name: "free", "contact" or "alone".
-        scene: the human and the objects.
-        start: (nq,) standing.
-        targets: (steps, 3) where the fingertip is asked to be [m].
-        tip: name of the frame that reaches.
-        feet: names of the frames that stay where they are.
-        clearance: that every pair keeps [m].
+    `start` (nq,); `targets` (steps, 3) of the frame `tip` [m]; `feet` stay where they are; every pair keeps `clearance`
+    [m].
     """
 
     name: str
@@ -91,15 +79,9 @@ class Track:
 
 
 def track(name: str, steps: int = 200) -> Track:
-    """Build a reach.
+    """Build the human's reach of a name.
 
-    Args:
-        name: "free", "contact" or "alone".
-        steps: of the way.
-
-    Raises:
-        UnknownNameError: another name.
-        InputError: fewer than two steps.
+    Raises UnknownNameError for another name, InputError for fewer than two steps.
     """
     if name not in VARIANTS:
         raise UnknownNameError("reach", name, VARIANTS)
@@ -131,7 +113,7 @@ def track(name: str, steps: int = 200) -> Track:
 
 
 def smooth_way(places: Array, steps: int) -> Array:
-    """Way (steps, 3) through places (k, 3), at rest at both ends (minimum jerk), with a tenth of the time at the end.
+    """Way (steps, 3) through places (k, 3), at rest at both ends, with a tenth of the time at the end.
 
     The share of the way done at the time t of 0 to 1 is 10 t^3 - 15 t^4 + 6 t^5: Flash and Hogan 1985, "The
     coordination of arm movements".
@@ -155,19 +137,10 @@ def put_objects(
     scene: wb.Scene, taken: Occupied, way: Array, rng: np.random.Generator, space: Sequence[Sequence[float]],
     size: float = 1.0, boxes: int = 6,
 ) -> None:  # fmt: skip
-    """Put boxes, spheres and hulls into a space, clear of what is taken up and of a way for a tip.
+    """Put boxes, spheres and hulls into a space (2, 3) [m], clear of what is taken up and of a way (k, 3) [m].
 
-    Args:
-        scene: gets the objects.
-        taken: by the figure.
-        way: (k, 3) of the tip [m].
-        rng: of their kinds' sizes and places.
-        space: (2, 3) corners of the space [m].
-        size: of the objects and of the room around them, as a share of those of the human's reaches.
-        boxes: how many of them are boxes.
-
-    Raises:
-        InputError: no place was found for one of them.
+    `size` of objects and of the room around them is a share of those of the human's reaches. Raises InputError where no
+    place was found for one of them.
     """
     given = _given()
     kinds = ["box"] * boxes + ["sphere"] * given.spheres + ["hull"] * given.hulls
@@ -193,17 +166,10 @@ def _shape(kind: str, rng: np.random.Generator, size: float) -> wb.Shape:
 class Verdict(NamedTuple):
     """What came of one run.
 
-    Attributes:
-        least_distance: (steps,) least signed distance of all pairs after each step [m].
-        near: (steps,) pairs nearer than `Setting.within`.
-        touching: (steps,) pairs at the clearance or nearer, to 1 mm.
-        error: (steps,) distance of the fingertip from its target [m].
-        foot_drift: greatest distance of a foot from where it began [m].
-        foot_turn: greatest angle of a foot from how it began [rad].
-        limit_violation: how far the worst joint was out of its limits [rad].
-        fastest_joint: greatest step of a joint, as a share of what the speed bound allows.
-        fastest_root: the same for the root, in its place and its orientation.
-        acceleration: mean of all joints' absolute accelerations [rad/s^2]; high where a tool trembles.
+    After each step (steps,): least signed distance of all pairs [m], pairs nearer than `Setting.within`, pairs at the
+    clearance to 1 mm, distance of the tip from its target [m]. Of the run: the greatest distance [m] and angle [rad] of
+    a foot from where it began; how far the worst joint was out of its limits [rad]; the fastest joint and root as
+    shares of the bounds; the mean of all joints' absolute accelerations [rad/s^2].
     """
 
     least_distance: Array
@@ -219,11 +185,7 @@ class Verdict(NamedTuple):
 
 
 def judge(track: Track, postures: Array) -> Verdict:
-    """Judge the postures (steps, nq) that a tool went through.
-
-    Raises:
-        ValueError: a posture is not finite.
-    """
+    """Judge the postures (steps, nq) that a tool went through; ValueError where one is not finite."""
     if not np.isfinite(postures).all():
         raise ValueError("a tool went to a posture that is not finite")
     scene, figure = track.scene, track.scene.figure
@@ -256,18 +218,10 @@ def judge(track: Track, postures: Array) -> Verdict:
 
 
 def figure_tracks(spec: str, steps: int = 200) -> list[Track]:
-    """Build the reaches of a figure, named as those of the human.
+    """Build the reaches of a figure, by name or path, named as those of the human.
 
-    Pairs are kept apart by the clearance of the human's reaches, or by half of the least distance along the way if
-    that is less, as it is for links of robots whose hulls nearly touch.
-
-    Args:
-        spec: name or path of a figure, as for `wholebody.load`.
-        steps: of each way.
-
-    Raises:
-        WholebodyError: the figure cannot be loaded.
-        InputError: it has no chain that moves, no way without contact was found, or no place for an object.
+    Pairs keep half of the least distance along the way if that is less than the clearance. Raises InputError where the
+    figure has no chain that moves, no way without contact was found, or no place for an object.
     """
     figure = wb.load(spec)
     chains = [chain for chain in figure.chains.values() if chain.joints]

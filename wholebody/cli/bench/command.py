@@ -46,12 +46,7 @@ def seed(of: str) -> Option:
 
 
 class Chart(NamedTuple):
-    """A chart that is still to be drawn.
-
-    Attributes:
-        draw: draws it into a file, whose suffix it replaces, and returns its SVG and its PNG.
-        caption: for the documentation.
-    """
+    """A chart that is still to be drawn: `draw` draws it into a file of another suffix, and returns SVG and PNG."""
 
     draw: Callable[[Path], tuple[Path, Path]]
     caption: str
@@ -69,16 +64,8 @@ def publish(
 ) -> None:
     """Write tables and report, draw charts, and write both into the documentation where that is asked for.
 
-    What was measured is written before anything is drawn, so that a chart that fails loses no measurement.
-
-    Args:
-        name: of the report's file, and of its section of the page.
-        report: Markdown.
-        arguments: of the command.
-        facts: of the machine, for the tables.
-        tables: rows by the name of their CSV file.
-        charts: by the names of their files.
-        page: of the documentation.
+    What was measured is written before anything is drawn, so that a chart that fails loses no measurement. Rows are by
+    the name of their CSV file, charts by those of their files, `page` is of the documentation.
     """
     for table, rows in (tables or {}).items():
         write_rows(arguments.out / f"{table}.csv", facts or {}, rows)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from wholebody.base.errors import InputError
 from wholebody.bench.tables import machine, write_rows, write_text
-from wholebody.cli.bench.command import folders, listed, publish, quick, seed
+from wholebody.cli.bench.command import folders, listed, quick, seed
 from wholebody.cli.command import command, count, option
 
 if TYPE_CHECKING:
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 Solve problems with known answers by every method at many budgets, and chart speed against accuracy. Writes a report
 (report.html) that says which method to choose when, charts as SVG and PNG, and every solve as CSV. A run that was
 ended goes on where it was when it is called again with the same settings and folder; a finished one writes its report
-anew. --held-out poses uniform witnesses, other people, other clutter and robots as they come, and puts the shares
-beside those of the sets. --again compares times in units of a reference kernel, and ends with 1 where what is solved
+anew. --held-out poses uniform witnesses, other people, other clutter and robots as they come, beside the sets of the
+same questions. --again compares times in units of a reference kernel, and ends with 1 where what is solved
 differs. --jobs works on cases beside each other through joblib; --cluster does so on a dask cluster.""",
     quick("20 problems a set, within three minutes on two cores"),
     option(
@@ -55,29 +55,20 @@ differs. --jobs works on cases beside each other through joblib; --cluster does 
     *folders("out/compare"),
 )
 def compare(arguments: argparse.Namespace) -> int:
-    """Compare methods; 1 where a comparison that is repeated solves other problems.
-
-    Raises:
-        InputError: options that exclude each other.
-    """
+    """Compare methods; 1 where a comparison that is repeated solves other problems."""
     if arguments.task is not None:
         return _compare_on_task(arguments)
     if arguments.again is not None:
         return _again(arguments)
-    if arguments.held_out:
-        return _held_out(arguments)
-    from rich.console import Console
-
     from wholebody.base.batches import threads
     from wholebody.bench.suite.adapters.registry import missing
     from wholebody.bench.suite.compare import run as comparison
     from wholebody.bench.suite.compare.advice import advice
-    from wholebody.bench.suite.compare.report import PAGE, publish
+    from wholebody.bench.suite.compare.report import PAGE, publish, to_docs
     from wholebody.cli.tables import progress_bar
 
     jobs = arguments.jobs or (threads(arguments.cluster) if arguments.cluster else 1)
     settings = _settings(arguments)
-    console = Console()
     with progress_bar(counted=False) as bar:
         task = bar.add_task("starting", total=60.0 * settings.minutes * jobs)
 
@@ -87,12 +78,14 @@ def compare(arguments: argparse.Namespace) -> int:
         store = comparison.run(settings, arguments.out, jobs, arguments.cluster, tell)
         where = f"the dask cluster {arguments.cluster}" if arguments.cluster else "this machine"
         given = publish(
-            settings, store, arguments.out, _facts(f"{jobs} on {where}"), missing(), arguments.update_docs,
+            settings, store, arguments.out, _facts(f"{jobs} on {where}"), missing(),
             lambda what: bar.update(task, description=f"making {what}"),
         )  # fmt: skip
+    if arguments.update_docs is not None:
+        to_docs(given, arguments.out, arguments.update_docs, "held-out" if arguments.held_out else "compare")
     for sentence in advice(given.results, given.rows):
-        console.print("- " + sentence.replace("**", "").replace("`", ""), highlight=False, markup=False)
-    console.print(f"wrote {arguments.out / PAGE}", highlight=False, soft_wrap=True)
+        print("- " + sentence.replace("**", "").replace("`", ""))
+    print(f"wrote {arguments.out / PAGE}")
     return 0
 
 
@@ -103,9 +96,12 @@ def _facts(beside: str) -> dict[str, str]:
 def _settings(arguments: argparse.Namespace) -> Settings:
     from wholebody.bench.suite.adapters.registry import adapters
     from wholebody.bench.suite.compare.settings import QUICK, Settings
-    from wholebody.bench.suite.problem_sets.registry import CASES, SETS, problem_set
+    from wholebody.bench.suite.problem_sets.registry import CASES, SETS, beside, problem_set
 
-    sets = tuple(problem_set(name) for name in dict.fromkeys(arguments.sets or SETS))
+    if arguments.held_out:
+        _alone(arguments, "held_out", ("sets",))
+    named = arguments.sets or (beside(print) if arguments.held_out else SETS)
+    sets = tuple(problem_set(name) for name in dict.fromkeys(named))
     chosen = None if arguments.methods is None else tuple(dict.fromkeys(arguments.methods))
     amounts: dict[str, Any] = dict(QUICK) if arguments.quick else {"cases": CASES}
     asked = {"cases": arguments.cases, "minutes": arguments.minutes}
@@ -138,9 +134,9 @@ def _compare_on_task(arguments: argparse.Namespace) -> int:
     from wholebody.taskfile import read_task
 
     _alone(arguments, "task", OF_SETS)
-    console, title = Console(), read_task(arguments.task).title
+    title = read_task(arguments.task).title
     chosen = adapters(arguments.methods, starts=True)
-    with console.status("solving") as status:
+    with Console().status("solving") as status:
         rows = own_task.compared(arguments.task, chosen, tell=lambda name: status.update(f"solving by {name}"))
     facts, out = machine(), arguments.out
     write_rows(out / "task.csv", facts, rows)
@@ -148,7 +144,7 @@ def _compare_on_task(arguments: argparse.Namespace) -> int:
     _, png = chart(own_task.panels(rows, title), out / "task")
     print_rows(rows)
     for path in (out / "task.md", out / "task.csv", png):
-        console.print(f"wrote {path}", highlight=False, soft_wrap=True)
+        print(f"wrote {path}")
     return 0
 
 
@@ -169,23 +165,3 @@ def _again(arguments: argparse.Namespace) -> int:
         print(line)
     print(f"wrote {arguments.out / PAGE}")
     return 1 if shares(differences(published, found)) else 0
-
-
-def _held_out(arguments: argparse.Namespace) -> int:
-    """Measure, judge, publish."""
-    _alone(arguments, "held_out", ("sets", "cluster"))
-    from wholebody.bench.suite.adapters.registry import adapters, installed
-    from wholebody.bench.suite.compare import held_out
-
-    cases = arguments.cases or (4 if arguments.quick else 40)
-    minutes = 20.0 if arguments.minutes is None else arguments.minutes
-    names = arguments.methods or [name for name in ("qp", "placo", "placo/starts", "dls/starts") if installed(name)]
-    asked, left_out = held_out.settings(adapters(names), cases, arguments.seed, minutes)
-    if left_out:
-        print(left_out)
-    folder = arguments.out / "held-out"
-    rows = held_out.measured(asked, folder, arguments.jobs or 1, lambda progress: print(progress.said, flush=True))
-    facts = _facts(f"{arguments.jobs or 1}")
-    report = held_out.report(rows, asked, left_out, facts)
-    publish("held-out", report, arguments, facts=facts, tables={"held-out/held_out": rows})
-    return 0

@@ -45,17 +45,10 @@ def stability(arguments: argparse.Namespace) -> None:
     facts, cells = machine(), _asked([(case, adapter) for case in chosen for adapter in asked], arguments.jobs)
     found = result(chosen, [adapter.name for adapter in asked], cells)
     _print(found)
-    rows, text = found.rows, report(found, facts)
+    text = report(found, facts)
     charts = {"stability": Chart(partial(matrix, found), "Cases by methods: a colour and a sign a cell")}
-    publish(
-        "stability",
-        text,
-        arguments,
-        facts=facts,
-        tables={"stability": rows},
-        charts=charts,
-        page="where-methods-fail.md",
-    )
+    tables = {"stability": found.rows}
+    publish("stability", text, arguments, facts=facts, tables=tables, charts=charts, page="where-methods-fail.md")
 
 
 def _asked(pairs: Sequence[tuple[HardCase, Adapter]], jobs: int) -> list[Cell]:
@@ -90,9 +83,9 @@ def _print(result: Result) -> None:
         counts.add_row(letter, method, *found, f"{result.acceptable(method)} of {len(result.cases)}")
     console.print(counts)
     legend = ", ".join(f"{symbol} {WORDS[kind]}" for kind, symbol in SYMBOLS.items())
-    console.print(f"{legend}; ● honest and as good as can be", highlight=False)
+    print(f"{legend}; ● honest and as good as can be")
     for method, case, verdict in result.of_kind("wrong"):
-        console.print(f"WRONG: {method}, {case.name}: {verdict.figure}", highlight=False, markup=False)
+        print(f"WRONG: {method}, {case.name}: {verdict.figure}")
 
 
 @command(
@@ -138,7 +131,6 @@ def attack(arguments: argparse.Namespace) -> int:
         raise InputError("no case ended; give more --seconds")
     rows.sort(key=lambda one: (one["seed"], one["number"]))
     facts = machine()
-    report.index(rows, arguments.out)
     publish(
         "attack", report.report(rows, facts), arguments, facts=facts, tables={"attack": rows}, page="reliability.md"
     )

@@ -1,4 +1,4 @@
-"""`wholebody bench step`, `solve`, `scaling`, `motion`, `world`, `robots`, `ablation`: what things cost and achieve."""
+"""`wholebody bench step`, `solve`, `scaling`, `motion` and `world`: what things cost and achieve."""
 
 from __future__ import annotations
 
@@ -12,16 +12,12 @@ from wholebody.base import checks
 from wholebody.base.files import make_folder
 from wholebody.bench.rows import Panel, Row, chart, only, report
 from wholebody.bench.tables import machine, write_rows
-from wholebody.cli.bench.command import Chart, listed, measuring, publish, publish_page
+from wholebody.cli.bench.command import Chart, listed, measuring, publish
 from wholebody.cli.command import count, option
 
 
 def chosen(wanted: Sequence[str] | None, known: Iterable[str], flag: str) -> tuple[str, ...]:
-    """The names that an option chooses; all of them where it is left out.
-
-    Raises:
-        UnknownNameError: one is not known.
-    """
+    """The names that an option chooses, or all; raises UnknownNameError."""
     names = tuple(known)
     return names if wanted is None else tuple(checks.known(name, names, "name", flag) for name in wanted)
 
@@ -69,39 +65,23 @@ def step(arguments: argparse.Namespace) -> None:
     publish(name, text, arguments, facts=facts, tables=rows, charts=charts)
 
 
-PARTS = "task", "reaches", "detail"
-"""Of `wholebody bench solve`, each into a table of its own."""
-
-
 @measuring(
     "solve",
-    "whole solves: a task and its memory, random reaches, levels of modelling",
-    """\
-Measure whole solves. `task`: the shelf, or a task of your own, with new and with used workspaces, and the memory of
-`wholebody pose`. `reaches`: random reaches from standing whose answer is known to exist; what was not solved is listed.
-`detail`: the same tasks with the person as spheres, capsules and hulls, with all joints and pairs and with those that a
-task needs, judged in the finest model.""",
-    listed("--parts", "what to measure (default: task reaches)", None, choices=PARTS, default=PARTS[:2]),
-    option("--task", type=Path, metavar="TASK.toml", help="of the part task (default: the shelf)"),
-    count("--count", None, "solves of the task (default: 30), reaches (200), cases of each level (8)"),
-    option("--first", type=int, default=0, metavar="SEED", help="seed of the first reach or case (default: 0)"),
-    listed("--methods", "such as qp, newton (default: qp, and qp/osqp for the task)"),
-    count("--jobs", 1, "processes of the reaches (default: 1, for steady times)"),
+    "whole solves of a task, and their memory",
+    "Solve the shelf, or a task of your own, with new and with used workspaces, and measure the memory of "
+    "`wholebody pose`. `wholebody bench compare` solves the problem sets.",
+    option("--task", type=Path, metavar="TASK.toml", help="(default: the shelf)"),
+    count("--count", 30, "solves"),
+    listed("--methods", "such as qp, newton (default: qp qp/osqp)"),
 )
 def solve(arguments: argparse.Namespace) -> None:
-    """Measure whole solves."""
-    for part in dict.fromkeys(arguments.parts):
-        {"task": _task, "reaches": _reaches, "detail": _detail}[part](arguments)
-
-
-def _task(arguments: argparse.Namespace) -> None:
     """Whole solves of a task with new and with used workspaces, and the memory of `wholebody pose`."""
     from wholebody.bench.measure import solve
     from wholebody.bench.suite.adapters.registry import adapters
     from wholebody.cli.demo import packaged_tasks
 
     task, facts, rows = arguments.task or packaged_tasks()["shelf"], machine(), []
-    methods, many = adapters(arguments.methods or ["qp", "qp/osqp"]), 3 if arguments.quick else arguments.count or 30
+    methods, many = adapters(arguments.methods or ["qp", "qp/osqp"]), 3 if arguments.quick else arguments.count
     for row in solve.task_rows(task, methods, many):
         rows.append(row)
         print(f"{row.case}, {row.tool}, {row['problem and method']}: {row['median ms']:.1f} ms, {row['status']}")
@@ -109,50 +89,6 @@ def _task(arguments: argparse.Namespace) -> None:
     about = "A task, solved with a new problem and a new method each time, and with the same ones again."
     text = report(about, {"Solves": rows, "Memory": [peak]}, facts)
     publish("solve", text, arguments, facts=facts, tables={"solve": rows, "memory": [peak]})
-
-
-def _reaches(arguments: argparse.Namespace) -> None:
-    """Random reaches whose answer is known to exist."""
-    from wholebody.bench.measure import solve
-    from wholebody.bench.rows import shares
-    from wholebody.bench.suite.adapters.registry import adapters
-
-    seeds = range(arguments.first, arguments.first + (10 if arguments.quick else arguments.count or 200))
-    methods = [adapter.name for adapter in adapters(arguments.methods or ["qp"])]
-    facts, rows, notes = machine() | {"processes": str(arguments.jobs)}, list[Row](), list[str]()
-    for method in methods:
-        for row in solve.reaches(seeds, method, arguments.jobs):
-            rows.append(row)
-            if row["status"] != "solved":
-                notes.append(f"{row.case}, {method}: {row['status']}; {row['how']}")
-                print(notes[-1])
-    about = (
-        f"Random reaches from standing among twenty random objects and a floor, seeds {seeds[0]} to {seeds[-1]}; the "
-        "target is where a fingertip is in a sampled posture free of contact, so an answer exists. Both feet held, "
-        "effort minimised. Brackets hold 95 % intervals: Wilson's of shares, the bootstrap's of times."
-    )
-    text = report(about, {"": solve.reach_summary(rows)}, facts, notes or ["Every reach was solved."])
-    spent = {name: [row["ms"] for row in rows if row.tool == name and row["status"] == "solved"] for name in methods}
-    panel = shares("solved", "time of a solve [ms]", spent, dict.fromkeys(methods, len(seeds)))
-    charts = _charts("reaches", [panel], "Share of the reaches solved within a time")
-    publish("reaches", text, arguments, facts=facts, tables={"reaches": rows}, charts=charts)
-
-
-def _detail(arguments: argparse.Namespace) -> None:
-    """The same tasks with every detail of geometry, judged in the finest model."""
-    from wholebody.bench.measure import solve
-
-    facts, refused = machine(), dict[str, None]()
-    rows = list(solve.detail_rows(2 if arguments.quick else arguments.count or 8, arguments.first, refused.setdefault))
-    about = (
-        "Answers of `qp` that their own model calls solved, judged in the finest model with everything in it: how "
-        "many are inside something by more than 0.1 mm, and by how much the worst misses what it is asked; the effort "
-        "is held against the finest model's own answer. Medians over the cases, of the processor's time. Simplified "
-        "is `wb.simplify`."
-    )
-    shown = [row for row in solve.detail_summary(rows) if row.tool.endswith(("all", "simplified"))]
-    text = report(about, {"": only(shown, *solve.SHOWN)}, facts, list(refused))
-    publish("detail", text, arguments, facts=facts, tables={"detail": rows})
 
 
 @measuring(
@@ -234,7 +170,6 @@ def motion(arguments: argparse.Namespace) -> None:
 
 
 WORLD = {
-    "closed": "Known by formula",
     "throws": "Thrown at a person",
     "drops": "The same drops in three engines",
     "long": "For minutes",
@@ -244,11 +179,11 @@ WORLD = {
 
 @measuring(
     "world",
-    "things that move by themselves: closed forms, throws at a person, drops beside MuJoCo and Rapier",
-    "Measure motions whose outcome is known by formula; throw things at a person who stands, walks or "
-    "is dragged; drop, slide and stack the same things in wholebody, MuJoCo and Rapier; let dominoes, stacks and "
-    "balls move for minutes. The whole takes about 15 minutes of one processor.",
-    listed("--parts", "closed, throws, drops, long (default: all)", "PART"),
+    "things that move by themselves: throws at a person, drops beside MuJoCo and Rapier",
+    "Throw things at a person who stands, walks or is dragged; drop, slide and stack the same things in wholebody, "
+    "MuJoCo and Rapier; let dominoes, stacks and balls move for minutes. The whole takes about 15 minutes of one "
+    "processor.",
+    listed("--parts", "throws, drops, long (default: all)", "PART"),
     listed("--only", "names of drops (default: all)", "DROP"),
     listed("--engines", "wholebody, mujoco, rapier (default: installed)"),
     option("--minutes", type=float, default=10.0, metavar="N", help="simulated minutes of the long run (default: 10)"),
@@ -279,13 +214,12 @@ def world(arguments: argparse.Namespace) -> int:
     if "drops" in found:
         shown["drops"] = only(found["drops"], "median ms", "p99 ms", "deepest mm", "largest gain of energy")
     publish("world", report(about, {WORLD[part]: rows for part, rows in shown.items()}, facts), arguments)
-    held = all(row["held"] == "yes" for row in found.get("closed", ()))
-    return 0 if held and not any(row["silent"] for row in found.get("throws", ())) else 1
+    return int(any(row["silent"] for row in found.get("throws", ())))
 
 
 def _world(arguments: argparse.Namespace) -> dict[str, Iterable[Row]]:
     """What measures each part; names are checked before anything is measured."""
-    from wholebody.bench.measure import closed_forms, drops, throws
+    from wholebody.bench.measure import drops, throws
 
     quick = arguments.quick
     known = {drop.name: drop for drop in drops.drops()}
@@ -294,47 +228,7 @@ def _world(arguments: argparse.Namespace) -> dict[str, Iterable[Row]]:
     minutes = 0.05 if quick else checks.number(arguments.minutes, "--minutes", 0.01, 1000.0, "minutes")
     frames = 30 if quick else None
     return {
-        "closed": closed_forms.closed_forms(),
         "throws": throws.all_throws(1 if quick else 3, quick),
         "drops": (drops.measure(known[name], tool, frames) for name, tool in product(names, tools)),
         "long": (throws.long_run(each) for each in (minutes,)),
     }
-
-
-@measuring(
-    "robots",
-    "load every robot description of a folder, and reach with its tips",
-    "Load every URDF and MJCF file below a folder, with an empty cache and again, and bring the tips "
-    "of each robot to where random postures free of contact have them. With --update-docs the table becomes "
-    "docs/robots.md.",
-    option("folder", type=Path, metavar="FOLDER", help="folder that holds robot descriptions"),
-)
-def robots(arguments: argparse.Namespace) -> None:
-    """Measure all descriptions; --quick makes three reaches instead of twelve."""
-    from wholebody.bench.measure.robots import measure, page
-
-    facts, reaches, found = machine(), 3 if arguments.quick else 12, []
-    for row in measure(arguments.folder, reaches):
-        found.append(row)
-        told = f"{row.figures.get('solved', 'no reach')} of {reaches} solved" if row.tool != "refused" else "refused"
-        print(f"{row.case}: {told}", flush=True)
-    publish_page("robots.md", page(found, facts, reaches), arguments)
-
-
-@measuring(
-    "ablation",
-    "what each constant and mechanism of a method is worth, in counts",
-    "Change one constant or switch one mechanism off at a time, and count answers that differ.",
-    option("--method", default="qp", choices=("qp", "newton", "ccd"), help="(default: qp)"),
-    count("--count", None, "problems of every set (default: 6, 1 with --quick)"),
-)
-def ablation(arguments: argparse.Namespace) -> None:
-    """Measure and report."""
-    from wholebody.bench.suite import ablation
-
-    method, facts = arguments.method, machine()
-    given = ablation.problems(arguments.count or (1 if arguments.quick else 6), method)
-    whole, rows = ablation.ablation(method, given, ablation.mechanisms(method), print)
-    text = ablation.report(method, len(given), whole, rows, ablation.constants(method)[1], facts)
-    name = f"ablation-{method}"
-    publish(name, text, arguments, facts=facts, tables={name: rows})

@@ -27,8 +27,6 @@ of how hard it is. The same sets, number and seed give the same files. They are 
 )
 def export(arguments: argparse.Namespace) -> None:
     """Export."""
-    from rich.console import Console
-
     from wholebody.bench.suite.problem_sets.registry import CASES, SETS, problem_set
     from wholebody.bench.suite.published.export import export
     from wholebody.cli.tables import progress_bar
@@ -42,8 +40,7 @@ def export(arguments: argparse.Namespace) -> None:
         index = export(
             sets, per_set, arguments.seed, arguments.folder, lambda name: bar.update(task, advance=1, description=name)
         )
-    wrote = f"wrote {per_set * len(sets)} problems, listed in {index}"
-    Console().print(wrote, highlight=False, soft_wrap=True)
+    print(f"wrote {per_set * len(sets)} problems, listed in {index}")
 
 
 @command(
@@ -88,9 +85,8 @@ def judge(arguments: argparse.Namespace) -> None:
     for row in verdict.sets:
         table.add_row(*cells(row))
     console.print(table)
-    for line in left_out(verdict):
-        console.print(line, highlight=False, markup=False, soft_wrap=True)
-    return console.print(f"wrote {out}", highlight=False, soft_wrap=True)
+    print(*left_out(verdict), f"wrote {out}", sep="\n")
+    return None
 
 
 def _leaderboard(arguments: argparse.Namespace) -> None:

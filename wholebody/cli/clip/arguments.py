@@ -45,11 +45,7 @@ JOBS: tuple[Option, ...] = (
 
 
 def jobs_of(arguments: argparse.Namespace) -> int:
-    """How many cases are done at a time.
-
-    Raises:
-        WholebodyError: less than one, or a cluster that does not answer.
-    """
+    """How many cases are done at a time; raises WholebodyError for less than one, or a cluster that does not answer."""
     from wholebody.base.batches import threads
     from wholebody.base.checks import whole
 
@@ -71,11 +67,7 @@ def bar(what: str, count: float = 1.0) -> Iterator[Callable[[float, str], object
 
 
 def figure_of(arguments: argparse.Namespace) -> Figure:
-    """Load the figure.
-
-    Raises:
-        WholebodyError: there is no such figure.
-    """
+    """Load the figure."""
     from wholebody.figures import load
 
     root = {} if arguments.root is None else {"root": arguments.root}
@@ -83,11 +75,7 @@ def figure_of(arguments: argparse.Namespace) -> Figure:
 
 
 def clip_of(arguments: argparse.Namespace) -> Clip:
-    """Read the clip of the figure.
-
-    Raises:
-        WholebodyError: the file cannot be read, or does not fit the figure.
-    """
+    """Read the clip of the figure."""
     from wholebody.motion.reading import read_clip
 
     return read_clip(arguments.file, figure_of(arguments))

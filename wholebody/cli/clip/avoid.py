@@ -102,8 +102,7 @@ def _ignored(_: object) -> None:
 def _method(name: str, arguments: argparse.Namespace) -> Avoider:
     """The method, which may slow the motion, and keep to the strength of a person of the sex that was asked for.
 
-    Raises:
-        WholebodyError: there is no such method, or it does not slow motions or take dynamics.
+    Raises WholebodyError where there is no such method, or it does not slow motions or take dynamics.
     """
     from wholebody.base.errors import InputError
     from wholebody.motion.avoidance import as_avoider
@@ -145,12 +144,10 @@ def _tell(console: Console, avoided: Avoided, written: Path) -> None:
     if report.stretch > 1.0:
         made.add_row("duration", f"{report.before.clip.duration:.2f} s", f"{report.duration:.2f} s")
     console.print(made)
-    console.print(
+    print(
         f"{report.method}: {report.seconds:.2f} s, {rate:.2f} s a second of motion; {report.programs} programs, "
-        f"{report.posture_solves} postures; {report.frames_changed} of {len(clip)} frames changed",
-        highlight=False,
+        f"{report.posture_solves} postures; {report.frames_changed} of {len(clip)} frames changed\nwritten: {written}"
     )
-    console.print(f"written: {escape(str(written))}", highlight=False)
 
 
 def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -> int:
@@ -176,11 +173,10 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
                 hold_feet=not arguments.no_feet, jobs=jobs_of(arguments), cluster=arguments.cluster, progress=said,
             )  # fmt: skip
     except KeyboardInterrupt:
-        said_last = f"ended; {folder} keeps what is done, and the same command goes on"
-        console.print(said_last, highlight=False, markup=False, soft_wrap=True)
+        print(f"ended; {folder} keeps what is done, and the same command goes on")
         raise
     _table(console, rows)
-    console.print(f"written: {folder}", highlight=False, markup=False, soft_wrap=True)
+    print(f"written: {folder}")
     return 0 if all(row.outcome == "free" for row in rows) else 1
 
 
@@ -208,5 +204,4 @@ def _table(console: Console, rows: tuple[AvoidedCase, ...]) -> None:
     console.print(made)
     for row in rows:
         if row.outcome != "free":
-            where = f"{row.clip}, {row.equipment}, {row.method}"
-            console.print(f"{where}: {row.message}", highlight=False, markup=False, soft_wrap=True)
+            print(f"{row.clip}, {row.equipment}, {row.method}: {row.message}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -68,13 +69,12 @@ def run(arguments: argparse.Namespace) -> int:
         print(json.dumps(found.as_dict(), indent=1))
     else:
         show(Console(width=max(WIDE, Console().width)), found)
-    notes = Console(stderr=arguments.json)
     if arguments.html is not None:
         from wholebody.view.timeline import timeline
 
         with Console(stderr=True).status("drawing"):
             page = timeline(found, scene)
-        notes.print(f"wrote {write(arguments.html, page)}", highlight=False, soft_wrap=True, markup=False)
+        print(f"wrote {write(arguments.html, page)}", file=sys.stderr if arguments.json else sys.stdout)
     return 0 if found.free and not found.limits else 1
 
 

@@ -26,15 +26,12 @@ def info(arguments: argparse.Namespace) -> int:
     from wholebody.cli.tables import table
 
     clip = clip_of(arguments)
-    figure, console = clip.figure, Console()
-    rate = 1.0 / clip.dt
-    console.print(
-        f"[bold]{escape(clip.name)}[/]: {len(clip)} frames at {rate:.4g} Hz, {clip.duration:.3f} s, "
-        f"{escape(figure.name)} with {figure.model.nv} degrees of freedom",
-        highlight=False,
+    figure = clip.figure
+    print(
+        f"{clip.name}: {len(clip)} frames at {1.0 / clip.dt:.4g} Hz, {clip.duration:.3f} s, "
+        f"{figure.name} with {figure.model.nv} degrees of freedom"
     )
-    outside = sum(not figure.within_limits(q, 1e-6) for q in clip.q)
-    console.print(f"frames beyond joint limits: {outside}", highlight=False)
+    print(f"frames beyond joint limits: {sum(not figure.within_limits(q, 1e-6) for q in clip.q)}")
     speeds = np.abs(clip.velocities()).max(axis=0)
     values = [figure.joint_values(q) for q in clip.q]
     made = table("joints that move most", "from", "to", "greatest speed")
@@ -45,7 +42,7 @@ def info(arguments: argparse.Namespace) -> int:
         low, high = (factor * end for end in (min(ranges[name]), max(ranges[name])))
         speed = factor * float(speeds[figure.dofs([name])].max())
         made.add_row(escape(name), f"{low:.4g} {unit}", f"{high:.4g} {unit}", f"{speed:.4g} {unit}/s")
-    console.print(made)
+    Console().print(made)
     return 0
 
 

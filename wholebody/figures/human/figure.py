@@ -9,16 +9,16 @@ from functools import partial
 import numpy as np
 
 from wholebody.base.records import with_values
-from wholebody.figures import postures
-from wholebody.figures.anthropometry import Person, make_person, table
+from wholebody.figures.anthropometry import Person, make_person, named_angles, table
 from wholebody.figures.body_spec import BodySpec, geometry_of, model_of
-from wholebody.figures.description import Chain, Description, ExcludedPair, JointCone
+from wholebody.figures.description import Chain, Description, JointCone
 from wholebody.figures.figure import Figure
 from wholebody.figures.hand import FINGERS, finger_degrees
 from wholebody.figures.human.fingers import EFFORT, finger_angles
 from wholebody.figures.human.pairs import body_pairs, collision_group, sphere_pairs
 from wholebody.figures.human.spec import human_solids, human_spec
 from wholebody.figures.motion_ranges import human_ranges
+from wholebody.figures.postures import stand
 from wholebody.figures.proportions import proportioned
 from wholebody.figures.reach_cones import ReachCone
 from wholebody.figures.reduction import drop_rigid_pairs
@@ -34,35 +34,13 @@ def human_figure(
     age: float | None = None,
     hands: str = "rigid",
 ) -> Figure:
-    """Return the person.
-
-    Args:
-        sex: "male" or "female".
-        stature: metres; the median of the sex if left out.
-        mass: kilograms; the median, or what is expected at the stature that was given.
-        detail: "spheres" (39, for whole motions; things in the world meet the hulls), "capsules" (and boxes), "hulls"
-            (convex polyhedra).
-        percentile: 1 to 99, of the sex in ANSUR II, for stature and mass where they are left out.
-        proportions: metres by name of a dimension; the other dimensions follow as they go together in people.
-        age: years, 20 to 69: from 45 on some ranges of motion are smaller.
-        hands: "rigid", one segment each, or "fingers", twenty joints each.
-
-    Raises:
-        InputError: an impossible body, or fingers in spheres.
-        UnknownNameError: an unknown detail or dimension, or other hands.
-    """
+    """Return the person; arguments and errors as for `wholebody.load`."""
     person = proportioned(make_person(sex, stature, mass, percentile, age), proportions)
     return figure_of(human_spec(person, detail, hands), detail, person.sex)
 
 
 def figure_of(spec: BodySpec, detail: str, sex: str | None = None) -> Figure:
-    """Return the figure of a human specification, whole or with some joints fixed.
-
-    Args:
-        spec: the specification.
-        detail: of its pieces.
-        sex: "male" or "female" gives it the ranges of motion and the effort of a person; None leaves them out.
-    """
+    """Return the figure of a human specification, with the ranges of motion and the effort of a person of a sex."""
     model = model_of(spec)
     tested, excluded = (sphere_pairs if detail == "spheres" else body_pairs)(spec.solids)
     geometry = geometry_of(model, spec.solids, tested)
@@ -71,10 +49,6 @@ def figure_of(spec: BodySpec, detail: str, sex: str | None = None) -> Figure:
     segments = tuple(link.name for link in spec.links if link.mass)
     fingers = [name for name in finger_angles("relaxed") if name in joints]
     held = finger_degrees({}) if fingers else {}
-    attitudes = {
-        name: postures.Attitude({**held, **attitude.degrees}, attitude.pitch)
-        for name, attitude in postures.HUMAN.items()
-    }
     # Weight of the root in a person's effort, beside 1 of an arm: of its position [rad^2/m^2] and of its rotation.
     # ESTIMATE: without it a person bows and walks away before an arm is lifted.
     description = Description(
@@ -82,14 +56,11 @@ def figure_of(spec: BodySpec, detail: str, sex: str | None = None) -> Figure:
         chains=human_chains(joints),
         frames=tuple(mark.name for mark in spec.landmarks),
         segments=segments,
-        postures={name: partial(postures.stand, attitude=attitude) for name, attitude in attitudes.items()},
+        postures={name: partial(stand, degrees={**held, **own}) for name, own in named_angles("human").items()},
         cones=human_cones(),
         collision_groups={segment: collision_group(segment) for segment in segments},
-        effort={
-            **{row["name"]: float(row["effort_weight"]) for row in table("joints")},
-            **dict.fromkeys(fingers, EFFORT),
-        },
-        excluded=(*(ExcludedPair(*entry) for entry in excluded), *rigid),
+        effort={row["name"]: float(row["effort_weight"]) for row in table("joints")} | dict.fromkeys(fingers, EFFORT),
+        excluded=(*excluded, *rigid),
         person=spec.person,
         outer=partial(human_solids, spec.person, "hulls") if detail == "spheres" and spec.person else None,
         ranges={} if sex is None else human_ranges(sex, joints),
@@ -101,20 +72,17 @@ def figure_of(spec: BodySpec, detail: str, sex: str | None = None) -> Figure:
 def human_groups(joints: set[str]) -> dict[str, tuple[str, ...]]:
     """Return the joint groups; the upper body is spine and arms (requirement of self-avoidance), not the neck."""
     names = [row["name"] for row in table("joints") if row["name"] in joints]
-    groups = {"spine": tuple(name for name in names if name.startswith("spine"))}
-    groups["neck"] = tuple(name for name in names if name.startswith("neck"))
+    groups = {part: tuple(name for name in names if name.startswith(part)) for part in ("spine", "neck")}
     for side in ("left", "right"):
-        for limb, parts in {
-            "arm": ("clavicle", "shoulder", "elbow", "wrist"),
-            "leg": ("hip", "knee", "ankle", "toe"),
-        }.items():
+        for limb, parts in (
+            ("arm", ("clavicle", "shoulder", "elbow", "wrist")),
+            ("leg", ("hip", "knee", "ankle", "toe")),
+        ):
             starts = tuple(f"{side}_{part}_" for part in parts)
             groups[f"{side}_{limb}"] = tuple(name for name in names if name.startswith(starts))
+        own = [name for name in finger_angles("relaxed", side) if name in joints]
         for finger in FINGERS:
-            shaped = finger_angles("relaxed", side)
-            groups[f"{side}_{finger}"] = tuple(
-                name for name in shaped if name.startswith(f"{side}_{finger}_") and name in joints
-            )
+            groups[f"{side}_{finger}"] = tuple(name for name in own if name.startswith(f"{side}_{finger}_"))
         groups[f"{side}_fingers"] = tuple(name for finger in FINGERS for name in groups[f"{side}_{finger}"])
     groups["arms"] = groups["left_arm"] + groups["right_arm"]
     groups["legs"] = groups["left_leg"] + groups["right_leg"]
@@ -126,14 +94,9 @@ def human_groups(joints: set[str]) -> dict[str, tuple[str, ...]]:
 def human_chains(joints: set[str]) -> dict[str, Chain]:
     """Return the limbs from the root outwards, with their tips."""
     groups = human_groups(joints)
-    tips = {
-        "spine": "thorax",
-        "neck": "head_top",
-        "left_arm": "left_index_tip",
-        "right_arm": "right_index_tip",
-        "left_leg": "left_toe_tip",
-        "right_leg": "right_toe_tip",
-    }
+    tips = {"spine": "thorax", "neck": "head_top"}
+    for limb, tip in (("arm", "index_tip"), ("leg", "toe_tip")):
+        tips |= {f"{side}_{limb}": f"{side}_{tip}" for side in ("left", "right")}
     tips |= {f"{side}_{finger}": f"{side}_{finger}_tip" for side in ("left", "right") for finger in FINGERS}
     return {name: Chain(groups[name], tip) for name, tip in tips.items() if name in groups}
 

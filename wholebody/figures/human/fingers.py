@@ -15,6 +15,7 @@ import coal
 import pinocchio as pin
 
 from wholebody.base.checks import choice, known
+from wholebody.figures.anthropometry import named_angles
 from wholebody.figures.body_spec import BodySpec, Landmark, Link, Solid, place
 from wholebody.figures.dimensions import FINGER_BASES, Dimensions, keyed_hand
 from wholebody.figures.hand import (
@@ -29,7 +30,7 @@ from wholebody.figures.hand import (
     part_radius,
     thumb_metacarpal,
 )
-from wholebody.figures.human.hulls import hull_of
+from wholebody.figures.human.details import hull_of
 
 HANDS = ("rigid", "fingers")
 """What a person's hands can be: one segment each, or palms with fingers."""
@@ -38,43 +39,6 @@ SIDES = ("left", "right")
 
 EFFORT = 0.2
 """Weight of a finger's joint in a person's effort, beside 1 of the arm's. ESTIMATE: fingers move before an arm."""
-
-_CLOSED = {
-    "mcp_flexion": 85.0,
-    "index_mcp_flexion": 80.0,
-    "pip_flexion": 95.0,
-    "dip_flexion": 50.0,
-    "thumb_cmc_flexion": 12.0,
-    "thumb_cmc_abduction": 25.0,
-    "thumb_mcp_flexion": 30.0,
-    "ip_flexion": 25.0,
-}
-_STRAIGHT = {"mcp_flexion": 0.0, "pip_flexion": 0.0, "dip_flexion": 0.0, "ip_flexion": 0.0}
-
-# Degrees by joint or by kind of joint; what is not named is relaxed.
-SHAPES: dict[str, dict[str, float]] = {
-    "relaxed": {},
-    "flat": _STRAIGHT,
-    "fist": _CLOSED,
-    "hook": {"mcp_flexion": 30.0, "pip_flexion": 95.0, "dip_flexion": 50.0},
-    "pinch": {
-        "index_mcp_flexion": 50.0,
-        "index_mcp_abduction": 10.0,
-        "index_pip_flexion": 52.0,
-        "index_dip_flexion": 20.0,
-        "thumb_cmc_flexion": 6.0,
-        "thumb_cmc_abduction": 29.0,
-        "thumb_mcp_flexion": 24.0,
-        "thumb_ip_flexion": 21.0,
-    },
-    "pointing": {
-        **_CLOSED,
-        "index_mcp_flexion": 0.0,
-        "index_pip_flexion": 0.0,
-        "index_dip_flexion": 0.0,
-    },
-}
-"""Named shapes of a hand."""
 
 
 class _Part(NamedTuple):
@@ -99,7 +63,8 @@ def finger_angles(shape: str, side: str | None = None) -> dict[str, float]:
         UnknownNameError: another shape.
         InputError: another side.
     """
-    degrees = SHAPES[known(shape, SHAPES, "shape of a hand", "finger_angles")]
+    shapes = named_angles("fingers")
+    degrees = shapes[known(shape, shapes, "shape of a hand", "finger_angles")]
     sides = SIDES if side is None else (choice(side, SIDES, "finger_angles: side"),)
     return {
         f"{which}_{joint}": math.radians(angle) for which in sides for joint, angle in finger_degrees(degrees).items()
@@ -123,10 +88,7 @@ def opened_for_a_bar(sides: Sequence[str]) -> Iterator[dict[str, float]]:
 def with_fingers(spec: BodySpec, size: Dimensions, detail: str) -> BodySpec:
     """Return a person's specification with fingers in the place of hands of one segment.
 
-    Args:
-        spec: of the person.
-        size: of the same person.
-        detail: "capsules" or "hulls": the collision pieces.
+    Its size is of the same person, the pieces are in a detail of "capsules" or "hulls".
     """
     links: list[Link] = [link for link in spec.links if link.name not in ("left_hand", "right_hand")]
     joints, marks, solids = list(spec.joints), list(spec.landmarks), list(spec.solids)
@@ -141,10 +103,8 @@ def with_fingers(spec: BodySpec, size: Dimensions, detail: str) -> BodySpec:
         ]
         joints += added
         segments = {part.segment for part in parts}
-        links += massive_links(
-            size,
-            {f"{side}_hand": part_radii(size, "palm"), **{part.segment: part_radii(size, part.key) for part in parts}},
-        )
+        radii = {part.segment: part_radii(size, part.key) for part in parts}
+        links += massive_links(size, {f"{side}_hand": part_radii(size, "palm"), **radii})
         links += [Link(joint.child) for joint in added if joint.child not in segments]
         tips = {mark.name: mark for mark in _tips(size, side)}
         marks = [tips.pop(mark.name, mark) for mark in marks]

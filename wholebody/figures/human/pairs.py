@@ -2,43 +2,26 @@
 
 from __future__ import annotations
 
-from itertools import combinations
+from itertools import pairwise
 
 from wholebody.figures.anthropometry import table
 from wholebody.figures.body_spec import Solid
+from wholebody.figures.description import ExcludedPair, chosen_pairs
 from wholebody.figures.hand import finger_pair, is_finger
-from wholebody.figures.human.spheres import sphere_names
+from wholebody.figures.human.details import sphere_names
 
 TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "neck", "head")
 
-Pairs = tuple[tuple[tuple[str, str], ...], tuple[tuple[str, str, str], ...]]
-"""Pairs that are tested, and (a, b, reason) of those that are not."""
+Pairs = tuple[tuple[tuple[str, str], ...], tuple[ExcludedPair, ...]]
+"""Pairs that are tested, and those that are not."""
 
-
-_NEXT = {
-    frozenset(pair)
-    for pair in (
-        ("clavicle", "upper_arm"),
-        ("upper_arm", "forearm"),
-        ("forearm", "hand"),
-        ("thigh", "shank"),
-        ("shank", "foot"),
-        ("foot", "toes"),
-        ("shank", "toes"),
-    )
-}
+_LIMBS = (("clavicle", "upper_arm", "forearm", "hand"), ("thigh", "shank", "foot", "toes"))
+_NEXT = {frozenset(pair) for limb in _LIMBS for pair in pairwise(limb)} | {frozenset(("shank", "toes"))}
 
 
 def body_pairs(solids: tuple[Solid, ...]) -> Pairs:
     """Return tested and excluded pairs of the capsules' and hulls' pieces."""
-    tested, excluded = [], []
-    for a, b in combinations(solids, 2):
-        reason = _reason(a, b) or _reason(b, a)
-        if reason:
-            excluded.append((a.name, b.name, reason))
-        else:
-            tested.append((a.name, b.name))
-    return tuple(tested), tuple(excluded)
+    return chosen_pairs(solids, lambda a, b: _reason(a, b) or _reason(b, a))
 
 
 def sphere_pairs(solids: tuple[Solid, ...]) -> Pairs:
@@ -46,15 +29,13 @@ def sphere_pairs(solids: tuple[Solid, ...]) -> Pairs:
     names = sphere_names()
     group = {names[row["name"]]: row["group"] for row in table("spheres39")}
     named = {frozenset((names[row["a"]], names[row["b"]])) for row in table("sphere_exclusions")}
-    tested, excluded = [], []
-    for a, b in combinations(solids, 2):
+
+    def reason(a: Solid, b: Solid) -> str | None:
         if group[a.name] == group[b.name]:
-            excluded.append((a.name, b.name, "same group of spheres"))
-        elif frozenset((a.name, b.name)) in named:
-            excluded.append((a.name, b.name, "limbs meet the trunk"))
-        else:
-            tested.append((a.name, b.name))
-    return tuple(tested), tuple(excluded)
+            return "same group of spheres"
+        return "limbs meet the trunk" if frozenset((a.name, b.name)) in named else None
+
+    return chosen_pairs(solids, reason)
 
 
 def _reason(a: Solid, b: Solid) -> str | None:

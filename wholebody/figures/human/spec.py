@@ -11,42 +11,27 @@ import math
 from collections.abc import Callable, Mapping
 
 from wholebody.base.checks import known
-from wholebody.base.errors import InputError, UnknownNameError
-from wholebody.figures.anthropometry import Person, describe, make_person, table
+from wholebody.base.errors import InputError
+from wholebody.figures.anthropometry import Person, describe, keyed, make_person, table
 from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, place
 from wholebody.figures.dimensions import MIDDLE_TIP, Dimensions
 from wholebody.figures.hand import palm_axes
-from wholebody.figures.human import capsules, fingers, hulls, spheres
+from wholebody.figures.human import capsules, details, fingers
 
 DETAILS: dict[str, Callable[[Dimensions], tuple[Solid, ...]]] = {
-    "spheres": spheres.solids,
+    "spheres": details.spheres,
     "capsules": capsules.solids,
-    "hulls": hulls.solids,
+    "hulls": details.polyhedra,
 }
 
 
 def human_spec(person: Person | None = None, detail: str = "capsules", hands: str = "rigid") -> BodySpec:
-    """Return the specification of a person.
-
-    Args:
-        person: from `wholebody.figures.anthropometry.make_person`; the median man if left out.
-        detail: "spheres", "capsules" or "hulls": the collision pieces.
-        hands: "rigid": each is one segment; "fingers": each has twenty joints.
-
-    Raises:
-        UnknownNameError: another detail or other hands.
-        InputError: fingers in spheres.
-    """
+    """Return the specification of a person, or of the median man; arguments and errors as for `wholebody.load`."""
     person = person or make_person()
     known(hands, fingers.HANDS, "kind of hands", "human")
     if hands == "fingers" and detail == "spheres":
         raise InputError("hands='fingers': the 39 spheres have none for fingers; give detail 'capsules' or 'hulls'")
-    spec = _spec(person, detail)
-    return fingers.with_fingers(spec, Dimensions(person), detail) if hands == "fingers" else spec
-
-
-def _spec(person: Person, detail: str) -> BodySpec:
-    return BodySpec(
+    spec = BodySpec(
         name="human",
         title=describe(person),
         links=_links(person),
@@ -55,29 +40,24 @@ def _spec(person: Person, detail: str) -> BodySpec:
         solids=human_solids(person, detail),
         person=person,
     )
+    return fingers.with_fingers(spec, Dimensions(person), detail) if hands == "fingers" else spec
 
 
 def human_solids(person: Person, detail: str) -> tuple[Solid, ...]:
-    """Return the collision pieces of a person in one detail.
-
-    Raises:
-        UnknownNameError: a detail other than "spheres", "capsules", "hulls".
-    """
-    if detail not in DETAILS:
-        raise UnknownNameError("detail", detail, DETAILS)
-    return DETAILS[detail](Dimensions(person))
+    """Return the collision pieces of a person in one detail, a name of `DETAILS`."""
+    return DETAILS[known(detail, DETAILS, "detail")](Dimensions(person))
 
 
 def _links(person: Person) -> tuple[Link, ...]:
-    massive = {row["name"] for row in table("segments")}
-    names = ["pelvis", *(row["child_segment"] for row in table("joints"))]
-    return tuple(_link(person, name) if name in massive else Link(name) for name in names)
-
-
-def _link(person: Person, segment: str) -> Link:
-    x, y, z = (float(value) for value in person.center_of_mass(segment))
-    ix, iy, iz = (float(value) for value in person.inertia(segment))
-    return Link(segment, person.segment_mass(segment), (x, y, z), (ix, iy, iz))
+    links = []
+    for name in ("pelvis", *(row["child_segment"] for row in table("joints"))):
+        if name in keyed("segments", "name"):
+            x, y, z = (float(value) for value in person.center_of_mass(name))
+            ix, iy, iz = (float(value) for value in person.inertia(name))
+            links.append(Link(name, person.segment_mass(name), (x, y, z), (ix, iy, iz)))
+        else:
+            links.append(Link(name))
+    return tuple(links)
 
 
 def _joints(person: Person) -> tuple[Joint, ...]:
@@ -98,12 +78,8 @@ def joint_limits(person: Person, row: Mapping[str, str]) -> tuple[float, float]:
     """Return the least and greatest angle of a joint, degrees.
 
     From 45 years on they are scaled by the means of people of 45 to 69 over those of 20 to 44 (Soucie et al. 2011),
-    where both are known; else they are at most the older people's mean. Younger people have the limits of the table
-    "joints".
-
-    Args:
-        person: whose age and sex it is.
-        row: the joint in the table "joints".
+    where both are known; else they are at most the older people's mean. Younger people have those of the table
+    "joints", of which the joint is a row.
     """
     limits = {"lower": float(row["lower_deg"]), "upper": float(row["upper_deg"])}
     # Years from which on the ranges of motion are those of older people: the bands of Soucie et al. (2011).

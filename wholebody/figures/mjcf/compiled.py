@@ -34,12 +34,7 @@ class Compiled:
     """
 
     def __init__(self, path: Path) -> None:
-        """Compile a file.
-
-        Raises:
-            FileFormatError: MuJoCo cannot read it.
-            MissingPackageError: MuJoCo is not installed.
-        """
+        """Compile a file; a `FileFormatError` has what MuJoCo says, a `MissingPackageError` that it is not there."""
         self.path, self.model = path, _compile(path)
         self.names = _names(self.model)
 
@@ -88,15 +83,7 @@ class Compiled:
         return any(self.model.jnt_type[joint] != FREE for joint in self.joints(body))
 
     def robot(self, name: str | None) -> int:
-        """The body of a robot on the world.
-
-        Args:
-            name: of the body; None where the file has one robot.
-
-        Raises:
-            FileFormatError: the file has no bodies.
-            InputError: it has several, or none of that name.
-        """
+        """The body of a robot on the world, by its name, or None where the file has one robot."""
         known = {self.names["body"][top]: top for top in self.robots}
         if not known:
             raise FileFormatError(f"{self.path}: there are no bodies in it; give an MJCF of a robot")
@@ -173,21 +160,12 @@ def _names(model: Any) -> dict[str, list[str]]:
         number = getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
         given = [mujoco.mj_id2name(model, number, k) or "" for k in range(count)]
         taken = set(given)
+        bodies = {"joint": model.jnt_bodyid, "geom": model.geom_bodyid, "site": model.site_bodyid}.get(kind)
         for k, name in enumerate(given):
             if not name:
-                base = _base(kind, k, model, found)
-                name = (
-                    base
-                    if base not in taken
-                    else next(f"{base}_{n}" for n in range(2, count + 2) if f"{base}_{n}" not in taken)
-                )
-                taken.add(name)
-                given[k] = name
+                base = f"{kind}{k}" if bodies is None else f"{found['body'][bodies[k]]}_{kind}"
+                others = (f"{base}_{n}" for n in range(2, count + 2))
+                given[k] = next(each for each in (base, *others) if each not in taken)
+                taken.add(given[k])
         found[kind] = given
     return found
-
-
-def _base(kind: str, number: int, model: Any, found: dict[str, list[str]]) -> str:
-    if kind in ("body", "key"):
-        return f"{kind}{number}"
-    return f"{found['body'][getattr(model, {'joint': 'jnt_bodyid'}.get(kind, f'{kind}_bodyid'))[number]]}_{kind}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from os import PathLike
 from pathlib import Path
 
@@ -33,20 +33,11 @@ def xml_figure(
 ) -> Figure:
     """Return the figure of an ``.xml`` file: an MJCF if its outermost element is ``<mujoco>``, otherwise a URDF.
 
-    Args:
-        path: the file.
-        root: "fixed" to the world, or "free"; if left out, as in the file. Of a file with several robots the name of
-            the body of one, which keeps its root.
-        package_dirs: as for `urdf_figure`; an MJCF has no packages.
-        concavity: as for `urdf_figure`.
-        samples: as for `urdf_figure`.
-        seed: as for `urdf_figure`.
+    Arguments and errors are those of `urdf_figure`; an MJCF has no packages. Of a file with several robots `root` may
+    be the name of the body of one, which keeps its root.
 
     Raises:
-        FileFormatError: a file that cannot be read, with the place and the correction.
-        InputError: another root, several robots, a concavity out of range, or too many joints for the memory.
         MissingPackageError: an MJCF, and MuJoCo is not installed.
-        UnknownNameError: `concavity` names an unknown link.
     """
     place = Path(path)
     if read_xml(place, "URDF or MJCF").tag != "mujoco":
@@ -78,20 +69,18 @@ def mjcf_figure(
             kept.append(geom)
     if not shapes:
         notes.append("no geom of the robot can touch another one, so nothing of it collides")
-    made = geometry_of_links(
+    geometry, told, numbers = geometry_of_links(
         robot.model, shapes, check_concavity(concavity, links), compiled.path, colors=_colors(compiled, robot)
     )
-    untested = _Untested(compiled, [kept[number] for number in made.shapes])
-    return robot_figure(
-        Robot(
-            compiled.name,
-            robot.model, links, made.geometry, (*notes, *made.notes), None, robot.sites,
-            _postures(compiled, robot), robot.cones, untested=untested,
-            place=compiled.place(top) if compiled.is_free(top) and root != "fixed" else None,
-        ),
-        samples,
-        seed,
+    found = Robot(
+        compiled.name, robot.model, links, geometry, (*notes, *told),
+        frames=robot.sites,
+        postures=_postures(compiled, robot),
+        cones=robot.cones,
+        untested=_untested(compiled, [kept[number] for number in numbers]),
+        place=compiled.place(top) if compiled.is_free(top) and root != "fixed" else None,
     )  # fmt: skip
+    return robot_figure(found, samples, seed)
 
 
 def geom_shape(compiled: Compiled, geom: int) -> LinkShape | None:
@@ -132,23 +121,20 @@ def _postures(compiled: Compiled, robot: RobotModel) -> dict[str, Array]:
     return {name: pin.normalize(robot.model, q) for name, q in found.items()}
 
 
-class _Untested:
-    """Why two pieces of the figure are never tested: contact bits, <exclude>."""
+def _untested(compiled: Compiled, geoms: Sequence[int]) -> Callable[[int, int], str | None]:
+    """Why two pieces, which belong to these geoms, are never tested: contact bits, <exclude>."""
+    model = compiled.model
+    types, affinities = np.array(model.geom_contype[geoms]), np.array(model.geom_conaffinity[geoms])
+    bodies = np.array(model.geom_bodyid[geoms])
+    excluded = {frozenset((value >> 16, value & 0xFFFF)) for value in map(int, model.exclude_signature)}
 
-    def __init__(self, compiled: Compiled, geoms: Sequence[int]) -> None:
-        model = compiled.model
-        self._type, self._affinity = np.array(model.geom_contype[geoms]), np.array(model.geom_conaffinity[geoms])
-        self._body = np.array(model.geom_bodyid[geoms])
-        signatures = {int(value) for value in model.exclude_signature}
-        self._excluded = {frozenset((value >> 16, value & 0xFFFF)) for value in signatures}
-
-    def __call__(self, first: int, second: int) -> str | None:
-        met = (self._type[first] & self._affinity[second]) | (self._type[second] & self._affinity[first])
-        if not met:
+    def reason(first: int, second: int) -> str | None:
+        if not (types[first] & affinities[second]) | (types[second] & affinities[first]):
             return "their contact bits do not meet"
-        if frozenset((int(self._body[first]), int(self._body[second]))) in self._excluded:
-            return "the file excludes them"
-        return None
+        pair = frozenset((int(bodies[first]), int(bodies[second])))
+        return "the file excludes them" if pair in excluded else None
+
+    return reason
 
 
 def _left_out(compiled: Compiled, mine: Sequence[int]) -> list[str]:

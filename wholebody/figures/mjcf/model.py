@@ -65,13 +65,7 @@ class RobotModel(NamedTuple):
 
 
 def robot_model(compiled: Compiled, top: int, root: str | None) -> RobotModel:
-    """Build the model of a robot.
-
-    Args:
-        compiled: the file.
-        top: the robot's body on the world.
-        root: "fixed", "free", or None as in the file.
-    """
+    """Build the model of the robot whose body on the world is `top`; its root is "fixed", "free", or as in the file."""
     return _Builder(compiled, top, root).build()
 
 
@@ -152,10 +146,8 @@ class _Builder:
         low, high = self._range(joint)
         for end, value in (("lower", low), ("upper", high)) if kind == HINGE else ():
             warn_of_degrees(value, f"joint {shown(name)}: the {end} limit")
-        for limits, value in (("lowerPositionLimit", low), ("upperPositionLimit", high)):
-            changed = np.array(getattr(self._model, limits))
-            changed[slot] = value + 0.0  # no negative zero
-            setattr(self._model, limits, changed)
+        self._fill("lowerPositionLimit", slot, low + 0.0)  # no negative zero
+        self._fill("upperPositionLimit", slot, high + 0.0)
         self._fill("velocityLimit", dof, np.inf)
         force = theirs.jnt_actfrcrange[joint]
         limited = bool(theirs.jnt_actfrclimited[joint])
@@ -163,9 +155,9 @@ class _Builder:
         self._fill("armature", dof, float(theirs.dof_armature[theirs.jnt_dofadr[joint]]))
         return made, turned.inverse()
 
-    def _fill(self, what: str, dof: int, value: float) -> None:
+    def _fill(self, what: str, place: int, value: float) -> None:
         changed = np.array(getattr(self._model, what))
-        changed[dof] = value
+        changed[place] = value
         setattr(self._model, what, changed)
 
     def _range(self, joint: int) -> tuple[float, float]:

@@ -44,6 +44,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError, UnknownNameError, WholebodyError
+from wholebody.figures.body_spec import digits
 from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, ExcludedPair, JointCone
 from wholebody.figures.figure import Figure
 from wholebody.figures.motion_ranges import (
@@ -74,17 +75,17 @@ def extension_text(figure: Figure) -> str:
         values = {joint: value for joint, value in figure.joint_values(q).items() if abs(value) > 1e-12}
         posture = SubElement(made, "posture", name=name)
         if figure.root == "free":
-            posture.set("root", _text(q[:7]))
+            posture.set("root", digits(q[:7]))
         posture.set("joints", " ".join(values))
-        posture.set("values", _text(values.values()))
+        posture.set("values", digits(values.values()))
     reasons: dict[str, list[str]] = {}
     for pair in figure.excluded_pairs:
         reasons.setdefault(pair.reason, []).append(f"{pair.a} {pair.b}")
     for reason, pairs in reasons.items():
         SubElement(made, "untested", reason=reason, pairs=" ".join(pairs))
     for name, cone in known.cones.items():
-        ends = {"reference": cone.reference, "limb": cone.limb, "axis": _text(cone.axis)}
-        shape = {"visible": _text(cone.cone.visible), "corners": _text(cone.cone.vertices.ravel())}
+        ends = {"reference": cone.reference, "limb": cone.limb, "axis": digits(cone.axis)}
+        shape = {"visible": digits(cone.cone.visible), "corners": digits(cone.cone.vertices.ravel())}
         SubElement(made, "cone", {"name": name, **ends, **shape})
     _add_ranges(made, known.ranges)
     collision_groups: dict[str, list[str]] = {}
@@ -94,9 +95,9 @@ def extension_text(figure: Figure) -> str:
         SubElement(made, "collision_group", name=name, segments=" ".join(segments))
     effort = {joint: weight for joint, weight in known.effort.items() if joint in figure.joints}
     if effort:
-        SubElement(made, "effort", joints=" ".join(effort), weights=_text(effort.values()))
+        SubElement(made, "effort", joints=" ".join(effort), weights=digits(effort.values()))
     if any(known.root_effort):
-        SubElement(made, "root_effort", weights=_text(known.root_effort))
+        SubElement(made, "root_effort", weights=digits(known.root_effort))
     ElementTree.indent(made, space="  ", level=1)
     return "  " + ElementTree.tostring(made, encoding="unicode").rstrip() + "\n"
 
@@ -104,15 +105,7 @@ def extension_text(figure: Figure) -> str:
 def extended_figure(
     path: Path, element: Element, name: str, model: pin.Model, geometry: pin.GeometryModel, notes: Sequence[str]
 ) -> Figure:
-    """Return the figure that an element `extension_text` describes.
-
-    Args:
-        path: of the file, for errors.
-        element: the extension.
-        name: of the figure.
-        model: Pinocchio's model.
-        geometry: pieces, without pairs; this function adds the pairs.
-        notes: changes of the geometry.
+    """Return the figure that an element of `extension_text` describes; pairs are added to its pieces.
 
     Raises:
         FileFormatError: a name that is not in the file, or numbers of the wrong count or value.
@@ -128,29 +121,27 @@ class _Reader:
 
     def figure(self, name: str, notes: tuple[str, ...]) -> Figure:
         excluded = self._pairs()
-        postures = {self._name(item): self._posture(item) for item in self._all("posture")}
+        postures = {self._name(item): self._posture(item) for item in self.element.findall("posture")}
         if not postures:
             self._fail("it has no <posture>; write the figure again")
         efforts: dict[str, float] = {}
-        for item in self._all("effort"):
-            joints = self._names(item, "joints", "joint", self.joints)
+        for item in self.element.findall("effort"):
+            joints = self._joints(item)
             efforts.update(zip(joints, numbers(item, "weights", self._place(item), len(joints)), strict=True))
         segments = self._listed("segments")
         description = Description(
-            groups={self._name(item): self._names(item, "joints", "joint", self.joints) for item in self._all("group")},
+            groups={self._name(item): self._joints(item) for item in self.element.findall("group")},
             chains={
-                self._name(item): Chain(
-                    self._names(item, "joints", "joint", self.joints), self._names(item, "tip", "frame", self.frames)[0]
-                )
-                for item in self._all("chain")
+                self._name(item): Chain(self._joints(item), self._names(item, "tip", "frame", self.frames)[0])
+                for item in self.element.findall("chain")
             },
             frames=self._listed("frames"),
             segments=segments,
             postures=postures,
-            cones={self._name(item): self._cone(item) for item in self._all("cone")},
+            cones={self._name(item): self._cone(item) for item in self.element.findall("cone")},
             collision_groups={
                 segment: self._name(item)
-                for item in self._all("collision_group")
+                for item in self.element.findall("collision_group")
                 for segment in self._names(item, "segments", "segment", set(segments))
             },
             effort=efforts,
@@ -158,7 +149,7 @@ class _Reader:
             ranges={
                 self._name(item): self._range(item)
                 for tag in ("coupled_range", "elliptic_range", "twist_range")
-                for item in self._all(tag)
+                for item in self.element.findall(tag)
             },
             root_effort=self._root_effort(),
             notes=notes,
@@ -168,7 +159,7 @@ class _Reader:
     def _pairs(self) -> tuple[ExcludedPair, ...]:
         number = {piece.name: k for k, piece in enumerate(self.geometry.geometryObjects)}
         excluded: dict[frozenset[str], ExcludedPair] = {}
-        for item in self._all("untested"):
+        for item in self.element.findall("untested"):
             names = self._names(item, "pairs", "piece", set(number))
             if len(names) % 2:
                 self._fail("<untested> has a piece without partner in its pairs; write two names a pair")
@@ -183,7 +174,7 @@ class _Reader:
         return (*excluded.values(), *drop_rigid_pairs(self.geometry))
 
     def _posture(self, item: Element) -> Callable[[Articulated], Array]:
-        joints = self._names(item, "joints", "joint", self.joints)
+        joints = self._joints(item)
         values = numbers(item, "values", self._place(item), len(joints), "") if joints else ()
         root = None
         if item.get("root") is not None:
@@ -210,7 +201,7 @@ class _Reader:
     def _range(self, item: Element) -> MotionRange:
         place = self._place(item)
         if item.tag == "coupled_range":
-            joints = self._names(item, "joints", "joint", self.joints)
+            joints = self._joints(item)
             factors = numbers(item, "factors", place, len(joints))
             return CoupledRange(dict(zip(joints, factors, strict=True)), numbers(item, "bound", place, 1)[0])
         if item.tag == "elliptic_range":
@@ -227,14 +218,14 @@ class _Reader:
         return TwistRange(reference, limb, center, sign, bound, slope)
 
     def _ellipse_axis(self, angle: Element, place: str) -> EllipseAxis:
-        joints = self._names(angle, "joints", "joint", self.joints)
+        joints = self._joints(angle)
         low, high, offset = (numbers(angle, name, place, 1)[0] for name in ("lower", "upper", "offset"))
         if not low < 0.0 < high:
             self._fail(f"<angle> of {place} goes from {low:g} to {high:g}; zero is to be between them")
         return EllipseAxis(joints, low, high, offset)
 
     def _root_effort(self) -> tuple[float, float]:
-        found = self._all("root_effort")
+        found = self.element.findall("root_effort")
         if not found:
             return 0.0, 0.0
         position, rotation = numbers(found[-1], "weights", self._place(found[-1]), 2)
@@ -242,11 +233,13 @@ class _Reader:
             self._fail("<root_effort> has a negative weight; weights are zero or more")
         return position, rotation
 
-    def _all(self, tag: str) -> list[Element]:
-        return self.element.findall(tag)
-
     def _listed(self, tag: str) -> tuple[str, ...]:
-        return tuple(name for item in self._all(tag) for name in self._names(item, "names", "frame", self.frames))
+        return tuple(
+            name for item in self.element.findall(tag) for name in self._names(item, "names", "frame", self.frames)
+        )
+
+    def _joints(self, item: Element) -> tuple[str, ...]:
+        return self._names(item, "joints", "joint", self.joints)
 
     def _name(self, item: Element) -> str:
         name = item.get("name")
@@ -274,24 +267,20 @@ def _placed(figure: Articulated, root: Array | None, values: dict[str, float]) -
     q = pin.neutral(figure.model)
     if root is not None and figure.root == "free":
         q[:7] = root
-    return figure.with_joints(q, values)
+    return np.asarray(figure.with_joints(q, values))
 
 
 def _add_ranges(made: Element, ranges: Mapping[str, MotionRange]) -> None:
     for name, part in ranges.items():
         if isinstance(part, CoupledRange):
-            texts = {"joints": " ".join(part.joints), "factors": _text(part.joints.values())}
-            SubElement(made, "coupled_range", {"name": name, **texts, "bound": _text([part.bound])})
+            texts = {"joints": " ".join(part.joints), "factors": digits(part.joints.values())}
+            SubElement(made, "coupled_range", {"name": name, **texts, "bound": digits([part.bound])})
         elif isinstance(part, EllipticRange):
             ellipse = SubElement(made, "elliptic_range", name=name)
             for axis in part.axes:
-                low, high, offset = (_text([value]) for value in axis[1:])
+                low, high, offset = (digits([value]) for value in axis[1:])
                 SubElement(ellipse, "angle", joints=" ".join(axis.joints), lower=low, upper=high, offset=offset)
         else:
-            ends = {"name": name, "reference": part.reference, "limb": part.limb, "center": _text(part.center.ravel())}
-            bound = {"sign": _text([part.sign]), "bound": _text([part.bound]), "slope": _text(part.slope)}
+            ends = {"name": name, "reference": part.reference, "limb": part.limb, "center": digits(part.center.ravel())}
+            bound = {"sign": digits([part.sign]), "bound": digits([part.bound]), "slope": digits(part.slope)}
             SubElement(made, "twist_range", {**ends, **bound})
-
-
-def _text(values: Iterable[float] | Array) -> str:
-    return " ".join(f"{float(value):.12g}" if abs(value) > 1e-12 else "0" for value in values)

@@ -6,8 +6,6 @@ from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
 
-import pinocchio as pin
-
 from wholebody.base.errors import InputError
 from wholebody.base.records import with_values
 from wholebody.figures.figure import Figure
@@ -31,18 +29,16 @@ def urdf_figure(
     seed: int = 0,
     srdf: str | PathLike[str] | None = None,
 ) -> Figure:
-    """Return the figure of a URDF file.
+    """Return the figure of a URDF file; arguments as for `wholebody.load`.
 
     Args:
         path: the file.
         root: "fixed" to the world, or "free"; if left out, as in the file (see `urdf.extension`), or "fixed".
-        package_dirs: folders in which ``package://`` names are looked up, before the file's own parents and those of
-            ROS_PACKAGE_PATH and AMENT_PREFIX_PATH.
-        concavity: None for one convex hull for each mesh; or the concavity of the pieces of meshes, 0.01 (close) to 1,
-            as a share of a mesh's size; or a mapping from link to such a number, with hulls for the other links.
+        package_dirs: looked through before the file's own parents and ROS_PACKAGE_PATH and AMENT_PREFIX_PATH.
+        concavity: see there.
         samples: number of random postures for finding pairs that always overlap.
         seed: of those postures.
-        srdf: path of its SRDF: groups, states as postures, and pairs of links that are not tested.
+        srdf: see there.
 
     Raises:
         FileFormatError: a file that cannot be read, with the place and the correction.
@@ -78,6 +74,6 @@ def _described(robot: Robot, path: Path) -> Robot:
         robot,
         notes=(*robot.notes, *known.notes),
         groups=known.groups,
-        postures=known.postures(robot.model, pin.neutral(robot.model)),
+        postures=known.postures,
         untested=lambda first, second: known.disabled.get(frozenset((owners[first], owners[second]))),
     )

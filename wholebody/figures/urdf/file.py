@@ -11,6 +11,7 @@ from xml.etree.ElementTree import Element
 
 from wholebody.base.checks import color, shown
 from wholebody.base.errors import FileFormatError, InputError
+from wholebody.base.files import is_file
 from wholebody.base.records import with_values
 from wholebody.figures.link_pieces import LinkShape
 from wholebody.figures.urdf.joints import UrdfJoint, read_joints
@@ -22,12 +23,7 @@ EXTENSION = "wholebody"
 
 
 class LinkVisual(NamedTuple):
-    """One visual of a link.
-
-    Attributes:
-        shape: the shape; its file is absolute.
-        color: red, green, blue, alpha of its material; None without one.
-    """
+    """One visual of a link, whose file is absolute; red, green, blue, alpha of its material, None without one."""
 
     shape: LinkShape
     color: tuple[float, float, float, float] | None
@@ -62,11 +58,7 @@ class UrdfFile(NamedTuple):
 
 
 def read_urdf(path: Path, package_dirs: Sequence[Path] = ()) -> UrdfFile:
-    """Read and check a URDF file.
-
-    Args:
-        path: the file.
-        package_dirs: folders that hold the packages of ``package://<package>/...`` names; see `find_mesh`.
+    """Read and check a URDF file; `find_mesh` looks in the folders.
 
     Raises:
         FileFormatError: one sentence with the place and the correction.
@@ -78,7 +70,9 @@ def read_urdf(path: Path, package_dirs: Sequence[Path] = ()) -> UrdfFile:
         raise FileFormatError(
             f"{path}: this is a xacro macro file; expand it first with `xacro {path.name} > robot.urdf`"
         )
-    links = _links(robot, path)
+    links = unique_names(robot.findall("link"), "link", path)
+    if not links:
+        raise FileFormatError(f"{path}: there are no links in it; give a URDF of a robot")
     joints, root, notes = read_joints(robot, links, path)
     inertials = {}
     for link in robot.findall("link"):
@@ -146,13 +140,6 @@ def _visuals(
                 continue
 
 
-def _links(robot: Element, path: Path) -> tuple[str, ...]:
-    names = unique_names(robot.findall("link"), "link", path)
-    if not names:
-        raise FileFormatError(f"{path}: there are no links in it; give a URDF of a robot")
-    return names
-
-
 def _check_inertial(inertial: Element, place: str) -> None:
     """Check masses, and moments only against absurd values: many robots' moments are not quite physical."""
     mass = inertial.find("mass")
@@ -178,11 +165,7 @@ def _shapes(link: Element, path: Path, package_dirs: tuple[Path, ...]) -> Iterat
 
 
 def _shape(element: Element, link: str, path: Path, package_dirs: tuple[Path, ...]) -> LinkShape:
-    """The shape of a ``<collision>`` or ``<visual>``.
-
-    Raises:
-        FileFormatError: one sentence with the place and the correction.
-    """
+    """The shape of a ``<collision>`` or ``<visual>``."""
     place = f"{path}: {element.tag} of link {shown(link)}"
     shapes = list(element.find("geometry") or ())
     if len(shapes) != 1:
@@ -216,12 +199,6 @@ def find_mesh(name: str, place: str, path: Path, package_dirs: Sequence[Path]) -
     file's parents, the folders of ROS_PACKAGE_PATH, and ``share`` below those of AMENT_PREFIX_PATH. A folder may hold
     packages or be one. A name that is not found is tried with slashes for backslashes and with ``%20`` decoded.
 
-    Args:
-        name: the mesh's name in the file.
-        place: of the mesh in the file, for messages.
-        path: of the file.
-        package_dirs: the caller's folders.
-
     Raises:
         FileFormatError: no name, or no such file.
     """
@@ -248,7 +225,7 @@ def _found(name: str, place: str, path: Path, package_dirs: Sequence[Path]) -> P
     else:
         plain = Path(name.removeprefix("file://"))
         candidates = [plain if plain.is_absolute() else folder / plain, *(base / plain for base in package_dirs)]
-    return next(filter(_is_file, candidates), None)
+    return next(filter(is_file, candidates), None)
 
 
 def _ros_folders() -> list[Path]:
@@ -256,10 +233,3 @@ def _ros_folders() -> list[Path]:
     return folders + [
         Path(entry) / "share" for entry in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if entry
     ]
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):  # a name that is too long, or with a zero byte
-        return False

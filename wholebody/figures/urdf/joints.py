@@ -60,14 +60,7 @@ class UrdfJoint(NamedTuple):
 def read_joints(
     robot: Element, links: tuple[str, ...], path: Path
 ) -> tuple[tuple[UrdfJoint, ...], str, tuple[str, ...]]:
-    """Read and check all joints.
-
-    Returns:
-        The joints, the root link, and one sentence for each missing part that was filled in.
-
-    Raises:
-        FileFormatError: one sentence with the place and the correction.
-    """
+    """Return the checked joints, the root link, and one sentence for each missing part that was filled in."""
     elements = robot.findall("joint")
     unique_names(elements, "joint", path)
     notes: list[str] = []
@@ -83,24 +76,14 @@ def read_joints(
             )
         parent_of[joint.child] = joint.parent
         joints.append(joint)
-    joints = _with_leaders(joints, notes)
+    names = {joint.name for joint in joints}
+    for k, joint in enumerate(joints):
+        if joint.mimic is not None and joint.mimic.joint not in names:
+            told = f"it mimics {shown(joint.mimic.joint)}, which is not in the file, so it is on its own"
+            notes.append(f"joint {shown(joint.name)}: {told}")
+            joints[k] = with_values(joint, mimic=None)
     _check_followers({joint.name: joint for joint in joints}, path)
     return tuple(joints), _root(links, parent_of, path), tuple(notes)
-
-
-def _with_leaders(joints: list[UrdfJoint], notes: list[str]) -> list[UrdfJoint]:
-    """Make joints independent if they mimic a joint that is not in the file."""
-    known = {joint.name for joint in joints}
-    made = []
-    for joint in joints:
-        if joint.mimic is not None and joint.mimic.joint not in known:
-            notes.append(
-                f"joint {shown(joint.name)}: it mimics {shown(joint.mimic.joint)}, which is not in the file, so it is "
-                "on its own"
-            )
-            joint = with_values(joint, mimic=None)
-        made.append(joint)
-    return made
 
 
 def _joint(element: Element, links: frozenset[str], place: str, notes: list[str]) -> UrdfJoint:

@@ -31,15 +31,7 @@ class _Law(NamedTuple):
 
 
 def urdf_model(urdf: UrdfFile, root: str) -> tuple[pin.Model, tuple[str, ...]]:
-    """Return Pinocchio's model and one sentence for each joint that was changed.
-
-    Args:
-        urdf: the checked file.
-        root: "fixed" or "free".
-
-    Raises:
-        FileFormatError: a file that passed our checks but fails in Pinocchio.
-    """
+    """Return Pinocchio's model, its root "fixed" or "free", and one sentence for each joint that was changed."""
     joints, notes = _with_constant_followers(urdf.joints)
     model = _build(urdf, joints, root, mimic=False)
     if any(joint.mimic for joint in joints):
@@ -87,9 +79,8 @@ def _within_followers(joints: tuple[UrdfJoint, ...]) -> tuple[tuple[UrdfJoint, .
             notes.append(f"joint {shown(name)}: {told}")
             continue
         ends[law.leader] = kept
-    return tuple(with_values(joint, lower=ends[joint.name][0], upper=ends[joint.name][1]) for joint in joints), tuple(
-        notes
-    )
+    made = [with_values(joint, lower=ends[joint.name][0], upper=ends[joint.name][1]) for joint in joints]
+    return tuple(made), tuple(notes)
 
 
 def _laws(joints: tuple[UrdfJoint, ...]) -> dict[str, _Law]:
@@ -172,7 +163,7 @@ def _text(urdf: UrdfFile, joints: tuple[UrdfJoint, ...]) -> str:
     for name in urdf.links:
         link = SubElement(robot, "link", name=name)
         if name in urdf.inertials:
-            _add_inertial(link, urdf.inertials[name])
+            link.append(urdf.inertials[name])
     for joint in joints:
         made = add_joint(
             robot,
@@ -188,18 +179,6 @@ def _text(urdf: UrdfFile, joints: tuple[UrdfJoint, ...]) -> str:
             multiplier, offset = (repr(float(value)) for value in joint.mimic[1:])
             SubElement(made, "mimic", joint=joint.mimic.joint, multiplier=multiplier, offset=offset)
     return ElementTree.tostring(robot, encoding="unicode")
-
-
-def _add_inertial(link: Element, given: Element) -> None:
-    inertial = SubElement(link, "inertial")
-    for tag, names in (
-        ("origin", ("xyz", "rpy")),
-        ("mass", ("value",)),
-        ("inertia", ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")),
-    ):
-        element = given.find(tag)
-        if element is not None:
-            SubElement(inertial, tag, {name: element.get(name, "") for name in names if element.get(name)})
 
 
 def _set_limits(model: pin.Model, joints: tuple[UrdfJoint, ...]) -> None:

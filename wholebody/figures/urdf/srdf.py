@@ -13,7 +13,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError
-from wholebody.figures.urdf.xml_reading import read_xml
+from wholebody.figures.urdf.xml_reading import numbers, read_xml
 
 
 class Srdf(NamedTuple):
@@ -21,35 +21,19 @@ class Srdf(NamedTuple):
 
     Attributes:
         groups: group to joints that move.
-        states: name to the values of joints; "<group>/<state>" where several groups have a state of that name.
+        postures: name to posture (nq,); "<group>/<state>" where several groups have a state of that name.
         disabled: two links -> why they are never tested.
         notes: sentences on lines that name what the URDF does not have.
     """
 
     groups: Mapping[str, tuple[str, ...]]
-    states: Mapping[str, Mapping[str, float]]
+    postures: Mapping[str, Array]
     disabled: Mapping[frozenset[str], str]
     notes: tuple[str, ...]
 
-    def postures(self, model: pin.Model, neutral: Array) -> dict[str, Array]:
-        """The states as postures (nq,): joints of no state are neutral."""
-        found = {}
-        for name, values in self.states.items():
-            q = np.array(neutral)
-            for joint, value in values.items():
-                made = model.joints[model.getJointId(joint)]
-                q[made.idx_q : made.idx_q + made.nq] = (value,) if made.nq == 1 else (np.cos(value), np.sin(value))
-            found[name] = q
-        return found
-
 
 def read_srdf(path: Path, model: pin.Model, links: tuple[str, ...]) -> Srdf:
-    """Read an SRDF.
-
-    Args:
-        path: the file.
-        model: of the URDF that it belongs to.
-        links: of this URDF.
+    """Read the SRDF of a URDF that has a model and links.
 
     Raises:
         FileFormatError: a file that is no SRDF, or a value that is no number.
@@ -59,7 +43,7 @@ def read_srdf(path: Path, model: pin.Model, links: tuple[str, ...]) -> Srdf:
         raise FileFormatError(f"{path}: the outermost element is <{robot.tag}>, not <robot>; give an SRDF")
     reader = _Reader(path, robot, model, links)
     groups = {name: reader.joints(group, (name,)) for name, group in reader.groups.items()}
-    return Srdf(groups, reader.states(), reader.disabled(), tuple(dict.fromkeys(reader.notes)))
+    return Srdf(groups, reader.postures(), reader.disabled(), tuple(dict.fromkeys(reader.notes)))
 
 
 class _Reader:
@@ -96,28 +80,23 @@ class _Reader:
                 self.notes.append(f"SRDF: group {shown(inside[-1])} names {shown(name)}, which is no other group")
         return tuple(sorted(found, key=self._movable.__getitem__))
 
-    def states(self) -> dict[str, dict[str, float]]:
-        """Named states."""
+    def postures(self) -> dict[str, Array]:
+        """Named states as postures; joints of no state are neutral."""
         elements = self._robot.findall("group_state")
         names = [str(state.get("name")) for state in elements]
-        found: dict[str, dict[str, float]] = {}
+        found: dict[str, Array] = {}
         for state, name in zip(elements, names, strict=True):
-            values = {}
+            q: Array = pin.neutral(self._model)
             for joint in state.findall("joint"):
                 known = str(joint.get("name"))
                 if known not in self._movable:
                     self.notes.append(f"SRDF: state {shown(name)} names the joint {shown(known)}, which does not move")
                     continue
-                try:
-                    values[known] = float(str(joint.get("value")))
-                except ValueError:
-                    values[known] = np.nan
-                if not np.isfinite(values[known]):
-                    raise FileFormatError(
-                        f"{self._path}: state {shown(name)}: joint {shown(known)} has the value "
-                        f"{shown(joint.get('value'))}; give one finite number"
-                    )
-            found[name if names.count(name) == 1 else f"{state.get('group')}/{name}"] = values
+                place = f"{self._path}: state {shown(name)}: joint {shown(known)}"
+                (value,) = numbers(joint, "value", place, 1)
+                made = self._model.joints[self._movable[known]]
+                q[made.idx_q : made.idx_q + made.nq] = (value,) if made.nq == 1 else (np.cos(value), np.sin(value))
+            found[name if names.count(name) == 1 else f"{state.get('group')}/{name}"] = q
         return found
 
     def disabled(self) -> dict[frozenset[str], str]:

@@ -63,17 +63,9 @@ def add_joint(
     axis: Iterable[float] | None = None,
     limit: Mapping[str, float] | None = None,
 ) -> Element:
-    """Add a joint between two links, with exact numbers, and return it.
+    """Add a joint between two links to the URDF's root element, with exact numbers, and return it.
 
-    Args:
-        robot: the URDF's root element.
-        name: of the joint.
-        kind: its type in URDF.
-        parent: link.
-        child: link.
-        origin: placement of the child in the parent at zero; None for none.
-        axis: (3,) direction; None for none.
-        limit: numbers by the names of the attributes of `<limit>`; None for no such element.
+    The origin places the child in the parent at zero; the limit has numbers by the attributes of ``<limit>``.
     """
     joint = SubElement(robot, "joint", name=name, type=kind)
     SubElement(joint, "parent", link=parent)

@@ -16,29 +16,21 @@ from wholebody.base.checks import shown, warn_of_degrees
 from wholebody.base.errors import FileFormatError, one_line
 from wholebody.base.files import read_bytes
 
-A_TURN = 2.0 * math.pi
-"""Radians: roll, pitch and yaw beyond this were probably meant in degrees."""
-
 MOST = 1e9
 """Largest number that is accepted as a mass, a length, a speed or an inertia in SI units."""
 
 
 def read_xml(path: Path, kind: str) -> Element:
-    """Return the outermost element of an XML file.
-
-    Args:
-        path: the file.
-        kind: its kind, for messages: "URDF".
+    """Return the outermost element of an XML file of a kind, such as "URDF".
 
     Raises:
         FileFormatError: no file, too large, not text, an unknown encoding, or broken XML.
     """
-    # largest file that is accepted as a description of a robot.
-    data = read_bytes(path, kind, (64 * 2**20))
+    data = read_bytes(path, kind, 64 * 2**20)  # the largest that is accepted as a description of a robot
     try:
         return ElementTree.fromstring(data)
     except ElementTree.ParseError as error:
-        if not _is_text(data):
+        if b"\0" in data or "\ufffd" in data.decode("utf-8", "replace"):
             raise FileFormatError(f"{path}: this is not a text file; give a {kind}") from None
         raise FileFormatError(f"{path}: the XML is broken ({one_line(str(error))}); correct that place") from None
     except (LookupError, ValueError) as error:
@@ -48,20 +40,8 @@ def read_xml(path: Path, kind: str) -> Element:
         ) from None
 
 
-def _is_text(data: bytes) -> bool:
-    try:
-        data.decode("utf-8")
-    except UnicodeDecodeError:
-        return False
-    return b"\0" not in data
-
-
 def unique_names(elements: Sequence[Element], kind: str, path: Path) -> tuple[str, ...]:
-    """Return the names of elements.
-
-    Raises:
-        FileFormatError: an element without a name, or two of one name.
-    """
+    """Return the names of elements; one without a name, or two of one name, are refused by a `FileFormatError`."""
     names: dict[str, None] = {}
     for k, element in enumerate(elements):
         name = element.get("name")
@@ -74,18 +54,7 @@ def unique_names(elements: Sequence[Element], kind: str, path: Path) -> tuple[st
 
 
 def numbers(element: Element, name: str, place: str, count: int, default: str | None = None) -> tuple[float, ...]:
-    """Return the finite numbers of an attribute.
-
-    Args:
-        element: the element.
-        name: of the attribute.
-        place: of the element in the file, for messages.
-        count: how many numbers there must be.
-        default: value of a missing attribute; without it the attribute is required.
-
-    Raises:
-        FileFormatError: another count, not numbers, or not finite.
-    """
+    """Return the finite numbers of an attribute; another count is refused with the element's place in the file."""
     text: Any = element.get(name, default)
     try:
         found = tuple(float(word) for word in text.split())
@@ -100,11 +69,7 @@ def numbers(element: Element, name: str, place: str, count: int, default: str | 
 def bounded(
     element: Element, name: str, place: str, count: int, default: str | None = None, most: float = MOST
 ) -> tuple[float, ...]:
-    """Return the numbers of an attribute, none of them larger than `most`.
-
-    Raises:
-        FileFormatError: as `numbers`, or one that is too large.
-    """
+    """Return the numbers of an attribute as `numbers` does, none of them larger than `most`."""
     found = numbers(element, name, place, count, default)
     if max(abs(number) for number in found) > most:
         raise FileFormatError(
@@ -114,17 +79,13 @@ def bounded(
 
 
 def placement(element: Element, place: str, most: float) -> pin.SE3:
-    """Return the ``<origin>`` of an element; the identity without one.
-
-    Raises:
-        FileFormatError: numbers that are not finite, or a position farther than `most` metres away.
-    """
+    """Return the ``<origin>`` of an element, at most `most` metres away; the identity without one."""
     origin = element.find("origin")
     if origin is None:
         return pin.SE3.Identity()
     roll, pitch, yaw = bounded(origin, "rpy", place, 3, "0 0 0", 1e6)
     for name, angle in (("roll", roll), ("pitch", pitch), ("yaw", yaw)):
-        warn_of_degrees(angle, f"{place}: the {name} of <origin>", A_TURN)
+        warn_of_degrees(angle, f"{place}: the {name} of <origin>", 2.0 * math.pi)
     return pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), np.array(bounded(origin, "xyz", place, 3, "0 0 0", most)))
 
 

@@ -9,9 +9,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.errors import InputError
-from wholebody.geometry.proximity import ENDLESS, Contacts, PairTable
-
-ARC = 1.1  # largest ratio of an arc to its chord, for the rotations of one step
+from wholebody.geometry.proximity import Contacts, PairTable
 
 
 class QueryResult(NamedTuple):
@@ -37,11 +35,11 @@ def far_moved(table: PairTable, before: QueryResult, after: QueryResult) -> Indi
         raise InputError(
             f"placements of {len(before.placements)} and {len(after.placements)} pieces; give {count} each"
         )
+    one, other = before.contacts, after.contacts
+    near = one.number, one.distance, float(before.within), other.number, other.distance, float(after.within)
     found: Indices = compiled_kernel().far_moved(
-        before.placements, after.placements, table.pairs, table.widths, table.reach,
-        before.contacts.number, np.ascontiguousarray(before.contacts.distance), float(before.within),
-        after.contacts.number, np.ascontiguousarray(after.contacts.distance), float(after.within), ARC, ENDLESS,
-    )  # fmt: skip
+        before.placements, after.placements, (table.pairs, table.widths, table.reach), near
+    )
     return found
 
 
@@ -58,10 +56,9 @@ def separated(table: PairTable, before: QueryResult, after: QueryResult, pairs: 
         overlap: metres by which a piece may be beyond the plane.
     """
     known = before.contacts
-    found: Mask = compiled_kernel().separated(
-        pairs, before.placements, after.placements, known.number, known.pair, known.normal, known.point_a,
-        known.point_b, table.points, table.first_point, table.radius, table.reach, overlap,
-    )  # fmt: skip
+    near = known.number, known.pair, known.normal, known.point_a, known.point_b
+    outline = table.points, table.first_point, table.radius, table.reach
+    found: Mask = compiled_kernel().separated(pairs, before.placements, after.placements, near, outline, overlap)
     return found
 
 
@@ -71,15 +68,12 @@ def compiled_kernel() -> Any:
     from wholebody.geometry.continuous import moved_pairs_kernel
 
     none, places, pairs = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp)
-    placements = np.zeros((0, 4, 3))
-    moved_pairs_kernel.far_moved(
-        placements, placements, pairs, none, none, places, none, 0.0, places, none, 0.0, ARC, ENDLESS
-    )
-    lines = np.zeros((0, 3))
+    placements, lines, one = np.zeros((0, 4, 3)), np.zeros((0, 3)), np.zeros(1, dtype=np.intp)
+    near = places, none, 0.0, places, none, 0.0
+    moved_pairs_kernel.far_moved(placements, placements, (pairs, none, none), near)
     moved_pairs_kernel.separated(
-        places, placements, placements, places, pairs, lines, lines, lines, lines, np.zeros(1, dtype=np.intp), none,
-        none, 0.0,
-    )  # fmt: skip
+        places, placements, placements, (places, pairs, lines, lines, lines), (lines, one, none, none), 0.0
+    )
     return moved_pairs_kernel
 
 

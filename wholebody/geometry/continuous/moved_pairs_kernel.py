@@ -2,45 +2,33 @@
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
+from wholebody.geometry.pieces import ENDLESS
+
+ARC = 1.1  # largest ratio of an arc to its chord, for the rotations of one step
 
 
 @compiled()
 def far_moved(
-    before: Array,
-    after: Array,
-    pairs: Indices,
-    widths: Array,
-    reach: Array,
-    number_before: Indices,
-    distance_before: Array,
-    within_before: float,
-    number_after: Indices,
-    distance_after: Array,
-    within_after: float,
-    arc: float,
-    endless: float,
-) -> Indices:
+    before: Array, after: Array, table: tuple[Indices, Array, Array],
+    near: tuple[Indices, Array, float, Indices, Array, float],
+) -> Indices:  # fmt: skip
     """Return the pairs (k,) that moved against each other by more than their distance.
 
     Args:
         before: (n, 4, 3) placements of the pieces before the motion.
         after: the same after the motion.
-        pairs: (p, 2).
-        widths: (p,) of both pieces of a pair together.
-        reach: (n,) of the pieces from their origins; infinite where endless.
-        number_before: pairs that were near before.
-        distance_before: their distances.
-        within_before: query distance before; all other pairs were farther apart.
-        number_after: pairs that are near after.
-        distance_after: their distances.
-        within_after: query distance after.
-        arc: largest ratio of an arc to its chord.
-        endless: value used for an infinite reach.
+        table: `pairs`, `widths` and `reach` of the pair table.
+        near: pairs that were near before, their distances, and the query distance, all others being farther apart; the
+            same after the motion.
     """
+    pairs, widths, reach = table
+    number_before, distance_before, within_before, number_after, distance_after, within_after = near
     count = len(before)
     motion = np.empty(count)
     for i in range(count):
@@ -50,7 +38,7 @@ def far_moved(
             for j in range(3):
                 turn += (after[i, j, k] - before[i, j, k]) ** 2
         far = reach[i] if np.isfinite(reach[i]) else 0.0
-        motion[i] = arc * (np.sqrt(center) + np.sqrt(0.5 * turn) * far)
+        motion[i] = ARC * (np.sqrt(center) + np.sqrt(0.5 * turn) * far)
     apart = np.full(len(pairs), max(within_before, 0.0))
     for c in range(len(number_before)):
         apart[number_before[c]] = max(distance_before[c], 0.0)
@@ -70,79 +58,57 @@ def far_moved(
         room += max(_between(after, first, second) - radii, apart_after[p])
         if way <= room:
             continue
-        if _seen(before, after, first, second, reach[second], arc, endless) <= room:
+        if _seen(before, after, first, second, reach[second]) <= room:
             continue
-        if _seen(before, after, second, first, reach[first], arc, endless) <= room:
+        if _seen(before, after, second, first, reach[first]) <= room:
             continue
         found[kept] = p
         kept += 1
     return found[:kept]
 
 
+Outline: TypeAlias = tuple[Array, Indices, Array, Array]
+"""Of all n pieces: swept points (m, 3), one piece after the other, where those of each begin (n + 1,), the radius
+around them (n,), and the reach of the pieces from their origins (n,)."""
+
+
 @compiled()
 def separated(
-    doubtful: Indices,
-    before: Array,
-    after: Array,
-    number: Indices,
-    pair: Indices,
-    normal: Array,
-    point_a: Array,
-    point_b: Array,
-    points: Array,
-    first_point: Indices,
-    radius: Array,
-    reach: Array,
-    overlap: float,
-) -> Mask:
+    doubtful: Indices, before: Array, after: Array, near: tuple[Indices, Indices, Array, Array, Array],
+    outline: Outline, overlap: float,
+) -> Mask:  # fmt: skip
     """Return whether the plane between the pieces of a pair before a motion, fixed to either, parts them after it (k,).
 
     Args:
         doubtful: (k,) pairs; those that were not near before are not separated.
         before: (n, 4, 3) placements of the pieces before the motion.
         after: the same after the motion.
-        number: (c,) pairs that were near before.
-        pair: (c, 2) their pieces.
-        normal: (c, 3) from the first piece to the second.
-        point_a: (c, 3) nearest point of the first.
-        point_b: (c, 3) and of the second.
-        points: (m, 3) swept points of all pieces, one piece after the other.
-        first_point: (n + 1,) where those of each piece begin.
-        radius: (n,) around the points.
-        reach: (n,) of the pieces from their origins.
+        near: pairs that were near before: their numbers, pieces, normals and nearest points of both.
+        outline: of the pieces.
         overlap: metres by which a piece may be beyond the plane.
     """
+    number, pair, normal, point_a, point_b = near
     found = np.zeros(len(doubtful), dtype=np.bool_)
     for k in range(len(doubtful)):
         for c in range(len(number)):
             if number[c] == doubtful[k]:
-                a, b = pair[c, 0], pair[c, 1]
-                found[k] = _beyond(
-                    before, after, a, b, normal[c], 1.0, point_a[c], points[first_point[b] : first_point[b + 1]],
-                    radius[b], reach[b], overlap,
-                ) or _beyond(
-                    before, after, b, a, normal[c], -1.0, point_b[c], points[first_point[a] : first_point[a + 1]],
-                    radius[a], reach[a], overlap,
-                )  # fmt: skip
+                a, b, places = pair[c, 0], pair[c, 1], (before, after)
+                found[k] = _beyond(places, a, b, normal[c], 1.0, point_a[c], outline, overlap) or _beyond(
+                    places, b, a, normal[c], -1.0, point_b[c], outline, overlap
+                )
                 break
     return found
 
 
 @compiled(inner=True)
 def _beyond(
-    before: Array,
-    after: Array,
-    carrier: int,
-    other: int,
-    normal: Array,
-    sign: float,
-    point: Array,
-    points: Array,
-    radius: float,
-    reach: float,
+    places: tuple[Array, Array], carrier: int, other: int, normal: Array, sign: float, point: Array, outline: Outline,
     overlap: float,
-) -> bool:
+) -> bool:  # fmt: skip
     """Whether a piece stays beyond a plane that is fixed to another one, also on the arcs between both placements."""
+    before, after = places
+    all_points, first_point, radii, reach = outline
+    points, radius = all_points[first_point[other] : first_point[other + 1]], radii[other]
     if len(points) == 0:
         return False
     local_normal, height, apart = np.empty(3), 0.0, 0.0
@@ -155,7 +121,7 @@ def _beyond(
         height += along * place
         apart += (before[other, 3, j] - point[j]) ** 2
     least, angle = np.inf, 0.0
-    for placed in (before, after):
+    for placed in places:
         world = np.zeros(3)  # the normal now
         for i in range(3):
             for j in range(3):
@@ -174,7 +140,7 @@ def _beyond(
             for i in range(3):
                 turned += (after[piece, j, i] - before[piece, j, i]) ** 2
         angle += np.sqrt(0.5 * turned)
-    arc = 0.125 * angle * angle * (reach + np.sqrt(apart))
+    arc = 0.125 * angle * angle * (reach[other] + np.sqrt(apart))
     return bool(least - arc > -overlap)
 
 
@@ -188,7 +154,7 @@ def _between(placements: Array, first: int, second: int) -> float:
 
 
 @compiled(inner=True)
-def _seen(before: Array, after: Array, carrier: int, other: int, reach: float, arc: float, endless: float) -> float:
+def _seen(before: Array, after: Array, carrier: int, other: int, reach: float) -> float:
     """Largest motion of a point of a piece in the axes of another one."""
     shift, turn = 0.0, 0.0
     for j in range(3):
@@ -205,4 +171,4 @@ def _seen(before: Array, after: Array, carrier: int, other: int, reach: float, a
     angle = np.sqrt(0.5 * turn)
     if angle <= 1e-12:
         angle = 0.0
-    return float(arc * (np.sqrt(shift) + angle * (reach if np.isfinite(reach) else endless)))
+    return float(ARC * (np.sqrt(shift) + angle * (reach if np.isfinite(reach) else ENDLESS)))

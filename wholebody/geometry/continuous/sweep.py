@@ -20,9 +20,8 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
 from wholebody.geometry.continuous.motion_bounds import MotionBounds
-from wholebody.geometry.memory_views import Guesses, distance_view, read_result
-from wholebody.geometry.proximity import SINGLY
-from wholebody.geometry.single_pairs import KEPT, SinglePairs, pair_data
+from wholebody.geometry.large_models import pairs_of
+from wholebody.geometry.pair_distances import PairDistances
 from wholebody.geometry.swept_points import swept_points
 
 TOLERANCE = 1e-4
@@ -67,23 +66,15 @@ class Sweep:
             InputError: a geometry that is not a convex piece, or a joint whose motion cannot be bounded.
         """
         self.model, self.geometry = model, geometry
-        self._data, self._results = model.createData(), pair_data(geometry, len(geometry.collisionPairs))
+        self._data, self._pairs = model.createData(), pairs_of(geometry)
+        self._distances = PairDistances(geometry, self._pairs)
+        self._places = self._distances.data.oMg
         self._swept = [swept_points(piece.geometry) for piece in geometry.geometryObjects]
         joint = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
         reach = np.array([swept.reach for swept in self._swept], dtype=float)
         self._bounds = MotionBounds(model, joint, reach)
-        pairs = [[pair.first, pair.second] for pair in geometry.collisionPairs]
-        self._pairs: Indices = np.array(pairs, dtype=np.intp).reshape(-1, 2)
         self._number: dict[tuple[int, int], int] = {}  # made when it is first needed
         self._reach = reach[self._pairs].sum(axis=1)
-        few = len(self._pairs) < SINGLY  # otherwise no table over all pairs of pieces is made
-        self._active = np.zeros((geometry.ngeoms,) * 2 if few else (0, 0), dtype=bool, order="F")
-        self._place(pin.neutral(model), np.zeros(model.nv))
-        self._kept, self._single = len(self._pairs) <= KEPT, SinglePairs(geometry)
-        if self._kept:
-            pin.computeDistances(geometry, self._results)
-        self._view = distance_view(self._results.distanceResults)
-        self._guesses = Guesses(self._results)
 
     def first_contact(
         self, q0: Array, q1: Array, pairs: Indices | None = None, tolerance: float = TOLERANCE
@@ -114,10 +105,10 @@ class Sweep:
         index = np.arange(len(self._pairs)) if pairs is None else self._indices(pairs)
         if not len(index):
             return None
-        self._guesses.reset()  # the same motion has the same answer, whatever was swept before
+        self._distances.reset()  # the same motion has the same answer, whatever was swept before
         velocity = np.asarray(pin.difference(self.model, q0, q1))
         self._place(q0, velocity)
-        centers = np.array([place.translation for place in self._results.oMg])
+        centers = self._distances.placed[:, 3].copy()
         self._bounds.update(self._data, velocity, centers)
         speed = self._bounds.approach(self._pairs[index, 0], self._pairs[index, 1])
         between = centers[self._pairs[index, 0]] - centers[self._pairs[index, 1]]
@@ -131,7 +122,7 @@ class Sweep:
     def _advance(
         self, q0: Array, velocity: Array, index: Indices, speed: Array, tolerance: float
     ) -> FirstContact | None:
-        start = self._query(index)[:, 0]
+        start = self._distances.measured(index)[:, 0]
         level = np.minimum(start, 0.0) - tolerance
         free = (start - level) / speed
         asked = np.zeros(len(index), dtype=int)
@@ -143,7 +134,7 @@ class Sweep:
             q = np.asarray(pin.integrate(self.model, q0, now * velocity))
             self._place(q, velocity)
             due = np.flatnonzero(free <= now + TOGETHER)
-            rows = self._query(index[due])
+            rows = self._distances.measured(index[due])
             room = rows[:, 0] - level[due]
             worst = int(np.argmin(room))
             if room[worst] <= 0.5 * tolerance:
@@ -157,7 +148,7 @@ class Sweep:
         worst = int(np.argmin(free))
         q = np.asarray(pin.integrate(self.model, q0, now * velocity))
         self._place(q, velocity)
-        distance = float(self._query(index[worst : worst + 1])[0, 0])
+        distance = float(self._distances.measured(index[worst : worst + 1])[0, 0])
         return self._found(now, q, int(index[worst]), distance, False)
 
     def _found(self, fraction: float, q: Array, index: int, distance: float, certain: bool) -> FirstContact:
@@ -192,7 +183,7 @@ class Sweep:
         Every direction gives a valid bound, but a wide face needs its exact normal for a useful one: where faces touch,
         coal's normal can be 1e-4 rad off.
         """
-        swept, rotation = self._swept[piece], self._results.oMg[piece].rotation
+        swept, rotation = self._swept[piece], self._places[piece].rotation
         if not len(swept.faces):
             return normal[None]
         faces = swept.faces[:, :3] @ rotation.T
@@ -202,7 +193,7 @@ class Sweep:
     def _planes_keep(self, points: int, plane: int, normals: Array, distance: float, level: float) -> float:
         """Time until a swept point of `points` can reach `level` above supporting planes (k, 3) of `plane`."""
         swept, base = self._swept[points], self._swept[plane]
-        at, below = self._results.oMg[points], self._results.oMg[plane]
+        at, below = self._places[points], self._places[plane]
         if np.isinf(base.reach):
             heights = base.faces[0, 3] + normals @ below.translation
         else:
@@ -231,29 +222,7 @@ class Sweep:
 
     def _place(self, q: Array, velocity: Array) -> None:
         pin.forwardKinematics(self.model, self._data, q, velocity)
-        pin.updateGeometryPlacements(self.model, self._data, self.geometry, self._results)
-
-    def _query(self, index: Indices) -> Array:
-        """Query coal for these pairs: rows of distance, normal and the two nearest points."""
-        if not self._kept:
-            pairs = self._pairs[index]
-            placed = np.zeros((self.geometry.ngeoms, 4, 3))
-            for piece in np.unique(pairs).tolist():
-                at = self._results.oMg[piece]
-                placed[piece, :3], placed[piece, 3] = at.rotation.T, at.translation
-            return self._single.measured(placed, pairs)
-        if len(self._active):
-            first, second = self._pairs[index, 0], self._pairs[index, 1]
-            self._active[:] = False
-            self._active[first, second] = self._active[second, first] = True
-            self._results.setActiveCollisionPairs(self.geometry, self._active, True)
-            pin.computeDistances(self.geometry, self._results)
-        else:
-            for number in index.tolist():
-                pin.computeDistance(self.geometry, self._results, number)
-        if self._view is not None:
-            return np.asarray(self._view[index])
-        return np.array([read_result(self._results.distanceResults[int(k)]) for k in index]).reshape(-1, 10)
+        self._distances.place(self.model, self._data)
 
     def _checked(self, q: Array, which: str) -> Array:
         q = np.asarray(q, dtype=float)

@@ -16,9 +16,9 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.geometry.continuous.motion_bounds import MotionBounds
-from wholebody.geometry.memory_views import Guesses, distance_view, placement_view, read_result
-from wholebody.geometry.proximity import AWAY, COAL_ACCURACY, PairTable
-from wholebody.geometry.single_pairs import KEPT, SinglePairs, pair_data
+from wholebody.geometry.pair_distances import PairDistances
+from wholebody.geometry.pieces import COAL_ACCURACY
+from wholebody.geometry.proximity import PairTable
 
 FINEST = 2.0**-12
 """Shortest part of a motion that is looked at; a hand moves 0.02 mm in it. What is still in doubt there gets the
@@ -64,7 +64,10 @@ class SweptDepth:
         self._table, self._geometry, self._tolerance = table, geometry, tolerance
         self._bounds = MotionBounds(table.model, table.joint, table.reach)
         self._kernel = compiled_kernel()
-        self._shapes = self._kernel.Shapes(table.pairs, table.joint, table.reach, *_shapes(table))
+        self._shapes = self._kernel.Shapes(
+            table.pairs, table.joint, table.reach, table.points, table.first_point, table.radius,
+            _radii(table.geometry), table.faces, table.first_face,
+        )  # fmt: skip
         self._before, self._now, self._middle = (_Postures(table, geometry) for _ in range(3))
         count = len(table.pairs)
         self._extent, self._index = np.zeros((geometry.ngeoms, 3)), np.zeros(count, dtype=np.intp)
@@ -74,7 +77,7 @@ class SweptDepth:
     def start(self, q: Array) -> Depths:
         """Look at the first posture (nq,) of a sequence; what was looked at before is forgotten."""
         for place in (self._before, self._now, self._middle):
-            place.guesses.reset()
+            place.distances.reset()
         self._now.move(q)
         self._q = q
         return self._look(np.full(len(self._table.pairs), -np.inf), np.zeros(len(self._table.pairs)))[0]
@@ -109,7 +112,7 @@ class SweptDepth:
         """Overlaps at the present posture, and the pairs that may overlap on the way there."""
         now, table = self._now, self._table
         count = self._kernel.screen(
-            now.places, table.pairs, table.reach, table.half, speed, before, now.least, self._extent, self._index
+            now.places, (table.pairs, table.reach, table.half), speed, before, now.least, self._extent, self._index
         )
         doubtful = self._index[:count].copy()
         now.exact[:] = False
@@ -214,39 +217,19 @@ class _Postures:
     """
 
     def __init__(self, table: PairTable, geometry: pin.GeometryModel) -> None:
-        self._table, self._geometry = table, geometry
-        self.data, self._results = table.model.createData(), pair_data(geometry, len(table.pairs))
-        self._kept, self._single = len(table.pairs) <= KEPT, SinglePairs(geometry)
-        for k in range(geometry.ngeoms):  # anywhere apart: views are checked by results that were computed
-            self._results.oMg[k] = pin.SE3(np.eye(3), np.array([AWAY * k, 0.0, 0.0]))
-        checked = {k * (len(table.pairs) - 1) // 6 for k in (0, 2, 3, 6)}
-        for number in sorted(checked) if self._kept and len(table.pairs) else ():
-            pin.computeDistance(geometry, self._results, number)
-        self._view, self._placed = distance_view(self._results.distanceResults), placement_view(self._results.oMg)
-        self.guesses = Guesses(self._results)
-        count = len(table.pairs)
+        self._model, self.data = table.model, table.model.createData()
+        self.distances, count = PairDistances(geometry, table.pairs), len(table.pairs)
         self.places = np.zeros((geometry.ngeoms, 4, 3))
         self.rows, self.least, self.exact = np.zeros((count, 4)), np.zeros(count), np.zeros(count, dtype=bool)
 
     def move(self, q: Array) -> None:
-        pin.forwardKinematics(self._table.model, self.data, q)
-        pin.updateGeometryPlacements(self._table.model, self.data, self._geometry, self._results)
-        if self._placed is not None:
-            self.places[:] = self._placed
-        else:
-            self.places[:] = np.array([[*M.rotation.T, M.translation] for M in self._results.oMg]).reshape(-1, 4, 3)
+        pin.forwardKinematics(self._model, self.data, q)
+        self.distances.place(self._model, self.data)
+        self.places[:] = self.distances.placed
 
     def measured(self, numbers: Indices) -> Array:
         """Distances and normals (k, 4) of pairs, by coal."""
-        if not self._kept:
-            return self._single.measured(self.places, self._table.pairs[numbers])[:, :4]
-        geometry, results = self._geometry, self._results
-        listed = numbers.tolist()
-        for number in listed:
-            pin.computeDistance(geometry, results, number)
-        if self._view is not None:
-            return np.asarray(self._view[numbers, :4])
-        return np.array([read_result(results.distanceResults[k])[:4] for k in listed]).reshape(-1, 4)
+        return self.distances.measured(numbers)[:, :4]
 
     def ask(self, numbers: Indices) -> None:
         """Remember the distances of pairs."""
@@ -256,20 +239,11 @@ class _Postures:
         self.exact[numbers] = True
 
 
-def _shapes(table: PairTable) -> tuple[Array, Indices, Array, Array, Array, Indices]:
-    """Swept points, their first places, radii, radii of ellipsoids, faces and their first places, of all pieces."""
-    swept = table.swept
-    radii = np.zeros((len(swept), 3))
-    for k, piece in enumerate(table.geometry.geometryObjects):
-        if isinstance(piece.geometry, coal.Ellipsoid):
-            radii[k] = piece.geometry.radii
-    return (
-        np.ascontiguousarray(np.vstack([np.zeros((0, 3)), *(piece.points for piece in swept)])),
-        np.cumsum([0, *(len(piece.points) for piece in swept)], dtype=np.intp),
-        np.array([piece.radius for piece in swept], dtype=float),
-        radii,
-        np.ascontiguousarray(np.vstack([np.zeros((0, 4)), *(piece.faces for piece in swept)])),
-        np.cumsum([0, *(len(piece.faces) for piece in swept)], dtype=np.intp),
+def _radii(geometry: pin.GeometryModel) -> Array:
+    """(n, 3) of ellipsoids; 0 for other pieces."""
+    shapes = [piece.geometry for piece in geometry.geometryObjects]
+    return np.array([shape.radii if isinstance(shape, coal.Ellipsoid) else (0.0,) * 3 for shape in shapes]).reshape(
+        -1, 3
     )
 
 
@@ -280,7 +254,8 @@ def compiled_kernel() -> Any:
 
     places, none, index = np.zeros((0, 4, 3)), np.zeros(0), np.zeros(0, dtype=np.intp)
     pairs, rows, one = np.zeros((0, 2), dtype=np.intp), np.zeros((0, 4)), np.zeros(1, dtype=np.intp)
-    swept_depth_kernel.screen(places, pairs, none, np.zeros((0, 3)), none, none, none, np.zeros((0, 3)), index)
+    lines = np.zeros((0, 3))
+    swept_depth_kernel.screen(places, (pairs, none, lines), none, none, none, lines, index)
     swept_depth_kernel.lower_bounds(
         swept_depth_kernel.Parts(index, index, index, rows, rows, none, none),
         np.zeros((0, 0, 4, 3)),

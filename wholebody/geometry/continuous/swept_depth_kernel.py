@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
@@ -14,16 +13,14 @@ from wholebody.geometry.proximity_kernel import bound_by_boxes, outer_gap
 
 @compiled()
 def screen(
-    place: Array, pairs: Indices, reach: Array, half: Array, speed: Array, before: Array, after: Array, extent: Array,
+    place: Array, table: tuple[Indices, Array, Array], speed: Array, before: Array, after: Array, extent: Array,
     index: Indices,
 ) -> int:  # fmt: skip
     """Bound the distances after a motion from below, and list the pairs that may overlap at its end or on its way.
 
     Args:
         place: (n, 4, 3) where the pieces are after the motion; see `Contacts.placements`.
-        pairs: (p, 2) the pieces of each pair.
-        reach: (n,) radius of each piece about its origin; may be infinite.
-        half: (n, 3) half the size of a box about each piece's origin, along its own axes.
+        table: `pairs`, `reach` and `half` of the pair table.
         speed: (p,) by how much a pair can have come nearer during the motion, metres.
         before: (p,) lower bounds of the distances before it.
         after: (p,) room for those after it: from the motion, from spheres and from boxes along the world's axes.
@@ -33,6 +30,7 @@ def screen(
     Returns:
         How many pairs there are.
     """
+    pairs, reach, half = table
     bound_by_boxes(place, half, extent)
     count = 0
     for p in range(len(pairs)):
@@ -124,7 +122,7 @@ def lower_bounds(
     # a record is taken apart once: in a loop each array that is read from it would be counted again
     asked, first_place, last_place, rows0, rows1, speed, wanted = parts
     pairs, joint, reach, points, first_point, radius, radii, faces, first_face = shapes
-    turn, speeds, carries = motion
+    outline, limits = (points, first_point, radius, radii), (motion.turn, motion.speed, motion.carries)
     normal, sags = np.empty(3), np.empty(2)
     for k in range(len(asked)):
         first, second = pairs[asked[k], 0], pairs[asked[k], 1]
@@ -149,15 +147,15 @@ def lower_bounds(
                 continue
             if sags[side % 2] < 0.0:
                 gap = max(rows0[k, 0], rows1[k, 0])
-                bend = _curvature(other, carrier, gap, joint, turn, speeds, carries, reach)
+                bend = _curvature(other, carrier, gap, joint, limits, reach)
                 sags[side % 2] = share * share / 8.0 * bend
             sag = sags[side % 2]
             if np.isfinite(reach[carrier]):
                 for j in range(3):
                     normal[j] /= np.sqrt(square)
-                height = _support(carrier, normal[0], normal[1], normal[2], points, first_point, radius, radii)
-                at0 = _above(carrier, other, normal, height, place0, points, first_point, radius, radii)
-                at1 = _above(carrier, other, normal, height, place1, points, first_point, radius, radii)
+                height = _support(carrier, normal[0], normal[1], normal[2], outline)
+                at0 = _above(carrier, other, normal, height, place0, outline)
+                at1 = _above(carrier, other, normal, height, place1, outline)
                 best = max(best, min(at0, at1) - sag - accuracy)
             face, most = -1, -np.inf
             for f in range(first_face[carrier], first_face[carrier + 1]):
@@ -167,18 +165,18 @@ def lower_bounds(
             if face >= 0 and radius[carrier] == 0.0:
                 for i in range(3):
                     normal[i] = faces[face, i]
-                at0 = _above(carrier, other, normal, faces[face, 3], place0, points, first_point, radius, radii)
-                at1 = _above(carrier, other, normal, faces[face, 3], place1, points, first_point, radius, radii)
+                at0 = _above(carrier, other, normal, faces[face, 3], place0, outline)
+                at1 = _above(carrier, other, normal, faces[face, 3], place1, outline)
                 best = max(best, min(at0, at1) - sag - accuracy)
         bound[k] = best
 
 
 @compiled(inner=True)
 def _curvature(
-    first: int, second: int, gap: float, joint: Indices, turn: Array, speeds: Array, carries: NDArray[np.bool_],
-    reach: Array,
-) -> float:  # fmt: skip
+    first: int, second: int, gap: float, joint: Indices, motion: tuple[Array, Array, Mask], reach: Array
+) -> float:
     """Bound of the acceleration of the first piece's points relative to the second; `MotionBounds.curvature`."""
+    turn, speeds, carries = motion
     a, b = joint[first], joint[second]
     turns, travel = 0.0, 0.0
     for j in range(len(turn)):
@@ -195,11 +193,14 @@ def _curvature(
     return total
 
 
+Outline: TypeAlias = tuple[Array, Indices, Array, Array]
+"""`points`, `first_point`, `radius` and `radii` of `Shapes`."""
+
+
 @compiled(inner=True)
-def _support(
-    piece: int, x: float, y: float, z: float, points: Array, first_point: Indices, radius: Array, radii: Array
-) -> float:
+def _support(piece: int, x: float, y: float, z: float, outline: Outline) -> float:
     """Height of a piece above its origin along a direction (x, y, z) in its own axes."""
+    points, first_point, radius, radii = outline
     begin, end = first_point[piece], first_point[piece + 1]
     if begin == end:
         return float(np.sqrt((radii[piece, 0] * x) ** 2 + (radii[piece, 1] * y) ** 2 + (radii[piece, 2] * z) ** 2))
@@ -210,10 +211,7 @@ def _support(
 
 
 @compiled(inner=True)
-def _above(
-    carrier: int, other: int, normal: Array, height: float, place: Array, points: Array, first_point: Indices,
-    radius: Array, radii: Array,
-) -> float:  # fmt: skip
+def _above(carrier: int, other: int, normal: Array, height: float, place: Array, outline: Outline) -> float:
     """Least height of a piece above a plane of another one: `normal` and `height` in the axes of the carrier."""
     between = x = y = z = 0.0
     for i in range(3):
@@ -222,4 +220,4 @@ def _above(
         x -= place[other, 0, i] * world
         y -= place[other, 1, i] * world
         z -= place[other, 2, i] * world
-    return between - height - _support(other, x, y, z, points, first_point, radius, radii)
+    return between - height - _support(other, x, y, z, outline)

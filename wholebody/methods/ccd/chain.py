@@ -118,9 +118,11 @@ class ChainResolver:
         grow = 1.0 + margin / length
         push = (grow * x, grow * y, grow * z)
         inner = self._inner(link)
-        if inner and self._parallel(link, push):
-            self._translate(link, push, inner, tracked)
+        there = self._kept(link, push, tracked) if inner else None
+        if there is not None:
+            self._translate(link, push, inner, there)
             return link.nodes
+        self.translated.difference_update(self.limbs.joints[node] for node in link.nodes)
         self._reach_out(link.node, link.nodes, link.effector, push)
         return link.nodes
 
@@ -140,8 +142,24 @@ class ChainResolver:
             if left < 1e-4 or left > 0.9 * before:  # m: reached; or slow
                 return
 
-    def _translate(self, link: Link, push: Vector, inner: Sequence[int], tracked: Any) -> None:
-        """Move the link by pure translation: its joint's origin moves, and its orientation stays.
+    def _kept(self, link: Link, push: Vector, tracked: Any) -> Array | None:
+        """(3, 3) axes, one a row, that a link keeps which moves out by translation; None for one that turns.
+
+        A link is translated whose bone is nearly parallel to the obstacle's surface: in its tracked direction, if it is
+        near to that, so that what other links and frames turned is turned back; else as it is.
+        """
+        there, bone = _columns(self.limbs.frames[link.node]).copy(), self._bone(link)
+        if tracked is not None:
+            wanted = np.ascontiguousarray(tracked.oMi[self.limbs.joints[link.node]].rotation.T)
+            turned = float(np.abs(wanted - there).max())
+            most = 2.0 * PARALLEL if turned < 0.02 else PARALLEL  # what is held there by translation stays so
+            if turned < PARALLEL and _parallel(wanted.T @ (there @ bone), push, most):
+                self.translated.update(self.limbs.joints[node] for node in link.nodes)
+                return wanted
+        return there if _parallel(bone, push, PARALLEL) else None
+
+    def _translate(self, link: Link, push: Vector, inner: Sequence[int], there: Array) -> None:
+        """Move the link by pure translation: its joint's origin moves, and its axes become `there` (3, 3).
 
         Its own joints keep its orientation, and inner ones whose axes pass through the origin: the rotation of an upper
         arm about its long axis moves no elbow.
@@ -150,12 +168,6 @@ class ChainResolver:
         own = tuple(node for node in link.nodes if node not in inner)
         first = limbs.frame(own[-1])
         own += tuple(node for node in inner if self._passes(node, first[9:]))
-        there = _columns(limbs.frames[link.node]).copy()
-        if tracked is not None:
-            wanted = np.ascontiguousarray(tracked.oMi[limbs.joints[link.node]].rotation.T)
-            if np.abs(wanted - there).max() < PARALLEL:  # otherwise it is another way that the tracked limb takes
-                there = wanted
-                self.translated.update(limbs.joints[node] for node in link.nodes)
         self._reach_out(inner[0], inner, (first[9], first[10], first[11]), push)
         aims = Aims(limbs, [link.node] * 3, np.eye(3), there, [False] * 3)
         plan = aims.plan(own)
@@ -179,19 +191,19 @@ class ChainResolver:
         before = [node for node in self._bearing if node < link.node and node in link.nodes]
         return tuple(node for node in link.nodes if node <= before[-1]) if before else ()
 
-    def _parallel(self, link: Link, push: Vector) -> bool:
-        """Whether the link's bone is nearly parallel to the obstacle's surface."""
+    def _bone(self, link: Link) -> Array:
+        """(3,) from the link's joint to the next link, or to the chain's tip, in the world, metres."""
         here = self.limbs.frame(link.node)
         after = [node for node in self._bearing if node > link.node]
         if after:
-            there = self.limbs.frame(after[0])
-            x, y, z = (there[k] - here[k] for k in (9, 10, 11))
-        else:
-            x, y, z = rotated(here, *self._tip)
-        bone = (x * x + y * y + z * z) ** 0.5
-        length = (push[0] ** 2 + push[1] ** 2 + push[2] ** 2) ** 0.5
-        along = abs(x * push[0] + y * push[1] + z * push[2])
-        return bool(bone > SHORT and along < PARALLEL * bone * length)
+            return np.subtract(self.limbs.frame(after[0])[9:], here[9:])
+        return np.array(rotated(here, *self._tip))
+
+
+def _parallel(bone: Array, push: Vector, most: float) -> bool:
+    """Whether a bone (3,) is at less than an angle, by its sine, to the surface that pushes it out."""
+    length = float(np.linalg.norm(bone))
+    return length > SHORT and abs(float(bone @ push)) < most * length * float(np.linalg.norm(push))
 
 
 def _columns(frame: Array) -> Array:

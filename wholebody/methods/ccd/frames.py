@@ -94,7 +94,7 @@ class Attraction:
 
     def __init__(self, scene: Scene, resolver: OverlapResolver) -> None:
         """Find the degrees of freedom of each chain."""
-        self._model, self._resolver = scene.model, resolver
+        self._model, self._resolver, self._data = scene.model, resolver, scene.model.createData()
         self.step_length, self.limit, self.free = 0.0, 0, False
         self.parts: list[tuple[NDArray[np.intp], Array]] = []
         rest = np.ones(scene.model.nv, dtype=bool)
@@ -138,11 +138,12 @@ class Attraction:
         """
         before = np.asarray(pin.difference(self._model, q, wanted))
         after = np.asarray(pin.difference(self._model, trial, wanted))
+        turned = self._turned_back(q, trial)
         back = np.zeros(self._model.nv, dtype=bool)
         slow = []
         for k, (dofs, _) in enumerate(self.parts):
             old, new = float(before[dofs] @ before[dofs]), float(after[dofs] @ after[dofs])
-            if shares[k] and old - new < LEAST_GAIN and not self.free:
+            if shares[k] and old - new < LEAST_GAIN and not self.free and not turned[k]:
                 back[dofs] = True
             if shares[k] and old - new < 0.4 * shares[k] * old:  # blocked: without contact it gains 2 shares
                 slow.append(k)
@@ -157,6 +158,19 @@ class Attraction:
         if len(slow) or back.any():
             self._resolver.query(trial)
         return trial
+
+    def _turned_back(self, q: Array, trial: Array) -> list[bool]:
+        """Whether each part has a link, moved out by translation, that is nearer to its tracked direction than at q."""
+        found = [False] * len(self.parts)
+        for k, chain in enumerate(self._resolver.chains.values()):
+            if chain.translated:
+                link, turns = max(chain.translated), []
+                for posture in (q, trial):
+                    pin.forwardKinematics(self._model, self._data, posture)
+                    wanted = self._resolver.tracked.oMi[link].rotation
+                    turns.append(np.abs(self._data.oMi[link].rotation - wanted).max())
+                found[k] = turns[1] < turns[0] - 1e-3  # rad
+        return found
 
     def _attract_joints(self, q: Array, wanted: Array, part: int) -> tuple[Array, bool]:
         """Move one joint after the other, from the root outwards, if its motion is free; returns whether any moved."""
@@ -195,8 +209,10 @@ class FrameResolver:
         self._workspace.begin()
         self._largest_motion = np.full(self._model.nv, np.inf) if largest_motion is None else largest_motion
         resolver = self._resolver
-        resolver.counts, resolver.margin, resolver.tracked = Counts(), MARGIN, None
+        resolver.counts, resolver.margin = Counts(), MARGIN
         wanted = resolver.into_cones(self._figure.clamp(q_wanted))
+        pin.forwardKinematics(self._model, self._tracked, wanted)
+        resolver.tracked = self._tracked
         self._swept = False
         q, free = self._freed(q_free, rng)
         if not free:
@@ -220,8 +236,6 @@ class FrameResolver:
         """The posture of this frame, from a free posture q towards the wanted one; None if no motion is free."""
         resolver, attraction = self._resolver, self._attraction
         before = resolver.placed
-        pin.forwardKinematics(self._model, self._tracked, wanted)
-        resolver.tracked = self._tracked
         attraction.free = not resolver.query(wanted)
         resolver.margin = (
             5e-3 if attraction.free else MARGIN

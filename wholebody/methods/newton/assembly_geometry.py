@@ -10,8 +10,8 @@ import pinocchio as pin
 from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
-from wholebody.figures.degrees import Turning
 from wholebody.figures.figure import Figure
+from wholebody.figures.model_check import Turning
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.geometry.shapes import Shape

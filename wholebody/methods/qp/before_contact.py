@@ -35,6 +35,7 @@ def before_contact(
     solver: QPSolver,
     seed: int,
     trace: list[TraceEntry],
+    most: int,
     control: Control,
 ) -> Iterator[LocalSolution]:
     """Descents through everything to where surfaces are in front of their faces; none where no term has a face.
@@ -48,6 +49,7 @@ def before_contact(
         solver: of the programs.
         seed: of the starts.
         trace: grows by one entry a program.
+        most: entries of the trace with which no further descent begins.
         control: what may end it.
     """
     if not any(has_face(term) for term in (*problem.goals, *problem.constraints)):
@@ -72,8 +74,7 @@ def before_contact(
         # ends that are the least and equally far: the goals are out of reach, and others are no nearer
         # times the least violation up to which ends count as equally far
         alike = sum(end <= 1.1 * min(ends) for end in ends) >= 3
-        # of the time limit that the descents may take
-        if alike or control.over or control.spent > 0.5:
+        if alike or control.over or len(trace) >= most:
             break
     if missed and not alike:
         nearest = min(missed, key=lambda each: each.violation.total)

@@ -19,6 +19,8 @@ from wholebody.methods.qp.tracking import QPTracker
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 
+LONGEST = 10.0  # s of processor time: twice what a search within its numbers of programs takes for a person in a cabin
+
 
 @dataclass(frozen=True)
 class QP(Checked):
@@ -43,8 +45,8 @@ class QP(Checked):
         seed: of the restarts.
         measures: whether the measures are to be least. Without, the first posture is the answer that meets the goals
             with everything held, which is there in a fifth to nine tenths of the time. This is for `solve`.
-        time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None, it
-            ends after four seconds of processor time.
+        time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None,
+            the numbers of programs end it, and at last ten seconds of processor time.
     """
 
     solver: str = "osqp"
@@ -106,7 +108,7 @@ class QP(Checked):
             self.tolerance, self.iterations, self.budget, self.restarts, self.seed, self.measures,
             self.restarts_for_measure,
         )  # fmt: skip
-        control = Control(self.time_limit, progress)
+        control = Control(self.time_limit, progress, LONGEST)
         with problem.borrow() as workspace:
             met = from_seeds(problem, workspace, budget, control)
             judgement = assess(problem, met.q) if met is not None and met.complete else None

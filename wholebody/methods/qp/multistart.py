@@ -74,7 +74,7 @@ class Multistart:
         self.how = "directly"
         self.contradictions: tuple[Contradiction, ...] = ()
         self._start = problem.scene.figure.clamp(problem.start)
-        self._left = budget.programs  # that attempts after the first may still solve
+        self._first = 0  # programs of the first attempt
         self._without_gain = 0  # probes in a row that came no nearer, without contacts or relaxed
         self._least = 0.0  # lower bound of the goals' residual, metres
         self._minima = Minima()  # where relaxed probes ended after the true clearances were required
@@ -82,6 +82,11 @@ class Multistart:
         self._through: list[Array] = []  # where a descent without contacts from another start reached the goals
         self._out_of_reach = False  # which is known
         self._best: LocalSolution | None = None
+
+    @property
+    def _left(self) -> int:
+        """Programs that attempts after the first may still solve."""
+        return self.budget.programs - (len(self.trace) - self._first)
 
     @property
     def best(self) -> LocalSolution:
@@ -111,13 +116,14 @@ class Multistart:
                 local = attempt.stage(q)
                 if local is not None and self._accept(local, attempt.how):
                     return
-                if self.control.over or self.control.spent > SEARCH.for_ways or self._proven():
+                if self.control.over or self._left <= 0 or self._proven():
                     return
 
     def _attempts(self, begin: Array) -> Iterator[Attempt]:
         """The attempts in their order; each is decided on when those before it failed."""
         start, state = self._start, self.lineariser.state
         yield Attempt([begin], self._directly, "directly")
+        self._first = len(self.trace)
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
         least = least_left(self.contradictions)
         if least is None:
@@ -159,8 +165,9 @@ class Multistart:
     def _before_contact(self) -> Iterator[Array]:
         """Postures where surfaces are in front of the faces that they are to meet."""
         for local in before_contact(
-            self.problem, self.subproblem, self.lineariser, self.solver, self.budget.seed, self.trace, self.control
-        ):
+            self.problem, self.subproblem, self.lineariser, self.solver, self.budget.seed, self.trace,
+            len(self.trace) + self._left, self.control,
+        ):  # fmt: skip
             self.spent += local.iterations
             yield local.q
 
@@ -198,10 +205,7 @@ class Multistart:
         if probe.violation.worst > tolerance:
             self._minima.add(probe.violation.total, probe.converged)
             return probe
-        before = self.spent
-        local = self._descend(probe.q, "restart", most=max(self._left, 1))
-        self._left -= self.spent - before
-        return local
+        return self._descend(probe.q, "restart", most=max(self._left, 1))
 
     def _restart_for_measure(self) -> None:
         """Where all is met, search for a lower minimum of the measures from other starts, which are screened first.
@@ -235,7 +239,6 @@ class Multistart:
         lineariser = self.lineariser if depth == 0.0 else self.lineariser.relaxed(depth)
         local = self._feasibility(lineariser, most, "probe").run(start)
         self.spent += local.iterations
-        self._left -= local.iterations
         return local
 
     def _feasibility(self, lineariser: Lineariser, most: int, note: str) -> Feasibility:

@@ -228,7 +228,6 @@ class SearchNumbers(NamedTuple):
         coming_near: most programs from there to the nearest posture among things.
         inside_probes: seeded starts for goals inside of things, which only look for the nearest posture.
         staying: most programs that improve the measures at the nearest posture to goals that are not met.
-        for_ways: share of the time limit that descents after the first may take. More: fewer answers that come to rest.
         screened: feasible postures that are looked for, for each that is descended from; more = lower measures, slower.
     """
 
@@ -250,7 +249,6 @@ class SearchNumbers(NamedTuple):
     coming_near: int = 40
     inside_probes: int = 5
     staying: int = 40
-    for_ways: float = 0.5
     screened: int = 4
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Mask
 from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State, Wrench
-from wholebody.geometry.proximity import COAL_ACCURACY
+from wholebody.geometry.pieces import COAL_ACCURACY
 from wholebody.problem import Problem
 from wholebody.tasks.base import Constraint, Goal, Measure
 from wholebody.tasks.checks import defined

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.figures.figure import Figure
-from wholebody.geometry.proximity import COAL_ACCURACY
+from wholebody.geometry.pieces import COAL_ACCURACY
 from wholebody.methods.simplification.reach import Balls, Reach, about_point, placed
 from wholebody.tasks.base import Constraint
 from wholebody.tasks.hold import Hold

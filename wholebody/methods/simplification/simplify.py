@@ -15,8 +15,7 @@ from wholebody.figures.description import ROOT_JOINT
 from wholebody.figures.figure import Figure
 from wholebody.geometry.hull import hull_piece, simplified_hull
 from wholebody.geometry.large_models import geometry_model
-from wholebody.geometry.pieces import Piece
-from wholebody.geometry.proximity import COAL_ACCURACY
+from wholebody.geometry.pieces import COAL_ACCURACY, Piece
 from wholebody.methods.simplification.active_joints import ActiveJoints, active_joints
 from wholebody.methods.simplification.embedding import Embedding, restated_term
 from wholebody.methods.simplification.pairs import PROBE, reachable_pairs

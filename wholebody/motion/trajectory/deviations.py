@@ -103,12 +103,11 @@ class Chart:
 
 
 def second_differences(frames: int, seam_before: bool, seam_after: bool) -> Array:
-    """(k, n) second differences over n frames, those across a seam included: beyond it everything is zero."""
+    """(k, n + 4) second differences over n frames and two on both sides, those across a seam included."""
     full = np.zeros((frames + 2, frames + 4))
     rows = np.arange(frames + 2)
     full[rows, rows], full[rows, rows + 1], full[rows, rows + 2] = 1.0, -2.0, 1.0
-    inside = full[0 if seam_before else 2 : None if seam_after else frames, 2 : frames + 2]
-    return inside
+    return full[0 if seam_before else 2 : None if seam_after else frames]
 
 
 class Objective:
@@ -116,10 +115,13 @@ class Objective:
 
     Attributes:
         bands: (n, n) of a degree of freedom of weight 1: the second derivative over the frames, five bands.
+        slope: (n, nv) derivative without deviations, of weight 1: what the frames beyond the seams ask for.
         weights: (nv,) of the degrees of freedom.
     """
 
-    def __init__(self, frames: int, weights: Array, time: float, dt: float, seams: tuple[bool, bool]) -> None:
+    def __init__(
+        self, frames: int, weights: Array, time: float, dt: float, seams: tuple[bool, bool], ends: Array | None = None
+    ) -> None:  # fmt: skip
         """Lay out the bands.
 
         Args:
@@ -128,11 +130,15 @@ class Objective:
             time: tau, seconds.
             dt: seconds from frame to frame.
             seams: whether the clip goes on before and after the window.
+            ends: (4, nv) deviations of the two frames before it and the two after it; None for none.
         """
-        differences = second_differences(frames, *seams)
-        self.bands: Array = np.eye(frames) + (time / dt) ** 4 * differences.T @ differences
-        self.weights = weights
+        full, scale = second_differences(frames, *seams), (time / dt) ** 4
+        inside, ends = full[:, 2:-2], np.zeros((4, len(weights))) if ends is None else ends
+        beyond = full[:, [0, 1, -2, -1]] @ ends
+        self.bands: Array = np.eye(frames) + scale * inside.T @ inside
+        self.slope: Array = scale * inside.T @ beyond
+        self.weights, self._least = weights, 0.5 * scale * float((beyond**2 @ weights).sum())
 
     def value(self, x: Array) -> float:
         """Of deviations (n, nv)."""
-        return 0.5 * float(np.einsum("ti,ti,i->", x, self.bands @ x, self.weights))
+        return self._least + float(np.einsum("ti,ti,i->", x, 0.5 * self.bands @ x + self.slope, self.weights))

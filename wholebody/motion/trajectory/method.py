@@ -101,7 +101,7 @@ class Trajectory:
             for window in run.windows(changed, self.margin):
                 if beyond[window.first : window.end].any():
                     told = run.watch.teller(1.0, 0.0, f"loads of frames {window.first} to {window.end - 1}")
-                    freed = windows.window(window, faults, told, q[window.first : window.end])
+                    freed = windows.window(window, faults, told, q)
                     other[window.first : window.end] = freed.q
             again = loads.corrected(other)
             now = again.of(other).worst()

@@ -39,8 +39,9 @@ class Limits(NamedTuple):
 
     @classmethod
     def of(
-        cls, terms: FrameTerms, chart: Chart, first: int, seams: tuple[bool, bool], rate: float | None = None
-    ) -> Limits:
+        cls, terms: FrameTerms, chart: Chart, first: int, seams: tuple[bool, bool], rate: float | None = None,
+        begun: Array | None = None,
+    ) -> Limits:  # fmt: skip
         """Those of the frames of a clip; at a seam nothing moves.
 
         Args:
@@ -49,6 +50,7 @@ class Limits(NamedTuple):
             first: number of its first frame.
             seams: whether the clip goes on before and after them.
             rate: factor of the speed limits; None for no bounds on speed.
+            begun: (n, nv) deviations that frames at seams keep; None for none.
         """
         count, nv = len(chart), chart.model.nv
         lower, upper = chart.bounds(terms.scene.figure.limits)
@@ -67,7 +69,7 @@ class Limits(NamedTuple):
                 fastest[place] = np.maximum(rate * fast, chart.steps[place]) - chart.steps[place]
         for seam, place in zip(seams, (0, -1), strict=True):
             if seam:
-                lower[place] = upper[place] = 0.0
+                lower[place] = upper[place] = 0.0 if begun is None else begun[place]
         return cls(lower, upper, slowest, fastest)
 
     def passed(self, x: Array) -> Array:
@@ -214,6 +216,7 @@ def _cost(objective: Objective, step: Step, place: Indices, prices: Array) -> tu
     x, dofs, count = step.x, step.dofs, len(step.dofs)
     stiffness = 1e6  # 1/m^2 and 1/rad^2, of equalities; their multipliers do the rest
     c = prices.copy()
+    c[place] += objective.slope[:, dofs] * objective.weights[dofs]
     first, second = np.nonzero(objective.bands)
     values = [np.outer(objective.bands[first, second], objective.weights[dofs]).ravel()]
     at, to = [place[first].ravel()], [place[second].ravel()]

@@ -14,6 +14,7 @@ from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.base.arrays import Array, Mask
 from wholebody.motion.avoider import Run
@@ -106,6 +107,7 @@ class _Window(NamedTuple):
     limits: Limits
     always: set[int]
     cancel: Callable[[float], bool]
+    around: Array  # (clip's frames, nq): what lies beyond the window stays so
 
     def moved(self, x: Array) -> list[int]:
         """Gaps beside frames with a deviation (n, nv), and those that are looked at always."""
@@ -164,7 +166,7 @@ class ClipRun:
                 changed[window.first : window.end] = True
                 marked = self._run.windows(changed, margin)
                 wider = next(one for one in marked if one.first <= window.first < one.end)
-                again = self.window(wider, found, cancel, kept[wider.first : wider.end])
+                again = self.window(wider, found, cancel, kept)
                 if not again.missed:
                     return wider, again
         return window, freed
@@ -178,14 +180,15 @@ class ClipRun:
             window: which frames.
             found: what is wrong with the original postures of the clip.
             cancel: told the share done; true ends the attempt, and the window stays as it was.
-            begun: (frames of the window, nq) postures to begin with; None for the original ones, and others after them.
+            begun: (n, nq) postures of the clip to begin with, of which those beyond the window stay; None for the
+                original ones, and others after them.
         """
-        own = self._of(window, found, cancel)
-        objective = self._objective(window, SETTINGS.first if self._time is None else self._time)
+        own = self._of(window, found, cancel, begun)
+        objective = self._objective(own, SETTINGS.first if self._time is None else self._time)
         if begun is None:
             starts = ((_Attempt(x), _Way(early=True)) for x in self._starts(own, found.depths))
         else:
-            starts = ((_Attempt(x), _Way(NEARLY, NEARLY)) for x in [own.deviations(begun)])
+            starts = ((_Attempt(x), _Way(NEARLY, NEARLY)) for x in [own.deviations(begun[window.first : window.end])])
         best: _Attempt | None = None
         ended_early: list[_Attempt] = []
         for start, way in chain(starts, ((start, _Way()) for start in ended_early)):
@@ -210,22 +213,34 @@ class ClipRun:
         q[changed] = own.chart.postures(best.x)[changed]
         return WindowResult(q, missed)
 
-    def _of(self, window: Window, found: Faults, cancel: Callable[[float], bool]) -> _Window:
-        terms = self._run.terms
+    def _of(self, window: Window, found: Faults, cancel: Callable[[float], bool], begun: Array | None) -> _Window:
+        terms, around = self._run.terms, self._reference if begun is None else begun
         chart = Chart(self._run.workspace.model, np.array(self._reference[window.first : window.end]))
-        limits = Limits.of(terms, chart, window.first, self._seams(window), self._rate)
+        kept = (
+            None if begun is None else np.array([self._away(around, window.first), self._away(around, window.end - 1)])
+        )
+        limits = Limits.of(terms, chart, window.first, self._seams(window), self._rate, kept)
         held = [terms.held(frame) for frame in range(window.first, window.end)]
         loads = None if self._loads is None else WindowLoads(self._loads, window.first, len(window))
         evaluator = NodeEvaluator(self._run.workspace, chart, held, self._run.clearance, loads)
-        return _Window(window, chart, evaluator, limits, {gap - window.first for gap in found.gaps}, cancel)
+        return _Window(window, chart, evaluator, limits, {gap - window.first for gap in found.gaps}, cancel, around)
+
+    def _away(self, q: Array, frame: int) -> Array:
+        """(nv,) deviation of a frame of postures (n, nq); none beyond the clip."""
+        model = self._run.workspace.model
+        if not 0 <= frame < len(q):
+            return np.zeros(model.nv)
+        return np.asarray(pin.difference(model, self._reference[frame], q[frame]))
 
     def _seams(self, window: Window) -> tuple[bool, bool]:
         """Whether the clip goes on before and after a window."""
         return window.first > 0, window.end < len(self._reference)
 
-    def _objective(self, window: Window, time: float) -> Objective:
-        weights = np.ones(self._run.workspace.model.nv)
-        return Objective(len(window), weights, time, self._run.terms.dt, self._seams(window))
+    def _objective(self, own: _Window, time: float) -> Objective:
+        window, weights = own.window, np.ones(self._run.workspace.model.nv)
+        beyond = (window.first - 2, window.first - 1, window.end, window.end + 1)
+        ends = np.array([self._away(own.around, frame) for frame in beyond])
+        return Objective(len(window), weights, time, self._run.terms.dt, self._seams(window), ends)
 
     def _again(self, found: _Attempt, own: _Window) -> _Attempt:
         """An answer once more, smoother where its jerk is not allowed, else less smooth and nearer to the original."""
@@ -233,7 +248,7 @@ class ClipRun:
         rough = jerk > SETTINGS.jerk
         if not rough and found.objective < (1.0 + SETTINGS.share) * 0.5 * square:
             return found
-        objective = self._objective(own.window, SETTINGS.first * (SETTINGS.smoother if rough else SETTINGS.rougher))
+        objective = self._objective(own, SETTINGS.first * (SETTINGS.smoother if rough else SETTINGS.rougher))
         other = self._attempt(found, own, objective, _Way(NEARLY))
         if other is None or not other.free:
             return found
@@ -244,7 +259,7 @@ class ClipRun:
         """Of the frames that deviations (n, nv) of a window change the jerk of, in parts of the original's."""
         window, figure, dt = own.window, self._run.scene.figure, self._run.terms.dt
         first, end = max(0, window.first - 3), min(len(self._reference), window.end + 3)
-        before, after = self._reference[first:end], self._reference[first:end].copy()
+        before, after = self._reference[first:end], own.around[first:end].copy()
         after[window.first - first : window.end - first] = own.chart.postures(x)
         return jerk_ratio(Clip(figure, before, dt), Clip(figure, after, dt))
 

@@ -20,8 +20,7 @@ class Bound(NamedTuple):
     """Vertices with what moves them.
 
     Attributes:
-        vertices: (n, 3) metres.
-        normals: (n, 3) outward unit vectors.
+        vertices, normals: (n, 3) metres, and outward unit vectors.
         weights: (n, b) influence of every bone; rows add up to 1.
         strength: (n, s) influence of every segment.
     """
@@ -38,10 +37,6 @@ class Bound(NamedTuple):
         made[1][len(self.normals) :] /= np.maximum(lengths, 1e-9)
         return Bound(*made)
 
-    def strongest(self) -> tuple[NDArray[np.uint8], Array]:
-        """(n, 4) the bones with the greatest influences, and (n, 4) these, which add up to 1."""
-        return strongest(self.weights)
-
 
 def strongest(weights: Array) -> tuple[NDArray[np.uint8], Array]:
     """The bones (n, 4) with the greatest weights (n, b), the strongest first, and these (n, 4), which add up to 1."""
@@ -51,13 +46,9 @@ def strongest(weights: Array) -> tuple[NDArray[np.uint8], Array]:
 
 
 def divided(bound: Bound, faces: NDArray[np.int64]) -> tuple[Bound, NDArray[np.int64], NDArray[np.int64]]:
-    """Cut the triangles between segments.
+    """Cut the triangles (m, 3) between segments.
 
     An edge whose ends are moved most by two different segments is cut where both move it alike, so that no crack opens.
-
-    Args:
-        bound: the vertices.
-        faces: (m, 3) indices of vertices.
 
     Returns:
         The vertices, with those of the cuts; (k, 3) the triangles; and (k,) the segment of each.

@@ -48,13 +48,7 @@ def ball(center: Any, radius: float) -> Field:
 
 
 def ellipsoid(center: Any, radii: Any, rotation: Array | None = None) -> Field:
-    """An ellipsoid; the distance is of first order at the surface.
-
-    Args:
-        center: (3,).
-        radii: (3,) along its axes.
-        rotation: (3, 3) whose columns are its axes; those of the frame if left out.
-    """
+    """An ellipsoid with the columns of a rotation (3, 3) as axes; the distance is of first order at the surface."""
     middle, size = np.asarray(center, dtype=float), np.asarray(radii, dtype=float)
     axes = np.eye(3) if rotation is None else rotation
 

@@ -1,4 +1,4 @@
-"""Parts of a body's surface: each a closed surface of one colour, and how strongly each bone moves its vertices."""
+"""What a body's surface is: patches that bones move (linear blend skinning); and the garments that it is made of."""
 
 from __future__ import annotations
 
@@ -9,9 +9,54 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
-from wholebody.view.surface.borders import BONES_EACH, strongest
 from wholebody.view.surface.fields import Field
-from wholebody.view.surface.nets import Triangles, triangles
+
+
+class Bone(NamedTuple):
+    """What moves vertices.
+
+    Attributes:
+        segment: the segment that it moves with; of a half, the segment that it turns half as much as.
+        parent: of a half, the segment against which the turn is halved; None of others.
+        instead: the segment to move with, rigidly, in a figure that lacks `segment`; None where there is always one.
+        bind: (4, 4) placement in the world in the binding posture.
+        rest: (4, 4) placement relative to `instead` in such a figure.
+    """
+
+    segment: str
+    parent: str | None
+    instead: str | None
+    bind: Array
+    rest: Array
+
+
+class Patch(NamedTuple):
+    """A part of the surface, of which most is moved by the bones of a segment.
+
+    Attributes:
+        name, segment, color: such as "shirt:left_upper_arm", which is unique; its segment; red, green, blue.
+        vertices, normals: (n, 3) metres, in the world of the binding posture, and outward unit vectors.
+        bones, weights: (n, 4) indices of bones, and their influences, which add up to 1.
+        faces: (m, 3) indices of vertices, wound outwards.
+        coarse: (k, 3) the same of fewer and larger triangles, for shadows and small pictures.
+    """
+
+    name: str
+    segment: str
+    color: tuple[float, float, float]
+    vertices: Array
+    normals: Array
+    bones: NDArray[np.uint8]
+    weights: Array
+    faces: NDArray[np.int64]
+    coarse: NDArray[np.int64]
+
+
+class Surface(NamedTuple):
+    """The surface of a body in its binding posture: what moves it, and patches that share the vertices of borders."""
+
+    bones: tuple[Bone, ...]
+    patches: tuple[Patch, ...]
 
 
 class Claim(NamedTuple):
@@ -32,11 +77,9 @@ class Garment(NamedTuple):
     """A part of one colour, before it is made.
 
     Attributes:
-        name: such as "shirt".
-        color: red, green, blue.
+        name, color: such as "shirt", and red, green, blue.
         field: its solid in the world of the body's binding posture.
-        low: (3,) least corner of a box around it.
-        high: (3,) greatest corner.
+        low, high: (3,) corners of a box around it.
         cell: size of the grid's cells, metres.
         claims: regions of the bones that move it.
         cuts: half spaces that end it at sharp edges: hem, collar, cuffs.
@@ -50,45 +93,6 @@ class Garment(NamedTuple):
     cell: float
     claims: Sequence[Claim]
     cuts: Sequence[Field] = ()
-
-
-class Part(NamedTuple):
-    """A closed surface in the binding posture.
-
-    Attributes:
-        name: such as "shirt".
-        color: red, green, blue.
-        surface: vertices, normals, faces in the world of the binding posture.
-        bones: (n, 4) indices of bones of each vertex, the strongest first.
-        weights: (n, 4) their influences, which add up to 1.
-    """
-
-    name: str
-    color: tuple[float, float, float]
-    surface: Triangles
-    bones: NDArray[np.uint8]
-    weights: Array
-
-
-def made(garment: Garment, order: Sequence[str]) -> Part:
-    """Return a garment's surface.
-
-    Args:
-        garment: the garment.
-        order: names of all bones of the body.
-    """
-    surface = triangles(garment.field, garment.low, garment.high, garment.cell, garment.cuts)
-    return Part(garment.name, garment.color, surface, *influences(surface.vertices, garment.claims, order))
-
-
-def influences(points: Array, claims: Sequence[Claim], order: Sequence[str]) -> tuple[NDArray[np.uint8], Array]:
-    """Return the strongest bones (n, 4) of points (n, 3), and their influences (n, 4), which add up to 1."""
-    place = {bone: number for number, bone in enumerate(order)}
-    strength = np.full((len(points), max(len(order), BONES_EACH)), -np.inf)
-    for claim in claims:
-        column = place[claim.bone]
-        strength[:, column] = np.maximum(strength[:, column], -claim.field(points) / claim.softness)
-    return strongest(np.exp(strength - strength.max(axis=1, keepdims=True)))
 
 
 def bounds(points: Sequence[Array], margin: float) -> tuple[Array, Array]:

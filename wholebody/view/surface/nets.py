@@ -26,13 +26,7 @@ STEEPEST = 1.8
 
 
 class Triangles(NamedTuple):
-    """A closed surface.
-
-    Attributes:
-        vertices: (n, 3) metres.
-        normals: (n, 3) outward unit vectors.
-        faces: (m, 3) indices of vertices, wound outwards.
-    """
+    """A closed surface: vertices (n, 3), metres, outward unit normals (n, 3), and faces (m, 3) that wind outwards."""
 
     vertices: Array
     normals: Array
@@ -40,14 +34,9 @@ class Triangles(NamedTuple):
 
 
 def triangles(field: Field, low: Array, high: Array, cell: float, cuts: Sequence[Field] = ()) -> Triangles:
-    """Return the surface of what is in a field and in every cut.
+    """Return the surface of what is in a field and in every cut, such as half spaces; edges between them are sharp.
 
-    Args:
-        field: negative inside.
-        low: (3,) least corner of a box that contains the solid in its inside.
-        high: (3,) greatest corner.
-        cell: size of the grid's cells, metres.
-        cuts: such as half spaces; the edges between them and the field are sharp.
+    `low` and `high` (3,) are corners of a box that contains the solid, `cell` is the size of the grid's cells, metres.
     """
     body = field
     for cut in cuts:
@@ -77,8 +66,7 @@ def coarsened(surface: Triangles) -> NDArray[np.int64]:
 
     All vertices in a cell of a grid become the one that is nearest to their middle, and triangles that so lose an edge
     are left out (vertex clustering: Rossignac and Borrel, "Multi-resolution 3D approximations for rendering complex
-    scenes", 1993). The cells are 1.6 times as large as the median edge is long. Vertices of sharp edges stay, as
-    hems would be ragged.
+    scenes", 1993). Vertices of sharp edges stay, as hems would be ragged.
     """
     vertices, faces = surface.vertices, surface.faces
     edges = vertices[faces] - vertices[np.roll(faces, 1, axis=1)]
@@ -96,13 +84,7 @@ def coarsened(surface: Triangles) -> NDArray[np.int64]:
 
 
 def clustered(vertices: Array, faces: NDArray[np.int64], keys: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the triangles (k, 3) that are left when all vertices of one key become the one nearest to their middle.
-
-    Args:
-        vertices: (n, 3) metres.
-        faces: (m, 3) indices of vertices.
-        keys: (n, any) rows that are equal for vertices which become one.
-    """
+    """Return the triangles (k, 3) that are left when vertices of equal keys become the one nearest to their middle."""
     _, group = np.unique(keys, axis=0, return_inverse=True)
     group = group.ravel()
     middle = np.zeros((group.max() + 1, 3))
@@ -204,8 +186,7 @@ def _on_edges(
 ) -> Iterator[tuple[NDArray[np.int64], Array]]:
     """For each cut, the cells (k,) that its edge with the body passes, and the points (k, 3) of the edge nearest them.
 
-    A vertex belongs to the edge if some of the quadrilaterals around it are the body's and others the cut's: then no
-    quadrilateral lies across the edge.
+    A vertex belongs to the edge if some of the quadrilaterals around it are the body's and others the cut's.
     """
     sides = [body, *cuts]
     middles = start + (cells + 0.5) * cell

@@ -61,7 +61,6 @@ class PersonShape:
     """
 
     def __init__(self, person: Person) -> None:
-        """Read the person's pieces and joints."""
         spec = human_spec(person)
         figure = figure_of(spec, "capsules")
         # The binding posture is half way between the ends of what people do, and no limbs touch.

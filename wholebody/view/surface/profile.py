@@ -64,11 +64,7 @@ def _contains(outer: Field, solid: Solid) -> bool:
 
 
 def limb(balls: Sequence[tuple[Array, float]]) -> Field:
-    """A smooth solid around balls in a row: its middle line and its radius run evenly from one to the next.
-
-    Args:
-        balls: centres (3,) and radii, from one end to the other; at least two places.
-    """
+    """A smooth solid around balls in a row, centres (3,) and radii: middle line and radius run evenly along them."""
     centers, radii = np.array([center for center, _ in balls]), np.array([radius for _, radius in balls])
     start, span = centers[0], centers[-1] - centers[0]
     length = float(np.linalg.norm(span))
@@ -89,14 +85,7 @@ def limb(balls: Sequence[tuple[Array, float]]) -> Field:
 
 
 def trunk(pieces: Field, low: float, high: float, x: float) -> Field:
-    """A smooth solid around the trunk's pieces.
-
-    Args:
-        pieces: signed distance of the pieces, in the world.
-        low: height at which the looking begins, metres.
-        high: height at which it ends.
-        x: a place inside the trunk at every height.
-    """
+    """A smooth solid around the trunk's pieces, between two heights; `x` is inside the trunk at every height."""
     heights = np.arange(low, high, LEVEL)
     front, back = np.empty(len(heights)), np.empty(len(heights))
     side = np.empty(len(heights))

@@ -59,7 +59,7 @@ def test_its_distances_are_ours_for_every_pair() -> None:
             assert pair.minimum_distance >= problem.clearance
 
 
-@pytest.mark.parametrize("kind", robots.given.kinds)
+@pytest.mark.parametrize("kind", robots.of_arm.kinds)
 @pytest.mark.parametrize("turned", [False, True])
 def test_it_brings_the_tool_of_an_arm_to_a_place(kind: str, turned: bool) -> None:
     rng = np.random.default_rng(6)

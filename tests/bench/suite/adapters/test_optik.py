@@ -16,7 +16,7 @@ from wholebody.bench.suite.problem_sets import robots
 pytest.importorskip("optik")
 
 
-@pytest.mark.parametrize("kind", robots.given.kinds)
+@pytest.mark.parametrize("kind", robots.of_arm.kinds)
 def test_it_places_the_tool_of_an_arm(kind: str) -> None:
     rng = np.random.default_rng(4)
     figure, ready = robots.arm(kind, rng)

@@ -15,14 +15,14 @@ from tests.bench.following import followed
 from wholebody.base.errors import InputError, MissingPackageError, UnknownNameError
 from wholebody.bench.measure.track import SETTING, Track, judge, track
 from wholebody.bench.suite.adapters.own import MovingPoint
-from wholebody.bench.suite.adapters.registry import chosen_tools, installed_tools, make_tool, tool_differences
+from wholebody.bench.suite.adapters.registry import chosen_tools, make_tool, tool_differences
 from wholebody.bench.suite.adapters.urdf import Frames, mjcf, own_frame
 
 LIMIT = {"pink": 1e-4}
 """Radians by which a tool may exceed a limit here: pink leaves DAQP at its own tolerance."""
 
 
-@pytest.mark.parametrize("name", installed_tools())
+@pytest.mark.parametrize("name", chosen_tools())
 def test_two_steps_keep_limits_and_feet(name: str, short_contact: Track) -> None:
     two = replace(short_contact, targets=short_contact.targets[[2, 4]])
     tool, verdict = followed(name, two)
@@ -36,7 +36,7 @@ def test_two_steps_keep_limits_and_feet(name: str, short_contact: Track) -> None
     assert np.allclose(tool.posture(), two.start, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", installed_tools())
+@pytest.mark.parametrize("name", chosen_tools())
 def test_a_far_target_is_approached_no_faster_than_joints_may(name: str, short_free: Track) -> None:
     one = replace(short_free, targets=short_free.targets[[-1]])
     tool = make_tool(name, one)
@@ -60,7 +60,7 @@ def test_the_moving_goal_has_the_derivative_that_differences_have(short_free: Tr
     assert np.allclose(goal.error(state), 0.0)
 
 
-@pytest.mark.parametrize("name", [name for name in installed_tools() if name.startswith("wholebody/")])
+@pytest.mark.parametrize("name", [name for name in chosen_tools() if name.startswith("wholebody/")])
 def test_our_step_keeps_the_speed_of_the_root_too(name: str, short_contact: Track) -> None:
     tool = make_tool(name, short_contact)
     postures = []

@@ -9,6 +9,7 @@ import pytest
 
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.suite.compare.results import Record
+from wholebody.bench.suite.problem_sets.registry import beside
 from wholebody.bench.tables import read_rows
 from wholebody.cli.bench import run as group
 
@@ -41,3 +42,14 @@ def test_what_cannot_be_is_refused_before_anything_is_computed(tmp_path: Path) -
         with pytest.raises(InputError, match="give 1 or more"):
             bench(option, "0", "--out", str(tmp_path / "c"))
     assert not list(tmp_path.iterdir())
+
+
+def test_held_out_sets_stand_beside_those_of_the_same_question(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("WHOLEBODY_ROBOTS", raising=False)
+    said: list[str] = []
+    assert beside(said.append) == (
+        "uniform_witnesses", "other_people", "other_clutter", "free_reach_several", "clutter",
+    )  # fmt: skip
+    assert "WHOLEBODY_ROBOTS" in said[0]
+    with pytest.raises(InputError, match="does not go with --held-out"):
+        bench("--held-out", "--sets", "clutter")

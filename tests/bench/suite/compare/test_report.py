@@ -53,7 +53,8 @@ def folder(asked: Settings, tmp_path_factory: pytest.TempPathFactory) -> Path:
         records.append(Record("arm", number, "hangs", 1e-4, 0, OVERTIME, said="ended after 20 s"))
         store.add(Chunk("arm", number, tuple(records)))
     missing = {"mink": "pip install 'wholebody[compare]'"}
-    publishing.publish(asked, store, place / "out", FACTS, missing, docs)
+    given = publishing.publish(asked, store, place / "out", FACTS, missing)
+    publishing.to_docs(given, place / "out", docs)
     return place
 
 

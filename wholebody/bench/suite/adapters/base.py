@@ -37,17 +37,10 @@ def _nothing(method: Any, problem: Problem) -> None:
 class Adapter:
     """A method as it takes part in comparisons.
 
-    Attributes:
-        name: "qp", "qp/osqp", "ccd", "newton/slack", ...; it has one colour in all charts.
-        make: a fresh method from a tolerance and the most iterations, as in a `Budget`.
-        loose: budgets from cheap to exact, that draw its curve of speed against accuracy; those of feasibility only
-            go before.
-        prepare: builds what a solve of a problem needs, so that it is not timed with it; raises InputError where the
-            method cannot express the problem.
-        hindered: a method, from a tolerance, whose quadratic programs are never finished, or that has one iteration;
-            None where `make` does the latter.
-        setup: how it was set up, for reports.
-        differences: what it cannot express, or does otherwise; one sentence each.
+    `make`: a fresh method from a tolerance and the most iterations; `loose`: budgets from cheap to exact, those of
+    feasibility only before the others; `prepare`: builds what a solve needs, untimed, or raises InputError where the
+    method cannot express a problem; `hindered`: a method whose quadratic programs are never finished, None where `make`
+    with one iteration stands for it; `setup` and `differences`: sentences for reports.
     """
 
     name: str
@@ -72,12 +65,7 @@ def few(*iterations: int) -> tuple[Budget, ...]:
 
 
 class Tool(ABC):
-    """Follows one reach, step by step, from its own last posture.
-
-    Attributes:
-        name: for tables.
-        failures: steps for which it found no answer; it then stays where it is.
-    """
+    """Follows a reach, step by step, from its own last posture; in steps without an answer it stays where it is."""
 
     name: str
     failures: int = 0
@@ -109,15 +97,12 @@ Built = TypeVar("Built")
 class Outside(SolvesAnew, ABC, Generic[Built]):
     """A tool as a method: refuses what it cannot express, and keeps what it builds while that is right.
 
-    Attributes:
-        name: as in reports.
-        kinds: the terms that it can express.
-        tolerance: metres and radians to which goals and constraints are met.
-        iterations: most iterations; None for the tool's own default.
+    `kinds` are the terms that it can express; None as `iterations` is the tool's own default.
     """
 
     name: ClassVar[str]
     kinds: ClassVar[tuple[type, ...]]
+    loose: ClassVar[tuple[Budget, ...]] = (*few(5, 10, 20), *LADDER)
 
     def __init__(self, tolerance: float, iterations: int | None = None) -> None:
         """Take a budget."""
@@ -132,11 +117,7 @@ class Outside(SolvesAnew, ABC, Generic[Built]):
 
     @abstractmethod
     def build(self, problem: Problem) -> Built:
-        """What the tool needs besides what may change.
-
-        Raises:
-            InputError: the tool has no joint or shape of a kind that is needed.
-        """
+        """What the tool needs besides what may change; InputError where it has no such joint or shape."""
 
     def unsupported(self, problem: Problem) -> list[str]:
         """Names of what the tool cannot express."""
@@ -147,11 +128,7 @@ class Outside(SolvesAnew, ABC, Generic[Built]):
         return refusal(self.name, self.unsupported(problem))
 
     def prepare(self, problem: Problem) -> None:
-        """Build what the tool needs, unless it has it.
-
-        Raises:
-            InputError: the tool cannot express the problem, or its scene changed after it was stated.
-        """
+        """Build what the tool needs; InputError where it cannot express the problem, or the scene changed."""
         self.ready(problem)
 
     def ready(self, problem: Problem) -> Built:
@@ -167,12 +144,7 @@ class Outside(SolvesAnew, ABC, Generic[Built]):
 
 
 class OneCall(Outside[Built], ABC):
-    """A tool that is called once.
-
-    Attributes:
-        way: how it finds a posture, as solutions say it.
-        failure: why there is none, where it finds none.
-    """
+    """A tool that is called once; `way` is how it finds a posture, `failure` why there is none."""
 
     way: ClassVar[str]
     failure: ClassVar[str]
@@ -182,11 +154,7 @@ class OneCall(Outside[Built], ABC):
         """The tool's posture (nq,), None where it has none, and whether it says that the posture meets everything."""
 
     def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
-        """Find a posture.
-
-        Raises:
-            InputError: the tool cannot express the problem, or its scene changed after it was stated.
-        """
+        """Find a posture; InputError as in `prepare`."""
         began = time.perf_counter()
         built, figure = self.ready(problem), problem.scene.figure
         entry = TraceEntry(0.0, 0.0, 0.0, 0.0)

@@ -1,7 +1,4 @@
-"""drake: `InverseKinematics`, one nonlinear program for the whole posture, solved by SNOPT.
-
-Its classes are constraints: goals, holds, the least distance of all pairs and the limits hold together or not at all.
-"""
+"""drake: `InverseKinematics`, one nonlinear program for the whole posture, solved by SNOPT."""
 
 from __future__ import annotations
 
@@ -14,29 +11,21 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
-from wholebody.bench.suite.adapters.base import Adapter, OneCall, few
+from wholebody.bench.suite.adapters.base import OneCall, few
 from wholebody.bench.suite.adapters.loop import kept_apart, placements, posture_costs
 from wholebody.bench.suite.adapters.urdf import axis_of
+from wholebody.bench.suite.problem_sets.things import shape_of
 from wholebody.methods.differential import TOOL
 from wholebody.problem import Problem
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.residuals import PlacementResidual
 
 
-def drake_adapter() -> Adapter:
-    """The method: InverseKinematics of drake."""
-    return Adapter(
-        name="drake",
-        make=Drake,
-        prepare=Drake.prepare,
-        loose=(*few(10, 20, 50), *((tolerance, None) for tolerance in (1e-2, 1e-3, 1e-4, 1e-5))),
-    )
-
-
 class Drake(OneCall["_Plant"]):
     """drake's InverseKinematics as a method; its iterations are SNOPT's major ones."""
 
     name = "drake"
+    loose = (*few(10, 20, 50), *((tolerance, None) for tolerance in (1e-2, 1e-3, 1e-4, 1e-5)))
     kinds = (
         wb.Displacement, wb.Effort, wb.Frame, wb.Freeze, wb.Hold, wb.Orientation, wb.Point, wb.Relative, wb.StepLimit,
     )  # fmt: skip
@@ -60,13 +49,7 @@ class Drake(OneCall["_Plant"]):
 
 
 class _Plant:
-    """A MultibodyPlant of a scene, with the pairs of a problem.
-
-    Attributes:
-        plant: the MultibodyPlant.
-        bodies: its bodies by the index of our joint.
-        least: the least distance that every pair of its geometry keeps [m].
-    """
+    """A MultibodyPlant of a scene: bodies by the index of our joint, and the least distance of its pairs [m]."""
 
     def __init__(self, problem: Problem) -> None:
         from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
@@ -274,25 +257,16 @@ def _pose(place: pin.SE3) -> Any:
 
 def _shape(piece: Any, lower: float) -> tuple[Any, pin.SE3]:
     """A piece as a shape of drake's, and its placement; a half-space is lowered."""
-    from pydrake.geometry import Box, Capsule, Convex, Cylinder, Ellipsoid, Sphere
+    import pydrake.geometry as shapes
 
-    shape, place = piece.geometry, piece.placement
-    if isinstance(shape, coal.Sphere):
-        return Sphere(shape.radius), place
-    if isinstance(shape, coal.Capsule):
-        return Capsule(shape.radius, 2.0 * shape.halfLength), place
-    if isinstance(shape, coal.Cylinder):
-        return Cylinder(shape.radius, 2.0 * shape.halfLength), place
-    if isinstance(shape, coal.Box):
-        return Box(*(2.0 * np.array(shape.halfSide))), place
-    if isinstance(shape, coal.Ellipsoid):
-        return Ellipsoid(*np.array(shape.radii)), place
-    if isinstance(shape, coal.ConvexBase):
-        points = np.array([shape.point(k) for k in range(shape.num_points)])
-        return Convex(points.T.copy(), piece.name.replace("\n", " ")), place
-    if isinstance(shape, coal.Halfspace):
-        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), np.array(shape.n)).matrix()
-        edge = 50.0  # m: of the box that stands for a half-space
-        middle = (shape.d - lower - 0.5 * edge) * np.array(shape.n)
-        return Box(edge, edge, edge), place * pin.SE3(turn, middle)
-    raise InputError(f"{piece.name!r} is a {type(shape).__name__}; drake's plant is made for convex shapes")
+    place, (kind, lengths) = piece.placement, shape_of(piece.geometry)
+    if kind in ("sphere", "capsule", "cylinder", "box", "ellipsoid"):
+        return getattr(shapes, kind.capitalize())(*lengths), place
+    if kind == "hull":
+        points = np.array([piece.geometry.point(k) for k in range(piece.geometry.num_points)])
+        return shapes.Convex(points.T.copy(), piece.name.replace("\n", " ")), place
+    if kind == "half-space":
+        normal, edge = np.array(lengths[:3]), 50.0  # m: of the box that stands for a half-space
+        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal).matrix()
+        return shapes.Box(edge, edge, edge), place * pin.SE3(turn, (lengths[3] - lower - 0.5 * edge) * normal)
+    raise InputError(f"{piece.name!r} is a {kind}; drake's plant is made for convex shapes")

@@ -11,7 +11,7 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.files import Scratch
-from wholebody.bench.suite.adapters.base import LADDER, Adapter, few
+from wholebody.bench.suite.adapters.base import LADDER, few
 from wholebody.bench.suite.adapters.loop import Loop, Stepper, kept_apart, placements, posture_costs, size
 from wholebody.bench.suite.adapters.urdf import Frames, joint_name, piece_name, write_urdf
 from wholebody.methods.base import named_terms
@@ -19,20 +19,11 @@ from wholebody.methods.differential import TOOL, StepError
 from wholebody.problem import Problem
 
 
-def embodik_adapter() -> Adapter:
-    """The kinematics of embodik in our loop."""
-    return Adapter(
-        name="embodik",
-        make=EmbodikLoop,
-        prepare=EmbodikLoop.prepare,
-        loose=(*few(10, 20, 50), *LADDER),
-    )
-
-
-class EmbodikLoop(Loop):
+class Embodik(Loop):
     """Steps of embodik."""
 
     name = "embodik"
+    loose = (*few(10, 20, 50), *LADDER)
     longest = 1.0  # it bounds its steps itself, by the joints' limits of speed
     kinds: ClassVar[tuple[type, ...]] = (
         wb.Displacement, wb.Effort, wb.Frame, wb.Freeze, wb.Orientation, wb.Point,
@@ -129,7 +120,7 @@ class _EmbodikStepper:
         """State the pairs: one least distance, and others for the pairs that have another."""
         problem, pieces = self._problem, self._problem.scene.geometry.geometryObjects
         asked: dict[tuple[str, str], float] = {}
-        for pair in kept_apart(problem, EmbodikLoop.margin * size(problem.scene.figure), held=False):
+        for pair in kept_apart(problem, Embodik.margin * size(problem.scene.figure), held=False):
             moves = not (pieces[pair.first].parentJoint and pieces[pair.second].parentJoint)
             names = piece_name(pair.first), piece_name(pair.second)
             asked[names] = pair.clearance + max(pair.margin, room if moves else 0.0)

@@ -23,12 +23,7 @@ from wholebody.solution import Solution
 
 
 class PostureCost(NamedTuple):
-    """A measure as a weighted squared distance from a posture.
-
-    Attributes:
-        reference: (nq,) that posture.
-        weights: (nv,) from 0 to 1.
-    """
+    """A measure as a squared distance from a posture (nq,), with weights (nv,) from 0 to 1."""
 
     reference: Array
     weights: Array
@@ -38,22 +33,16 @@ class Stepper(differential.Stepper, Protocol):
     """A tool, set up for one problem."""
 
     def begin(self, room: float) -> None:
-        """State the problem's present goals, constraints and places of objects by the tool's classes.
-
-        Args:
-            room: beside things that move, what pairs keep beyond their clearances [m]; 0 where nothing moves.
-        """
+        """State the problem as it is now; `room` is what pairs keep beyond clearances [m] beside moving things."""
 
 
 class Loop(Outside[Stepper], ABC):
     """A tool as a method: refuses what it cannot express, builds its model, and iterates its steps.
 
-    Attributes:
-        kinds: terms that the tool can express, besides holds of whole frames.
-        longest: most that anything moves in one step, radians and shares of the figure's size.
-        margin: most that a pair keeps beyond its clearance, as a share of the figure's size: 1 mm for a person. Less
-            fits into narrower gaps, more is against what linearised rows leave out.
-        out: share of the room beside things that move that a pair which lacks it gains in one step.
+    `kinds`: terms that the tool can express, besides holds of whole frames. `longest`: most that anything moves in one
+    step, radians and shares of the figure's size. `margin`: most that a pair keeps beyond its clearance, as a share of
+    the size: less fits into narrower gaps, more is against what linearised rows leave out. `out`: share of the room
+    beside things that move that a pair which lacks it gains in one step.
     """
 
     longest: ClassVar[float] = 0.05
@@ -75,15 +64,7 @@ class Loop(Outside[Stepper], ABC):
         return problem.scene, problem.goals, problem.constraints, problem.bounds, problem.measures, problem.clearances
 
     def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
-        """Find a posture.
-
-        Args:
-            problem: to be solved.
-            progress: see `wholebody.methods.control.Progress`.
-
-        Raises:
-            InputError: the tool cannot express the problem, or its scene changed after it was stated.
-        """
+        """Find a posture; InputError where the tool cannot express the problem, or its scene changed."""
         began = time.perf_counter()
         stepper, room = self.ready(problem), self._room(problem)
         longest = self.longest * max(1.0, size(problem.scene.figure))  # the tool bounds turns and lengths apart
@@ -141,11 +122,7 @@ def posture_costs(problem: Problem) -> list[PostureCost]:
 
 
 def size(figure: Figure) -> float:
-    """Length of the longest chain of joints and frames from the root, metres; a person's is 1 to 2 m.
-
-    What tools bound or look for in metres is given to them as shares of it: 10 cm is far for a hand and near for a
-    crane.
-    """
+    """Length of the longest chain of joints and frames from the root, metres: lengths are shares of it."""
     model = figure.model
     there = np.zeros(model.njoints)
     for index in range(1, model.njoints):
@@ -159,8 +136,7 @@ def size(figure: Figure) -> float:
 def margins(problem: Problem, most: float) -> Array:
     """What each pair keeps beyond its clearance (pairs,) [m]: at most so much, and no more than the start allows.
 
-    Rows are linear, and steps have a length: a pair that is asked for its clearance exactly ends nearer. One that rests
-    at its clearance has no margin.
+    Rows are linear, and steps have a length: a pair that is asked for its clearance exactly ends nearer.
     """
     found = np.full(len(problem.clearances), most)
     if most <= 0.0:
@@ -196,10 +172,8 @@ class Pair(NamedTuple):
 def kept_apart(problem: Problem, margin: float, held: bool = True) -> list[Pair]:
     """Pairs that can move against each other, with margins of at most `margin` metres.
 
-    `held` says whether hard tasks hold what the problem holds.
-
-    A foot that a hard task holds stands on the floor as it does at the start. Its pair and its task would ask for the
-    same to first order and for different things to second order, which leaves a program no solution.
+    `held` says whether hard tasks hold what the problem holds. The pair of a held foot and the floor is left out: with
+    the task it would leave a program no solution, since the two differ to second order.
     """
     pieces = problem.scene.geometry.geometryObjects
     still = {0}

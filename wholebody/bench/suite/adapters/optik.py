@@ -11,26 +11,17 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.files import Scratch
-from wholebody.bench.suite.adapters.base import Adapter, OneCall
+from wholebody.bench.suite.adapters.base import OneCall
 from wholebody.bench.suite.adapters.urdf import add_model_joint
 from wholebody.methods.differential import TOOL
 from wholebody.problem import Problem
-
-
-def optik_adapter() -> Adapter:
-    """The method: `Robot.ik` of optik."""
-    return Adapter(
-        name="optik",
-        make=Optik,
-        prepare=Optik.prepare,
-        loose=tuple((tolerance, None) for tolerance in (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8)),
-    )
 
 
 class Optik(OneCall["_Chain"]):
     """optik as a method. It has no count of iterations."""
 
     name = "optik"
+    loose = tuple((tolerance, None) for tolerance in (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8))
     kinds = (wb.Displacement, wb.Effort, wb.Frame)
     way = "by its restarts"
     failure = "optik found no posture in its time"

@@ -156,7 +156,7 @@ def reach_problem(track: Track, **terms: Any) -> tuple[wb.Problem, MovingPoint]:
     return stated, goal
 
 
-class WholebodyTool(Tool):
+class OwnTool(Tool):
     """One program a step, with the workspace of the step before."""
 
     def __init__(self, track: Track, solver: str = "") -> None:

@@ -1,11 +1,8 @@
-"""pink: `solve_ik` with its tasks, limits and SelfCollisionBarrier; the QPs are solved by DAQP.
-
-To solve a problem it is iterated; a reach is followed with one call a step.
-"""
+"""pink: tasks, limits and SelfCollisionBarrier on our own Pinocchio model."""
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 import coal
 import numpy as np
@@ -14,167 +11,109 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.bench.measure.track import SETTING, Track
-from wholebody.bench.suite.adapters.base import FEASIBILITY_ONLY, LADDER, Adapter, Tool, few
-from wholebody.bench.suite.adapters.loop import Loop, Stepper, kept_apart, longest_moves, posture_costs, size
-from wholebody.methods.differential import TOOL, StepError
+from wholebody.bench.suite.adapters.base import FEASIBILITY_ONLY
+from wholebody.bench.suite.adapters.loop import Loop, Stepper, kept_apart, longest_moves, size
+from wholebody.bench.suite.adapters.tasks import TaskStepper, TaskTool
 from wholebody.problem import Problem
+from wholebody.tasks.inputs import Place
 from wholebody.tasks.residuals import PlacementResidual
 
 NEAREST = 20  # pairs that its barrier looks at; it gets slower with more
 
 
-def pink_adapter() -> Adapter:
-    """The kinematics of pink in our loop."""
-    return Adapter(
-        name="pink",
-        make=_pink,
-        prepare=PinkLoop.prepare,
-        loose=(*((tolerance, FEASIBILITY_ONLY) for tolerance in (1e-2, 1e-3, 1e-4)), *few(5, 10, 20), *LADDER),
-    )
-
-
-def _pink(tolerance: float, iterations: int | None) -> Loop:
-    return SafePinkLoop(tolerance) if iterations == FEASIBILITY_ONLY else PinkLoop(tolerance, iterations)
-
-
-class PinkLoop(Loop):
+class Pink(Loop):
     """Steps of pink."""
 
     name = "pink"
-    safe: ClassVar[float] = 0.0  # gain of the barrier's cost of leaving a safe displacement, which here is no motion
     longest = 0.0125  # twice that leaves pink no solution more often
     margin = 3.5e-4
+    loose = (*((tolerance, FEASIBILITY_ONLY) for tolerance in (1e-2, 1e-3, 1e-4)), *Loop.loose)
+
+    def __init__(self, tolerance: float, iterations: int | None = None) -> None:
+        """Take a budget; feasibility only has pink's default gain of leaving a safe displacement, here no motion."""
+        safe = iterations == FEASIBILITY_ONLY
+        super().__init__(tolerance, None if safe else iterations)
+        self.safe = float(safe)  # faster, and of more effort
 
     def build(self, problem: Problem) -> Stepper:
         """Copy our models."""
-        return _PinkStepper(problem, type(self))
+        return _PinkStepper(problem, self)
 
 
-class SafePinkLoop(PinkLoop):
-    """The same with pink's default of that gain: faster, and of more effort."""
+class _PinkStepper(TaskStepper):
+    def __init__(self, problem: Problem, loop: Pink) -> None:
+        import pink
 
-    safe = 1.0
-
-
-class _PinkStepper:
-    def __init__(self, problem: Problem, loop: type[PinkLoop]) -> None:
-        from pink.limits import FloatingBaseVelocityLimit
-
-        self._problem, self._safe, self._out, figure = problem, loop.safe, loop.out, problem.scene.figure
-        longest, margin = loop.longest, loop.margin * size(figure)
+        super().__init__(problem, pink)
+        self._safe, self._out, figure = loop.safe, loop.out, problem.scene.figure
         self._model = model = figure.model.copy()  # pink hangs attributes onto it
         for goal in problem.goals:
             if isinstance(goal, wb.Point):
-                _offset_frame(model, goal)
-        model.velocityLimit = longest_moves(figure, longest)
+                self._offset_frame(goal)
+        model.velocityLimit = longest_moves(figure, loop.longest)
         if figure.root == "free":
-            root = FloatingBaseVelocityLimit(model, None, longest * size(figure), longest)
-            model.floating_base_velocity_limit = root
+            _bound_root(model, loop.longest * size(figure), loop.longest)
         self._data = model.createData()
-        self._least = problem.clearance + margin
+        self._least = problem.clearance + loop.margin * size(figure)
         self._geometry, self._pieces = _geometry(problem, self._least)
 
     def begin(self, room: float) -> None:
-        """Make the tasks anew."""
+        """Place the pieces, and make the tasks anew."""
+        ours = self._problem.scene.geometry.geometryObjects
+        for number, (piece, shift) in enumerate(self._pieces):
+            self._geometry.geometryObjects[number].placement = ours[piece].placement * shift
+        self._room = room
+        super().begin(room)
+
+    def _keeping(self, held: list[PlacementResidual], frozen: set[int]) -> dict[str, Any]:
         from pink.barriers import SelfCollisionBarrier
 
-        problem, scene = self._problem, self._problem.scene
-        for number, (ours, shift) in enumerate(self._pieces):
-            self._geometry.geometryObjects[number].placement = scene.geometry.geometryObjects[ours].placement * shift
-        self._points: list[tuple[Any, Array]] = []
-        self._tasks = [self._goal(goal) for goal in problem.goals]
-        self._hard = [self._placement(term.residual, 1.0) for term in problem.constraints if isinstance(term, wb.Hold)]
-        frozen = [figure_dof for bound in problem.bounds if isinstance(bound, wb.Freeze)
-                  for figure_dof in scene.figure.dofs(bound.joints).tolist()]  # fmt: skip
+        hard = [self._placement(residual, 1.0) for residual in held]
         if frozen:
-            self._hard.append(self._joints(problem.start, sorted(set(frozen)), np.ones(len(set(frozen)))))
-        self._measures = []
-        for cost in posture_costs(problem):
-            dofs = np.flatnonzero(cost.weights > 0.0)
-            self._measures.append((self._joints(cost.reference, dofs, np.ones(len(dofs))), np.sqrt(cost.weights[dofs])))
-        pairs = len(self._geometry.collisionPairs)
-        self._barriers = (
-            [
-                SelfCollisionBarrier(
-                    min(NEAREST, pairs),
-                    # All that is free of a gap may be used up in one iteration: with less, held feet cannot
-                    # come back
-                    gain=self._out if room else 1.0,
-                    safe_displacement_gain=self._safe,
-                    d_min=self._least + room,
-                )
-            ]
-            if pairs
-            else []
-        )
-
-    def step(self, q: Array, weight: float, damping: float) -> Array:
-        """One `solve_ik`, with a time step of one second."""
-        import pink
-
-        with TOOL:
-            configuration = pink.Configuration(
-                self._model, self._data, q, copy_data=False, collision_model=self._geometry if self._barriers else None
+            hard.append(
+                self._joints(self._problem.start, np.isin(np.arange(self._model.nv), list(frozen)).astype(float))
             )
-        for task, place in self._points:
-            turn = configuration.get_transform_frame_to_world(task.frame).rotation
-            task.set_target(pin.SE3(turn, place))
-        for task, share in self._measures:
-            task.cost = weight**0.5 * share
-        try:
-            with TOOL:
-                velocity = pink.solve_ik(
-                    configuration, [*self._tasks, *(task for task, _ in self._measures)], 1.0, solver="daqp",
-                    damping=damping, barriers=self._barriers, constraints=self._hard, safety_break=False,
-                )  # fmt: skip
-        except pink.exceptions.NoSolutionFound as error:
-            raise StepError(f"{type(error).__name__}: its program has no solution") from None
-        return np.asarray(velocity, dtype=float)
+        pairs, barriers = len(self._geometry.collisionPairs), []
+        if pairs:
+            # All that is free of a gap may be used up in one iteration: with less, held feet cannot come back.
+            gain = self._out if self._room else 1.0
+            least = self._least + self._room
+            barriers.append(
+                SelfCollisionBarrier(min(NEAREST, pairs), gain=gain, safe_displacement_gain=self._safe, d_min=least)
+            )
+        return {"barriers": barriers, "constraints": hard, "safety_break": False}
 
-    def _goal(self, goal: Any) -> Any:
-        from pink.tasks import ComTask, FrameTask
+    def _configured(self, q: Array) -> Any:
+        pieces = self._geometry if len(self._geometry.collisionPairs) else None
+        return self._package.Configuration(self._model, self._data, q, copy_data=False, collision_model=pieces)
 
-        cost = goal.weight**0.5
-        if isinstance(goal, wb.Point):
-            task = FrameTask(_offset_name(goal), position_cost=cost, orientation_cost=0.0)
-            self._points.append((task, np.array(goal.resolved_target)))
-            return task
-        if isinstance(goal, wb.CenterOfMass):
-            task = ComTask(cost=[cost, cost, cost if goal.axes == "xyz" else 0.0])
-            task.set_target(np.array((*goal.resolved_target, 0.0)[:3]))
-            return task
-        if isinstance(goal, wb.Posture):
-            dofs = np.asarray(goal.dofs)
-            return self._joints(goal.resolved_target, dofs, np.full(len(dofs), cost))
-        return self._placement(goal.residual, cost)
+    def _named(self, place: Place, offset: Array | None = None) -> tuple[str, ...]:
+        name = self._model.frames[place.frame].name
+        return (name if offset is None else f"{name} at {offset.tolist()}",)
 
-    def _placement(self, residual: PlacementResidual, cost: float) -> Any:
-        from pink.tasks import FrameTask, RelativeFrameTask
+    def _joints(self, reference: Array, cost: Array) -> Any:
+        dofs = np.flatnonzero(cost > 0.0)
+        rows, zeros = np.eye(self._model.nv)[dofs], np.zeros(len(dofs))
+        return self._tasks.LinearHolonomicTask(rows, zeros, np.array(reference), cost=cost[dofs])
 
-        costs = {"position_cost": cost * residual.position, "orientation_cost": cost * residual.orientation}
-        target = residual.placement
-        names = [self._model.frames[place.frame].name for place in (residual.place, residual.base)]
-        task = RelativeFrameTask(*names, **costs) if residual.base.frame else FrameTask(names[0], **costs)
-        task.set_target(target)
-        return task
+    def _at(self, turned: pin.SE3, place: Array) -> Any:
+        return pin.SE3(turned.rotation, place)
 
-    def _joints(self, reference: Array, dofs: Any, cost: Array) -> Any:
-        from pink.tasks import LinearHolonomicTask
+    def _target(self, residual: PlacementResidual) -> Any:
+        return residual.placement
 
-        return LinearHolonomicTask(np.eye(self._model.nv)[dofs], np.zeros(len(dofs)), np.array(reference), cost=cost)
+    def _offset_frame(self, goal: wb.Point) -> None:
+        (name,), model = self._named(goal.place, goal.resolved_offset), self._model
+        if not model.existFrame(name):
+            frame = model.frames[goal.place.frame]
+            there = frame.placement * pin.SE3(np.eye(3), goal.resolved_offset)
+            model.addFrame(pin.Frame(name, frame.parentJoint, goal.place.frame, there, pin.FrameType.OP_FRAME))
 
 
-def _offset_name(goal: wb.Point) -> str:
-    return f"{goal.frame} at {goal.resolved_offset.tolist()}"
+def _bound_root(model: Any, speed: float, turn: float) -> None:
+    from pink.limits import FloatingBaseVelocityLimit
 
-
-def _offset_frame(model: Any, goal: wb.Point) -> None:
-    frame = model.frames[goal.place.frame]
-    there = frame.placement * pin.SE3(np.eye(3), goal.resolved_offset)
-    if not model.existFrame(_offset_name(goal)):
-        model.addFrame(
-            pin.Frame(_offset_name(goal), frame.parentJoint, goal.place.frame, there, pin.FrameType.OP_FRAME)
-        )
+    model.floating_base_velocity_limit = FloatingBaseVelocityLimit(model, None, speed, turn)
 
 
 def _geometry(problem: Problem, least: float) -> tuple[Any, list[tuple[int, Any]]]:
@@ -197,15 +136,14 @@ def _geometry(problem: Problem, least: float) -> tuple[Any, list[tuple[int, Any]
     for first, second, clearance, _ in kept_apart(problem, 0.0):
         surface = isinstance(ours.geometryObjects[second].geometry, coal.Halfspace)
         resting = clearance < problem.clearance or (problem.clearance == 0.0 and surface)
-        if not resting:
-            made.addCollisionPair(pin.CollisionPair(piece(first, 0.0), piece(second, 0.0)))
-        elif surface:
-            made.addCollisionPair(pin.CollisionPair(piece(first, 0.0), piece(second, least - clearance)))
+        if not resting or surface:
+            lower = least - clearance if resting else 0.0
+            made.addCollisionPair(pin.CollisionPair(piece(first, 0.0), piece(second, lower)))
     return made, pieces
 
 
-class PinkTool(Tool):
-    """One `solve_ik` and `integrate_inplace` a step."""
+class PinkTool(TaskTool):
+    """pink along a reach."""
 
     name = "pink"
 
@@ -213,53 +151,31 @@ class PinkTool(Tool):
         """Set the tasks up."""
         import pink
         from pink.barriers import SelfCollisionBarrier
-        from pink.limits import FloatingBaseVelocityLimit
-        from pink.tasks import FrameTask, PostureTask
 
-        self._pink, self._scene = pink, track.scene
-        self._model = track.scene.model.copy()
+        self._package = pink
+        self._geometry, self._model = track.scene.geometry, track.scene.model.copy()
         self._model.velocityLimit = np.full(self._model.nv, SETTING.joint_speed)
         if track.floating:
-            root = FloatingBaseVelocityLimit(self._model, None, SETTING.root_speed, SETTING.root_turn)
-            self._model.floating_base_velocity_limit = root
-        self._solvers_failure = pink.exceptions.NoSolutionFound
-        self.reset(track.start)
-        self._reach = FrameTask(track.tip, position_cost=1.0, orientation_cost=0.0)
-        self._at = pin.SE3.Identity()
-        posture = PostureTask(cost=SETTING.posture_cost)
-        posture.set_target(track.start)
-        self._tasks = [self._reach, posture]
-        self._feet = [FrameTask(foot, position_cost=1.0, orientation_cost=1.0) for foot in track.feet]
-        for task in self._feet:
-            task.set_target_from_configuration(self._configuration)
+            _bound_root(self._model, SETTING.root_speed, SETTING.root_turn)
+        self.begin(track)
         pairs = min(NEAREST, track.pairs)
         # Half of what is free of a gap may be used up in one step.
-        self._barriers = (
-            [SelfCollisionBarrier(n_collision_pairs=pairs, gain=0.5 / SETTING.dt, d_min=track.clearance)]
-            if pairs
-            else []
-        )
+        barrier = SelfCollisionBarrier(pairs, gain=0.5 / SETTING.dt, d_min=track.clearance) if pairs else None
+        self._kept = {"barriers": [barrier] if pairs else [], "constraints": self._feet, "safety_break": False}
 
     def reset(self, q: Array) -> None:
         """Go to a posture."""
-        self._configuration = self._pink.Configuration(
-            self._model, self._model.createData(), np.array(q), collision_model=self._scene.geometry
+        data = self._model.createData()
+        self._configuration = self._package.Configuration(
+            self._model, data, np.array(q), collision_model=self._geometry
         )
         self.failures = 0
 
-    def step(self, target: Array) -> None:
-        """Move one step."""
-        self._at.translation = target
-        self._reach.set_target(self._at)
-        try:
-            velocity = self._pink.solve_ik(
-                self._configuration, self._tasks, SETTING.dt, solver="daqp", damping=SETTING.posture_cost**2,
-                barriers=self._barriers, constraints=self._feet, safety_break=False,
-            )  # fmt: skip
-        except self._solvers_failure:
-            self.failures += 1
-            return
-        self._configuration.integrate_inplace(velocity, SETTING.dt)
+    def _posture_task(self) -> Any:
+        return self._package.tasks.PostureTask(cost=SETTING.posture_cost)
+
+    def _there(self, target: Array) -> Any:
+        return pin.SE3(np.eye(3), target)
 
     def posture(self) -> Array:
         """Where it is."""

@@ -1,14 +1,13 @@
 """placo: our method of that name, and `KinematicsSolver` with its documented tasks for a reach.
 
-In a reach, feet and the self-collision constraint are hard tasks. placo knows collisions of a robot with itself only.
-The objects are added to its collision model, fixed to the world; it then treats them as parts of the robot.
+placo knows collisions of a robot with itself only, so the objects are added to its collision model.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
@@ -16,25 +15,16 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.bench.measure.track import SETTING, Track
-from wholebody.bench.suite.adapters.base import LADDER, Adapter, Tool, few, made
+from wholebody.bench.suite.adapters.base import Tool
 from wholebody.bench.suite.adapters.urdf import own_frame
+from wholebody.methods.placo.method import Placo
 from wholebody.methods.placo.robot import Robot
 from wholebody.problem import Problem
 from wholebody.scene.geometry_model import SceneGeometry
 
 
-def placo_adapter(variant: str = "") -> Adapter:
-    """The adapter to placo's kinematics solver; with the pairs of a figure "pruned"."""
-    return Adapter(
-        name=f"placo/{variant}".removesuffix("/"),
-        make=partial(made, PrunedPlaco if variant else wb.methods.Placo, {}),
-        prepare=wb.methods.Placo.prepare,
-        loose=(*few(5, 10, 20), *LADDER),
-    )
-
-
 @dataclass(frozen=True)
-class PrunedPlaco(wb.methods.Placo):
+class PrunedPlaco(Placo):
     """placo without the pairs of a figure with itself that do not come near: what its users prune in a robot's file."""
 
     def pairs(self, problem: Problem) -> Indices:
@@ -123,12 +113,7 @@ class PrunedPlacoTool(PlacoTool):
 
 @lru_cache(maxsize=4)
 def near_pairs(scene: wb.Scene, start: bytes) -> Sequence[tuple[int, int]]:
-    """Pairs of pieces that come nearer than `Setting.within` in 2000 sampled postures.
-
-    Args:
-        scene: whose pairs.
-        start: (nq,) posture about which the root is sampled, as bytes.
-    """
+    """Pairs of pieces nearer than `Setting.within` in one of 2000 postures about that of the bytes `start`."""
     found = _sampled(scene, np.frombuffer(start), 2000, SETTING.within)
     pairs = [(pair.first, pair.second) for pair in scene.geometry.collisionPairs]
     return [pair for pair, near in zip(pairs, found, strict=True) if near]

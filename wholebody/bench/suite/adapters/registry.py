@@ -9,14 +9,13 @@ from importlib import import_module
 from importlib.util import find_spec
 from inspect import signature
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from wholebody.base.errors import MissingPackageError, UnknownNameError
 from wholebody.base.files import parsed_toml
 from wholebody.base.records import with_values
 from wholebody.bench.measure.track import Track
-from wholebody.bench.suite.adapters.base import LADDER, Adapter, Tool
+from wholebody.bench.suite.adapters.base import LADDER, Adapter, Outside, Tool, made
 from wholebody.bench.suite.adapters.own import NEWTONS, ccd_adapter, dls_adapter, newton_adapter, one_start, qp_adapter
 from wholebody.bench.suite.adapters.starts import ONE, STARTS, restarted
 from wholebody.methods.base import Method
@@ -45,14 +44,10 @@ class _Row(NamedTuple):
 def adapters(names: Iterable[str] | None = None, starts: bool = False) -> tuple[Adapter, ...]:
     """The adapters of these names, in the order given; where None, one of each algorithm that is installed.
 
-    The name of a method with several adapters and none of that name, such as "newton", means all that are installed;
-    "all" means every method that is installed, "module:Class" a method of one's own. Methods that differ from another
-    in their starts alone, such as "qp/one_start" and "mink/starts", are among several only if `starts` is true.
-
-    Raises:
-        UnknownNameError: there is no such adapter.
-        MissingPackageError: what it needs is not installed.
-        InputError: a method of one's own cannot be imported.
+    "newton", a method with several adapters, means all that are installed; "all" means every method that is installed,
+    "module:Class" a method of one's own. Methods that differ from another in their starts alone are among several only
+    if `starts` is true. Raises UnknownNameError, MissingPackageError, or InputError where a method of one's own cannot
+    be imported.
     """
     rows = _rows()
     if names is None:
@@ -60,24 +55,24 @@ def adapters(names: Iterable[str] | None = None, starts: bool = False) -> tuple[
         usual = (*listed["usual"], *(listed["further"] if starts else ()))
         return tuple(rows[name].build() for name in usual if rows[name].installed())
     families = {name.partition("/")[0] for name in rows}
-    plain = [name for name in rows if starts or not name.endswith((f"/{ONE}", f"/{STARTS}"))]
-    chosen: dict[str, None] = {}
+    several = [
+        name
+        for name, row in rows.items()
+        if row.installed() and (starts or not name.endswith((f"/{ONE}", f"/{STARTS}")))
+    ]
+    chosen: list[str] = []
     for name in names:
         if ":" in name:
             rows[name] = _Row(partial(_own, name))
-            chosen[name] = None
-        elif name == "all":
-            chosen.update(dict.fromkeys(key for key in plain if rows[key].installed()))
-        elif name in rows:
-            chosen[name] = None
-        elif name in families:
-            family = (key for key in plain if key.startswith(f"{name}/"))
-            chosen.update(dict.fromkeys(key for key in family if rows[key].installed()))
+        if name in rows:
+            chosen.append(name)
+        elif name == "all" or name in families:
+            chosen += [key for key in several if name in ("all", key.partition("/")[0])]
         else:
             raise UnknownNameError("method", name, {*rows, *families, "all"})
     for name in chosen:
         rows[name].check(name)
-    return tuple(rows[name].build() for name in chosen)
+    return tuple(rows[name].build() for name in dict.fromkeys(chosen))
 
 
 def names() -> tuple[str, ...]:
@@ -86,20 +81,19 @@ def names() -> tuple[str, ...]:
 
 
 def installed(name: str) -> bool:
-    """Whether what an adapter needs is installed; false for a name that is none."""
-    row = _rows().get(name)
-    return row is not None and row.installed()
+    """Whether what an adapter needs is installed."""
+    return _rows()[name].installed()
 
 
 def missing() -> Mapping[str, str]:
     """Adapters whose packages are not installed -> the command that installs them."""
-    return MappingProxyType({name: row.command() for name, row in _rows().items() if not row.installed()})
+    return {name: row.command() for name, row in _rows().items() if not row.installed()}
 
 
 def _rows() -> dict[str, _Row]:
     """All methods, in the order of reports."""
-    rows = {"qp": _Row(partial(qp_adapter, ""))}
-    rows |= {f"qp/{solver}": _Row(partial(qp_adapter, solver)) for solver in ("active_set", "osqp", "daqp")}
+    rows = {f"qp/{solver}".removesuffix("/"): _Row(partial(qp_adapter, solver))
+            for solver in ("", "active_set", "osqp", "daqp")}  # fmt: skip
     for solver, need in _texts()["solvers"].items():
         rows[f"qp/{solver}"] = _Row(partial(qp_adapter, solver), (need,), "solvers")
     for solver in solver_names():  # any other that qpsolvers finds on this machine
@@ -109,18 +103,23 @@ def _rows() -> dict[str, _Row]:
     outside = {name: said for name, said in _texts().items() if "extra" in said}
     rows |= {name: _Row(partial(_outside, name), said["modules"], said["extra"]) for name, said in outside.items()}
     rows |= {f"{family}/{ONE}": _Row(partial(one_start, family)) for family in ("qp", "newton", "ccd")}
-    rows = {name: with_values(row, build=partial(_described, name, row)) for name, row in rows.items()}
+    rows = {name: with_values(row, build=partial(_described, name, row.build)) for name, row in rows.items()}
     for family in ("qp", "newton", "ccd", "dls", "placo", "mink", "pink", "drake", "embodik"):
-        row = rows[f"{family}/{ONE}"] if f"{family}/{ONE}" in rows else rows[family]
-        rows[f"{family}/{STARTS}"] = with_values(row, build=partial(_restarted, row))
+        row = rows[f"{family}/{ONE}" if f"{family}/{ONE}" in rows else family]
+        rows[f"{family}/{STARTS}"] = with_values(row, build=partial(_restarted, row.build))
     return rows
 
 
+def _class_of(name: str, end: str = "") -> Any:
+    """The class of an adapter's module, such as Placo, PrunedPlaco or PlacoTool."""
+    family, _, variant = name.partition("/")
+    module = import_module(f"wholebody.bench.suite.adapters.{family}")
+    return getattr(module, f"{variant.capitalize()}{family.capitalize()}{end}")
+
+
 def _outside(name: str) -> Adapter:
-    module, _, variant = name.partition("/")
-    build = getattr(import_module(f"wholebody.bench.suite.adapters.{module}"), f"{module}_adapter")
-    made: Adapter = build(variant) if variant else build()
-    return made
+    kind = _class_of(name)
+    return Adapter(name, partial(made, kind, {}), getattr(kind, "loose", Outside.loose), kind.prepare)
 
 
 def _own(name: str) -> Adapter:
@@ -136,21 +135,21 @@ def _made(kind: Callable[..., Method], known: frozenset[str], tolerance: float, 
     return kind(**{name: value for name, value in asked.items() if name in known and value is not None})
 
 
-def _described(name: str, row: _Row) -> Adapter:
-    """The adapter of a row with its texts; those of a QP solver have its name in place of SOLVER."""
+def _described(name: str, build: Callable[[], Adapter]) -> Adapter:
+    """An adapter with its texts; those of a QP solver have its name in place of SOLVER."""
     said = _texts()[name if name in _texts() else "qp/SOLVER"]
     setup = said["setup"].replace("SOLVER", name.rpartition("/")[2])
-    return replace(row.build(), setup=setup, differences=tuple(said.get("differences", ())))
+    return replace(build(), setup=setup, differences=tuple(said.get("differences", ())))
+
+
+def _restarted(build: Callable[[], Adapter]) -> Adapter:
+    return restarted(build())
 
 
 @cache
 def _texts() -> dict[str, Any]:
     file = Path(__file__).with_name("adapters.toml")
     return parsed_toml(file.read_text("utf-8"), file.name)
-
-
-def _restarted(row: _Row) -> Adapter:
-    return restarted(row.build())
 
 
 @cache
@@ -160,45 +159,25 @@ def stepping() -> tuple[str, ...]:
     return "wholebody", *ours, "placo", "placo/pruned", "pink", "mink"
 
 
-def _row_of(tool: str) -> _Row:
-    return _rows()[tool.replace("wholebody", "qp")]
-
-
-def installed_tools() -> tuple[str, ...]:
-    """Names of the tools whose packages are installed."""
-    return tuple(name for name in stepping() if _row_of(name).installed())
-
-
-def chosen_tools(names: Iterable[str] | None) -> tuple[str, ...]:
-    """Check names of tools; all installed ones where None.
-
-    Raises:
-        UnknownNameError: there is no such tool.
-        MissingPackageError: its packages are not installed.
-    """
+def chosen_tools(names: Iterable[str] | None = None) -> tuple[str, ...]:
+    """Names of tools, all installed ones where None; UnknownNameError or MissingPackageError for one that is not."""
+    rows = {name: _rows()[name.replace("wholebody", "qp")] for name in stepping()}
     if names is None:
-        return installed_tools()
+        return tuple(name for name, row in rows.items() if row.installed())
     chosen = tuple(names)
     for name in chosen:
-        if name not in stepping():
-            raise UnknownNameError("tool", name, stepping())
-        _row_of(name).check(name)
+        if name not in rows:
+            raise UnknownNameError("tool", name, rows)
+        rows[name].check(name)
     return chosen
 
 
 def make_tool(name: str, track: Track) -> Tool:
-    """Set a tool up for a reach.
-
-    Raises:
-        UnknownNameError: there is no such tool.
-        MissingPackageError: its packages are not installed.
-    """
+    """Set a tool up for a reach; errors as in `chosen_tools`."""
     (name,) = chosen_tools([name])
-    family, _, variant = name.partition("/")
-    module = "own" if family == "wholebody" else family
-    kind = "PrunedPlaco" if name == "placo/pruned" else family.capitalize()
-    made = getattr(import_module(f"wholebody.bench.suite.adapters.{module}"), f"{kind}Tool")
-    tool: Tool = made(track, variant) if family == "wholebody" else made(track)
+    family, _, solver = name.partition("/")
+    ours = family == "wholebody"
+    tool: Tool = _class_of("own", "Tool")(track, solver) if ours else _class_of(name, "Tool")(track)
     return tool
 
 

@@ -1,8 +1,7 @@
 """Any method from one start or from many: further starts by one rule and one time for all, so that they compare.
 
-Where a method ends without an answer it starts again elsewhere until the time is over, and the best answer counts. A
-start is the problem's own with its joints moved at random within the limits, free of overlap. The root, and all joints
-between it and a frame that the problem holds in the world, stay, so that holds are met where the search begins.
+A start is the problem's own with its joints moved at random within the limits, free of overlap. The root, and all
+joints between it and a frame that the problem holds in the world, stay, so that holds are met where the search begins.
 """
 
 from __future__ import annotations
@@ -34,11 +33,9 @@ STARTS, ONE = "starts", "one_start"
 
 
 class Restarted:
-    """A method with one start that starts again elsewhere where it ends without an answer.
+    """A method with one start that starts again elsewhere where it ends without an answer, and the best answer counts.
 
-    Attributes:
-        method: what solves from each start.
-        seconds: processor time of all starts of a solve; the last one that began within it is finished.
+    The last start that began within so many seconds of the processor is finished.
     """
 
     def __init__(self, method: Any, prepare: Callable[[Any, Problem], None], seconds: float = 1.5) -> None:
@@ -61,11 +58,7 @@ class Restarted:
         self._prepare(self.method, problem)
 
     def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
-        """The first answer that is solved, or the best one when the time is over.
-
-        Raises:
-            InputError: the method cannot express the problem.
-        """
+        """The first answer that is solved, or the best one when the time is over."""
         began, worked = time.perf_counter(), processor_time()
         best: Solution = self.method.solve(problem, progress)
         tried, judging = 1, best.assessment.seconds

@@ -8,13 +8,13 @@ from types import MappingProxyType
 from typing import Any
 from xml.etree import ElementTree
 
-import coal
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.bench.suite.adapters.loop import size
+from wholebody.bench.suite.problem_sets.things import shape_of
 from wholebody.figures.figure import Figure
 from wholebody.figures.urdf.writing import FOLLOWS, UrdfAxis, add_joint, exact, urdf_axis
 from wholebody.scene.scene import Scene
@@ -52,16 +52,9 @@ def piece_name(number: int) -> str:
 def write_urdf(scene: Scene, frames: Mapping[str, tuple[int, pin.SE3]], folder: Path) -> Path:
     """Write a scene as URDF, with a file for each hull, and return its path.
 
-    Every piece and every frame is a link of its own, fixed to the link that carries it. Objects are fixed to the root.
-    Links have no mass. A half-space is the top of a box.
-
-    Args:
-        scene: a figure with turning and sliding joints on a fixed root, and things.
-        frames: names of further links -> our joint and the placement in it.
-        folder: for the files.
-
-    Raises:
-        InputError: a joint or a shape that this translation does not know.
+    Every piece and every frame is a link of its own, fixed to the link that carries it, without mass. Objects are fixed
+    to the root. A half-space is the top of a box. `frames` has names of further links, our joint and the placement in
+    it. Raises InputError for a joint or a shape that this translation does not know.
     """
     model = scene.model
     top = ElementTree.Element("robot", name="figure")
@@ -72,8 +65,10 @@ def write_urdf(scene: Scene, frames: Mapping[str, tuple[int, pin.SE3]], folder: 
     for number, piece in enumerate(scene.geometry.geometryObjects):
         shape, shift = _shape(scene, piece, folder / f"{number}.obj")
         _fixed(top, piece_name(number), piece.parentJoint, piece.placement * shift).append(shape)
-        link = top[-2]
-        link.append(_convexity(piece))
+        # Pinocchio's extension of URDF: which cylinders are capsules, and which meshes are hulls.
+        checked = {"capsule": "capsule", "hull": "convex"}.get(shape_of(piece.geometry)[0])
+        if checked:
+            ElementTree.SubElement(ElementTree.SubElement(top[-2], "collision_checking"), checked, name="shape")
     for name, (joint, place) in frames.items():
         _fixed(top, name, joint, place)
     path = folder / "scene.urdf"
@@ -86,11 +81,7 @@ def _link(index: int) -> str:
 
 
 def add_model_joint(top: ElementTree.Element, model: Any, index: int, parent: str, child: str) -> None:
-    """Add a turning or sliding joint of a model, with its placement, axis and limits, between two links.
-
-    Raises:
-        InputError: a joint of another kind.
-    """
+    """Add a turning or sliding joint of a model between two links; InputError for a joint of another kind."""
     joint, known = model.joints[index], axis_of(model, index, "URDF is written for turning and sliding joints")
     speed, fast = float(model.velocityLimit[joint.idx_v]), 1e3  # rad/s, m/s: in place of a limit that is none
     limit = {"effort": 1.0, "velocity": speed if 0.0 < speed < fast else fast}
@@ -102,11 +93,7 @@ def add_model_joint(top: ElementTree.Element, model: Any, index: int, parent: st
 
 
 def axis_of(model: Any, index: int, written_for: str) -> UrdfAxis:
-    """Kind and axis of a joint that turns about or slides along one axis by itself.
-
-    Raises:
-        InputError: a joint of another kind; `written_for` ends the sentence.
-    """
+    """Kind and axis of a joint of one axis; InputError for another, whose sentence `written_for` ends."""
     known, kind = urdf_axis(model, index), model.joints[index].shortname()
     if known is None or kind == FOLLOWS:
         raise InputError(f"joint {model.names[index]!r} is a {kind}; {written_for}")
@@ -120,40 +107,29 @@ def _fixed(top: ElementTree.Element, name: str, joint: int, place: pin.SE3) -> E
     return link
 
 
-def _convexity(piece: Any) -> ElementTree.Element:
-    """Pinocchio's extension of URDF: which cylinders are capsules, and which meshes are hulls."""
-    made = ElementTree.Element("collision_checking")
-    if isinstance(piece.geometry, coal.Capsule):
-        ElementTree.SubElement(made, "capsule", name="shape")
-    elif isinstance(piece.geometry, coal.ConvexBase):
-        ElementTree.SubElement(made, "convex", name="shape")
-    return made
-
-
 def _shape(scene: Scene, piece: Any, path: Path) -> tuple[ElementTree.Element, pin.SE3]:
     """The shape of a piece, and how it is shifted against the piece."""
-    shape, shift = piece.geometry, pin.SE3.Identity()
+    shift, (kind, lengths) = pin.SE3.Identity(), shape_of(piece.geometry)
     made = ElementTree.Element("collision", name="shape")
     inner = ElementTree.SubElement(made, "geometry")
-    if isinstance(shape, coal.Sphere):
-        ElementTree.SubElement(inner, "sphere", radius=repr(float(shape.radius)))
-    elif isinstance(shape, (coal.Capsule, coal.Cylinder)):
-        length = repr(2.0 * float(shape.halfLength))
-        ElementTree.SubElement(inner, "cylinder", radius=repr(float(shape.radius)), length=length)
-    elif isinstance(shape, coal.Box):
-        ElementTree.SubElement(inner, "box", size=exact(2.0 * np.array(shape.halfSide)))
-    elif isinstance(shape, coal.Halfspace) and not piece.parentJoint:
+    if kind == "sphere":
+        ElementTree.SubElement(inner, "sphere", radius=repr(lengths[0]))
+    elif kind in ("capsule", "cylinder"):
+        ElementTree.SubElement(inner, "cylinder", radius=repr(lengths[0]), length=repr(lengths[1]))
+    elif kind == "box":
+        ElementTree.SubElement(inner, "box", size=exact(lengths))
+    elif kind == "half-space" and not piece.parentJoint:
         # A box stands for a half-space: eight sizes of the figure wide, a quarter of that high.
         edge = 8.0 * size(scene.figure)
         ElementTree.SubElement(inner, "box", size=exact(np.array([edge, edge, 0.25 * edge])))
         shift = _slab(scene, piece, 0.125 * edge)
-    elif isinstance(shape, coal.Convex):
-        path.write_text(_obj(shape), encoding="utf-8")
+    elif kind == "hull":
+        path.write_text(_obj(piece.geometry), encoding="utf-8")
         ElementTree.SubElement(inner, "mesh", filename=str(path))
     else:
         raise InputError(
-            f"{piece.name!r} is a {type(shape).__name__}; URDF is written for spheres, capsules, cylinders, boxes, "
-            "hulls and half-spaces of the world"
+            f"{piece.name!r} is a {type(piece.geometry).__name__}; URDF is written for spheres, capsules, cylinders, "
+            "boxes, hulls and half-spaces of the world"
         )
     return made, shift
 
@@ -177,17 +153,10 @@ def _obj(shape: Any) -> str:
 
 
 def mjcf(scene: Scene, frames: Mapping[str, tuple[int, pin.SE3]] = MappingProxyType({})) -> str:
-    """Return a scene as MJCF.
+    """Return a scene as MJCF: bodies are named after the joint that moves them, geoms after their pieces.
 
-    Bodies are named after the joint that moves them, geoms after their pieces. Links
-    without mass get a millionth of a kilogram, because MuJoCo refuses none; kinematics do not see it.
-
-    Args:
-        scene: a figure with turning and sliding joints, on a free root or fixed, and things.
-        frames: names of sites -> our joint and the placement in it.
-
-    Raises:
-        InputError: a joint or a shape that this translation does not know.
+    Links without mass get a millionth of a kilogram, because MuJoCo refuses none. `frames` has names of sites, our
+    joint and the placement in it. Raises InputError for a joint or a shape that this translation does not know.
     """
     model, geometry = scene.model, scene.geometry
     top = ElementTree.Element("mujoco", model=scene.figure.name)
@@ -237,19 +206,19 @@ def _motion(model: Any, index: int) -> dict[str, str]:
 
 
 def _geom(piece: Any, body: ElementTree.Element, assets: ElementTree.Element) -> None:
-    shape = piece.geometry
-    attributes = {"name": piece.name} | _place(piece.placement)
-    if isinstance(shape, coal.Sphere):
-        attributes |= {"type": "sphere", "size": _text([shape.radius])}
-    elif isinstance(shape, coal.Capsule):
-        attributes |= {"type": "capsule", "size": _text([shape.radius, shape.halfLength])}
-    elif isinstance(shape, coal.Box):
-        attributes |= {"type": "box", "size": _text(shape.halfSide)}
-    elif isinstance(shape, coal.ConvexBase):
+    shape, (kind, lengths) = piece.geometry, shape_of(piece.geometry)
+    attributes = {"name": piece.name, "type": kind} | _place(piece.placement)
+    if kind == "sphere":
+        attributes |= {"size": _text(lengths)}
+    elif kind == "capsule":
+        attributes |= {"size": _text((lengths[0], 0.5 * lengths[1]))}
+    elif kind == "box":
+        attributes |= {"size": _text(0.5 * np.array(lengths))}
+    elif kind == "hull":
         points = np.array([shape.point(k) for k in range(shape.num_points)])
         ElementTree.SubElement(assets, "mesh", name=piece.name, vertex=_text(points.ravel()))
         attributes |= {"type": "mesh", "mesh": piece.name}
-    elif isinstance(shape, coal.Halfspace):
+    elif kind == "half-space":
         attributes |= {"type": "plane", "size": "0 0 1"} | _place(piece.placement * _surface(shape))
     else:
         raise InputError(

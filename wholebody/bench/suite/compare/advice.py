@@ -1,7 +1,7 @@
-"""Which method to choose when, from the figures alone, and no winner where the figures do not tell one.
+"""Which method to choose when, from the figures alone.
 
-Methods are compared on the problems that both were given, by the ratio of two figures with its interval: medians over
-different problems say nothing of two methods, and a ratio whose interval holds 1 names no winner.
+Methods are compared on the problems that both were given, by the ratio of two figures with its interval; a ratio whose
+interval holds 1 names no winner.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ Figures = Mapping[tuple[str, int], float]
 def best(found: Mapping[str, Figures]) -> tuple[str, ...]:
     """Return the methods with the least figure, as many as cannot be told apart; the least of all first.
 
-    A method that has too few problems in common with the least is left out. Where the least itself has too few problems
-    to compare with anybody, nobody is told apart.
+    A method that has too few problems in common with the least is left out. Where the least itself has too few, nobody
+    is told apart.
     """
     order = sorted((name for name in found if found[name]), key=lambda name: middle(list(found[name].values())))
     if order and len(found[order[0]]) < LEAST:
@@ -84,12 +84,9 @@ def named(adapters: Sequence[str]) -> str:
 class Choice(NamedTuple):
     """What to choose for one set. Methods that cannot be told apart stand together; none where none is dependable.
 
-    Attributes:
-        fastest: dependable methods with the least time; the median milliseconds of the first.
-        exact: dependable methods with the least error at any of their budgets; the median error of the first.
-        cheapest: dependable methods with the least effort; the median effort of the first above the best known.
-        leading: of the methods that were given all problems, the one that solves most, and those that do not solve
-            fewer by more than chance, of the same problems; the share of the first.
+    `fastest`, `exact` and `cheapest`: dependable methods with the least time, error and effort, and the median of the
+    first. `leading`: of the methods that were given all problems those that do not solve fewer than the best by more
+    than chance.
     """
 
     set: str
@@ -104,15 +101,10 @@ class Choice(NamedTuple):
 
 
 class Standing(NamedTuple):
-    """A method over all sets.
+    """A method over all sets: those that it takes whole, those of which it solves 98 %, and where it solves least.
 
-    Attributes:
-        taken: sets of which it takes every case.
-        dependable: sets of which it solves at least 98 %.
-        worst_set, worst: where it solves least of what it takes.
-        slowness: its time over that of the method that others are compared with, on the problems that both solve.
-        false_claims: answers called solved that are off by more than 1 mm.
-        deepest_mm: deepest overlap of all answers.
+    `slowness`: its time over that of the method that others are compared with, on the problems that both solve;
+    `false_claims`: answers called solved that are off by more than 1 mm.
     """
 
     method: str

@@ -61,13 +61,10 @@ _local = threading.local()
 
 @dataclass(frozen=True)
 class Task:
-    """What a chunk of work is.
+    """What a chunk of work is: methods, each with its further budgets, on one case.
 
-    Attributes:
-        family, number, seed: which case.
-        solves: methods, each with its further budgets (none where only the default one is asked for).
-        cap: seconds of the processor's time after which a solve is ended.
-        most: seconds that a sweep may be expected to take, by the solve before it; it is left out where it is more.
+    A solve is ended after `cap` seconds of the processor; a sweep that is expected to take more than `most` seconds is
+    left out.
     """
 
     family: ProblemSet
@@ -144,11 +141,7 @@ def _solve(child: Child, adapter: Adapter, level: Budget, task: Task) -> tuple[R
 
 
 def _warm_up(child: Child, which: Which, adapter: Adapter, cap: float) -> float:
-    """Let a method import and compile what it needs. What goes wrong over it will do so again in its solve.
-
-    Returns:
-        Seconds of its first solve in the process; 0 where it has run there before, or never came back.
-    """
+    """Seconds of a method's first solve in the process; 0 where it has run there before, or never came back."""
     if adapter.name in _hopeless():
         return 0.0
     try:

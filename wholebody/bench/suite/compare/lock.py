@@ -1,7 +1,7 @@
 """What a comparison found, with all that is needed to do it again; and what differs, when it is done again.
 
 A figure differs where the published value is outside of the new interval, and the new one outside of the published.
-Times are compared in units of the reference kernel, so that another machine does not differ for its speed alone.
+Times are in units of the reference kernel.
 """
 
 from __future__ import annotations
@@ -32,12 +32,8 @@ AMOUNTS = ("cases", "sweep", "levels", "seed", "cap", "minutes")
 class Locked:
     """A comparison as it was published.
 
-    Attributes:
-        sets, methods: names.
-        amounts: the numbers of its settings.
-        facts: of the machine and the versions.
-        figures: by set, method and name: "solved", as a share, and "median time" of an answer, in kernels,
-            both by the processor: the kernel is too short to wait for other work, and a solve is not.
+    `figures` are by set, method and name: "solved", as a share, and "median time" of an answer, in kernels, by the
+    processor.
     """
 
     sets: tuple[str, ...]
@@ -47,11 +43,7 @@ class Locked:
     figures: Mapping[tuple[str, str, str], Interval]
 
     def settings(self) -> Settings:
-        """The settings to do it again.
-
-        Raises:
-            UnknownNameError: a set or a method is not known, or not installed.
-        """
+        """The settings to do it again; UnknownNameError for a set or a method that is not known or not installed."""
         given = self.amounts
         return Settings(
             tuple(problem_set(name) for name in self.sets),
@@ -101,11 +93,7 @@ def write_lock(path: Path, found: Locked) -> None:
 
 
 def read_lock(path: Path) -> Locked:
-    """Read a lock file.
-
-    Raises:
-        FileFormatError: it is none.
-    """
+    """Read a lock file; FileFormatError where it is none."""
     text = read_text(path, "lock file")
     try:
         content: Any = json.loads(text)
@@ -138,11 +126,7 @@ class Difference(NamedTuple):
 
 
 def differences(published: Locked, found: Locked) -> list[Difference]:
-    """Figures that differ by more than their intervals, in the order of the lock file.
-
-    Raises:
-        InputError: the two have no figure in common.
-    """
+    """Figures that differ by more than their intervals, in the order of the lock; InputError where none is common."""
     common = [key for key in published.figures if key in found.figures]
     if not common:
         raise InputError(

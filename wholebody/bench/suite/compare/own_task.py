@@ -1,7 +1,4 @@
-"""Methods beside each other on a task of one's own: each in a process of its own, cold and warm, judged in one way.
-
-One problem says how methods do on it, and nothing of others. The spread of a time is over repeated solves of it.
-"""
+"""Methods beside each other on a task of one's own: each in a process of its own, cold and warm, judged in one way."""
 
 from __future__ import annotations
 
@@ -32,14 +29,7 @@ def compared(
 ) -> list[Row]:
     """Every method on the problem of a task file: what solves it first, by time; then by the worst error.
 
-    Args:
-        path: the task file.
-        adapters: the methods.
-        cap: seconds of the processor's time after which a solve is ended.
-        tell: is told the name of each method before it begins.
-
-    Raises:
-        WholebodyError: the task file cannot be read; nothing has been solved then.
+    A solve is ended after `cap` seconds of the processor. Raises WholebodyError where the task file cannot be read.
     """
     read_task(path)
     rows = []
@@ -87,11 +77,7 @@ def _ready(problem: Problem) -> Ready:
 
 
 def _row(name: str, cold: float, records: Sequence[Record]) -> Row:
-    """One method: what came of it, its times, and what is left, as judged; no figures where there is no answer.
-
-    "cold" is the first solve in a process, with what it imports and builds, "warm" the median of the later ones;
-    "set-up", in none of these, builds a model of its own.
-    """
+    """One method: what came of it, its times, and what is left, as judged; no figures where there is no answer."""
     last, warm = records[-1], [1e3 * record.seconds for record in records[1:]]
     if last.outcome != ANSWERED:
         return Row("task", name, {"outcome": last.outcome, "said": last.said})

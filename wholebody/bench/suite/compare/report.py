@@ -1,7 +1,4 @@
-"""What a comparison leaves: every solve as CSV, charts, and the report of what to choose when and what was left out.
-
-A chart has at most six methods; a method has the same colour in all of them.
-"""
+"""What a comparison leaves: every solve as CSV, charts, and the report of what to choose when and what was left out."""
 
 from __future__ import annotations
 
@@ -76,10 +73,7 @@ def chart_name(family: str, number: int = 0) -> str:
 
 
 def groups(adapters: Sequence[str]) -> list[tuple[str, ...]]:
-    """Methods as they stand together in charts: at most `MOST`, first one of each algorithm, then the others.
-
-    Our default stands in every group, to compare with.
-    """
+    """Methods beside each other in charts: at most `MOST`, one of each algorithm first, our default in each."""
     kinds: dict[str, str] = {}
     for name in adapters:
         kinds.setdefault(re.split(r"[/,+ ]", name)[0], name)
@@ -115,15 +109,11 @@ def publish(
     folder: Path,
     facts: Mapping[str, str],
     missing: Mapping[str, str],
-    docs: Path | None = None,
     say: Callable[[str], None] = lambda text: None,
 ) -> Material:
-    """Write everything that is made from the records of a run into a folder, and its part of the docs where given.
+    """Write everything that is made from a run into a folder.
 
-    `missing` are methods that are not installed, and what installs them; `say` is told what is being made.
-
-    Raises:
-        FileFormatError: the documentation has no place for it.
+    `missing` are methods that are not installed, and what installs them.
     """
     given = material(settings, store.chunks, facts, missing)
     write_rows(folder / "solves.csv", facts, store.records)
@@ -138,18 +128,20 @@ def publish(
     counts = f"{len(settings.sets)} problem sets, {len(settings.adapters)} methods, {len(store.records)} solves."
     subtitle = f"{counts} Measured {facts.get('date', '')} on {facts.get('processor', '')}."
     write_text(folder / PAGE, page("Speed against accuracy: which method when", text, charts, subtitle) + "\n")
-    if docs is not None:
-        _to_docs(given, charts, docs)
     return given
 
 
-def _to_docs(given: Material, charts: Mapping[str, Path], docs: Path) -> None:
-    """Write the short report into the page of results, with its charts and its lock file beside."""
-    replace_section(docs / "results.md", "compare", as_markdown(given, "assets/bench", "compare_page.md"))
+def to_docs(given: Material, folder: Path, docs: Path, section: str = "compare") -> None:
+    """Write the short report into a section of the page of results, with its charts and its lock file beside.
+
+    Raises FileFormatError where the page has no place for it.
+    """
+    text = as_markdown(given, "assets/bench", "compare_page.md")
+    replace_section(docs / "results.md", section, text.replace("assets/bench/compare-", f"assets/bench/{section}-"))
     assets = docs / "assets" / "bench"
-    write_lock(assets / f"compare-{LOCK}", locked(given))
-    for svg in charts.values():
-        shutil.copyfile(svg, assets / svg.name)
+    write_lock(assets / f"{section}-{LOCK}", locked(given))
+    for svg in (folder / "charts").glob("*.svg"):
+        shutil.copyfile(svg, assets / svg.name.replace("compare-", f"{section}-", 1))
 
 
 def as_markdown(given: Material, charts: str, template: str = "compare.md") -> str:

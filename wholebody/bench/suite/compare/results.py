@@ -31,24 +31,13 @@ process was ended because it took too long."""
 class Record:
     """One solve. Errors are infinite where there is no answer.
 
-    Attributes:
-        tolerance, budget: of this solve; a budget of 0 iterations is the method's own, one of -1 is `FEASIBILITY_ONLY`.
-        status: what the method claims; empty without an answer.
-        said: its message, its refusal or the exception.
-        seconds, cpu_seconds: of the call without the judgement in it; of a frame, median, where goals move.
-        tool_seconds: of `seconds`, within calls of the tool behind an adapter; 0 for methods of our own, and where
-            goals move.
-        setup_seconds: to build a model of its own from the problem; 0 for one that needs none.
-        iterations: as the method counts them; of a frame, mean, where goals move.
-        programs: what closed its quadratic programs, and how many; empty for methods without, and where goals move.
-        goal_error, goal_angle: left, as judged [m], [rad]; 95 % of the frames where goals move.
-        penetration, clearance_violation, limit_violation, constraint_violation: as judged [m, rad]; the worst frame.
-        measure, optimality: as judged; of the last frame.
-        best: measure of the witness, which is as good as any method need be.
-        frames: answered with moving goals; 0 for a case that is solved once.
-        frame_p95: seconds of a frame, 95 %.
-        jerk: root mean square of the joints' third differences [rad/s^3].
-        turns: sign changes of the velocity of the least gap, a second.
+    `budget`: 0 iterations are the method's own, -1 is `FEASIBILITY_ONLY`. `status`: what the method claims; `said`: its
+    message, its refusal or the exception. `seconds`, `cpu_seconds`: of the call without the judgement, of a frame
+    (median) where goals move; `tool_seconds`: within calls of the tool behind an adapter; `setup_seconds`: to build a
+    model of its own. `programs`: what closed its quadratic programs. Errors are as judged [m, rad]: of goals 95 % of
+    the frames where they move, of what must hold the worst frame; `best`: measure of the witness. Of moving goals:
+    `frames`, `frame_p95` [s], `jerk` (root mean square of third differences), `turns` (sign changes of the velocity of
+    the least gap, a second).
     """
 
     set: str
@@ -115,22 +104,13 @@ class Record:
 
 
 def frame_cap(cap: float, frames: float) -> float:
-    """Seconds that a frame may take on the average, where a solve may take `cap` seconds and there are so many.
-
-    At least 0.1: nobody drags with slower frames.
-    """
+    """Seconds that a frame may take on the average, at least 0.1, where a solve may take `cap` and there are many."""
     return max(cap / frames, 0.1)
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """What is charted against time.
-
-    Attributes:
-        title: over a chart.
-        label: of its axis.
-        of: its value from a record and the best known measure of the case; infinite for a failure.
-    """
+    """What is charted against time: its value is of a record and the best known measure; infinite for a failure."""
 
     title: str
     label: str
@@ -149,11 +129,7 @@ EFFORT = Quantity("effort", "effort above the best known [share]", effort_excess
 
 
 class Results:
-    """All records of a comparison.
-
-    Attributes:
-        sets, adapters: names, in the order of reports.
-    """
+    """All records of a comparison; names of sets and adapters in the order of reports."""
 
     def __init__(self, records: Iterable[Record], sets: Sequence[str], adapters: Sequence[str]) -> None:
         self.sets, self.adapters = tuple(sets), tuple(adapters)
@@ -231,16 +207,9 @@ NAME = "chunks.jsonl"
 class Chunk:
     """One case by some methods.
 
-    Attributes:
-        set, number: which case.
-        records: what came of it.
-        spent: seconds that each method took at the default budget, all that it brought about included.
-        swept: the same at all its other budgets.
-        building: seconds to build the case.
-        cold: seconds of the first solve of each method in its process, what it imports and compiles included; of the
-            methods for which the process was new.
-        kernel: seconds of the reference kernel in the process, before the case was solved.
-        fault: why the case could not be built; empty where it was.
+    Seconds by method: `spent` at the default budget, `swept` at all others, `cold` of the first solve in a process;
+    `building` the case; `kernel`: of the reference kernel before the case was solved. `fault`: why the case could not
+    be built.
     """
 
     set: str
@@ -258,12 +227,7 @@ class Store:
     """The file of a run."""
 
     def __init__(self, folder: Path, settings: Mapping[str, Any]) -> None:
-        """Open or begin the file of a folder.
-
-        Raises:
-            InputError: the folder holds a run with other settings.
-            FileFormatError: the file is none of ours.
-        """
+        """Open or begin the file; InputError for a run with other settings, FileFormatError for another file."""
         self.path = folder / NAME
         folder.mkdir(parents=True, exist_ok=True)
         self.chunks: list[Chunk] = []

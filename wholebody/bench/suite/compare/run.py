@@ -1,8 +1,8 @@
 """The whole comparison: which case next, by whom, what is kept, and how long it will take.
 
-Every method has the same share of the time in every set. What a fast one leaves over goes to the others, until all is
-given out: min(cost, share) summed over all is the time there is. Of its share a method spends half at the default
-budget and half on the sweep of its budgets, and what the one does not need on the other.
+Every method has the same share of the time in every set. What a fast one leaves over goes to the others: min(cost,
+share) summed over all is the time there is. Of its share a method spends half at the default budget and half on the
+sweep of its budgets, and what the one does not need on the other.
 """
 
 from __future__ import annotations
@@ -106,12 +106,8 @@ class Plan:
 def share_out(one: Array, sweep: Array, most: Array, most_swept: Array, total: float) -> tuple[Array, Array]:
     """Cases (n,) and sweeps (n,) of every method, at least one case, and a sweep where its share allows one.
 
-    Args:
-        one: (n,) seconds of a case at the default budget.
-        sweep: (n,) seconds of a case at all others.
-        most: (n,) cases asked for.
-        most_swept: (n,) sweeps asked for.
-        total: seconds there are.
+    `one` and `sweep` are seconds of a case at the default budget and at all others, `most` and `most_swept` what is
+    wanted.
     """
 
     def parts(share: float) -> tuple[Array, Array]:
@@ -150,18 +146,10 @@ def run(
     cluster: str | None = None,
     tell: Callable[[Progress], None] = lambda progress: None,
 ) -> Store:
-    """Compare, or go on with a comparison that was ended.
+    """Compare, or go on with a comparison that was ended; `cluster` is the address of a dask scheduler.
 
-    Args:
-        settings: what is compared.
-        folder: where what is found is kept.
-        jobs: cases that are worked on at a time.
-        cluster: address of a dask scheduler, for a sweep on many machines.
-        tell: is told how far it is.
-
-    Raises:
-        InputError: the folder holds a run with other settings.
-        WholebodyError: a set whose cases cannot be built.
+    Raises InputError where the folder holds a run with other settings, WholebodyError for a set whose cases cannot be
+    built.
     """
     store, plan = Store(folder, settings.described()), Plan(settings, jobs)
     for chunk in store.chunks:
@@ -183,7 +171,7 @@ def run(
 def _tasks(settings: Settings, plan: Plan, done: set[tuple[str, int]], end: float) -> Iterator[Task]:
     """Cases in turn over all sets, each with those methods that there is time for when it is begun.
 
-    After the time `end`, for which the predicted costs were too low, only sets are begun of which there is no case yet.
+    After the time `end` only sets are begun of which there is no case yet.
     """
     for number in range(settings.cases):
         for family in settings.sets:

@@ -19,14 +19,9 @@ SEEDS = 3  # from which the cases of a set are made in turn
 class Settings:
     """What is compared, and how much of it.
 
-    Attributes:
-        sets, adapters: problem sets and methods.
-        cases: of every set at the default budget.
-        sweep: of these, the first so many at every budget.
-        levels: most budgets beside the default one.
-        seed: the first of `SEEDS` from which the problems are made in turn.
-        cap: seconds of the processor's time after which a solve is ended.
-        minutes: of all solving; methods that are too slow for it get fewer cases.
+    `cases` of every set at the default budget, of which the first `sweep` at `levels` others too; problems are made
+    from `SEEDS` seeds in turn, from `seed` on; a solve is ended after `cap` seconds of the processor; all solving takes
+    `minutes`.
     """
 
     sets: tuple[ProblemSet, ...]
@@ -39,11 +34,7 @@ class Settings:
     minutes: float = 25.0
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            InputError: one that makes no sense.
-        """
+        """Check the numbers; InputError for one that makes no sense."""
         for name, least in (("cases", 1), ("sweep", 0), ("levels", 1), ("seed", 0)):
             if getattr(self, name) < least:
                 raise InputError(f"{name} is {getattr(self, name)}; give {least} or more")
@@ -68,18 +59,14 @@ class Settings:
         }
 
     def asked(self, family: ProblemSet) -> tuple[int, int]:
-        """Cases of a set at the default budget, and at all budgets: fewer of these where a case is hundreds of solves.
-
-        A set whose goals move has as many cases as the others; the plan gives a method as many as its share allows.
-        """
+        """Cases of a set at the default budget, and at all budgets: fewer of these where goals move."""
         # A case whose goals move is hundreds of solves at every budget.
         return self.cases, self.sweep // 4 if family.moving else self.sweep
 
     def ladder(self, adapter: Adapter, moving: bool = False) -> list[Budget]:
         """Budgets beside the default one, from cheap to exact, evenly chosen where there are more than `levels`.
 
-        Budgets of feasibility only are chosen among themselves, as many as their share: the most exact of them is the
-        time to an exact posture where least measures are not asked for.
+        Budgets of feasibility only are chosen among themselves, as many as their share.
         """
         unused = FEASIBILITY_ONLY if moving else 0
         listed = [level for level in adapter.loose if level != DEFAULT and level[1] != unused]

@@ -1,8 +1,4 @@
-"""One solve of one case, or goals that move followed frame by frame, timed, and judged by `assess` alone.
-
-`built`, `warmed` and `solved` are jobs of a process of `wholebody.base.runner`, which keeps the last case and knows
-which methods have run in it.
-"""
+"""One solve of one case, or goals that move followed frame by frame, timed, and judged by `assess` alone."""
 
 from __future__ import annotations
 
@@ -56,12 +52,7 @@ class Which(NamedTuple):
 
 @dataclass(frozen=True)
 class Ready:
-    """A case, built, with everything that belongs to the scene and to no method built too.
-
-    Attributes:
-        case: as the set made it.
-        best: measure of the witness.
-    """
+    """A case with everything that belongs to its scene built, and the measure of its witness."""
 
     case: Case
     best: float
@@ -81,11 +72,7 @@ def built(which: Which) -> str | None:
 
 
 def warmed(which: Which, adapter: Adapter, cap: float) -> float:
-    """Let a method import and compile what it needs, before it is timed for the first time in this process.
-
-    Returns:
-        Seconds of that first time, the building of a model of its own included; 0 where it has run before.
-    """
+    """Seconds of a method's first solve in this process, building included; 0 where it has run before."""
     made = case_of(which)
     key = (adapter.name, bool(made.case.frames))
     if key in _warm:
@@ -200,11 +187,7 @@ class _Frame(NamedTuple):
 
 
 def _followed(method: Any, problem: Problem, case: Case, empty: Record) -> Record:
-    """Follow the goals of a case frame by frame; `problem` is a copy of its problem, that may be changed.
-
-    Each frame is one of the method's tracker, to the method's tolerance: qp and newton make a few steps, as `wb.Drag`
-    does; every other method solves each frame from the posture of the frame before.
-    """
+    """Follow the goals of a case frame by frame; `problem` is a copy of its problem, that may be changed."""
     q = problem.scene.figure.clamp(problem.start)
     frames: list[_Frame] = []
     tracker: Tracker = method.tracker(problem, case.dt)

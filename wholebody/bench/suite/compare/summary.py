@@ -62,24 +62,12 @@ class _Cell:
 class Summary:
     """One method in one set. Shares and times are with their intervals of 95 %.
 
-    Attributes:
-        cases, swept: given to it, fewer than asked for where it is too slow; and of these solved at all its budgets.
-        refused, failed, overtime: cases without an answer: said so, broke, or took too long.
-        said: the first refusal or exception.
-        success, success_fine: share of the cases not refused that are solved to 1e-3 and to 1e-4, as judged.
-        false_claims: answers called solved that are off by more than 1 mm.
-        median_ms, p95_ms, cpu_median_ms: of a call (of a frame where goals move), over all answers.
-        mean_ms: shifted geometric mean over all cases not refused; one that is not solved counts as long as a solve, or
-            on the average a frame, may take.
-        kernels: the median of the processor's time in units of the reference kernel; NaN where that was not timed.
-        cold_ms: median of the first solve in a process; NaN where no process was new.
-        tool: share of the time within calls of the tool behind an adapter, median; 0 for methods of our own.
-        setup_ms, iterations: medians; the first to build a model of its own.
-        programs: what closed its quadratic programs, of all problems together.
-        worst_median: median of the worst error [m or rad].
-        deepest_mm: deepest overlap of all answers.
-        effort: above the best known, median over the successes, as a share.
-        frame_p95_ms, error_mm, jerk, turns: where goals move: 95 % of the frames, tracking error, trembling.
+    `cases` given to it, of which `swept` at all its budgets; `refused`, `failed`, `overtime`: without an answer, and
+    `said` why first. Shares solved, to 1e-3 and 1e-4, are of the cases not refused. Times are of a call, or of a frame
+    where goals move, over all answers; `mean_ms` is the shifted geometric mean in which a case that is not solved
+    counts as long as a solve may take; `kernels` in units of the reference kernel; `tool`: share of the time within the
+    tool behind an adapter. `effort`: above the best known, as a share; `deepest_mm` of all answers; `error_mm`, `jerk`
+    and `turns` where goals move.
     """
 
     set: str
@@ -118,13 +106,7 @@ class Summary:
 
 
 def summaries(results: Results, chunks: Sequence[Chunk] = (), cap: float = 20.0) -> list[Summary]:
-    """All rows, of methods that were given a case.
-
-    Args:
-        results: the records.
-        chunks: what was timed beside them: the reference kernel, and first solves.
-        cap: seconds of the processor's time after which a solve was ended.
-    """
+    """All rows, of methods that were given a case; `cap`: seconds of the processor after which a solve was ended."""
     cells = (_Cell(results, family, adapter, chunks, cap) for family in results.sets for adapter in results.adapters)
     return [filled(Summary, cell) for cell in cells if cell.mine]
 
@@ -155,16 +137,7 @@ def _cut(text: str) -> str:
 
 @dataclass(frozen=True)
 class Material:
-    """All that a report is written from.
-
-    Attributes:
-        settings: what was asked for.
-        chunks: what was done.
-        results: the records of them.
-        rows: the figures at the default budget.
-        facts: of the machine and the run.
-        missing: methods that are not installed, and the command that installs them.
-    """
+    """All that a report is written from: `missing` are methods that are not installed, and what installs them."""
 
     settings: Settings
     chunks: Sequence[Chunk]

@@ -54,11 +54,7 @@ def is_free(scene: wb.Scene, q: Array, room: float = ROOM) -> bool:
 
 
 def sampled_posture(figure: wb.Figure, start: Array, rng: np.random.Generator) -> Array:
-    """Posture (nq,) with the upper body uniformly at random within its limits, nothing touching itself or the floor.
-
-    Raises:
-        InputError: none was found.
-    """
+    """Posture (nq,), the upper body at random within its limits, nothing touching; InputError where there is none."""
     joints = figure.groups["upper_body"]
     places = np.array([figure.model.joints[figure.joint_id(name)].idx_q for name in joints])
     lower, upper = figure.model.lowerPositionLimit[places], figure.model.upperPositionLimit[places]
@@ -72,11 +68,7 @@ def sampled_posture(figure: wb.Figure, start: Array, rng: np.random.Generator) -
 
 
 def until_found(attempt: Callable[[], _Found | None]) -> _Found:
-    """What an attempt gives, made again until it gives something.
-
-    Raises:
-        InputError: it never did.
-    """
+    """What an attempt gives, made again until it gives something; InputError where it never did."""
     for _ in range(5000):  # about one in five of the postures of a person's upper body is free
         found = attempt()
         if found is not None:
@@ -111,10 +103,7 @@ def movable(figure: wb.Figure) -> NDArray[np.intp]:
 def standing_problem(
     scene: wb.Scene, start: Array, goals: Sequence[wb.Goal], *constraints: wb.Constraint
 ) -> wb.Problem:
-    """The requirements of a person: both feet stay where they are at the start (nq,), and all pairs `CLEARANCE` apart.
-
-    What a person keeps by default is left out: most tools cannot be told of it, and known answers do not keep it.
-    """
+    """What a person keeps: both feet stay where they are at the start (nq,), and all pairs `CLEARANCE` apart."""
     feet = [wb.Hold(foot) for foot in FEET]
     return wb.Problem(
         scene, start, goals=goals, constraints=[*constraints, *feet], clearance=CLEARANCE,
@@ -167,11 +156,7 @@ def held(problem: wb.Problem) -> list[wb.Goal]:
 def fitted(figure: wb.Figure, q: Array, goals: Sequence[wb.Goal], dofs: Indices) -> Array | None:
     """Return the posture (nq,) that Newton's method finds from q, or None where it finds none within the limits.
 
-    Args:
-        figure: whose posture.
-        q: (nq,) where to begin.
-        goals: the equalities, resolved.
-        dofs: places in the tangent of what may move.
+    `goals` are resolved; `dofs`: places in the tangent of what may move.
     """
     model, state = figure.model, _state(figure)
     for _ in range(25):
@@ -194,10 +179,7 @@ def _state(figure: wb.Figure) -> State:
 
 
 def _shortest(rows: Array, wanted: Array, dofs: Indices, lower: Array, upper: Array) -> Array:
-    """Step (nv,) of the given degrees of freedom that does what is wanted; those that would leave their limits stop.
-
-    1e-9 keeps the step finite where rows depend on each other.
-    """
+    """Step (nv,) of some degrees of freedom that does what is wanted; those that would leave their limits stop."""
     step = np.zeros(rows.shape[1])
     left = dofs
     while len(left):

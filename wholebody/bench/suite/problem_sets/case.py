@@ -19,16 +19,10 @@ from wholebody.tasks.base import Goal
 
 @dataclass(frozen=True)
 class Case:
-    """One problem of a set.
+    """One problem of a set, of which methods see `problem` and nothing else.
 
-    Attributes:
-        set: name of its set.
-        number: within the set.
-        problem: to be solved; methods see this and nothing else of the case.
-        witness: (nq,) a posture that meets the goals and keeps everything that must hold.
-        frames: goals of each following frame, for a set whose goals move; empty for one that is solved once.
-        path: a posture (nq,) for each frame that proves it possible.
-        dt: seconds between frames.
+    `witness` (nq,) meets the goals and keeps everything that must hold. Of a set whose goals move: the goals of each
+    following frame, a posture for each, and seconds between frames.
     """
 
     set: str
@@ -48,15 +42,7 @@ Pose = Callable[[int, np.random.Generator], Posed]
 
 @dataclass(frozen=True)
 class ProblemSet:
-    """A family of problems.
-
-    Attributes:
-        name: as typed at the command line.
-        title: as written over a chart.
-        about: one sentence: the problem, and what makes it hard.
-        pose: a problem, its witness, and the frames of a moving set, from a number and a generator of random numbers.
-        moving: whether its goals move from frame to frame.
-    """
+    """A family of problems: its title over a chart, one sentence about it, and whether its goals move."""
 
     name: str
     title: str

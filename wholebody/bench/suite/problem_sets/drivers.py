@@ -1,8 +1,7 @@
 """People of all sizes at controls: a seat with a backrest, something for both hands, something for the feet.
 
-A cabin is built around a seated posture, which is the witness: the seat under the pelvis, the backrest at the trunk, a
-board or two pedals under the soles, bars in the hands or a panel at a fingertip. The start is the figure's own seated
-posture somewhere near, so that it is often inside of what it is to touch, as where a user adds a seat to a scene.
+A cabin is built around a seated posture, which is the witness. The start is the figure's own seated posture somewhere
+near, so that it is often inside of what it is to touch.
 """
 
 from __future__ import annotations

@@ -76,15 +76,7 @@ of_contact = numbers("self_contact")
 
 @dataclass(frozen=True)
 class Touch:
-    """A palm that is to lie on a segment.
-
-    Attributes:
-        hand: "left" or "right".
-        segment: what it lies on.
-        axis: (3,) a place within the segment, in the segment's axes, metres.
-        normal: (3,) unit vector from there out of the segment.
-        near: the segment and neighbours that the hand may lie on as well.
-    """
+    """A palm that is to lie on a segment, from the place `axis` in it along `normal` (3,), or on what is `near`."""
 
     hand: str
     segment: str
@@ -143,10 +135,7 @@ def _on_hip(hand: str, rng: np.random.Generator) -> Touch:
 
 
 def _laid(figure: wb.Figure, q: Array, touches: list[Touch]) -> Array | None:
-    """A posture near q, (nq,), with the hands some millimetres from what they lie on; None if there is none.
-
-    The distances are measured, and the hands moved along the normals by what is too much or too little.
-    """
+    """A posture near q, (nq,), with the hands some millimetres from what they lie on; None if there is none."""
     scene, dofs = alone(figure), figure.dofs("upper_body")
     least, most = of_contact.gap_m
     heights = [0.1] * len(touches)

@@ -1,8 +1,4 @@
-"""Reaches of a fingertip, or of both hands and the eyes: alone, among things, through a passage, along a curve.
-
-The last three sets have other witnesses, other people and other things: no constant was tuned on them. What is solved
-of the one and not of the other is a matter of the distribution, not of the question.
-"""
+"""Reaches of a fingertip, or of both hands and the eyes: alone, among things, through a passage, along a curve."""
 
 from __future__ import annotations
 
@@ -219,10 +215,7 @@ def way(figure: wb.Figure, rng: np.random.Generator) -> Array:
 
     A uniform cubic B-spline (de Boor 1978, "A Practical Guide to Splines") whose control postures are random. It stays
     within their convex hull, so within the limits; a span depends on four of them, so a new one is tried until the span
-    that it ends is free.
-
-    Raises:
-        InputError: none was found.
+    that it ends is free. Raises InputError where none was found.
     """
     standing = figure.posture("standing")
     spans = int(rng.integers(of_drag.spans[0], of_drag.spans[1] + 1))

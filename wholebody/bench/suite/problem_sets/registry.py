@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from wholebody.base.errors import UnknownNameError
+from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.suite.problem_sets import balance, drivers, hands, reaching, robots
 from wholebody.bench.suite.problem_sets.case import Pose, ProblemSet, numbers
 
@@ -48,16 +48,24 @@ that are not a part of this package; and drivers, whose contacts most other tool
 TUNED_ON = MappingProxyType({name: numbers(name).beside for name in NAMED if numbers(name).beside})
 """Those distributions -> the set of the same question that constants were tuned on."""
 
+
+def beside(say: Callable[[str], object]) -> tuple[str, ...]:
+    """Names of the held-out sets and of those beside them; `say` is told why robots are left out, if they are."""
+    names = list(TUNED_ON)
+    try:
+        robots.folder()
+    except InputError as error:
+        say(str(error))
+        names.remove("robots")
+    return (*names, *dict.fromkeys(TUNED_ON[name] for name in names))
+
+
 CASES = 200
 """Problems of a set, if nothing else is asked for."""
 
 
 def problem_set(name: str) -> ProblemSet:
-    """Return a set.
-
-    Raises:
-        UnknownNameError: with the nearest names.
-    """
+    """Return a set; UnknownNameError with the nearest names."""
     known = {**SETS, **NAMED}
     if name not in known:
         raise UnknownNameError("problem set", name, known)

@@ -54,13 +54,11 @@ class Axis(NamedTuple):
 
 
 def arm(kind: str, rng: np.random.Generator) -> tuple[wb.Figure, dict[str, float]]:
-    """Return an arm, and the joint values it is ready with, elbow bent, the tool in front.
+    """Return an arm with links of random lengths, and the joint values it is ready with, elbow bent, the tool in front.
 
-    Args:
-        kind: "seven axes": a shoulder, an elbow and a wrist that turn as a person's do; "industrial": six axes, the
-            elbow beside the shoulder's plane, the last three crossing; "parallel": six axes, three of them parallel,
-            no three of the last crossing.
-        rng: for the lengths.
+    `kind`: "seven axes": a shoulder, an elbow and a wrist that turn as a person's do; "industrial": six axes, the elbow
+    beside the shoulder's plane, the last three crossing; "parallel": six axes, three of them parallel, no three of the
+    last crossing.
     """
     lengths = [round(float(length), 3) for length in rng.uniform(*of_arm.lengths_m)]
     lower, upper, fore, hand = lengths
@@ -138,11 +136,7 @@ of_robots = numbers("robots")
 
 
 def folder() -> Path:
-    """Where the descriptions are.
-
-    Raises:
-        InputError: the variable names no folder with them.
-    """
+    """Where the descriptions are; InputError where the variable names no folder with them."""
     named = os.environ.get("WHOLEBODY_ROBOTS", "")
     folders: list[Path] = [Path(named), *Path(named).glob("**/example-robot-data/robots")] if named else []
     for found in folders:
@@ -156,12 +150,7 @@ def folder() -> Path:
 
 @lru_cache(maxsize=2)
 def robot(name: str) -> wb.Figure:
-    """A robot with its root where it stands; the path is relative to the folder.
-
-    Raises:
-        InputError: there is no such folder.
-        FileFormatError: the description cannot be read.
-    """
+    """A robot with its root where it stands, by its path in the folder."""
     return wb.load(folder() / name)
 
 

@@ -24,13 +24,30 @@ def coal_distance(first: Any, at: pin.SE3, second: Any, there: pin.SE3) -> float
     return float(coal.distance(first, put, second, other, coal.DistanceRequest(), coal.DistanceResult()))
 
 
+def shape_of(geometry: Any) -> tuple[str, list[float]]:
+    """Kind of a shape of coal and its lengths in metres, full ones and radii; the name of its class where not known.
+
+    Half-spaces n . x <= d have n and d, hulls nothing.
+    """
+    known: dict[Any, tuple[str, Callable[[Any], Any]]] = {
+        coal.Box: ("box", lambda shape: 2.0 * np.array(shape.halfSide)),
+        coal.Sphere: ("sphere", lambda shape: (shape.radius,)),
+        coal.Capsule: ("capsule", lambda shape: (shape.radius, 2.0 * shape.halfLength)),
+        coal.Cylinder: ("cylinder", lambda shape: (shape.radius, 2.0 * shape.halfLength)),
+        coal.Ellipsoid: ("ellipsoid", lambda shape: shape.radii),
+        coal.Halfspace: ("half-space", lambda shape: (*shape.n, shape.d)),
+    }
+    if isinstance(geometry, coal.ConvexBase):
+        return "hull", []
+    kind, lengths = known.get(type(geometry), (type(geometry).__name__, lambda shape: ()))
+    return kind, [float(length) for length in lengths(geometry)]
+
+
 class Occupied:
     """The space that a figure takes up in some postures.
 
-    Attributes:
-        places: placements (pin.SE3) of all pieces in the first posture, then in the second, and so on; then of balls.
-        centres: (n, 3) of these places.
-        count: pieces of the figure.
+    `places` (pin.SE3) and `centres` (n, 3) are those of all pieces in the first posture, then in the second, and so on;
+    then of balls. `count`: pieces of the figure.
     """
 
     def __init__(self, figure: wb.Figure, postures: Iterable[Array]) -> None:
@@ -86,13 +103,10 @@ def add_things(
     space: Sequence[Sequence[float]] = ((-0.6, -1.0, 0.1), (1.2, 1.0, 2.0)),
     make: Callable[[int, np.random.Generator], tuple[str, wb.Shape]] | None = None,
 ) -> None:
-    """Put random things into a box of space, in any orientation, clear of what is taken up; they may cross each other.
+    """Put random things into a box of space [m], turned at random, clear of what is taken up; they may cross.
 
-    `space` is in metres; without it, around a person. `make` gives the kind and the shape of a thing by its number;
-    `household_thing` where it is left out.
-
-    Raises:
-        InputError: no place was found for one of them.
+    `make` gives the kind and the shape of a thing by its number. Raises InputError where no place was found for one of
+    them.
     """
     for number in range(count):
         for _ in range(5000):  # many times what the most crowded postures have needed

@@ -21,14 +21,7 @@ SEEDS: tuple[Seed, ...] = ("near", "far")
 
 @dataclass(frozen=True)
 class Answer:
-    """One answer.
-
-    Attributes:
-        problem, seed: to which problem, and from which seed.
-        postures: (frames, nq), one where the goals do not move; None for a refusal.
-        seconds: of the solve, or of a frame; NaN where it is not told.
-        refused: why there is none.
-    """
+    """One answer: postures (frames, nq), one where goals do not move, None where it is `refused`; seconds, or NaN."""
 
     problem: str
     seed: Seed
@@ -39,13 +32,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Answers:
-    """The content of a file of answers.
-
-    Attributes:
-        method, about, machine: as the file says; empty where it does not.
-        kernel_seconds: time of the reference kernel on that machine; NaN where it is not told.
-        answers: in the order of the file.
-    """
+    """The content of a file of answers; texts are empty, and the kernel's time NaN, where the file has none."""
 
     method: str
     about: str
@@ -57,10 +44,8 @@ class Answers:
 def read_answers(path: Path, folder: Path) -> Answers:
     """Read a file of answers to the problems of an export.
 
-    Raises:
-        FileFormatError: the file is none of answers; the message names the entry and how to correct it.
-        UnknownNameError: an answer is to a problem that the export does not have.
-        InputError: there is no export in the folder.
+    Raises FileFormatError whose message names the entry and how to correct it, UnknownNameError for an unknown problem,
+    InputError where there is no export in the folder.
     """
     index = read_index(folder)
     known = {name for family in index["sets"].values() for name in family["problems"]}

@@ -1,8 +1,7 @@
 """A body as files: a URDF that every program reads, and a JSON file with its collision pieces and its coordinates.
 
-The URDF is written from Pinocchio's model, so that a figure of any origin gives one: links, hinges, slides, limits,
-masses, and frames to reach with as links without mass. The order of the numbers of a posture is the one that Pinocchio
-gives to the written file, so whoever reads it with Pinocchio has the same postures.
+The URDF is written from Pinocchio's model, so that a figure of any origin gives one. The order of the numbers of a
+posture is the one that Pinocchio gives to the written file.
 """
 
 from __future__ import annotations
@@ -12,12 +11,12 @@ from dataclasses import dataclass
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
-import coal
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
+from wholebody.bench.suite.problem_sets.things import shape_of
 from wholebody.bench.suite.published.rebuilt import VERSION
 from wholebody.figures.figure import Figure
 from wholebody.figures.urdf.writing import urdf_axis
@@ -27,28 +26,28 @@ Meshes = dict[str, str]
 
 
 def described(geometry: Any, meshes: Meshes, name: str) -> dict[str, Any]:
-    """What a shape of coal is called in the files; one with corners is put among the meshes under a name.
-
-    Raises:
-        InputError: a shape that the files have no word for.
-    """
+    """What a shape of coal is called in the files, its corners put among the meshes; InputError for others."""
     if geometry.getSweptSphereRadius() != 0.0:
         raise InputError(f"{name}: it has a rounding of {geometry.getSweptSphereRadius():g} m; publish it without")
-    if isinstance(geometry, coal.Box):
-        return {"type": "box", "size": [2.0 * float(half) for half in geometry.halfSide]}
-    if isinstance(geometry, coal.Sphere):
-        return {"type": "sphere", "radius": float(geometry.radius)}
-    if isinstance(geometry, coal.Capsule):
-        return {"type": "capsule", "radius": float(geometry.radius), "length": 2.0 * float(geometry.halfLength)}
-    if isinstance(geometry, coal.Ellipsoid):
-        return {"type": "ellipsoid", "semi_axes": [float(length) for length in geometry.radii]}
-    if isinstance(geometry, coal.Halfspace):
-        return {"type": "half-space", "normal": [float(x) for x in geometry.n], "offset": float(geometry.d)}
-    if isinstance(geometry, coal.ConvexBase):
+    kind, lengths = shape_of(geometry)
+    if kind == "hull":
         path = f"meshes/{name.replace(' ', '-').replace(':', '-')}.obj"
         meshes[path] = _obj(geometry)
         return {"type": "convex", "mesh": path}
-    raise InputError(f"{name}: it is a {type(geometry).__name__}, which the files have no word for")
+    match kind:
+        case "box":
+            said: dict[str, Any] = {"size": lengths}
+        case "sphere":
+            said = {"radius": lengths[0]}
+        case "capsule":
+            said = {"radius": lengths[0], "length": lengths[1]}
+        case "ellipsoid":
+            said = {"semi_axes": lengths}
+        case "half-space":
+            said = {"normal": lengths[:3], "offset": lengths[3]}
+        case _:
+            raise InputError(f"{name}: it is a {type(geometry).__name__}, which the files have no word for")
+    return {"type": kind, **said}
 
 
 def pose_of(place: pin.SE3) -> list[float]:
@@ -66,15 +65,7 @@ def _obj(convex: Any) -> str:
 
 @dataclass(frozen=True)
 class BodyFiles:
-    """A body, written.
-
-    Attributes:
-        name: for its files.
-        urdf: text of the URDF.
-        content: of the JSON file.
-        order: (nq,) `q[order]` has the order of the files, for a posture q of the figure.
-        links: (njoints,) the link that stands at each joint of the figure.
-    """
+    """A body, written: `q[order]` has the order of the files; `links` stand at the joints of the figure."""
 
     name: str
     urdf: str
@@ -90,8 +81,7 @@ class BodyFiles:
 def body_files(figure: Figure, name: str, meshes: Meshes) -> BodyFiles:
     """Write a figure; convex pieces go to the meshes.
 
-    Raises:
-        InputError: a joint is neither a hinge, nor a slide, nor a free root; or joints follow each other.
+    Raises InputError where a joint is neither a hinge, nor a slide, nor a free root; or joints follow each other.
     """
     if figure.followers:
         raise InputError(f"{name}: joints of it follow others, which a published body does not say; leave it out")

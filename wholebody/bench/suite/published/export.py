@@ -61,21 +61,10 @@ class _Export:
 def export(
     sets: Sequence[ProblemSet], per_set: int, seed: int, folder: Path, say: Callable[[str], None] = lambda text: None
 ) -> Path:
-    """Write problems of some sets into a folder; the same sets, counts and seed give the same files.
+    """Write problems of some sets into a folder, and return the index; the same arguments give the same files.
 
-    Args:
-        sets: which ones.
-        per_set: problems of each.
-        seed: of all problems.
-        folder: where to; it must not exist yet, or be empty.
-        say: is told of every problem that was written.
-
-    Returns:
-        The index.
-
-    Raises:
-        InputError: the folder holds something.
-        WholebodyError: a witness that the judge does not confirm: the files would be wrong.
+    The folder must not exist yet, or be empty (InputError); WholebodyError for a witness that the judge does not
+    confirm.
     """
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder}: is not an empty folder; name one that does not exist yet")
@@ -102,11 +91,7 @@ def export(
 
 
 def client_paths() -> list[Path]:
-    """Return the example clients: inside an installed package, or among the examples of a checkout.
-
-    Raises:
-        WholebodyError: the installation lacks them.
-    """
+    """Return the example clients of an installed package or a checkout; WholebodyError without them."""
     here = Path(__file__).resolve().parent
     for folder in (here / "clients", here.parents[3] / "examples" / "clients"):
         found = sorted(folder.glob("*.py"))
@@ -207,10 +192,7 @@ def _rounded(value: Any) -> Any:
 
 
 def _difficulty(case: Case, body: BodyFiles, rebuilt: Rebuilt, far: Array) -> dict[str, Any]:
-    """How hard a case is, as it stands in `difficulty.json`; the judge of the files says what a descent has solved.
-
-    A case whose goals move is described by its first frame, and by how far it goes from there.
-    """
+    """How hard a case is; the judge of the files says what a descent solves; of moving goals the first."""
     way = away(case)
     return {
         "witness_distance": float(np.linalg.norm(way)),

@@ -33,13 +33,9 @@ NONE = Score(inf, inf, inf, inf, inf, inf, inf)
 class Judged:
     """One problem from one seed, judged.
 
-    Attributes:
-        outcome: "answered", "refused" or "unanswered".
-        said: the reason of a refusal.
-        score: of the answer; of the worst frame where goals move. Infinite without an answer.
-        solved, solved_fine: whether goals are met and all that must hold is kept, to 1e-3 and to 1e-4.
-        effort_above: effort above the best known, as a share; NaN where it is not solved, or where goals move.
-        seconds: as the answers say; NaN where they do not.
+    `outcome` is answered, refused (as `said`) or unanswered; the score is infinite without an answer, and of the worst
+    frame where goals move. It is solved to 1e-3, and finely to 1e-4. `effort_above`: above the best known, as a share;
+    NaN where it is not solved, or where goals move.
     """
 
     problem: str
@@ -62,14 +58,9 @@ class Judged:
 class SetScore:
     """A method in one set from one seed.
 
-    Attributes:
-        problems, refused, unanswered: how many; shares leave out the refused ones, and the unanswered are not solved.
-        solved: how many, to 1e-3.
-        share, share_fine: of what was not refused, to 1e-3 and to 1e-4.
-        worst: median of the worst error [m or rad].
-        overlap: deepest of all answers [m].
-        effort_above: median over what is solved, as a share of the best known.
-        seconds: median of all answers; mean of all problems, failures counting `TIMEOUT`. NaN where no times are told.
+    Shares leave out the refused problems, and the unanswered are not solved. `worst`: median of the worst error [m or
+    rad]; `overlap`: deepest of all answers [m]; `mean_seconds`: of all problems, failures counting `TIMEOUT`. Times are
+    NaN where none are told.
     """
 
     set: str
@@ -89,14 +80,7 @@ class SetScore:
 
 @dataclass(frozen=True)
 class Verdict:
-    """All that is said of a file of answers.
-
-    Attributes:
-        answers: what was judged.
-        fingerprint, per_set: of the export.
-        judged: every problem of the sets and seeds that have an answer.
-        sets: one row for each of them.
-    """
+    """All that is said of a file of answers: problems of all sets and seeds with an answer, and a row for each."""
 
     answers: Answers
     fingerprint: str
@@ -109,9 +93,7 @@ def judge(answers: Answers, folder: Path) -> Verdict:
     """Judge answers to the problems of an export.
 
     Every problem of a set counts if the answers take part in the set from that seed: what is left out is not solved.
-
-    Raises:
-        FileFormatError, InputError: the folder holds no whole export.
+    Raises FileFormatError or InputError where the folder holds no whole export.
     """
     index = read_index(folder)
     given = {(answer.problem, answer.seed): answer for answer in answers.answers}

@@ -35,12 +35,9 @@ PAGE = "leaderboard.html"
 
 @dataclass(frozen=True)
 class Board:
-    """One set from one seed.
+    """One set from one seed: rows of the methods that take part, those that solve most first.
 
-    Attributes:
-        set, seed: which.
-        rows: the methods that take part, those that solve most first.
-        leading: methods whose share is not below the greatest by more than chance, the greatest first.
+    `leading`: methods whose share is not below the greatest by more than chance, the greatest first.
     """
 
     set: str
@@ -52,9 +49,8 @@ class Board:
 def judge_folder(folder: Path, problems: Path) -> list[Verdict]:
     """Judge every file of answers in a folder; the best effort known is the least of all exact answers.
 
-    Raises:
-        InputError: there is no such folder, it has no answers, or two files have one method.
-        FileFormatError: a file is malformed.
+    Raises InputError where there is no such folder, it has no answers, or two files have one method; FileFormatError
+    for a malformed file.
     """
     if not is_folder(folder):
         raise InputError(f"{folder}: there is no such folder; give one with files of answers")

@@ -24,18 +24,10 @@ def problem_name(family: str, number: int) -> str:
 
 
 def problem_content(case: Case, body: BodyFiles, far: Array, meshes: Meshes) -> dict[str, Any]:
-    """A case as the content of its file; hulls of things go to the meshes.
+    """A case as the content of its file, with the far seed (nq,); hulls of things go to the meshes.
 
-    Of the measures that a problem has by default the effort is published, which any solver can be asked for.
-
-    Args:
-        case: the case.
-        body: its figure, written.
-        far: (nq,) the far seed.
-        meshes: takes the hulls.
-
-    Raises:
-        InputError: the case asks for something that the files have no word for.
+    Of the measures that a problem has by default the effort is published. Raises InputError where the case asks for
+    something that the files have no word for.
     """
     problem, name = case.problem, problem_name(case.set, case.number)
     if problem.bounds or problem.measures_given:
@@ -148,11 +140,10 @@ def _listed(values: Sequence[float] | Array) -> list[float]:
 
 
 def far_seed(case: Case, rng: np.random.Generator) -> Array:
-    """A random posture (nq,) from which solving is hard.
+    """A random posture (nq,) from which solving is hard: the first draw in which nothing overlaps, or the least does.
 
     Joints that carry what is held in the world stay as they are at the start; all others are drawn uniformly within
-    their limits, and two frames that hold each other are brought together again by Newton's method. The first draw in
-    which nothing overlaps is taken, else the one that overlaps least.
+    their limits, and two frames that hold each other are brought together again by Newton's method.
     """
     problem = case.problem
     free, closing = _free(problem), [term for term in held(problem) if _is_relative(term)]
@@ -211,10 +202,7 @@ def away(case: Case) -> Array:
 
 
 def descended(case: Case, seed: Array) -> Array | None:
-    """The posture (nq,) in which the descent from a seed (nq,) ends; None where goals and holds are not closed.
-
-    A case whose goals move is asked for those of its first frame.
-    """
+    """The posture (nq,) in which the descent from a seed (nq,) ends; None where goals and holds are not closed."""
     problem = case.problem
     figure = problem.scene.figure
     goals = problem.goals

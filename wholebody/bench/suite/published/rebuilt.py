@@ -1,7 +1,6 @@
 """A published problem, rebuilt from its files by Pinocchio and coal alone, and what a posture is worth for it.
 
-Nothing of the package's scenes, terms or methods is used, so that no fault of theirs is judged by itself. Files are
-read with one sentence for whatever is wrong with them, and written the same each time.
+Nothing of the package's scenes, terms or methods is used, so that no fault of theirs is judged by itself.
 """
 
 from __future__ import annotations
@@ -26,11 +25,7 @@ INDEX = "index.json"
 
 
 def read_json(path: Path, kind: str) -> dict[str, Any]:
-    """Read a JSON object of an export whose "format" is "wholebody KIND".
-
-    Raises:
-        FileFormatError: there is no such file, it is no JSON, or no such object of this version.
-    """
+    """Read a JSON object of an export whose "format" is "wholebody KIND"; FileFormatError for anything else."""
     found = loaded(path, f"{kind} file")
     if not isinstance(found, dict) or found.get("format") != f"wholebody {kind}":
         raise FileFormatError(f'{path}: its "format" is not "wholebody {kind}"; export the problems again')
@@ -40,11 +35,7 @@ def read_json(path: Path, kind: str) -> dict[str, Any]:
 
 
 def loaded(path: Path, kind: str) -> Any:
-    """Read a JSON file; NaN and infinities are refused.
-
-    Raises:
-        FileFormatError: there is no such file, or it is no JSON.
-    """
+    """Read a JSON file; NaN and infinities are refused, as is a file that is missing or no JSON: FileFormatError."""
     text = read_text(path, kind, LARGEST)
     try:
         return json.loads(text, parse_constant=_refused)
@@ -78,12 +69,7 @@ def dumped(content: Mapping[str, Any]) -> str:
 
 @lru_cache(maxsize=2)
 def read_index(folder: Path) -> dict[str, Any]:
-    """Read the index of an export.
-
-    Raises:
-        InputError: there is no such folder.
-        FileFormatError: it is no export.
-    """
+    """Read the index of an export; InputError where there is no folder, FileFormatError where it is no export."""
     if not is_folder(folder):
         raise InputError(f"{folder}: there is no such folder; make one with `wholebody bench export {folder}`")
     if not (folder / INDEX).is_file():
@@ -99,13 +85,8 @@ EXACT = 1e-6  # m, rad: what a witness meets, and an answer whose effort counts 
 class Score:
     """What a posture is worth for a problem.
 
-    Attributes:
-        goal_error, goal_angle: largest error of a goal [m], [rad].
-        overlap: depth of the deepest overlap of any pair [m].
-        clearance: largest shortfall of a pair from the distance that it must keep [m].
-        limits: largest violation of a joint limit [rad, m].
-        holds: largest violation of what is held, and of balance [m, rad].
-        effort: weighted squared displacement of joints and root from the start [rad^2, m^2].
+    The worst of goals [m], [rad]; of pairs: the deepest overlap and the largest shortfall [m]; of limits, and of what
+    is held and balanced [m, rad]. `effort`: weighted squared displacement of joints and root from the start.
     """
 
     goal_error: float
@@ -125,13 +106,7 @@ class Score:
 
 @dataclass(frozen=True)
 class Body:
-    """A body, read from its files.
-
-    Attributes:
-        model: Pinocchio's model of the URDF.
-        content: of the JSON file.
-        shapes: of the pieces, in their order.
-    """
+    """A body, read from its files: the model of the URDF, the JSON file, and the shapes of its pieces."""
 
     model: pin.Model
     content: Mapping[str, Any]
@@ -139,21 +114,14 @@ class Body:
 
 
 class Rebuilt:
-    """A problem as its files state it.
+    """A problem as its files state it: a posture has `model.nq` numbers, in the order of the files.
 
-    Attributes:
-        content: of the file.
-        model: Pinocchio's model; a posture has `model.nq` numbers, in the order of the files.
-        moving: whether the goals move, so that an answer is a posture for each frame.
-        free: whether a posture begins with the root's place and quaternion.
+    `moving`: whether an answer is a posture for each frame; `free`: whether it begins with the root's place and
+    quaternion.
     """
 
     def __init__(self, folder: Path, name: str) -> None:
-        """Read a problem, such as "clutter/0007", of an export.
-
-        Raises:
-            FileFormatError: a file is missing or is none of an export.
-        """
+        """Read a problem, such as "clutter/0007"; FileFormatError where a file is wrong."""
         path = folder / "problems" / f"{name}.json"
         self.content = read_json(path, "problem")
         body = read_body(folder, str(self.content["body"]))
@@ -285,11 +253,7 @@ def _frame(model: pin.Model, link: str) -> int:
 
 @lru_cache(maxsize=4)
 def read_body(folder: Path, path: str) -> Body:
-    """Read a body of an export; its JSON file names its URDF.
-
-    Raises:
-        FileFormatError: a file is missing or is none of an export.
-    """
+    """Read a body of an export; its JSON file names its URDF. FileFormatError where a file is wrong."""
     content = read_json(folder / path, "body")
     urdf = folder / str(content["urdf"])
     text = read_text(urdf, "URDF")

@@ -1,7 +1,4 @@
-"""Asks methods hard questions, each in a process of its own, and measures the answers on questions made anew.
-
-What hangs or crashes costs one cell and a time. Answers are measured by the independent assessment and the sweep.
-"""
+"""Asks methods hard questions, each in a process of its own, and measures the answers on questions made anew."""
 
 from __future__ import annotations
 
@@ -27,19 +24,11 @@ INSIDE = 1e-4  # m: deeper than this is inside
 
 @dataclass(frozen=True)
 class Judged:
-    """What an answer measures, the worst of all frames where there are several.
+    """What an answer measures, the worst of all frames where there are several [m, rad].
 
-    Attributes:
-        finite: whether it is made of numbers.
-        goal_error: largest goal error at the end [m, rad].
-        penetration: deepest overlap [m].
-        start_penetration: deepest overlap at the start [m]; 0 for a stream.
-        limit_violation: farthest out of a joint's limits [rad, m].
-        constraint_violation: farthest from what must hold [m, rad].
-        speed_excess: by how much the fastest joint is too fast, as a share of what is allowed.
-        passed: what it went into between frames, in words; "" for nothing.
-        dip: how deep, at the deepest [m].
-        misreported: largest difference between what it says is left and what is [m, rad].
+    `goal_error`: at the end; `speed_excess`: by how much the fastest joint is too fast, as a share; `passed`: what it
+    went into between frames, in words, and `dip` how deep; `misreported`: largest difference between what it says is
+    left and what is.
     """
 
     finite: bool = True

@@ -19,13 +19,7 @@ FRAME = 1.0 / 60.0  # s: a frame of a screen
 
 @dataclass(frozen=True)
 class Posed:
-    """A problem to solve once. Only the answer counts, not a way to it.
-
-    Attributes:
-        problem: to be solved.
-        iterations: most iterations that the method gets; None for its own default.
-        hindered: whether the method is asked as `Adapter.hindered` makes it.
-    """
+    """A problem to solve once, with the most iterations (None: the method's own), or by a method that is `hindered`."""
 
     problem: Problem
     iterations: int | None = None
@@ -34,12 +28,7 @@ class Posed:
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame of a stream.
-
-    Attributes:
-        target: (3,) where the goal is now.
-        moved: things that are elsewhere from this frame on: name to place (3,).
-    """
+    """One frame of a stream: where the goal is now (3,), and things that are elsewhere from now on."""
 
     target: tuple[float, float, float]
     moved: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
@@ -49,11 +38,7 @@ class Frame:
 class Stream:
     """A goal to follow frame by frame with `wholebody.Drag`; every frame counts, and the way from one to the next.
 
-    Attributes:
-        problem: to be solved; its first goal, a `Point`, is the one that moves.
-        frames: where the goal and the things are.
-        dt: seconds a frame.
-        speed: most that a joint may move [rad/s]; inf where nothing bounds it.
+    The first goal, a `Point`, is the one that moves; no joint may move faster than `speed` [rad/s].
     """
 
     problem: Problem
@@ -64,11 +49,7 @@ class Stream:
 
 @dataclass(frozen=True)
 class Nonsense:
-    """Inputs that no method can make sense of: each has to be refused.
-
-    Attributes:
-        attempts: what is given, in words, to a call that gives it to a method.
-    """
+    """Inputs that no method can make sense of, in words: each has to be refused."""
 
     attempts: Mapping[str, Callable[[Adapter], object]]
 
@@ -78,21 +59,12 @@ Question = Posed | Stream | Nonsense
 
 @dataclass(frozen=True)
 class HardCase:
-    """One hard case.
+    """One hard case: why it is hard, and which answers are acceptable.
 
-    Attributes:
-        name: as typed at the command line.
-        group: heading under which it stands.
-        title: its heading.
-        why: why it is hard.
-        acceptable: what an acceptable answer is, in words.
-        question: makes the problem, a new one at each call: what a method does to it does not reach the judge.
-        expected: the best verdict that there can be.
-        also: verdicts that are acceptable besides.
-        best: goal error of the best possible answer [m, rad]; None where only the best answer of all is known.
-        near: by how much an honest best effort may miss the best known answer and still be as good as it [m, rad].
-        tolerance: to which an answer counts as solved [m, rad].
-        can_hold: whether all constraints can hold together.
+    `question` makes the problem, a new one at each call: what a method does to it does not reach the judge. `expected`:
+    the best verdict that there can be; `also`: others that are acceptable. `best`: goal error of the best possible
+    answer [m, rad], None where only the best answer of all is known; an honest best effort may miss it by `near`. An
+    answer counts as solved to `tolerance`; `can_hold`: whether all constraints can hold together.
     """
 
     name: str
@@ -109,12 +81,7 @@ class HardCase:
     can_hold: bool = True
 
     def accepts(self, kind: Kind, miss: float) -> bool:
-        """Whether an answer is acceptable.
-
-        Args:
-            kind: its verdict.
-            miss: by how much its goal error is above that of the best known answer [m, rad].
-        """
+        """Whether an answer is acceptable whose goal error is above that of the best known one by `miss` [m, rad]."""
         return kind in self.also or (kind == self.expected and (kind != "honest" or miss <= self.near))
 
 
@@ -122,15 +89,9 @@ class HardCase:
 class Answer:
     """What a method did with one case.
 
-    Attributes:
-        postures: (k, nq) its answer, or one posture a frame; empty where it gave none.
-        status: what it says of its answer; "" for streams, which say only their residual.
-        left: (k,) what it says is left to the goal, metres or radians; NaN where it does not say.
-        refusal: what it says where it refuses.
-        failure: an exception that is no WholebodyError, or how the process ended.
-        taken: nonsense that it took without a word.
-        seconds: wall time.
-        message: its own sentence.
+    `postures` (k, nq): one, or one a frame, or none; `left` (k,): what it says is left to the goal; `failure`: an
+    exception that is no WholebodyError, or how the process ended; `taken`: nonsense that it took without a word;
+    `seconds` by the clock.
     """
 
     postures: Array

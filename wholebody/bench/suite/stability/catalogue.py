@@ -1,7 +1,4 @@
-"""All hard cases by name, in the order of reports, and what each asks, from `cases.toml`.
-
-A question is made anew at each call from its figure, its things, its goals, and the frames of one that moves.
-"""
+"""All hard cases by name, in the order of reports, and what each asks, from `cases.toml`."""
 
 from __future__ import annotations
 
@@ -40,11 +37,7 @@ def names() -> tuple[str, ...]:
 
 
 def cases(chosen: Iterable[str] | None = None, where: str = "") -> tuple[HardCase, ...]:
-    """The cases of these names, in the order of reports; all of them where None. `where` is for the message.
-
-    Raises:
-        UnknownNameError: there is no such case.
-    """
+    """The cases of these names, all of them where None; UnknownNameError where there is no such case."""
     listed = _data()
     wanted = listed if chosen is None else [known(name, listed, "case", where) for name in chosen]
     return tuple(_case(name, given) for name, given in listed.items() if name in wanted)

@@ -1,7 +1,4 @@
-"""Decides what answers are worth, by rules, in order: solved, an honest best effort, a clear refusal, or WRONG.
-
-All verdicts together are a result, of which the report is written and the matrix of cases and methods is drawn.
-"""
+"""Decides what answers are worth, by rules, in order: solved, an honest best effort, a clear refusal, or WRONG."""
 
 from __future__ import annotations
 
@@ -29,13 +26,7 @@ WORDS: dict[Kind, str] = {
 
 
 class Verdict(NamedTuple):
-    """What one method's answer to one case is worth.
-
-    Attributes:
-        kind: of the four.
-        figure: the worst figure, in a few words; "" where there is nothing to add.
-        acceptable: whether the case accepts it.
-    """
+    """What one method's answer to one case is worth, and its worst figure in a few words."""
 
     kind: Kind
     figure: str
@@ -48,10 +39,7 @@ class Verdict(NamedTuple):
 
 
 def decide(case: HardCase, answer: Answer, judged: Judged, best: float | None = None) -> Verdict:
-    """The verdict on an answer and what it measures.
-
-    `best` is the goal error of the best answer that any method found, for a case that knows none itself [m, rad].
-    """
+    """The verdict on an answer and what it measures; `best`: least goal error of any method [m, rad]."""
     wrong = _wrong(case, answer, judged)
     if wrong:
         return Verdict("wrong", wrong, False)
@@ -128,14 +116,7 @@ def length(metres: float) -> str:
 
 @dataclass(frozen=True)
 class Result:
-    """All cells with their verdicts.
-
-    Attributes:
-        cases: in the order of reports.
-        methods: in the order in which they were asked.
-        verdicts: by case's name and method.
-        rows: the same with figures.
-    """
+    """All cells with their verdicts by case's name and method, and as rows with figures."""
 
     cases: tuple[HardCase, ...]
     methods: tuple[str, ...]

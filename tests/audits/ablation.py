@@ -1,8 +1,7 @@
 """Which constants and mechanisms of a method matter: each changed or switched off, on problems that stay the same.
 
-Problems solved, iterations, and whether any answer differs at all do not depend on the machine; the processor's time is
-compared as a ratio to that of the unchanged method in the same run. A constant that changes no answer when it is halved
-and doubled decides nothing here.
+Counts do not depend on the machine; the processor's time is compared as a ratio to that of the unchanged method in the
+same run. A constant that changes no answer when it is halved and doubled decides nothing here.
 """
 
 from __future__ import annotations
@@ -54,15 +53,7 @@ class Constant:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a method did with all problems.
-
-    Attributes:
-        solved: how many it solved.
-        iterations: of all of them together.
-        left: goal errors that are left, metres and radians, of all of them together.
-        seconds: of the processor, of all of them together.
-        answers: postures, one a problem.
-    """
+    """What a method did with all problems together: those solved, goal errors left [m, rad], processor seconds."""
 
     solved: int
     iterations: int
@@ -76,10 +67,7 @@ class Outcome:
 
 
 def constants(method: str) -> tuple[list[Constant], list[str]]:
-    """Constants of a method, a package of `wholebody.methods`, but those of tracking.
-
-    Modules whose constants are compiled in and cannot be changed are the second part.
-    """
+    """Constants of a method but those of tracking, and the modules whose constants are compiled in and stay."""
     package = import_module(f"wholebody.methods.{method}")
     names = [found.name for found in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")]
     names = [name for name in names if not name.endswith(".tracking")]  # no step is asked for here
@@ -139,10 +127,9 @@ def ablation(
     mechanisms: Mapping[str, tuple[Any, str, Any]],
     tell: Callable[[str], None],
 ) -> tuple[Outcome, list[Row]]:
-    """Change one thing after the other; return what the method does unchanged, and a row a change.
+    """Change one thing after the other; return what the method does unchanged, and a row a change; tell them.
 
-    `mechanisms` are what is switched off by name: an owner, its attribute, and what takes its place. `tell` is told
-    of every row.
+    `mechanisms` are what is switched off by name: an owner, its attribute, and what takes its place.
     """
     outcome(method, given)  # what is compiled or loaded at first use
     whole = outcome(method, given)

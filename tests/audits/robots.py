@@ -1,7 +1,4 @@
-"""Every robot description of a folder: whether it loads, how fast, and whether its tips reach; and the page about it.
-
-A description is examined in a process of its own: it is loaded, and its tips reach to where a free posture has them.
-"""
+"""Every robot description of a folder, in a process each: whether it loads, how fast, and whether its tips reach."""
 
 from __future__ import annotations
 
@@ -89,11 +86,7 @@ def _free_posture(figure: Body, scene: Scene, count: int, number: int) -> Array:
 
 
 def descriptions(folder: Path) -> list[Path]:
-    """Return the URDF and MJCF files below a folder.
-
-    Raises:
-        InputError: no folder, or no description in it.
-    """
+    """Return the URDF and MJCF files below a folder; InputError where there is none."""
     if not os.path.isdir(folder):
         raise InputError(f"{folder}: there is no such folder; give one that holds robot descriptions")
     found = sorted(folder.rglob("*.urdf")) + sorted(path for path in folder.rglob("*.xml") if _is_mjcf(path))
@@ -111,10 +104,7 @@ def _is_mjcf(path: Path) -> bool:
 
 
 def measure(folder: Path, reaches: int) -> Iterator[Row]:
-    """Load every description of a folder twice, each time in a process of its own, and reach with it the second time.
-
-    The folder and its parents are looked up for packages.
-    """
+    """Load every description of a folder twice, and reach with it the second time."""
     for path in descriptions(folder):
         name = str(path.relative_to(folder))
         with Scratch() as cache:
@@ -146,7 +136,7 @@ def page(rows: Sequence[Row], facts: Mapping[str, str], reaches: int) -> str:
     whole = sum(row.figures.get("solved") == reaches for row in loaded)
     about = (
         "# Robots\n\nWhich robot descriptions load, how long that takes, and whether the robots reach. The files come "
-        "from other people and are loaded without changes; `wholebody bench robots FOLDER --update-docs` writes "
+        "from other people and are loaded without changes; `python -m tests.audits robots FOLDER --update-docs` writes "
         f"this page.\n\n{len(loaded)} of {len(rows)} descriptions load; {whole} robots solve all of their {reaches} "
         "reaches. A reach moves the tip of a chain to where a random posture free of contact has it; it begins at the "
         "default posture, and the robot may not touch itself. The chains take turns, the longest first. First is the "

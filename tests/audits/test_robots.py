@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from tests.audits.__main__ import main
+from tests.audits.robots import descriptions, examine, measure, page, tip_targets
 from wholebody.base.errors import InputError
-from wholebody.bench.measure.robots import descriptions, examine, measure, page, tip_targets
-from wholebody.cli import main
 
 ROBOT = """<robot name="r"><link name="a"/>
 <link name="b"><collision><origin xyz="0 0 0.2"/><geometry><cylinder radius="0.02" length="0.3"/></geometry>
@@ -89,9 +89,9 @@ def test_targets_are_of_free_postures_where_most_are_not(tmp_path: Path) -> None
 
 def test_the_command_writes_the_page(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     docs, out = folder / "docs", folder / "out"
-    wanted = ["bench", "robots", str(folder / "good"), "--quick", "--out", str(out), "--update-docs", str(docs)]
+    wanted = ["robots", str(folder / "good"), "--quick", "--out", str(out), "--update-docs", str(docs)]
     assert main(wanted) == 0
     assert "robot.urdf" in capsys.readouterr().out
     assert (docs / "robots.md").read_text().startswith("# Robots\n")
     assert (docs / "robots.md").read_text() == (out / "robots.md").read_text()
-    assert main(["bench", "robots", str(folder / "nowhere")]) == 2
+    assert main(["robots", str(folder / "nowhere")]) == 2

@@ -7,11 +7,11 @@ import argparse
 import pytest
 
 import wholebody as wb
+from tests.audits import ablation
+from tests.audits.__main__ import ablation as command
+from tests.audits.ablation import Constant, report
 from wholebody.bench.rows import Row
-from wholebody.bench.suite import ablation
-from wholebody.bench.suite.ablation import Constant, report
 from wholebody.bench.suite.problem_sets.registry import SETS
-from wholebody.cli.bench.measuring import ablation as command
 from wholebody.methods import contradictions, starts
 from wholebody.methods.qp import settings, sqp
 

@@ -1,4 +1,4 @@
-"""`wholebody bench solve`: random reaches are possible, and levels of modelling are judged in the finest model."""
+"""Levels of modelling are judged in the finest model."""
 
 from __future__ import annotations
 
@@ -8,60 +8,17 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from tests.audits import __main__ as audits
+from tests.audits import detail
+from tests.audits.detail import LEVELS, detail_summary, levels, of_figure
 from tests.csv_rows import csv_rows
-from wholebody.bench.measure import solve
 from wholebody.bench.measure.scaling import TIP, chain, task
-from wholebody.bench.measure.solve import LEVELS, detail_summary, levels, of_figure, reach, reach_summary, solve_reach
 from wholebody.bench.rows import Row
-from wholebody.bench.suite.problem_sets.bodies import CLEARANCE
 from wholebody.bench.suite.problem_sets.registry import SETS
-from wholebody.bench.suite.problem_sets.things import KINDS
-from wholebody.cli import main
 from wholebody.figures.state import State
 
 ERRORS = {"clearance missed mm": 0.0, "goal missed mm": 0.0}
 SIZES = {"freedoms": 55, "pairs": 700, "judgement ms": 2.0, "leaving out ms": 0.0}
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_the_witness_reaches_the_target_and_violates_nothing(seed: int) -> None:
-    problem, witness = reach(seed)
-    judged = wb.assess(problem, witness)
-    assert judged.met(1e-9)
-    assert judged.holds(1e-9)
-    assert judged.constraint_violation < 1e-12
-    assert problem.scene.figure.within_limits(witness)
-
-
-def test_the_witness_and_the_start_are_clear_of_all_objects() -> None:
-    problem, witness = reach(1)
-    scene, floor = problem.scene, "floor"
-    owners = scene.piece_owner
-    for q in (witness, problem.start):
-        near = scene.contacts(q, within=CLEARANCE)
-        pairs = {frozenset((owners[a], owners[b])) for a, b in near.pair}
-        assert all(floor in pair for pair in pairs), pairs
-    assert len(scene.objects) == 20 + 1
-    assert {name.split()[0] for name in scene.objects} == {*KINDS, floor}
-
-
-def test_a_seed_makes_one_reach_and_another_seed_another() -> None:
-    (problem, first), (same, again), (_, other) = reach(3), reach(3), reach(4)
-    assert (first == again).all()
-    for name, thing in problem.scene.objects.items():
-        assert same.scene.objects[name].placement == thing.placement
-    assert not np.allclose(first, other)
-
-
-def test_a_row_is_what_the_assessment_says() -> None:
-    row = solve_reach(0, "qp")
-    assert row["status"] == "solved"
-    assert row["how"] in ("directly", "by feasibility first", "from another start")
-    assert row["goal error"] < 2e-5
-    assert row["overlap"] < 1e-4
-    assert row["beyond limits"] < 1e-9
-    (summary,) = reach_summary([row])
-    assert (summary["solved %"].value, summary["worst overlap"]) == (100.0, row["overlap"])
 
 
 def test_errors_count_where_a_model_calls_its_answer_solved() -> None:
@@ -109,9 +66,9 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         figures = {"status": "solved", "deepest mm": 0.0, "effort above %": 0.0, "a solve ms": 5.0}
         return [Row("clutter", f"hulls, {level}", {**figures, **SIZES, **ERRORS}) for level in LEVELS]
 
-    monkeypatch.setattr(solve, "detail_rows", rows)
+    monkeypatch.setattr(detail, "detail_rows", rows)
     (tmp_path / "results.md").write_text("<!-- bench:detail -->\n<!-- /bench:detail -->")
-    words = ["--parts", "detail", "--count", "1", "--out", str(tmp_path / "out"), "--update-docs", str(tmp_path)]
-    assert main(["bench", "solve", *words]) == 0
+    words = ["--count", "1", "--out", str(tmp_path / "out"), "--update-docs", str(tmp_path)]
+    assert audits.main(["detail", *words]) == 0
     assert len(csv_rows(tmp_path / "out" / "detail.csv")) == len(LEVELS)
     assert "whole body, spheres: not asked" in (tmp_path / "results.md").read_text()
