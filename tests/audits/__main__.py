@@ -18,11 +18,18 @@ from wholebody.base.errors import WholebodyError
 from wholebody.base.files import make_folder
 from wholebody.bench.rows import only, report
 from wholebody.bench.tables import machine, write_rows, write_text
-from wholebody.cli.bench.command import listed, measuring, publish, publish_page, seed
+from wholebody.cli.bench.command import listed, measuring, publish, seed
 from wholebody.cli.bench.measuring import CLIPS, chosen, clips
 from wholebody.cli.command import command, count, option
 
 QUICK = 45  # quadratic programs
+
+
+def publish_page(name: str, text: str, arguments: argparse.Namespace) -> None:
+    """Write a page that a command makes whole, and into the documentation where that is asked for."""
+    for folder in filter(None, (arguments.out, arguments.update_docs)):
+        write_text(folder / name, text)
+        print(f"wrote {folder / name}")
 
 
 @measuring(

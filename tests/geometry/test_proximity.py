@@ -71,7 +71,7 @@ def test_agrees_with_coal_asked_pair_by_pair(detail):
         for k, within in enumerate((5.0, 0.02, 0.5, -0.01, 0.0, 0.1, 5.0)):
             proximity = Proximity(scene.pair_table) if k == 0 else used
             ask = proximity.query_views if k % 2 else proximity.query
-            found = ask(scene.state(q), within)
+            found = ask(scene.state(q).data, within)
             check(scene, found, expected, within, 1e-9 if k == 0 else 3e-6)
             seen["near"] += len(found.pair)
             seen["inside"] += int((found.distance < 0.0).sum())
@@ -258,7 +258,7 @@ def test_official_getters_stand_in_for_views(monkeypatch, lost):
         monkeypatch.setattr(pair_distances, name, lambda results: None)
     slow = Proximity(scene.pair_table)
     for (q, within), wanted in zip(queries, expected, strict=True):
-        found = slow.query(scene.state(q), within)
+        found = slow.query(scene.state(q).data, within)
         slow.reset()
         for part, want in zip(found.nearest_first(), wanted, strict=True):
             assert np.array_equal(part, want)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.geometry.swept_points import swept_points
+from wholebody.geometry.pieces import swept_points
 
 DIRECTIONS = np.random.default_rng(0).normal(size=(200, 3))
 DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1)[:, None]

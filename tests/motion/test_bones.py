@@ -54,3 +54,22 @@ def test_a_figure_that_cannot_follow_is_told(human: wb.Figure) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert max(map(np.max, wb.motion.bone_errors(motion, clip, NAMES).values())) == pytest.approx(1.2)
+
+
+@pytest.mark.parametrize("bend", [0.4, 1.0, 1.8])
+def test_the_place_of_a_hand_bends_the_elbow_that_no_joint_is_known_for(bend: float, human: wb.Figure) -> None:
+    q = human.with_joints(human.neutral, {"left_shoulder_flexion": 0.8, "left_elbow_flexion": bend})
+    straight = human.with_joints(q, {"left_elbow_flexion": 0.1})
+    parts = ("hip", "knee", "ankle", "shoulder", "wrist")
+    names = ["pelvis", *(f"{side}_{part}" for side in ("left", "right") for part in parts)]
+    places = np.array(
+        [[human.placement(each, name).translation for name in names] for each in [q] * 6 + [straight] * 2]
+    )
+    still = np.tile(np.eye(3), (*places.shape[:2], 1, 1))
+    parents = np.array([-1, *[0] * (len(names) - 1)])
+    motion = SkeletonMotion(tuple(names), parents, places[0] - places[0, 0], still, places, 0.05)
+    with pytest.warns(UserWarning, match="left_elbow"):
+        clip = wb.retarget(motion, human)
+    for k in range(4):
+        assert human.joint_values(clip.q[k])["left_elbow_flexion"] == pytest.approx(bend, abs=0.2)
+    assert "left_shoulder to left_wrist" in wb.motion.bone_errors(motion, clip)

@@ -100,7 +100,7 @@ def test_real_recordings_keep_the_directions_of_their_limbs(name: str, human: Fi
     assert len(clip) == 20
     assert clip.dt == motion.dt
     assert within(clip)
-    joints = matched(motion.names, human, None).joints
+    joints = matched(motion, human, None).joints
     off = []
     for side in SIDES:
         for first, second in BONES:
@@ -283,11 +283,9 @@ def test_wrong_names_of_bones_are_one_sentence(text: str, sentence: str, human: 
 
 
 def test_a_skeleton_of_unknown_names_is_refused_with_the_way_out(human: Figure) -> None:
-    motion = person(2)
-    strange = SkeletonMotion(
-        tuple(f"bone{k}" for k in range(len(motion.names))), motion.parents, motion.offsets, motion.rotations,
-        motion.positions, motion.dt,
-    )  # fmt: skip
+    parents, offsets = np.arange(-1, 6), np.tile([0.0, 0.0, 0.2], (7, 1))
+    snake = np.tile(np.eye(3), (2, 7, 1, 1))
+    strange = SkeletonMotion.moved(tuple(f"bone{k}" for k in range(7)), parents, offsets, snake, np.zeros((2, 3)), 0.1)
     with pytest.raises(wb.InputError, match=r"no bones .* bone0, .*; name them in a TOML file"):
         wb.retarget(strange, human)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -36,10 +37,18 @@ def human() -> wb.Figure:
     return wb.load("human")
 
 
+def still(names: tuple[str, ...]) -> SkeletonMotion:
+    """A skeleton of these names, a chain whose bones are ten centimetres each."""
+    parents, offsets = np.arange(-1, len(names) - 1), np.tile([0.0, 0.0, 0.1], (len(names), 1))
+    return SkeletonMotion.moved(
+        names, parents, offsets, np.tile(np.eye(3), (1, len(names), 1, 1)), np.zeros((1, 3)), 1.0
+    )
+
+
 @pytest.mark.parametrize("program", KNOWN)
 def test_names_of_programs_are_known(program: str, human: wb.Figure) -> None:
     pelvis, *limbs = KNOWN[program].replace("Skeleton_", "Skeleton:").split()
-    found = matched((pelvis, *limbs), human, None)
+    found = matched(still((pelvis, *limbs)), human, None)
     assert found.joints == {"pelvis": pelvis} | {f"left_{part}": name for part, name in zip(LEGS, limbs, strict=True)}
     assert {"head", "right_knee"} <= set(found.missing)
 
@@ -58,4 +67,37 @@ def test_what_follows_nothing_is_told(human: wb.Figure) -> None:
         wb.retarget(motion, human)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert matched(names, human, {"skeleton": {"head": "leftHand"}}).joints["head"] == "leftHand"
+        assert matched(motion, human, {"skeleton": {"head": "leftHand"}}).joints["head"] == "leftHand"
+
+
+@pytest.mark.parametrize("turn", [0.0, 2.0])
+def test_structure_tells_what_names_do_not(turn: float, human: wb.Figure) -> None:
+    """A person's own skeleton whose joints have numbers, however it stands and wherever it looks."""
+    frames = {"pelvis": "pelvis", "chest": "thorax", "head": "head", "crown": "head_top"}
+    for side in ("left", "right"):
+        frames |= {f"{side}_{part}": f"{side}_{part}" for part in (*LEGS, "toe_tip", "index_tip")}
+    above = {"pelvis": "", "chest": "pelvis", "head": "chest", "crown": "head"}
+    for side in ("left", "right"):
+        for limb in (
+            ("pelvis", "hip", "knee", "ankle", "toe_tip"),
+            ("chest", "shoulder", "elbow", "wrist", "index_tip"),
+        ):
+            above |= {f"{side}_{b}": a if a in above else f"{side}_{a}" for a, b in pairwise(limb)}
+    names = tuple(above)
+    q = human.posture("sitting")
+    q[3:7] = 0.0, 0.0, np.sin(0.5 * turn), np.cos(0.5 * turn)
+    places = np.array([human.placement(q, frames[name]).translation for name in names])
+    parents = np.array([-1, *(names.index(above[name]) for name in names[1:])])
+    offsets = np.vstack([np.zeros((1, 3)), places[1:] - places[parents[1:]]])
+    local = np.tile(np.eye(3), (2, len(names), 1, 1))
+    numbers = tuple(f"joint {number}" for number in range(len(names)))
+    motion = SkeletonMotion.moved(numbers, parents, offsets, local, np.tile(places[0], (2, 1)), 0.02)
+    found = matched(motion, human, None)
+    ends = {"toe_tip": "toe", "index_tip": "hand"}
+    expected = {name.replace(*next(((a, b) for a, b in ends.items() if a in name), ("", ""))): numbers[k]
+                for k, name in enumerate(names) if name != "crown"}  # fmt: skip
+    assert found.joints == expected
+    assert set(found.told) == set(expected)
+    with pytest.warns(UserWarning, match="by the structure of the skeleton .*left_knee is 'joint "):
+        wb.retarget(motion, human)
+    assert matched(motion, human, {"skeleton": {"left_elbow": "joint 3", "left_wrist": "joint 4"}}).told == ()

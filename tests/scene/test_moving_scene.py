@@ -9,8 +9,8 @@ import trimesh
 
 import wholebody as wb
 from wholebody.geometry.continuous.sweep import Sweep
-from wholebody.geometry.proximity import Joints, PairTable, Proximity
-from wholebody.scene.moving_scene import PER_MOTION, PER_THING, MovingScene
+from wholebody.geometry.proximity import PairTable, Proximity
+from wholebody.scene.moving_scene import PER_THING, MovingScene
 
 
 def hull_points() -> np.ndarray:
@@ -36,7 +36,7 @@ def test_pieces_and_distances_are_those_of_a_scene_whose_things_were_moved(scene
     moving = MovingScene(scene.built, ["board", "tray", "stone"], between_things=False)
     model, rng = scene.model, np.random.default_rng(0)
     assert moving.model.nq == model.nq + 3 * PER_THING
-    assert moving.model.nv == model.nv + 3 * PER_MOTION
+    assert moving.model.nv == model.nv + 3 * 6
     table = PairTable(moving.model, moving.geometry)
     proximity, data = Proximity(table), moving.model.createData()
     for _ in range(5):
@@ -48,7 +48,7 @@ def test_pieces_and_distances_are_those_of_a_scene_whose_things_were_moved(scene
             assert moving.placement(at, name).homogeneous == pytest.approx(place.homogeneous, abs=1e-12)
             scene.move(name, at=place)
         pin.forwardKinematics(moving.model, data, at)
-        found, expected = proximity.query(Joints(data), 0.5), scene.contacts(q, 0.5)
+        found, expected = proximity.query(data, 0.5), scene.contacts(q, 0.5)
         assert found.placements == pytest.approx(expected.placements, abs=1e-9)
         found = found.nearest_first()
         assert len(found.number) > 50

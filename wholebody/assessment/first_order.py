@@ -48,7 +48,6 @@ class Blocker:
     frame: str | None = None
 
     def __str__(self) -> str:
-        """Describe it in words."""
         if self.kind == "contact":
             return f"{self.names[0]} against {self.names[1]}"
         return {"limit": "the limit of ", "bound": "the bound on ", "constraint": ""}[self.kind] + self.names[0]
@@ -86,7 +85,6 @@ class FirstOrder:
     """
 
     def __init__(self, problem: Problem, pairs: AllPairs, fits: bool) -> None:
-        """Keep what was asked, the posture where `pairs` are, and the pairs that push there."""
         self.fits = fits
         scene = problem.scene
         self._asked = _Asked(
@@ -97,18 +95,17 @@ class FirstOrder:
         self._clearances = problem.clearances[self._near.number]
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the answers: a copy in another process has nothing to compute them from."""
         return {"fits": self.fits, "optimality": self.optimality, "blockers": self.blockers}
 
     @cached_property
     def optimality(self) -> float:
-        """See `wholebody.assessment.posture.Assessment`."""
+        """See `Assessment`."""
         with self._lent() as state:
             return _optimality(self._asked, state, _active(self._asked, state, self._near))
 
     @cached_property
     def blockers(self) -> tuple[Blocker, ...]:
-        """See `wholebody.assessment.posture.Assessment`."""
+        """See `Assessment`."""
         if self.fits:
             return ()
         with self._lent() as state:
@@ -198,14 +195,7 @@ def _without(rows: _Rows, labels: dict[Label, float]) -> _Rows:
 
 
 class _Active(NamedTuple):
-    """Gradients of everything at work.
-
-    Attributes:
-        signed: of what works to both sides.
-        one_sided: of what only pushes one way.
-        gaps: (n, nv) those of contacts among them.
-        contacts: (n,) the pair that each of these is of.
-    """
+    """Gradients of what works to both sides, of what pushes one way, of contacts among these, and their pairs."""
 
     signed: _Rows
     one_sided: _Rows
@@ -264,19 +254,12 @@ def _row_space(rows: Array) -> Array:
 
 
 def nonnegative_least_squares(rows: Array, right: Array, lengths: Array) -> tuple[Array, Array]:
-    """The nonnegative combination of rows (m, n) that is nearest to a right side (n,), and what it leaves (n,).
+    """The nonnegative combination of rows (m, n) nearest to a right side (n,): shares (m,), and what it leaves (n,).
 
     Lawson and Hanson 1974, "Solving least squares problems", chapter 23: the row that agrees most with what is left
     joins the passive set, and rows whose share would turn negative leave it. scipy's does the same, but loading
-    scipy.optimize takes longer than a whole solve.
-
-    Args:
-        rows: (m, n).
-        right: (n,).
-        lengths: (m,) what is long for each row; one that is shorter than `INDEPENDENT` of it counts as zero.
-
-    Returns:
-        The shares (m,), nonnegative, and right - shares @ rows.
+    scipy.optimize takes longer than a whole solve. A row that is shorter than `INDEPENDENT` of its length (m,) counts
+    as zero.
     """
     norms = np.linalg.norm(rows, axis=1)
     counts = norms > INDEPENDENT * lengths

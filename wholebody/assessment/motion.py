@@ -55,14 +55,7 @@ class MotionAssessment:
 def assess_motion(
     scene: Scene, q: Array, dt: float, moves: Mapping[str, Sequence[pin.SE3]] | None = None
 ) -> MotionAssessment:
-    """Assess postures (n, nq), `dt` seconds apart.
-
-    Args:
-        scene: figure and things.
-        q: (n, nq) postures.
-        dt: seconds from one to the next.
-        moves: thing to its n placements, at the postures; all others stay.
-    """
+    """Assess postures (n, nq), `dt` seconds apart; `moves` has n placements of each thing that moves, others stay."""
     depth, overlapping = np.zeros(len(q)), np.zeros(len(q), dtype=np.intp)
     for frame, pairs in enumerate(pairs_along(scene, q, moves)):
         depth[frame] = max(0.0, -pairs.least)
@@ -88,10 +81,10 @@ def pairs_along(scene: Scene, q: Array, moves: Mapping[str, Sequence[pin.SE3]] |
 
 
 def limit_violation(figure: Figure, q: Array) -> float:
-    """Largest violation of a joint limit at any posture (n, nq), radians or metres."""
+    """Largest violation of a joint limit at any posture (n, nq) or (nq,), radians or metres."""
     limits = figure.limits
-    values = np.atleast_2d(q)[:, limits.idx_q]
-    return float(np.maximum(limits.lower - values, values - limits.upper).max(initial=0.0))
+    values = q[..., limits.idx_q]
+    return float(np.maximum.reduce(np.maximum(limits.lower - values, values - limits.upper), axis=None, initial=0.0))
 
 
 def cone_violation(scene: Scene, q: Array) -> float:
@@ -148,17 +141,15 @@ def deepened(scene: Scene, q: Array) -> Array:
 
     It is the least of `DEPTHS` that no pair exceeds in a sweep from either end; inf if some pair exceeds all of them.
     """
-    sweep = Sweep(scene.model, scene.geometry)
-    return np.array([_deepened(sweep, *way) for way in pairwise(q)])
-
-
-def _deepened(sweep: Sweep, before: Array, after: Array) -> float:
-    for depth in DEPTHS:
-        if sweep.first_contact(before, after, tolerance=depth) is None:
-            return depth
-        if sweep.first_contact(after, before, tolerance=depth) is None:
-            return depth
-    return np.inf
+    sweep, found = Sweep(scene.model, scene.geometry), []
+    for way in pairwise(q):
+        free = (
+            depth
+            for depth in DEPTHS
+            if any(sweep.first_contact(*ends, tolerance=depth) is None for ends in (way, way[::-1]))
+        )
+        found.append(next(free, np.inf))
+    return np.array(found)
 
 
 def depth_between(scene: Scene, before: Array, after: Array, depth: float) -> tuple[float, str]:

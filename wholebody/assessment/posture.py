@@ -17,6 +17,7 @@ import numpy as np
 
 from wholebody.assessment.all_pairs import AllPairs, all_pairs
 from wholebody.assessment.first_order import MET, Blocker, FirstOrder
+from wholebody.assessment.motion import limit_violation
 from wholebody.base.arrays import Array
 from wholebody.base.checks import a, number, posture
 from wholebody.base.errors import InputError, TermError
@@ -87,21 +88,13 @@ class Assessment:
         return {**numbers, "optimality": self.optimality, "blockers": [asdict(blocker) for blocker in self.blockers]}
 
     def holds(self, tolerance: float) -> bool:
-        """Whether limits, constraints and clearances hold to a tolerance, metres and radians.
-
-        Raises:
-            InputError: the tolerance is negative or no number.
-        """
+        """Whether limits, constraints and clearances hold to a tolerance, metres and radians."""
         tolerance = number(tolerance, "tolerance", 0.0, inf)
         all_of_it = (self.limit_violation, self.constraint_violation, self.clearance_violation, self.penetration)
         return all(violation <= tolerance for violation in all_of_it)  # NaN holds nothing
 
     def met(self, tolerance: float) -> bool:
-        """Whether the goals are met to a tolerance, metres and radians.
-
-        Raises:
-            InputError: the tolerance is negative or no number.
-        """
+        """Whether the goals are met to a tolerance, metres and radians."""
         tolerance = number(tolerance, "tolerance", 0.0, inf)
         return all(error <= tolerance for error in (self.goal_error, self.goal_angle, *self.goal_errors))
 
@@ -117,11 +110,7 @@ class Assessment:
 
 
 def assess(problem: Problem, q: Array) -> Assessment:
-    """Judge a posture.
-
-    Args:
-        problem: to be solved.
-        q: (nq,) the posture.
+    """Judge a posture q (nq,) for a problem.
 
     Raises:
         InputError: q has the wrong shape or a value that is not finite.
@@ -155,9 +144,9 @@ def _judged(problem: Problem, pairs: AllPairs, q: Array, began: float) -> Assess
         penetration=max(0.0, -pairs.least),
         least_distance=pairs.least,
         clearance_violation=violation,
-        limit_violation=_limit_violation(problem, q),
+        limit_violation=limit_violation(problem.scene.figure, q),
         constraint_violation=missed,
-        measure=_weighed(problem, state),
+        measure=sum((one(term, "value", term.weight * term.value(state)) for term in problem.measures), 0.0),
         goal_errors=each,
         first_order=FirstOrder(problem, pairs, fits),
         seconds=time.perf_counter() - began,
@@ -177,12 +166,6 @@ def goal_errors(problem: Problem, state: State) -> tuple[float, float, tuple[flo
     return max(distances), max(angles), tuple(each)
 
 
-def _limit_violation(problem: Problem, q: Array) -> float:
-    limits = problem.scene.figure.limits
-    values = q[limits.idx_q]
-    return float(np.maximum.reduce(np.maximum(limits.lower - values, values - limits.upper), initial=0.0))
-
-
 def largest_violation(problem: Problem, state: State) -> float:
     """The largest violation of a constraint, metres or radians."""
     worst = 0.0
@@ -196,8 +179,3 @@ def largest_violation(problem: Problem, state: State) -> float:
 def _values(term: Goal | Constraint, evaluate: Callable[[State], Array], state: State) -> Array:
     """Values (m,) of a goal or constraint; one of one's own must have as many rows as values here too."""
     return values_and_rows(term, evaluate, state)[0] if is_own(term) else evaluate(state)
-
-
-def _weighed(problem: Problem, state: State) -> float:
-    """The weighted sum of the measures."""
-    return sum((one(term, "value", term.weight * term.value(state)) for term in problem.measures), 0.0)

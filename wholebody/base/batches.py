@@ -196,12 +196,7 @@ def _in_own_child(sent: _Sent) -> tuple[int, Any, tuple[int, str] | None]:
 
 
 def threads(cluster: str) -> int:
-    """How many jobs a cluster does at a time.
-
-    Raises:
-        MissingPackageError: dask is not installed.
-        WholebodyError: the cluster does not answer, or has no workers.
-    """
+    """How many jobs a cluster does at a time; raises as `run_batch`, also where the cluster has no workers."""
     with _client(cluster) as client:
         found = sum(client.nthreads().values())
     if not found:

@@ -1,4 +1,4 @@
-"""Checks of arguments: each returns the value in the form in which it is used, or raises one sentence with its name.
+"""Checks of arguments: each returns the value in the form in which it is used, or raises an InputError, one sentence.
 
 `what` is the name of the value in the sentence: the argument's name, with the callable in front if that is not obvious.
 """
@@ -35,7 +35,6 @@ TIME_STEP = (1e-6, 1e6)
 """Least and greatest time step, seconds: beyond them velocities have no significant digits."""
 TIME_STEP_ASKED = f"give one between {TIME_STEP[0]:g} and {TIME_STEP[1]:g} s"
 """The end of a message about a time step that is out of that range."""
-
 
 MOST_TURNED = 4.0 * math.pi
 """Radians, two turns, beyond which degrees were probably meant."""
@@ -81,17 +80,7 @@ def some(names: Iterable[str]) -> str:
 
 
 def instance(value: object, kind: type[_T] | tuple[type[_T], ...], what: str, correction: str) -> _T:
-    """A value of a type, or of one of several.
-
-    Args:
-        value: the argument.
-        kind: the type.
-        what: its name in the message.
-        correction: such as "load one with wb.load('human')".
-
-    Raises:
-        InputError: it is of another type.
-    """
+    """A value of a type, or of one of several; `correction` ends the sentence: "load one with wb.load('human')"."""
     if not isinstance(value, kind):
         wanted = " or ".join(a(one) for one in (kind if isinstance(kind, tuple) else (kind,)))
         raise InputError(f"{what} is {a(type(value))}, not {wanted}; {correction}")
@@ -99,11 +88,7 @@ def instance(value: object, kind: type[_T] | tuple[type[_T], ...], what: str, co
 
 
 def number(value: object, what: str, low: float, high: float, unit: str = "", wanted: str = "") -> float:
-    """A finite number within a range, both ends included; `wanted` replaces range and unit in the message.
-
-    Raises:
-        InputError: it is none.
-    """
+    """A finite number within a range, both ends included; `wanted` replaces range and unit in the message."""
     found = _real(value)
     if found is None or not low <= found <= high:
         if not wanted:
@@ -141,11 +126,7 @@ def unit_hint(value: float, low: float, high: float, unit: str) -> str:
 
 
 def time_step(value: object, what: str) -> float:
-    """Seconds of a step or a frame.
-
-    Raises:
-        InputError: no number within `TIME_STEP`.
-    """
+    """Seconds of a step or a frame, within `TIME_STEP`."""
     found = number(value, what, *TIME_STEP, "s, such as 0.02")
     if found > 10.0:  # Seconds of a step beyond which a number of frames a second was probably meant.
         told = f"{what} is {found:g} s; for {found:g} frames a second give 1 / {found:g}"
@@ -154,11 +135,7 @@ def time_step(value: object, what: str) -> float:
 
 
 def whole(value: object, what: str, low: int, high: int) -> int:
-    """A whole number within a range, both ends included.
-
-    Raises:
-        InputError: it is none.
-    """
+    """A whole number within a range, both ends included."""
     try:
         found = None if isinstance(value, (bool, np.bool_)) else index(value)  # type: ignore[arg-type]
     except TypeError:
@@ -169,33 +146,21 @@ def whole(value: object, what: str, low: int, high: int) -> int:
 
 
 def flag(value: object, what: str) -> bool:
-    """True or false.
-
-    Raises:
-        InputError: it is neither.
-    """
+    """True or false."""
     if not isinstance(value, (bool, np.bool_)):
         raise InputError(f"{what} is {shown(value)}; give True or False")
     return bool(value)
 
 
 def text(value: object, what: str) -> str:
-    """A line of text: not empty, at most `LONGEST` characters, all of which can be shown.
-
-    Raises:
-        InputError: it is none.
-    """
+    """A line of text: not empty, at most `LONGEST` characters, all of which can be shown."""
     if not isinstance(value, str) or not value.strip() or len(value) > LONGEST or not value.isprintable():
         raise InputError(f"{what} is {shown(value)}; give a line of text, at most {LONGEST} characters")
     return value
 
 
 def choice(value: object, options: Collection[str], what: str) -> str:
-    """One of a few words.
-
-    Raises:
-        InputError: it is another value.
-    """
+    """One of a few words."""
     if not isinstance(value, str) or value not in options:
         raise InputError(f"{what} is {shown(value)}; give {' or '.join(map(repr, options))}")
     return value
@@ -204,18 +169,10 @@ def choice(value: object, options: Collection[str], what: str) -> str:
 def known(
     value: object, names: Collection[str], kind: str, where: str = "", offered: Collection[str] | None = None
 ) -> str:
-    """A known name.
-
-    Args:
-        value: the argument.
-        names: all known names.
-        kind: the kind of object, singular: "frame", "posture".
-        where: the place, for the message.
-        offered: the names that the message may suggest, if not all.
+    """A known name of a kind of object such as "frame", in a place; only those `offered` are suggested, by default all.
 
     Raises:
-        UnknownNameError: the name is unknown.
-        InputError: it is not a text.
+        UnknownNameError: the name is unknown; it is a text.
     """
     if not isinstance(value, str):
         raise InputError(f"{f'{where}: ' if where else ''}{shown(value)} is not the name of {a(kind)}; give a text")
@@ -225,11 +182,7 @@ def known(
 
 
 def listed(value: object, what: str, example: str) -> list[Any]:
-    """The entries of a list, a tuple or another iterable that is no text.
-
-    Raises:
-        InputError: it is not iterable.
-    """
+    """The entries of a list, a tuple or another iterable that is no text."""
     if isinstance(value, Iterable) and not isinstance(value, (str, bytes)):
         try:
             return list(value)
@@ -241,8 +194,7 @@ def listed(value: object, what: str, example: str) -> list[Any]:
 class FixedAttributes:
     """Base of objects whose public attributes are decided when they are made.
 
-    Setting one later is an InputError, except those that `_settable` names, which `_checked_value` checks. Methods and
-    private attributes are set as usual.
+    Setting one later is an InputError, except those that `_settable` names, which `_checked_value` checks.
     """
 
     _settable: ClassVar[frozenset[str]] = frozenset()
@@ -271,22 +223,14 @@ def settle(record: object, name: str, value: object) -> None:
 
 
 def function(value: _T, what: str) -> _T:
-    """Something that can be called, or None.
-
-    Raises:
-        InputError: it is neither.
-    """
+    """Something that can be called, or None."""
     if value is not None and not callable(value):
         raise InputError(f"{what} is {shown(value)}; give a function, or leave it out")
     return value
 
 
 def path(value: object, what: str) -> Path:
-    """The path of a file.
-
-    Raises:
-        InputError: it is neither text nor a path, or no file system takes it.
-    """
+    """The path of a file."""
     given = value.__fspath__() if isinstance(value, os.PathLike) else value
     if not isinstance(given, str) or not given or "\0" in given:
         raise InputError(f"{what} is {shown(value)}; give the path of a file")
@@ -294,15 +238,9 @@ def path(value: object, what: str) -> Path:
 
 
 def array(value: object, what: str, wanted: str) -> Array:
-    """Real numbers as an array of any shape; an array of floats is returned without a copy.
+    """Real numbers as an array of any shape, infinite ones and NaN too; an array of floats is returned without a copy.
 
-    Args:
-        value: the argument.
-        what: its name in the message.
-        wanted: the accepted values, such as "corners, shape (k, 3), metres".
-
-    Raises:
-        InputError: it does not consist of real numbers. Infinite values and NaN are accepted.
+    `wanted` says what is accepted, such as "corners, shape (k, 3), metres".
     """
     if type(value) is np.ndarray and value.dtype == np.float64:
         return value
@@ -323,11 +261,7 @@ def array(value: object, what: str, wanted: str) -> Array:
 
 
 def numbers(value: object, shape: tuple[int, ...], what: str) -> Array:
-    """Read-only copy with finite numbers of this shape.
-
-    Raises:
-        InputError: it is none.
-    """
+    """Read-only copy with finite numbers of this shape."""
     plain = "one number" if not shape else f"numbers of shape {shape}"
     found: Array = array(value, what, plain).copy()
     if found.shape != shape:
@@ -339,11 +273,7 @@ def numbers(value: object, shape: tuple[int, ...], what: str) -> Array:
 
 
 def posture(value: object, size: int, what: str = "a posture") -> Array:
-    """A posture (size,) of finite numbers; an array of floats is returned without a copy.
-
-    Raises:
-        InputError: it has another shape, or a value that is not finite.
-    """
+    """A posture (size,) of finite numbers; an array of floats is returned without a copy."""
     found = array(value, what, f"{size} numbers; start from figure.posture(...)")
     if found.shape != (size,):
         raise InputError(f"{what} has shape ({size},), not {found.shape}; start from figure.posture(...)")
@@ -354,14 +284,9 @@ def posture(value: object, size: int, what: str = "a posture") -> Array:
 
 
 def color(value: object, what: str) -> tuple[float, float, float, float]:
-    """Red, green, blue and alpha, each from 0 to 1; alpha is 1 if it is missing.
+    """Red, green, blue and alpha, each from 0 to 1, of three or four such numbers, a name of CSS, or "#rrggbb(aa)".
 
-    Args:
-        value: three or four such numbers, a name of CSS such as "steelblue", or "#rrggbb" or "#rrggbbaa".
-        what: is painted, for the message.
-
-    Raises:
-        InputError: it is none of these.
+    Alpha is 1 if it is missing.
     """
     wanted = "red, green, blue and, if wanted, alpha, each from 0 to 1, such as (1.0, 0.0, 0.0), a name or '#rrggbb'"
     if isinstance(value, str):

@@ -53,15 +53,11 @@ _compiling = {"depth": 0, "since": 0.0, "seconds": 0.0, "collects": True}
 
 
 def compiled(*, inner: bool = False, **options: Any) -> Callable[[F], F]:
-    """Let numba compile a function at its first call, and cache the result.
+    """Let numba compile a function at its first call, with the options of `numba.njit`, and cache the result.
 
     The cache is beside the file, or in the user's cache folder if that is not writable; NUMBA_CACHE_DIR names another
-    folder. If no folder is writable, every process compiles anew.
-
-    Args:
-        inner: whether only compiled functions call it. It is compiled sooner then, and calling it from Python raises a
-            TypeError.
-        options: what `numba.njit` takes, such as error_model and fastmath.
+    folder. If no folder is writable, every process compiles anew. A function that only compiled functions call,
+    `inner`, is compiled sooner, and calling it from Python raises a TypeError.
     """
     loop_type = _inner_type() if inner else _loop_type()
     _watch()

@@ -7,23 +7,20 @@ from collections.abc import Collection, Iterable
 from difflib import SequenceMatcher
 from typing import Any
 
-SHOWN = 80
-"""Largest number of characters of a name in a message."""
+SHOWN = 80  # characters of a name in a message
+
+OFFERED = 4  # names that a message offers; of a few more, all, if none is similar
+
+SIMILAR, ALIKE = 0.4, 0.6
+"""Least similarity, 0 to 1, of a name that is offered, and of one beside which the dissimilar ones are left out."""
+
+_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+|[0-9]+|[^\W_]")
 
 
 def one_line(text: str, most: int = SHOWN) -> str:
     """A text as messages quote it: without line ends and unprintable characters, and no longer than `most`."""
     plain = text if text.isprintable() else text.encode("unicode_escape", "backslashreplace").decode()
     return plain if len(plain) <= most else f"{plain[: most - 3]}..."
-
-
-OFFERED = 4
-"""Most names that a message offers; of a few more, all, if none is similar."""
-
-SIMILAR, ALIKE = 0.4, 0.6
-"""Least similarity, 0 to 1, of a name that is offered, and of one beside which the dissimilar ones are left out."""
-
-_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+|[0-9]+|[^\W_]")
 
 
 def nearest_names(name: str, known: Collection[str]) -> list[str]:
@@ -67,12 +64,10 @@ class TermError(InputError):
     """
 
     def __init__(self, term: object, name: str, told: str) -> None:
-        """Build the sentence of a term's name and what is told of it."""
         self.term, self.name, self.told = term, name, told
         super().__init__(f"{name}: {told}")
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Return the words: a term need not go into another process."""
+    def __reduce__(self) -> tuple[Any, ...]:  # a term need not go into another process
         return type(self), (None, self.name, self.told)
 
 
@@ -95,14 +90,7 @@ class UnknownNameError(WholebodyError, KeyError):
     """An unknown name; the message lists the nearest known names."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str], where: str = "") -> None:
-        """Build the sentence.
-
-        Args:
-            kind: the kind of object, singular: "frame", "joint", "object".
-            name: the unknown name.
-            known: all known names.
-            where: the place, such as "goal 2" or "task.toml, key goals[1].frame".
-        """
+        """Build the sentence of a kind of object and all known names; `where` is a place, such as "goal 2"."""
         known = sorted(set(known))
         near = nearest_names(str(name), known)
         hint = f"did you mean {', '.join(map(one_line, near))}?" if near else "there are none."
@@ -111,8 +99,7 @@ class UnknownNameError(WholebodyError, KeyError):
         called = repr(name) if len(name) <= SHOWN else f"{name[:SHOWN]!r}..."
         super().__init__(f"{place}no {kind} is called {called}; {hint}")
 
-    def __str__(self) -> str:
-        """Return the sentence (KeyError would show its repr)."""
+    def __str__(self) -> str:  # KeyError would show its repr
         return str(self.args[0])
 
 

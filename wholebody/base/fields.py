@@ -78,17 +78,14 @@ class Vector:
 
     def __call__(self, value: object, what: str) -> tuple[float, ...]:
         """The numbers; an InputError if the value is of another shape, or one of them is out of range."""
-        return tuple(self.each(one, what) for one in checks.numbers(value, (self.count,), what).tolist())
+        found = tuple(checks.numbers(value, (self.count,), what).tolist())
+        within = not self.each.whole and self.each.low <= min(found) and max(found) <= self.each.high
+        return found if within else tuple(self.each(one, what) for one in found)
 
 
 @dataclass(frozen=True)
 class Names:
-    """A list of names, kept as a tuple.
-
-    Attributes:
-        example: such a list as it is written, for messages.
-        least: how many at least.
-    """
+    """A list of at least `least` names, kept as a tuple; `example` is such a list as it is written, for messages."""
 
     example: str
     least: int = 1
@@ -102,14 +99,7 @@ class Names:
 
 
 class _Checked(NamedTuple):
-    """A field with its check.
-
-    Attributes:
-        name: of the field.
-        check: of its values.
-        optional: whether None stands for no value.
-        kept: name of the field that keeps what the check returns.
-    """
+    """A field with its check; None stands for no value where it is optional, and what the check returns is `kept`."""
 
     name: str
     check: Check
@@ -126,11 +116,7 @@ class Checked:
     """
 
     def __post_init__(self) -> None:
-        """Check the fields.
-
-        Raises:
-            InputError: a value that its field does not accept.
-        """
+        """Check the fields."""
         kind: Any = type(self)
         where = called(self)
         for field in _checked(kind):

@@ -24,39 +24,21 @@ from typing import Any
 from wholebody.base import checks
 from wholebody.base.errors import FileFormatError, InputError, one_line
 
-LARGEST_TEXT = 10_000_000
-"""Bytes of a file that people write by hand, such as a task."""
-
-LARGEST = 1_000_000_000
-"""Bytes of any other file, such as a mesh or a recorded track."""
-
-LONGEST_NAME = 200
-"""Largest number of characters of a path in a message."""
-
-DEEPEST_KEY = 20
-"""Largest number of parts of a dotted key of TOML."""
-
+LARGEST_TEXT = 10_000_000  # bytes of a file that people write by hand, such as a task
+LARGEST = 1_000_000_000  # bytes of any other file, such as a mesh or a recorded track
+LONGEST_NAME = 200  # characters of a path in a message
+DEEPEST_KEY = 20  # parts of a dotted key of TOML
 
 _DEEP_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{DEEPEST_KEY}}}""")
 _LONG_NUMBER = re.compile(r"[\d_]{4000}")
 
 PREFIX = "wholebody-scratch-"
-"""Beginning of the names of our scratch folders."""
-
-LOCK = "in-use"
-"""A file in each scratch folder that its process keeps locked; the system releases the lock when the process ends."""
-
-UNLOCKED = 60.0
-"""Seconds for which a scratch folder may be without its lock file; making the file takes far less."""
+LOCK = "in-use"  # a file in each scratch folder that its process keeps locked; the system releases it when it ends
+UNLOCKED = 60.0  # s: for which a scratch folder may be without its lock file; making the file takes far less
 
 
 def read_bytes(path: str | PathLike[str], kind: str = "file", largest: int = LARGEST) -> bytes:
-    """Read a regular file.
-
-    Args:
-        path: the file.
-        kind: its name in messages: "task file", "mesh".
-        largest: largest size, bytes.
+    """Read a regular file of at most `largest` bytes; `kind` is its name in messages: "task file", "mesh".
 
     Raises:
         FileFormatError: there is no such file, it is no regular file (a folder, a device, a pipe), it is too large, or
@@ -73,9 +55,7 @@ def read_bytes(path: str | PathLike[str], kind: str = "file", largest: int = LAR
 
 
 def read_text(path: str | PathLike[str], kind: str = "file", largest: int = LARGEST_TEXT) -> str:
-    """Read a text file in UTF-8, with or without a byte order mark.
-
-    Line ends are kept as they are.
+    """Read a text file in UTF-8, with or without a byte order mark; line ends are kept as they are.
 
     Raises:
         FileFormatError: as for `read_bytes`, or the text is not in UTF-8.
@@ -112,11 +92,7 @@ def packaged_table(path: Path) -> tuple[dict[str, str], ...]:
 
 
 def parsed_toml(text: str, name: str) -> dict[str, Any]:
-    """What a text in TOML says.
-
-    Args:
-        text: of the file.
-        name: of the file, for messages.
+    """What a text in TOML says; `name` is that of the file, for messages.
 
     Raises:
         FileFormatError: it is not TOML, or has keys, tables or numbers that a reader of TOML does not bear.
@@ -211,13 +187,10 @@ def _named(path: str | PathLike[str]) -> str:
 
 
 def write(path: str | PathLike[str], content: str | bytes) -> Path:
-    """Write a file whole or not at all; text as UTF-8. A link is followed; devices and pipes are written into.
+    """Write a file whole or not at all, text as UTF-8. A link is followed; devices and pipes are written into.
 
     A process that is killed during the call may leave a temporary file; the next process that writes to the folder
     removes it.
-
-    Returns:
-        The path.
 
     Raises:
         InputError: the file cannot be written.
@@ -266,22 +239,14 @@ def check_writable(path: Path) -> Path:
 
 
 def checked_target(path: object, what: str, content: str, endings: Collection[str]) -> Path:
-    """The path of a file to write, checked before long work: its ending as by `checked_ending`, and its folder.
-
-    Raises:
-        InputError: no path, another ending, or its folder is missing or not writable.
-    """
+    """The path of a file to write, checked before long work: its ending as by `checked_ending`, and its folder."""
     return check_writable(checked_ending(path, what, content, endings))
 
 
 def checked_ending(path: object, what: str, content: str, endings: Collection[str]) -> Path:
-    """The path of a file to write in the format that the ending of its name says.
+    """The path of a file to write in the format that its ending says, one of `endings`: in lower case, with the dot.
 
-    Args:
-        path: the argument.
-        what: its name in the message about what is no path.
-        content: what the file has, in messages: "a scene".
-        endings: of names, in lower case, each with its dot: the formats in which it can be written.
+    `what` names the path in messages, `content` what the file has: "a scene".
 
     Raises:
         InputError: no path, or the ending of its name is no such format.
@@ -297,11 +262,7 @@ def checked_ending(path: object, what: str, content: str, endings: Collection[st
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder and those above it, if they do not exist.
-
-    Raises:
-        InputError: it cannot be made.
-    """
+    """Make a folder and those above it, if they do not exist; an InputError if it cannot be made."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except (OSError, ValueError) as error:
@@ -329,14 +290,9 @@ def _remove_left_behind(folder: Path) -> None:
 
 
 class Scratch:
-    """A folder for temporary files. `close` removes it; after a crash, the next `Scratch` of any process does.
-
-    Attributes:
-        path: the folder.
-    """
+    """A folder for temporary files. `close` removes it; after a crash, the next `Scratch` of any process does."""
 
     def __init__(self) -> None:
-        """Make the folder, and remove those of processes that have ended."""
         _remove_abandoned()
         self.path = Path(tempfile.mkdtemp(prefix=PREFIX))
         unseen = self.path / f"{LOCK}.new"  # others take a lock that they see and that is free as left by the dead
@@ -350,11 +306,9 @@ class Scratch:
         self._lock.close()
 
     def __enter__(self) -> Path:
-        """Return the folder."""
         return self.path
 
     def __exit__(self, *_: object) -> None:
-        """Remove it."""
         self.close()
 
 

@@ -11,9 +11,7 @@ from importlib import import_module
 def exported(package: str, modules: Mapping[str, str]) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
     """Return a package's `__getattr__` and `__dir__`.
 
-    Args:
-        package: its name.
-        modules: names that it exports, separated by blanks, by the module that has them; a module for itself has none.
+    `modules` has the names that it exports, separated by blanks, by the module that has them.
     """
     home = {name: module for module, names in modules.items() for name in names.split()}
 

@@ -15,12 +15,7 @@ class Pool(Generic[T]):
     """A thread-safe free list; no two threads hold the same object at a time."""
 
     def __init__(self, make: Callable[[], T], at_most: int | None = None) -> None:
-        """Make an empty pool.
-
-        Args:
-            make: makes an object if none is free.
-            at_most: as many free objects are kept; None keeps all.
-        """
+        """Make an empty pool: `make` makes an object if none is free; `at_most` free ones are kept, all by default."""
         self._make, self._at_most = make, at_most
         self._free: list[T] = []
 
@@ -61,21 +56,14 @@ class Loan(Generic[T]):
 
 
 class OneAtATime:
-    """Guard of an object that serves one call at a time: it refuses a call while another one runs."""
+    """Guard of an object that serves one call at a time: another is refused by an `InputError` while one runs."""
 
     def __init__(self, what: str) -> None:
-        """Name the object for the error message, such as "tracker"."""
         self._what, self._lock = what, Lock()
 
     def __enter__(self) -> None:
-        """Enter a call.
-
-        Raises:
-            InputError: another call runs.
-        """
         if not self._lock.acquire(blocking=False):
             raise InputError(f"this {self._what} is within another call; make one {self._what} for each thread")
 
     def __exit__(self, *_: object) -> None:
-        """Leave the call."""
         self._lock.release()

@@ -53,7 +53,6 @@ class EndedError(WholebodyError):
     """
 
     def __init__(self, code: int, said: str = "") -> None:
-        """Build the message from the exit code and the last line."""
         self.overtime, self.code, self.said = -code in (signal.SIGALRM, signal.SIGPROF), code, said
         message = "it took too long" if self.overtime else f"the process ended with {self.how}"
         super().__init__(message + (f": {said}" if said and not self.overtime else ""))
@@ -69,7 +68,7 @@ class Job(NamedTuple):
 
     Attributes:
         name: any value by which the caller identifies the job; it is not sent to the process.
-        function: called in the process.
+        function: called in the process with the arguments.
         arguments: of the function.
         seconds: time to the deadline, unless the job moves it; 0 for none.
     """
@@ -81,13 +80,9 @@ class Job(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """The outcome of a job.
+    """The outcome of a job: the notes that it sent before its answer, and what the function returned.
 
-    Attributes:
-        job: the job.
-        notes: the notes that it sent before its answer.
-        answer: the return value of the function; None if the process ended.
-        error: how the process ended; None if there is an answer.
+    Where the process ended, there is no answer, and `error` says how.
     """
 
     job: Job
@@ -97,13 +92,7 @@ class Outcome(NamedTuple):
 
 
 class Started(NamedTuple):
-    """A process that reads jobs.
-
-    Attributes:
-        process: it.
-        connection: over which it gets jobs and answers.
-        output: what it writes.
-    """
+    """A process that reads jobs, the connection over which it gets them and answers, and what it writes."""
 
     process: subprocess.Popen[bytes] | BaseProcess
     connection: Connection
@@ -145,11 +134,7 @@ class Child:
         return self._connection
 
     def call(self, function: Callable[..., Any], *arguments: Any, seconds: float) -> Any:
-        """Do a job, and wait for its answer.
-
-        Raises:
-            EndedError: the process ended during the job; the next call starts another process.
-        """
+        """Do a job, and wait for its answer; an `EndedError` if the process ended: the next call starts another."""
         self.begin(Job(None, function, arguments, seconds))
         while (outcome := self.listen()) is None:
             pass
@@ -257,11 +242,9 @@ def interrupt_ignored() -> Iterator[None]:
 
 
 def run_jobs(next_job: Callable[[], Job | None], children: Sequence[Child]) -> Iterator[Outcome]:
-    """Run jobs in parallel, and yield their outcomes as they end; at an early end busy children are closed.
+    """Run jobs in parallel, each in one of the children, and yield outcomes as they end. An early end closes busy ones.
 
-    Args:
-        next_job: called for a job whenever a process is free; returns None if there is none (now, or any more).
-        children: the processes, each of which does one job at a time.
+    `next_job` is called for a job whenever a process is free; it returns None if there is none (now, or any more).
     """
     free, busy = list(children), list[Child]()
     try:
@@ -322,8 +305,7 @@ def tell(note: Any) -> None:
 def end_with(parent: int) -> None:
     """End this process when its parent has ended, also in the middle of a job, and where it had ended before this call.
 
-    Args:
-        parent: process id; whoever began this process says it, for an orphan's parent is another process.
+    Whoever began this process says the parent's id, for an orphan's parent is another process.
     """
     threading.Thread(target=_end_after, args=(parent,), daemon=True).start()
 

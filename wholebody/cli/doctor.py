@@ -25,7 +25,11 @@ something is wrong; an absent optional package is no fault.""",
 def run(arguments: argparse.Namespace) -> int:
     """Examine and print; 1 if there are faults."""
     if arguments.clear_cache:
-        return _clear_cache()
+        from wholebody.geometry.mesh_cache import clear_cache
+
+        state = clear_cache()
+        print(f"removed {state.entries} meshes, {state.size / 2**20:.1f} MB, in {state.folder}")
+        return 0
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
@@ -51,11 +55,3 @@ def run(arguments: argparse.Namespace) -> int:
     if report.healthy:
         console.print("[green]nothing is wrong[/]")
     return 0 if report.healthy else 1
-
-
-def _clear_cache() -> int:
-    from wholebody.geometry.mesh_cache import clear_cache
-
-    state = clear_cache()
-    print(f"removed {state.entries} meshes, {state.size / 2**20:.1f} MB, in {state.folder}")
-    return 0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +13,6 @@ if TYPE_CHECKING:
     from wholebody.problem import Problem
     from wholebody.taskfile import Task
     from wholebody.tracking.dragging import Dragged, DragJudgement
-    from wholebody.tracking.live import LiveDrag
 
 
 def _path_or_live(parser: argparse.ArgumentParser) -> None:
@@ -107,8 +105,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 def live(arguments: argparse.Namespace) -> int:
     """Let the figure be dragged in a browser until Ctrl-C."""
-    from functools import partial
-
     from wholebody.base.errors import InputError
     from wholebody.cli.picture import make_folder
     from wholebody.taskfile import read_task, write_task
@@ -121,7 +117,10 @@ def live(arguments: argparse.Namespace) -> int:
     drag = LiveDrag(task.problem, arguments.method or "qp")
     out = arguments.out or Path("out") / "drag" / arguments.task.stem
     make_folder(out)
-    saved = partial(_save_posture, drag, write_task, f"{task.title}, dragged")
+
+    def saved(path: Path) -> Path:
+        return write_task(drag.stated(goals=drag.problem.goals), path, title=f"{task.title}, dragged")
+
     page = LivePage(drag, out / "posture.toml", arguments.port, saved)
     print(f"drag the handles at {page.url}; Ctrl-C ends", flush=True)
     try:
@@ -131,11 +130,6 @@ def live(arguments: argparse.Namespace) -> int:
     finally:
         page.stop()
     return 0
-
-
-def _save_posture(drag: LiveDrag, write: Callable[..., Path], title: str, path: Path) -> Path:
-    """Write the present posture with its things and holds as a task file."""
-    return write(drag.stated(goals=drag.problem.goals), path, title=title)
 
 
 def followed(problem: Problem, places: Any, method: str, goal: int, label: str) -> tuple[Dragged, DragJudgement]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -13,33 +13,21 @@ from wholebody.base.errors import InputError
 from wholebody.dynamics import motion_kernel, witness_kernel
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.large_models import geometry_model
-from wholebody.geometry.proximity import Contacts, Kinematics, PairTable, Proximity
-from wholebody.scene.matter.inertia import MassProperties, mass_properties
+from wholebody.geometry.proximity import Contacts, PairTable, Proximity
+from wholebody.scene.matter.body import MassProperties, mass_properties
 from wholebody.scene.matter.materials import MATERIALS, Material, surface
 from wholebody.scene.scene import Scene
 
 HUMAN = MATERIALS["human"]  # of every figure
 
 
-class PlacedPieces(NamedTuple):
-    """Pieces whose placements (pieces, 4, 3) are known; see `Contacts.placements`."""
-
-    placement: Array
-
-    @property
-    def data(self) -> Any:
-        """None: no model has placed them."""
-        return None
-
-
 class PlacedProximity(Proximity):
     """Distances between pieces that stand where they are said to stand."""
 
-    def placements(self, state: Kinematics) -> Array:
-        """Take the placements over; `state` is `PlacedPieces`."""
-        placement = cast(PlacedPieces, state).placement
-        self.distances.put(placement)
-        return placement
+    def placements(self, data: Array) -> Array:
+        """Take placements (pieces, 4, 3) over, in the place of Pinocchio's data; see `Contacts.placements`."""
+        self.distances.put(data)
+        return data
 
 
 class SweptPoints(NamedTuple):
@@ -281,7 +269,7 @@ class ContactFinder:
         first, second = self._bodies[:, 0], self._bodies[:, 1]
         most = np.where(active[first] | active[second], margin[first] + margin[second], -np.inf)
         within = float(2.0 * margin.max(initial=0.0))
-        return self._proximity.query(PlacedPieces(placement), within, most)
+        return self._proximity.query(placement, within, most)
 
     def points(self, contacts: Contacts) -> ContactPoints:
         """Contact points of near pairs; the normals in `contacts` become those of faces where they are meant."""

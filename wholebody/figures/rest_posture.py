@@ -95,7 +95,7 @@ class _Parting:
             self.movable[:6] = False
 
     def contacts(self, q: Array, within: float) -> Contacts:
-        return self.proximity.query(self.state.update(q), within)
+        return self.proximity.query(self.state.update(q).data, within)
 
     def away_from(self, q: Array) -> _Try:
         """Correct until nothing is nearer than `APART`; otherwise return the posture with the fewest overlaps."""

@@ -14,14 +14,10 @@ AT_ONCE = 1_000_000  # pairs of boxes that are compared in one go; more = more m
 
 
 def box_pairs(low: Array, high: Array) -> Indices:
-    """Pairs (k, 2), the lesser index first, of boxes along the axes that overlap or touch.
+    """Pairs (k, 2), the lesser index first, of boxes that overlap or touch, with corners `low` and `high` (n, 3).
 
     They are sorted along the axis on which they are spread most; what begins there before another one ends is compared
     on the other two.
-
-    Args:
-        low: (n, 3) least corner of each box.
-        high: (n, 3) greatest corner.
     """
     if len(low) < 2:
         return np.zeros((0, 2), dtype=np.intp)
@@ -51,7 +47,7 @@ def near_among(
     within: float,
     left_out: Collection[tuple[int, int]] = (),
 ) -> Contacts:
-    """Pairs of some pieces that are nearer than a distance, the nearest first, whatever pairs the table has.
+    """Pairs of some pieces that are nearer than `within` metres, the nearest first, whatever pairs the table has.
 
     Of two half-spaces nothing is said: they have no end. `number` is -1 for all.
 

@@ -58,10 +58,10 @@ class ContactRowBuilder:
     """Builds contact rows for all near pairs at once. It remembers no posture, so any number of runs may share one."""
 
     def __init__(self, table: PairTable, most_ends: int = MOST_ENDS, same_normal: float = SAME_NORMAL) -> None:
-        """Lay the swept points and faces of all pieces in flat tables.
+        """Take the pieces and pairs.
 
         Args:
-            table: the pieces and pairs.
+            table: of them.
             most_ends: rows of one contact beside its witness row.
             same_normal: cosine of the angle to a face's normal within which coal's may be meant to be it.
         """
@@ -77,16 +77,12 @@ class ContactRowBuilder:
         self._kernel = compiled_kernel()
 
     def rows(self, contacts: Contacts, clearance: Array | float = 0.0) -> ContactRows:
-        """Rows of all contacts, at the placements they were found at.
+        """Rows of all contacts among the same pieces, to which `clearance` metres are asked, (k,) or one for all.
 
         Where coal's normal is that of a face but for rounding, it becomes the face's own, in `contacts` too. coal stops
         within 1e-6 m of the distance, which at a few centimetres leaves its normal up to 6e-3 rad off: half a
         millimetre at the end of a forearm that lies along a table. The face's own normal is right if it parts the
         pieces by as much.
-
-        Args:
-            contacts: the near pairs of the same pieces.
-            clearance: distance asked of each contact, (k,) or one for all, metres.
 
         Raises:
             InputError: contacts of other pieces.
@@ -107,13 +103,10 @@ class ContactRowBuilder:
         )  # fmt: skip
 
     def write(self, contacts: Contacts, clearance: Array, room: tuple[Array, Array, Indices, Indices]) -> int:
-        """Write the rows of all contacts into arrays with room for ``k * (1 + most_ends)`` rows; how many there are.
+        """Write the rows of all contacts with clearances (k,), metres, into `room`; how many there are.
 
-        Args:
-            contacts: the near pairs of the same pieces.
-            clearance: (k,) distance asked of each, metres.
-            room: for the wrenches (rows, 6), the gaps (rows,), the contact that each row belongs to (rows,), and the
-                joints of its first and second piece (rows, 2).
+        It is for ``k * (1 + most_ends)`` rows: wrenches (rows, 6), gaps (rows,), the contact that each row belongs to
+        (rows,), and the joints of its first and second piece (rows, 2).
         """
         count: int = self._kernel.contact_rows(contacts[:], clearance, self._arrays, self.most_ends, room)
         return count

@@ -15,9 +15,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError, MissingPackageError
+from wholebody.base.fields import Range
 from wholebody.base.records import with_values
-from wholebody.geometry.closing import closed_up
-from wholebody.geometry.components import Component, enclosed_volume, is_convex, passes_through_itself, split_components
+from wholebody.geometry.components import (
+    Component,
+    closed_up,
+    enclosed_volume,
+    is_convex,
+    passes_through_itself,
+    split_components,
+)
 from wholebody.geometry.hull import hull_piece, thickened
 from wholebody.geometry.mesh_cache import ConvexPieces, cached
 from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
@@ -31,6 +38,7 @@ HULL_VERTICES = (64, 48)
 robots have 12 % more volume than with all their vertices, with 48 they have 6 %, and with 64 they have 4 %. Contacts
 have more rows with more vertices."""
 
+VERTICES, CONCAVITY = Range(8, 256, whole=True), Range(0.01, 1.0)
 
 _log = logging.getLogger(__name__)
 
@@ -44,14 +52,14 @@ def convex_pieces(
     Another one is split into connected parts. A convex part is kept as it is, with all its vertices. CoACD decomposes
     another closed part (Wei et al. 2022, "Approximate convex decomposition for 3D meshes with collision-aware concavity
     and tree search"), and its pieces are simplified outwards, so that they cover the whole surface. A part that lacks
-    faces is closed first; of a shell, which encloses nothing, every triangle is thickened (see `geometry.closing`). A
-    flat part is thickened to twice `SMALLEST`. `notes` reports this.
+    faces is closed first; of a shell, which encloses nothing, every triangle is thickened (see `components`). A flat
+    part is thickened to twice `SMALLEST`. `notes` reports this.
 
     Args:
         vertices: (n, 3), metres.
         faces: (m, 3) vertex indices.
-        max_vertices: most vertices of a piece that comes out of a decomposition, 8 to 256.
-        threshold: concavity of the pieces, as a share of the part's size, 0.01 to 1: CoACD's own measure.
+        max_vertices: most vertices of a piece that comes out of a decomposition, within `VERTICES`.
+        threshold: concavity of the pieces, as a share of the part's size, within `CONCAVITY`: CoACD's own measure.
         what: name of the mesh, for messages.
 
     Raises:
@@ -59,29 +67,18 @@ def convex_pieces(
         MissingPackageError: a part needs decomposing and coacd is not installed.
     """
     cloud, triangles = check_mesh(vertices, faces, what)
-    if not isinstance(max_vertices, (int, np.integer)) or not 8 <= max_vertices <= 256:
-        raise InputError(f"{what}: max_vertices is {max_vertices!r}; give a whole number between 8 and 256")
-    if not isinstance(threshold, (int, float, np.floating)) or not 0.01 <= threshold <= 1.0:
-        raise InputError(f"{what}: threshold is {threshold!r}; give a number between 0.01 and 1")
-    found = _decomposed(cloud.tobytes(), triangles.tobytes(), int(max_vertices), float(threshold), what)
+    settings = int(VERTICES(max_vertices, f"{what}: max_vertices")), CONCAVITY(threshold, f"{what}: threshold")
+    found = _decomposed(cloud.tobytes(), triangles.tobytes(), *settings, what)
     return with_values(
         found, pieces=tuple(with_values(piece, placement=pin.SE3(piece.placement)) for piece in found.pieces)
     )
 
 
 def mesh_hull(vertices: ArrayLike, faces: ArrayLike, what: str = "mesh") -> ConvexPieces:
-    """The convex hull of a whole triangle mesh, as one piece that contains the mesh.
+    """The convex hull of a whole triangle mesh, vertices (n, 3) in metres and faces (m, 3), as one piece around it.
 
     A hull of many vertices is replaced by one around it with fewer (`HULL_VERTICES`), and a mesh that is too thin
-    to be solid is thickened. `notes` gives the added volume.
-
-    Args:
-        vertices: (n, 3), metres.
-        faces: (m, 3) vertex indices.
-        what: name of the mesh, for messages.
-
-    Raises:
-        InputError: invalid arrays.
+    to be solid is thickened. `notes` gives the added volume. An InputError names `what` if the arrays are no mesh.
     """
     cloud, triangles = check_mesh(vertices, faces, what)
     points = cloud[np.unique(triangles)]
@@ -102,11 +99,7 @@ def mesh_hull(vertices: ArrayLike, faces: ArrayLike, what: str = "mesh") -> Conv
 
 
 def check_mesh(vertices: ArrayLike, faces: ArrayLike, what: str) -> tuple[Array, NDArray[np.int64]]:
-    """Return the arrays of a mesh: (n, 3) float and (m, 3) int64.
-
-    Raises:
-        InputError: wrong shapes, no faces, indices out of range, values that are not finite.
-    """
+    """The arrays of a mesh, (n, 3) float and (m, 3) int64; an InputError if they are none, or not finite."""
     try:
         cloud = np.ascontiguousarray(vertices, dtype=float)
         triangles = np.asarray(faces)
@@ -136,7 +129,7 @@ def _decomposed(vertices: bytes, faces: bytes, max_vertices: int, threshold: flo
 
 
 def coacd_version() -> str:
-    """Return the version of coacd that is installed, or "none"."""
+    """The version of coacd that is installed, or "none"."""
     from importlib.metadata import PackageNotFoundError, version
 
     try:
@@ -273,9 +266,8 @@ def limited(function: Callable[..., list[Array]], seconds: float, *arguments: An
 def run_coacd(vertices: Array, faces: NDArray[np.int32], threshold: float) -> list[Array]:
     """Corners of the convex parts that CoACD finds, each (k, 3); for a child process.
 
-    Self-intersecting meshes make it crash or run for ever. Its own cap on vertices (decimate) leaves
-    parts of the surface outside; its re-meshing (preprocess) inflates thin parts by half, and a closed manifold does
-    not need it.
+    Self-intersecting meshes make it crash or run for ever. Its own cap on vertices (decimate) leaves parts of the
+    surface outside; its re-meshing (preprocess) inflates thin parts by half, and a closed manifold does not need it.
     """
     import coacd
 

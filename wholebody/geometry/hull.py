@@ -1,11 +1,8 @@
-"""Convex hulls for which coal is reliable.
+"""Convex hulls for which coal is reliable, and simpler hulls around them.
 
 coal's own ``ConvexBase.convexHull`` crashes the process on flat or collinear points and accepts NaN silently. So qhull
-computes the hulls through scipy, and everything is checked before coal gets it.
-
-A simpler hull around a hull, with fewer vertices.
-
-Dropping vertices would leave parts of the surface uncovered, and a posture could be free of contact and still inside.
+computes the hulls through scipy, and everything is checked before coal gets it. A simpler hull contains the other:
+dropping vertices would leave parts of the surface uncovered, and a posture could be free of contact and still inside.
 """
 
 from __future__ import annotations
@@ -29,10 +26,10 @@ FEW = 1000
 
 
 def hull_piece(points: ArrayLike, what: str = "hull", vertices: tuple[int, int] | None = None) -> Piece:
-    """Convex hull of points, with its origin at the centre of the smallest sphere around it.
+    """Convex hull of points (n, 3), metres, with its origin at the centre of the smallest sphere around it.
 
     Args:
-        points: (n, 3), metres, n >= 4; duplicates and inner points are dropped.
+        points: at least four; duplicates and inner points are dropped.
         what: name of the points, for messages.
         vertices: (most, few): a hull with more than `most` vertices is replaced by one around it that has no more than
             `few`, at least 8. Without it only a hull that coal cannot take, with more than `MOST_NEIGHBOURS` edges at a
@@ -71,7 +68,7 @@ def thickened(points: Array) -> Array:
 
 
 def coal_convex(corners: Array, faces: NDArray[np.int_]) -> Any:
-    """Return coal's Convex of corners (n, 3) and outward triangles (m, 3)."""
+    """Convex of coal with corners (n, 3) and outward triangles (m, 3)."""
     import coal
 
     vertices = coal.StdVec_Vec3s()
@@ -82,11 +79,7 @@ def coal_convex(corners: Array, faces: NDArray[np.int_]) -> Any:
 
 
 def check_points(points: ArrayLike, what: str) -> Array:
-    """Return points as a float array (n, 3) without duplicates.
-
-    Raises:
-        InputError: another shape, not finite, or farther than `LARGEST` from the origin.
-    """
+    """Points as a float array (n, 3) without duplicates; an InputError if they are none, or farther than `LARGEST`."""
     return np.unique(_finite_points(points, what), axis=0)
 
 
@@ -174,17 +167,10 @@ def _smallest_basis(points: Array, candidates: list[int], scale: float) -> tuple
 
 
 def simplified_hull(points: Array, max_vertices: int) -> Array:
-    """Vertices of a convex polytope that contains points and has few vertices.
+    """Vertices (k, 3) of a convex polytope that contains points (n, 3) and has at most `max_vertices`, 8 or more.
 
     The polytope begins as a box along the points' principal axes. Planes of the points' own hull then cut it: each time
     the plane that cuts most off the farthest protruding vertex, as long as the number of vertices allows.
-
-    Args:
-        points: (n, 3), enclosing a volume.
-        max_vertices: most vertices, at least 8.
-
-    Returns:
-        (k, 3) vertices; those of the points' hull if they are few enough.
     """
     from scipy.spatial import ConvexHull, QhullError
 

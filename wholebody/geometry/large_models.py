@@ -19,14 +19,10 @@ TABLED = 2000  # number of pieces up to which a model has Pinocchio's table of p
 
 
 def geometry_model(pieces: Sequence[pin.GeometryObject], pairs: Indices | None = None) -> pin.GeometryModel:
-    """Pinocchio's geometry model of these pieces, in this order.
+    """Pinocchio's geometry model of these pieces, in this order, and of pairs (k, 2), the lesser index first.
 
     If its pairs are given, a model of more than `TABLED` pieces has no table of pair numbers. What reads or writes that
     table cannot be called on it: `addCollisionPair`, `findCollisionPair`, `existCollisionPair`; see `add_pairs`.
-
-    Args:
-        pieces: each with a name of its own.
-        pairs: (k, 2) pairs of pieces, the lesser index first, each pair once; none by default.
     """
     tabled = pairs is None or len(pieces) <= TABLED
     pairs = np.zeros((0, 2), dtype=np.intp) if pairs is None else pairs

@@ -35,7 +35,7 @@ def placement_view(placements: Any) -> Array | None:
     """View of a StdVec_SE3 as (n, 4, 3): [i, :3] holds the columns of the rotation, [i, 3] the translation.
 
     A point x of frame i is in the world at ``x @ view[i, :3] + view[i, 3]``. The view does not own the memory: keep the
-    Pinocchio data alive. Returns None if the layout in memory is not as expected.
+    Pinocchio data alive. None if the layout in memory is not as expected.
     """
     count = len(placements)
     if count == 0:
@@ -57,10 +57,7 @@ def computed_first(count: int) -> list[int]:
 
 
 def result_view(results: Any) -> Array | None:
-    """View of a StdVec_DistanceResult as (n, 20) doubles without gaps, of which `fields` have a meaning.
-
-    Returns None if the layout in memory is not as expected.
-    """
+    """View of a StdVec_DistanceResult as (n, 20) doubles without gaps, see `fields`; None if the layout is another."""
     count = len(results)
     if count == 0:
         return np.zeros((0, RESULT_DOUBLES))

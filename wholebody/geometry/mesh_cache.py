@@ -1,7 +1,7 @@
 """Cache of convex pieces of meshes, and of what else takes seconds to make, on disk: loading takes milliseconds.
 
-An entry is one file, named by a hash of the mesh and the settings. It is written under a temporary name and renamed, so
-any number of processes may read and write at once. It begins with its checksum; an entry whose checksum does not match
+An entry is one file, named by a hash of the mesh and the settings. It is written whole, so any number
+of processes may read and write at once. It begins with its checksum; an entry whose checksum does not match
 is discarded. If the folder is not writable, nothing is cached.
 """
 
@@ -11,9 +11,9 @@ import hashlib
 import io
 import json
 import os
-import tempfile
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -21,6 +21,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.base.errors import InputError
+from wholebody.base.files import write
 from wholebody.base.records import with_values
 from wholebody.geometry.hull import coal_convex
 from wholebody.geometry.pieces import Piece
@@ -31,17 +33,10 @@ T = TypeVar("T")
 VARIABLE = "WHOLEBODY_CACHE"
 """Environment variable that names another folder for the cache."""
 
-LARGEST_CACHE = 256 * 2**20
-"""Largest size of the cache, bytes; a mesh as hull takes 3 kB, a decomposition 20 kB."""
-
-
-LOOKED_AT_EVERY = 64
-"""Number of writes of a process between checks of the cache's size; the first write checks it too."""
-
+LARGEST_CACHE = 256 * 2**20  # bytes; a mesh as hull takes 3 kB, a decomposition 20 kB
+LOOKED_AT_EVERY = 64  # writes of a process between checks of the cache's size; the first write checks it too
 
 _SUFFIX = ".pieces"
-_OTHER = ".made"
-_PART = ".part"
 _CHECKSUM = hashlib.sha256().digest_size
 
 _writes = 0
@@ -52,8 +47,7 @@ class ConvexPieces(NamedTuple):
 
     Attributes:
         pieces: at least one.
-        added_volume: volume of all pieces over the volume of the mesh, minus one; parts that are not closed do not
-            count, since they have no volume of their own.
+        added_volume: volume of all pieces over that of the closed parts of the mesh, minus one.
         notes: one sentence for each part that was changed.
     """
 
@@ -63,14 +57,7 @@ class ConvexPieces(NamedTuple):
 
 
 class CacheState(NamedTuple):
-    """The state of the cache.
-
-    Attributes:
-        folder: its folder.
-        entries: number of cached meshes and surfaces.
-        size: bytes.
-        writable: whether this process can write there.
-    """
+    """Folder of the cache, number of its entries, their size in bytes, and whether this process can write there."""
 
     folder: Path
     entries: int
@@ -79,7 +66,7 @@ class CacheState(NamedTuple):
 
 
 def cache_folder() -> Path:
-    """Return the folder of the cache, which need not exist: the user's cache folder, or that of `VARIABLE`."""
+    """The folder of the cache, which need not exist: the user's cache folder, or that of `VARIABLE`."""
     import platformdirs
 
     named = os.environ.get(VARIABLE)
@@ -100,30 +87,32 @@ def cached(content: tuple[bytes, ...], settings: str, what: str, make: Callable[
     digest = hashlib.sha256("\0".join(("1", __version__, settings)).encode())
     for part in content:
         digest.update(hashlib.sha256(part).digest())
-    path = cache_folder() / f"{digest.hexdigest()}{_SUFFIX}"
-    found = _read(path, _unpacked)
-    if found is not None:
-        return with_values(found, notes=tuple(what + note for note in found.notes))
-    made = make()
-    _write(path, _packed(with_values(made, notes=tuple(note.removeprefix(what) for note in made.notes))))
-    return made
+
+    def made() -> ConvexPieces:
+        found = make()
+        return with_values(found, notes=tuple(note.removeprefix(what) for note in found.notes))
+
+    found = cached_entry(digest.hexdigest(), made, _packed, _unpacked)
+    return with_values(found, notes=tuple(what + note for note in found.notes))
 
 
 def cached_entry(key: str, make: Callable[[], T], packed: Callable[[T], bytes], unpacked: Callable[[bytes], T]) -> T:
-    """Return something from the cache, or make and cache it; both times it is what `unpacked` reads.
+    """Something from the cache, or made and cached; both times it is what `unpacked` reads of its bytes.
 
-    Args:
-        key: hexadecimal digest of what it is made from, and of the way it is made.
-        make: makes it.
-        packed: its bytes.
-        unpacked: what the bytes say.
+    `key` is the hexadecimal digest of what it is made from, and of the way it is made.
     """
-    path = cache_folder() / f"{key}{_OTHER}"
+    global _writes
+    path = cache_folder() / f"{key}{_SUFFIX}"
     found = _read(path, unpacked)
     if found is not None:
         return found
     data = packed(make())
-    _write(path, data)
+    with suppress(OSError, InputError):  # a read-only or full disk: nothing is cached
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write(path, hashlib.sha256(data).digest() + data)
+        if _writes % LOOKED_AT_EVERY == 0:
+            _evict(path.parent)
+        _writes += 1
     return unpacked(data)
 
 
@@ -140,7 +129,7 @@ def cache_state() -> CacheState:
 def clear_cache() -> CacheState:
     """Remove all entries; return the state before."""
     state = cache_state()
-    for file in [file for ending in (_SUFFIX, _OTHER, _PART) for file in state.folder.glob(f"*{ending}")]:
+    for _, _, file in _entries(state.folder):
         file.unlink(missing_ok=True)
     return state
 
@@ -157,66 +146,33 @@ def _read(path: Path, unpacked: Callable[[bytes], T]) -> T | None:
     except Exception:  # another program's file, or a faulty disk: make it anew
         path.unlink(missing_ok=True)
         return None
-    try:
+    with suppress(OSError):
         # Least seconds between two updates of an entry's time of use.
         if time.time() - path.stat().st_mtime > 3600.0:
             os.utime(path)
-    except OSError:
-        pass
     return found
 
 
-def _write(path: Path, packed: bytes) -> None:
-    global _writes
-    part: str | None = None
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=_PART, delete=False) as file:
-            part = file.name
-            file.write(hashlib.sha256(packed).digest() + packed)
-        os.replace(part, path)
-    except OSError:  # a read-only or full disk: nothing is cached
-        if part is not None:
-            Path(part).unlink(missing_ok=True)
-        return
-    if _writes % LOOKED_AT_EVERY == 0:
-        _evict(path.parent)
-    _writes += 1
-
-
 def _evict(folder: Path) -> None:
-    """Remove the least recently used entries if the cache is too large, and the files of killed processes."""
-    for file in folder.glob(f"*{_PART}"):
-        try:
-            # Seconds after which the temporary file of a killed process is removed.
-            if time.time() - file.stat().st_mtime > 600.0:
-                file.unlink(missing_ok=True)
-        except OSError:
-            continue
+    """Remove the least recently used entries if the cache is too large, until it has 3/4 of its largest size."""
     files = sorted(_entries(folder))
     size = sum(entry[1] for entry in files)
-    if size <= LARGEST_CACHE:
-        return
+    most = LARGEST_CACHE if size <= LARGEST_CACHE else 0.75 * LARGEST_CACHE
     for _, bytes_, file in files:
-        # Share of `LARGEST_CACHE` that remains after eviction; the least recently used entries are removed first.
-        if size <= 0.75 * LARGEST_CACHE:
+        if size <= most:
             return
-        try:
+        with suppress(OSError):
             file.unlink(missing_ok=True)
-        except OSError:
-            continue
-        size -= bytes_
+            size -= bytes_
 
 
 def _entries(folder: Path) -> list[tuple[float, int, Path]]:
     """Time of last use, size and path of every entry; another process may remove some meanwhile."""
     found = []
-    for file in [file for ending in (_SUFFIX, _OTHER) for file in folder.glob(f"*{ending}")]:
-        try:
+    for file in folder.glob(f"*{_SUFFIX}"):
+        with suppress(OSError):
             status = file.stat()
-        except OSError:
-            continue
-        found.append((status.st_mtime, status.st_size, file))
+            found.append((status.st_mtime, status.st_size, file))
     return found
 
 

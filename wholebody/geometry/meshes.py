@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
+from wholebody.base.checks import is_number
 from wholebody.base.errors import FileFormatError, InputError, MissingPackageError, WholebodyError, one_line
 from wholebody.base.files import check_file
 from wholebody.geometry.convex import check_mesh
@@ -30,10 +31,7 @@ class EmptyMeshError(FileFormatError):
 
 
 def read_mesh(path: str | Path) -> tuple[Array, NDArray[np.int64]]:
-    """Read all triangles of a file, every object at its placement.
-
-    Args:
-        path: an OBJ, STL, PLY, glTF, GLB or COLLADA (.dae) file; polygons are cut into triangles.
+    """Read all triangles of an OBJ, STL, PLY, glTF, GLB or COLLADA (.dae) file, every object at its placement.
 
     Returns:
         vertices (n, 3) in the file's units and axes, faces (m, 3). A COLLADA file that names its unit is converted to
@@ -41,7 +39,7 @@ def read_mesh(path: str | Path) -> tuple[Array, NDArray[np.int64]]:
 
     Raises:
         FileFormatError: missing, empty, of another kind, damaged, without triangles, or not finite.
-        MissingPackageError: trimesh, or for a COLLADA file pycollada, is not installed.
+        MissingPackageError: for a COLLADA file, pycollada is not installed.
     """
     path = Path(path)
     scene, unit = _read_scene(path)
@@ -56,15 +54,8 @@ def read_mesh(path: str | Path) -> tuple[Array, NDArray[np.int64]]:
 def read_parts(path: str | Path) -> list[tuple[Array, NDArray[np.int64], tuple[float, float, float, float] | None]]:
     """Read a file as `read_mesh` does, each object alone and with its colour, in the order of their names.
 
-    Args:
-        path: of the file.
-
-    Returns:
-        Of each object vertices (n, 3), faces (m, 3), and red, green, blue, alpha; None where the file has no colour.
-        Of a texture the mean is taken.
-
-    Raises:
-        FileFormatError, MissingPackageError: as `read_mesh`.
+    Of each vertices (n, 3), faces (m, 3), and red, green, blue, alpha; None where the file has no colour. Of a texture
+    the mean is taken.
     """
     path = Path(path)
     scene, unit = _read_scene(path)
@@ -97,10 +88,8 @@ def _color(visual: Any) -> tuple[float, float, float, float] | None:
 
 def _read_scene(path: Path) -> tuple[Any, float]:
     """The file as trimesh reads it, and the metres of its unit."""
-    try:
-        import trimesh
-    except ImportError:
-        raise MissingPackageError("reading meshes needs trimesh: pip install trimesh") from None
+    import trimesh
+
     check_file(path, "mesh")
     if path.suffix.lower() not in SUFFIXES:
         raise FileFormatError(
@@ -114,7 +103,9 @@ def _read_scene(path: Path) -> tuple[Any, float]:
     quiet.setLevel(logging.CRITICAL)
     try:
         scene = trimesh.load_scene(path, process=False)
-        return scene, _metres(scene.units) if path.suffix.lower() == ".dae" else 1.0
+        # trimesh writes the unit of a COLLADA file as "meters", or "0.0254 * meters"
+        unit = (scene.units or "").partition("*")[0] if path.suffix.lower() == ".dae" else ""
+        return scene, float(unit) if is_number(unit) else 1.0
     except Exception as error:  # trimesh's readers raise many kinds of errors
         raise _unreadable(path, error) from error
     finally:
@@ -132,15 +123,11 @@ def _check_content(path: Path) -> None:
         raise FileFormatError(f"mesh {path}: the file is a pointer of Git LFS, not the mesh; run: git lfs pull")
     if head.lstrip()[:14].lower().startswith((b"<!doctype html", b"<html")):
         raise FileFormatError(f"mesh {path}: the file is a web page, not the mesh; download the file itself")
-    if path.suffix.lower() == ".stl" and len(head) >= 84 and not _is_text_stl(head):
+    text = head.lstrip().startswith(b"solid") and b"\0" not in head  # some binary ones begin with "solid" too
+    if path.suffix.lower() == ".stl" and len(head) >= 84 and not text:
         wanted = 84 + 50 * int.from_bytes(head[80:84], "little")
         if size < wanted:
             raise FileFormatError(f"mesh {path}: the file has {size} bytes of {wanted}; it is cut: get it whole")
-
-
-def _is_text_stl(head: bytes) -> bool:
-    """Whether an STL is text: some binary ones begin with "solid" too, and have bytes that no text has."""
-    return head.lstrip().startswith(b"solid") and b"\0" not in head
 
 
 def _unreadable(path: Path, error: Exception) -> FileFormatError:
@@ -156,12 +143,3 @@ def _checked(vertices: Array, faces: NDArray[np.int64], path: Path) -> tuple[Arr
         return check_mesh(vertices, faces, f"mesh {path}")
     except InputError as error:
         raise FileFormatError(str(error)) from error
-
-
-def _metres(unit: str | None) -> float:
-    """Metres of a unit as trimesh writes it for COLLADA files: "meters", or "0.0254 * meters"."""
-    number = (unit or "").partition("*")[0]
-    try:
-        return float(number)
-    except ValueError:
-        return 1.0

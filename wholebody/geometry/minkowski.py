@@ -15,8 +15,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
-from wholebody.geometry.pieces import COAL_ACCURACY
-from wholebody.geometry.swept_points import SweptPoints, swept_points
+from wholebody.geometry.pieces import COAL_ACCURACY, SweptPoints, normal_across, swept_points
 
 Placed: TypeAlias = tuple[Any, pin.SE3]
 """A coal geometry and its placement in the world."""
@@ -111,11 +110,7 @@ class ObjectPair:
         if (
             not normal @ normal > 0.25
         ):  # swept points that coincide exactly (capsule axes, concentric spheres): coal has no normal
-            normal = np.cross(a.axis, b.axis)
-            if np.linalg.norm(normal) < 1e-9:
-                along = a.axis if a.axis.any() else b.axis if b.axis.any() else np.array([1.0, 0.0, 0.0])
-                normal = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
-            normal /= np.linalg.norm(normal)
+            normal = normal_across(a.axis, b.axis)
         return -float(distance), normal
 
     def between(self, translation: Array) -> Sides | None:

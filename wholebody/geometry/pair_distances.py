@@ -91,8 +91,9 @@ class PairDistances:
         """Distance, normal, and nearest points on both pieces (k, 10) of the pairs with these numbers (k,)."""
         if not self.kept:
             return self._single.measured(self.placed, self.pairs[numbers])
+        compute, geometry, data = pin.computeDistance, self.geometry, self.data
         for number in numbers.tolist():
-            pin.computeDistance(self.geometry, self.data, number)
+            compute(geometry, data, number)
         return self.read(numbers)
 
     def all_measured(self) -> Array:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
+from wholebody.geometry.large_models import pairs_of
 from wholebody.geometry.minkowski import ObjectPair, Placed
 from wholebody.geometry.separation import least_separation
 
@@ -24,7 +25,7 @@ class ObjectPenetration(NamedTuple):
         global_depth: (3,) PD_g, metres, out of B into A: the estimate of `global_depth`.
         separation: (3,) least translation of A that separates all pairs of pieces, metres.
         separated: whether the translation separates them (verified by coal); false if none can.
-        least: whether no shorter translation exists, proven; see `wholebody.geometry.separation.Separation`.
+        least: whether no shorter translation exists, proven; see `Separation`.
         pairs: number of overlapping pairs of pieces.
     """
 
@@ -38,7 +39,7 @@ class ObjectPenetration(NamedTuple):
 
 
 def global_depth(depths: Array, normals: Array) -> Array:
-    """Global penetration of two objects from their overlapping convex pairs.
+    """Global penetration of two objects from their overlapping convex pairs: a translation (3,) of A, metres.
 
     PD_g = sum(pd_i^2 n_i) / sum(pd_i), equation 1 of Schmidl and Lin, "Real-time physically-based interaction between
     avatars and virtual environments". It is a fast estimate: A moves by it, or A by half of it and B by minus half,
@@ -48,9 +49,6 @@ def global_depth(depths: Array, normals: Array) -> Array:
     Args:
         depths: (k,) penetration depth of each pair, metres, positive.
         normals: (k, 3) unit normals out of B into A.
-
-    Returns:
-        (3,) translation of A, metres; zero without pairs.
 
     Raises:
         InputError: shapes that do not match, or a depth that is negative or not finite.
@@ -72,7 +70,7 @@ def object_penetration(
     allowed: NDArray[np.bool_] | None = None,
     tolerance: float = 1e-6,
 ) -> ObjectPenetration | None:
-    """Both measures of the overlap of two objects.
+    """Both measures of the overlap of two objects, named `a` and `b`; None if no pair overlaps.
 
     Args:
         a: name of the first object.
@@ -81,9 +79,6 @@ def object_penetration(
         pieces_b: the m of the second.
         allowed: (n, m) the pairs of pieces that count; all by default.
         tolerance: depth up to which a pair only touches, metres: coal's own accuracy by default.
-
-    Returns:
-        None if no pair overlaps.
     """
     overlap, depths, normals = ObjectPair(pieces_a, pieces_b, allowed).overlapping(np.zeros(3), tolerance)
     if not overlap:
@@ -110,8 +105,7 @@ def object_penetrations(
         tested: (m, 2) pairs of pieces that can touch, the geometry's by default; all of two owners where it has none.
     """
     if tested is None:
-        listed = [[pair.first, pair.second] for pair in geometry.collisionPairs]
-        tested = np.array(listed, dtype=np.intp).reshape(-1, 2)
+        tested = pairs_of(geometry)
     first = {owner: k for k, owner in reversed(list(enumerate(owners)))}
     asked = {tuple(sorted((owners[i], owners[j]), key=first.__getitem__)) for i, j in np.asarray(pairs).reshape(-1, 2)}
     touching: dict[tuple[str, ...], list[tuple[int, int]]] = {names: [] for names in asked}
@@ -122,7 +116,11 @@ def object_penetrations(
         touching[owners[i], owners[j]].append((i, j))
     found = []
     for (a, b), pairs_of_both in touching.items():
-        allowed = np.array(pairs_of_both or _all_pairs(owners, a, b))
+        if not pairs_of_both:  # all of two owners where the geometry has none
+            pairs_of_both = [
+                (i, j) for i, one in enumerate(owners) if one == a for j, two in enumerate(owners) if two == b
+            ]
+        allowed = np.array(pairs_of_both)
         (of_a, row), (of_b, column) = (np.unique(allowed[:, side], return_inverse=True) for side in range(2))
         mask = np.zeros((len(of_a), len(of_b)), dtype=bool)
         mask[row, column] = True
@@ -132,8 +130,3 @@ def object_penetrations(
         )
         found.append(object_penetration(a, b, pieces_a, pieces_b, mask))
     return sorted(filter(None, found), key=lambda one: -float(np.linalg.norm(one.separation)))
-
-
-def _all_pairs(owners: Sequence[str], a: str, b: str) -> list[tuple[int, int]]:
-    """All pairs of a piece of one owner and a piece of another."""
-    return [(i, j) for i, one in enumerate(owners) if one == a for j, other in enumerate(owners) if other == b]

@@ -1,13 +1,22 @@
-"""Convex pieces, between which coal computes distances, and the sizes for which coal is reliable."""
+"""Convex pieces, between which coal computes distances: the sizes for which it is reliable, and their swept points.
+
+Swept points are points plus a radius (a swept sphere), and the flat faces between them. A sphere is one point with a
+radius, a capsule two points with a radius; a box is eight points and a hull its vertices, without a radius. They show
+which parts of a piece can touch next when the posture changes; one witness point cannot show that (see
+`wholebody.geometry.contact_rows`).
+"""
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
+import coal
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 
 SMALLEST = 1e-4
 """Least extent of a piece, metres: below 1e-5 m coal reads gaps as zero, and at 1e-6 m it loses the depth."""
@@ -45,3 +54,97 @@ def box_corners(geometry: Any) -> Array:
     own.computeLocalAABB()
     sides = np.array([own.aabb_local.min_, own.aabb_local.max_])
     return np.array([[sides[x, 0], sides[y, 1], sides[z, 2]] for x, y, z in np.ndindex(2, 2, 2)])
+
+
+class SweptPoints(NamedTuple):
+    """One piece as swept points, in the piece's own frame.
+
+    Attributes:
+        points: (m, 3) swept points; empty if one witness point is sufficient (ellipsoid, half-space).
+        radius: radius around the points, metres.
+        faces: (f, 4) rows [n, b] with n . x <= b inside; for a capsule only the two caps' planes.
+        reach: radius about the piece's origin that contains the piece; inf for a half-space.
+        axis: unit direction of a capsule, zero for everything else.
+        width: least distance between two parallel planes that enclose the piece; inf for a half-space.
+        half: (3,) half the size of a box about the piece's origin, along its axes, that contains it.
+    """
+
+    points: Array
+    radius: float
+    faces: Array
+    reach: float
+    axis: Array
+    width: float
+    half: Array
+
+
+_NONE = np.zeros((0, 3))
+_NO_FACES = np.zeros((0, 4))
+_NO_AXIS = np.zeros(3)
+_CENTER = np.zeros((1, 3))
+_ALONG = np.array([0.0, 0.0, 1.0])
+_CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+_SIDES = np.concatenate([np.eye(3), -np.eye(3)])
+
+
+def swept_points(geometry: Any) -> SweptPoints:
+    """Swept points of a coal shape: Sphere, Capsule, Box, Ellipsoid, Halfspace or Convex.
+
+    Raises:
+        InputError: another kind of geometry, which has no exact distance here.
+    """
+    if isinstance(geometry, coal.Sphere):
+        radius = geometry.radius
+        return SweptPoints(_CENTER, radius, _NO_FACES, radius, _NO_AXIS, 2.0 * radius, np.full(3, radius))
+    if isinstance(geometry, coal.Capsule):
+        half, radius = geometry.halfLength, geometry.radius
+        points = np.array([[0.0, 0.0, -half], [0.0, 0.0, half]])
+        caps = np.array([[0.0, 0.0, 1.0, half], [0.0, 0.0, -1.0, half]])
+        box = np.array([radius, radius, half + radius])
+        return SweptPoints(points, radius, caps, half + radius, _ALONG, 2.0 * radius, box)
+    if isinstance(geometry, coal.Box):
+        box = np.array(geometry.halfSide)
+        faces = np.empty((6, 4))
+        faces[:, :3], faces[:3, 3], faces[3:, 3] = _SIDES, box, box
+        return SweptPoints(_CORNERS * box, 0.0, faces, math.hypot(*box), _NO_AXIS, 2.0 * min(box.tolist()), box)
+    if isinstance(geometry, coal.Ellipsoid):
+        radii = np.array(geometry.radii)
+        return SweptPoints(_NONE, 0.0, _NO_FACES, float(radii.max()), _NO_AXIS, 2.0 * float(radii.min()), radii)
+    if isinstance(geometry, coal.Halfspace):
+        face = np.array([[*geometry.n, geometry.d]])
+        return SweptPoints(_NONE, 0.0, face, np.inf, _NO_AXIS, np.inf, np.full(3, np.inf))
+    if isinstance(geometry, coal.Convex):
+        points = np.array(geometry.points())
+        faces = _convex_faces(geometry, points)
+        width = float((faces[:, 3] - (points @ faces[:, :3].T).min(axis=0)).min())
+        reach = float(np.linalg.norm(points, axis=1).max())
+        return SweptPoints(points, 0.0, faces, reach, _NO_AXIS, width, np.abs(points).max(axis=0))
+    raise InputError(
+        f"{type(geometry).__name__} is not a convex piece; use Box, Sphere, Capsule, Ellipsoid, HalfSpace, Hull or Mesh"
+    )
+
+
+def normal_across(axis_a: Array, axis_b: Array) -> Array:
+    """Unit vector (3,) across the axes of two pieces that meet exactly, where coal has no normal; axes may be zero."""
+    normal = np.cross(axis_a, axis_b)
+    if np.linalg.norm(normal) < 1e-9:
+        along = axis_a if axis_a.any() else axis_b if axis_b.any() else np.array([1.0, 0.0, 0.0])
+        normal = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+    return np.asarray(normal / np.linalg.norm(normal))
+
+
+def _convex_faces(geometry: Any, points: Array) -> Array:
+    """Outward planes of a coal.Convex, coplanar triangles merged."""
+    triangles = np.array([[t[0], t[1], t[2]] for t in (geometry.polygons(i) for i in range(geometry.num_polygons))])
+    a, b, c = points[triangles[:, 0]], points[triangles[:, 1]], points[triangles[:, 2]]
+    normals = np.cross(b - a, c - a)
+    length = np.linalg.norm(normals, axis=1)
+    solid = length > 1e-14
+    normals, a = normals[solid] / length[solid, None], a[solid]
+    offsets = np.einsum("ij,ij->i", normals, a)
+    inward = offsets < normals @ points.mean(axis=0)
+    normals[inward] *= -1.0
+    offsets[inward] *= -1.0
+    planes = np.column_stack([normals, offsets])
+    _, first = np.unique(np.round(planes, 7), axis=0, return_index=True)
+    return planes[np.sort(first)]

@@ -23,17 +23,17 @@ ROUNDING = 1e-3
 """Largest error of a rotation: numbers with four digits are repaired, larger errors are refused."""
 
 
+_UPRIGHT = np.eye(3)
+
+
 def placement(at: PlacementLike, what: str = "placement") -> pin.SE3:
-    """Read a placement, metres; the quaternion is x, y, z, w.
+    """Read a placement, metres, as a fresh SE3 whose rotation is orthonormal to machine precision.
 
     coal treats a NaN placement as touching and accepts any matrix as a rotation, so both are refused here.
 
     Args:
-        at: (3,) position, (7,) position and unit quaternion, (4, 4) homogeneous matrix, or ``pin.SE3``.
+        at: (3,) position, (7,) position and unit quaternion x, y, z, w, (4, 4) homogeneous matrix, or ``pin.SE3``.
         what: name of the placed object, for messages.
-
-    Returns:
-        A fresh ``pin.SE3`` whose rotation is orthonormal to machine precision.
 
     Raises:
         InputError: another shape, a value that is not finite, a quaternion that is not of unit length, a matrix that is
@@ -43,8 +43,9 @@ def placement(at: PlacementLike, what: str = "placement") -> pin.SE3:
         return _rigid(np.asarray(at.rotation), np.asarray(at.translation), what)
     values = array(at, what, "(x, y, z), (x, y, z, qx, qy, qz, qw), a 4x4 matrix or a pin.SE3")
     if values.shape == (3,):
-        _check_values(values, what)
-        return pin.SE3(np.eye(3), values.copy())
+        if not max(map(abs, values.tolist())) <= FARTHEST or np.isnan(values).any():
+            _check_values(values, what)
+        return pin.SE3(_UPRIGHT, values)
     if values.shape == (7,):
         norm = float(np.linalg.norm(values[3:]))
         if np.isfinite(norm) and abs(norm - 1.0) > ROUNDING:
@@ -71,11 +72,7 @@ def placement(at: PlacementLike, what: str = "placement") -> pin.SE3:
 
 
 def unit_vector(value: object, what: str) -> tuple[float, float, float]:
-    """The unit vector along another.
-
-    Raises:
-        InputError: not three finite numbers, or too short or too long to have a direction.
-    """
+    """The unit vector along another; an InputError if that has no direction."""
     x, y, z = numbers(value, (3,), what).tolist()
     length = math.hypot(x, y, z)
     if not 1e-9 <= length <= 1e9:

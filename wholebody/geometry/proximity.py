@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from functools import lru_cache
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -18,8 +18,7 @@ from wholebody.base.checks import number
 from wholebody.geometry.large_models import pairs_of
 from wholebody.geometry.memory_views import RESULT_DOUBLES, fields
 from wholebody.geometry.pair_distances import PairDistances
-from wholebody.geometry.pieces import COAL_ACCURACY, ENDLESS
-from wholebody.geometry.swept_points import swept_points
+from wholebody.geometry.pieces import COAL_ACCURACY, ENDLESS, normal_across, swept_points
 
 PENETRATION = 1e-5  # m: deeper than this a pair is called inside of each other; what touches is solved to it
 
@@ -54,44 +53,24 @@ class Contacts(NamedTuple):
         return self._rows(np.argsort(self.distance, kind="stable"))
 
     def nearer(self, distance: float) -> Contacts:
-        """Those that are nearer than a distance, metres.
-
-        Raises:
-            InputError: the distance is no number.
-        """
+        """Those that are nearer than a distance, metres."""
         distance = number(distance, "nearer: distance", -np.inf, np.inf, "m")
         return self._rows(np.flatnonzero(self.distance < distance))
 
     def joined(self, others: Contacts) -> Contacts:
         """These and others at the same placements."""
-        return Contacts(
-            np.concatenate([self.pair, others.pair]), np.concatenate([self.distance, others.distance]),
-            np.concatenate([self.normal, others.normal]), np.concatenate([self.point_a, others.point_a]),
-            np.concatenate([self.point_b, others.point_b]), np.concatenate([self.number, others.number]),
-            self.placements,
-        )  # fmt: skip
+        joined: Any = [*map(np.concatenate, zip(self[:6], others[:6], strict=True)), self.placements]
+        return Contacts(*joined)
 
     def _rows(self, rows: Indices) -> Contacts:
-        return Contacts(
-            self.pair[rows], self.distance[rows], self.normal[rows], self.point_a[rows], self.point_b[rows],
-            self.number[rows], self.placements,
-        )  # fmt: skip
+        chosen: Any = [*(part[rows] for part in self[:6]), self.placements]
+        return Contacts(*chosen)
 
 
 class _ContactBuffer:
-    """Room for contacts.
-
-    Attributes:
-        size: how many contacts it has room for.
-        distance: (size,) see `Contacts`, like the following.
-        vectors: (3, size, 3) normals, points on the first and on the second piece.
-        number: (size,).
-        pair: (size, 2).
-        arrays: these four.
-    """
+    """Room for so many contacts; `vectors` has normals, points on the first and on the second piece."""
 
     def __init__(self, size: int) -> None:
-        """Allocate."""
         self.size = size
         self.distance, self.vectors = np.empty(size), np.empty((3, size, 3))
         self.number, self.pair = np.empty(size, dtype=np.intp), np.empty((size, 2), dtype=np.intp)
@@ -131,12 +110,7 @@ class PairTable:
     """
 
     def __init__(self, model: pin.Model, geometry: pin.GeometryModel, pairs: Indices | None = None) -> None:
-        """Read the pieces and pairs.
-
-        Args:
-            model: Pinocchio's model.
-            geometry: the geometry model.
-            pairs: its pairs (pairs, 2), where they are known: to read a hundred thousand of them takes half a second.
+        """Read the pieces and pairs; to read a hundred thousand pairs takes half a second, where they are not given.
 
         Raises:
             InputError: a geometry that is not a convex piece.
@@ -164,20 +138,6 @@ def _joined(parts: list[Array]) -> tuple[Array, Indices]:
     return np.concatenate(parts), np.cumsum([len(part) for part in parts], dtype=np.intp)
 
 
-class Kinematics(Protocol):
-    """What knows where the joints of a model are, such as `figures.state.State`."""
-
-    @property
-    def data(self) -> Any:
-        """Pinocchio's data, with the joints' placements."""
-
-
-class Joints(NamedTuple):
-    """Where the joints of a model are: Pinocchio's data after its forward kinematics."""
-
-    data: Any
-
-
 class Proximity:
     """Distances of every collision pair of a geometry model, re-used from posture to posture by one run at a time.
 
@@ -192,7 +152,6 @@ class Proximity:
     """
 
     def __init__(self, table: PairTable) -> None:
-        """Lay views over results of Pinocchio that nothing else uses."""
         self.table = table
         self.geometry = table.geometry.copy()  # shapes are shared
         self.seconds = 0.0
@@ -225,29 +184,29 @@ class Proximity:
         """Place a piece anew in its joint's frame."""
         self.geometry.geometryObjects[index].placement = placement
 
-    def placements(self, state: Kinematics) -> Array:
-        """Placements (n, 4, 3) of the pieces with the joints as in `state`; see `Contacts.placements`."""
-        self.distances.place(self.table.model, state.data)
+    def placements(self, data: Any) -> Array:
+        """Placements (n, 4, 3) of the pieces with the joints as in Pinocchio's `data`; see `Contacts.placements`."""
+        self.distances.place(self.table.model, data)
         return np.array(self.distances.placed)
 
-    def query(self, state: Kinematics, within: float, most: Array | None = None) -> Contacts:
-        """Every pair nearer than `within` metres with the joints as in `state`, in the order of the pairs.
+    def query(self, data: Any, within: float, most: Array | None = None) -> Contacts:
+        """Every pair nearer than `within` metres with the joints as in Pinocchio's `data`, in the order of the pairs.
 
         With `most`, shape (pairs,), a pair that is as far apart as its entry [m] is left out too. Nothing else is left
         out. Results of pairs that were culled are never read: coal leaves old numbers in them.
         """
         began = time.perf_counter()
-        placements = self.placements(state)
+        placements = self.placements(data)
         most = self._endless if most is None else most
         index = self._asked(placements, within, most)
         contacts = self._gather(_ContactBuffer(len(index)), placements, index, within, most)
         self.seconds += time.perf_counter() - began
         return contacts
 
-    def query_views(self, state: Kinematics, within: float, most: Array | None = None) -> Contacts:
+    def query_views(self, data: Any, within: float, most: Array | None = None) -> Contacts:
         """What `query` returns, in arrays that the next call of this overwrites."""
         began = time.perf_counter()
-        self.distances.place(self.table.model, state.data)
+        self.distances.place(self.table.model, data)
         placements = self._placed
         placements[:] = self.distances.placed
         most = self._endless if most is None else most
@@ -307,11 +266,7 @@ class Proximity:
             first, second = contacts.pair[row]
             axis_a = self.table.swept[first].axis @ placements[first, :3]
             axis_b = self.table.swept[second].axis @ placements[second, :3]
-            normal = np.cross(axis_a, axis_b)
-            if np.linalg.norm(normal) < 1e-9:
-                along = axis_a if axis_a.any() else axis_b if axis_b.any() else np.array([1.0, 0.0, 0.0])
-                normal = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
-            normal /= np.linalg.norm(normal)
+            normal = normal_across(axis_a, axis_b)
             center = 0.5 * (contacts.point_a[row] + contacts.point_b[row])
             depth = -0.5 * contacts.distance[row] * normal
             contacts.normal[row], contacts.point_a[row], contacts.point_b[row] = normal, center + depth, center - depth

@@ -12,15 +12,9 @@ from wholebody.geometry.pieces import COAL_ACCURACY
 
 @compiled(inner=True)
 def travel(placement: Array, last: Array, reach: Array, travelled: Array) -> None:
-    """Add to `travelled` (n,) how far a point of each piece can have moved since `last`, and renew `last`.
+    """Add to `travelled` (n,) how far a point of each piece can have moved since `last`, and renew `last` (n, 4, 3).
 
     A point x of a piece moves by at most |t1 - t0| + |R1 - R0| |x|, with the Frobenius norm of R1 - R0.
-
-    Args:
-        placement: (n, 4, 3) where the pieces are now; see `Contacts.placements`.
-        last: (n, 4, 3) where they were when this was asked last; is overwritten.
-        reach: (n,) radius of each piece about its origin; may be infinite.
-        travelled: (n,) metres since the beginning; grows.
     """
     for i in range(len(reach)):
         shift = 0.0
@@ -105,8 +99,7 @@ def gather(
 def renew(marked: Indices, before: int, index: Indices, count: int, changed: Indices) -> tuple[int, int]:
     """Make ``marked[:before]`` the same pairs as ``index[:count]``, both in ascending order.
 
-    Returns:
-        How many pairs are marked no longer, and how many newly; they go to the front of `changed`, in this order.
+    How many pairs are marked no longer, and how many newly; they go to the front of `changed`, in this order.
     """
     gone, came, k = 0, 0, 0
     for m in range(before):

@@ -58,19 +58,13 @@ def least_separation(
 ) -> Separation:
     """Least translation of A after which no piece of it overlaps a piece of B.
 
-    Args:
-        pieces_a: the pieces of A, each a coal geometry and its placement in the world.
-        pieces_b: those of B.
-        allowed: (n, m) the pairs of pieces that count; all by default.
-
-    Returns:
-        The zero translation if nothing overlaps, and also, with ``separated=False``, if no translation separates the
-        objects (a piece between two half-spaces).
+    The zero translation if nothing overlaps, and also, with ``separated=False``, if no translation separates the
+    objects (a piece between two half-spaces). See `object_penetration` for the arguments.
     """
     pairs = ObjectPair(pieces_a, pieces_b, allowed)
     escapes = pairs.escapes()
-    best = escapes[np.argmin((escapes**2).sum(axis=1))] if len(escapes) else None
-    best = _shorter(best, _depth_first(pairs, _ROOT))
+    ways = [*escapes, *([] if (found := _depth_first(pairs, _ROOT)) is None else [found])]
+    best = min(ways, key=lambda way: float(way @ way), default=None)
     least = False
     if not pairs.sampled:
         best, least = _search(pairs, best)
@@ -85,12 +79,6 @@ def least_separation(
 
 
 _ROOT = _Node(np.zeros(3), np.zeros((0, 3)), np.zeros(0))
-
-
-def _shorter(first: Array | None, second: Array | None) -> Array | None:
-    if first is None or second is None:
-        return first if second is None else second
-    return second if second @ second < first @ first else first
 
 
 def _search(pairs: ObjectPair, best: Array | None) -> tuple[Array | None, bool]:

@@ -17,7 +17,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import array, listed, path, shown
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range, Vector
-from wholebody.geometry.convex import check_mesh, convex_pieces
+from wholebody.geometry.convex import CONCAVITY, VERTICES, check_mesh, convex_pieces
 from wholebody.geometry.hull import check_points, hull_piece
 from wholebody.geometry.mesh_cache import ConvexPieces
 from wholebody.geometry.meshes import GLTF, Y_UP, read_mesh
@@ -329,8 +329,8 @@ class Mesh(Shape):
     source: str | PathLike[str] | tuple[ArrayLike, ArrayLike] | HasTriangles
     scale: Annotated[float, Range(1e-12, 1e12, wanted="metres for each unit of the file, such as 0.001")] = 1.0
     up: Literal["z", "y"] | None = None
-    max_vertices: Annotated[int, Range(8, 256, whole=True)] = 32
-    threshold: Annotated[float, Range(0.01, 1.0)] = 0.05
+    max_vertices: Annotated[int, VERTICES] = 32
+    threshold: Annotated[float, CONCAVITY] = 0.05
     vertices: Array = field(init=False, repr=False)
     faces: NDArray[np.int64] = field(init=False, repr=False)
 

@@ -176,7 +176,7 @@ class Iteration:
     def _clearance_violation(self, q: Array) -> float:
         """By what the worst pair is nearer than its clearance at a posture (nq,) [m]."""
         clearances = self._problem.clearances
-        near = self._proximity.query(self._state.update(q), float(clearances.max(initial=0.0)))
+        near = self._proximity.query(self._state.update(q).data, float(clearances.max(initial=0.0)))
         return float((clearances[near.number] - near.distance).max(initial=0.0))
 
     def _rank(self, error: float, violation: float) -> None:

@@ -8,6 +8,7 @@ foot that stands at several places made steps between them.
 from __future__ import annotations
 
 from collections.abc import Collection
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -134,15 +135,8 @@ def _apart(places: Array, mask: Mask) -> Mask:
 UPRIGHT = 0.7
 """Cosine of the greatest angle between up and the trunk, thighs and shanks of a rest posture that stands."""
 
-LIMBS = (
-    ("hip", "knee"),
-    ("knee", "ankle"),
-    ("ankle", "toe"),
-    ("shoulder", "elbow"),
-    ("elbow", "wrist"),
-    ("wrist", "hand"),
-)
-"""Bones whose directions are taken from the skeleton, and their lengths from the figure."""
+LIMBS = (("hip", "knee", "ankle", "toe"), ("shoulder", "elbow", "wrist", "hand"))
+"""Ends of bones whose directions are taken from the skeleton, and their lengths from the figure."""
 
 
 class Targets(NamedTuple):
@@ -209,7 +203,7 @@ def rest_axes(motion: SkeletonMotion, roles: Roles) -> Array | None:
     up = np.array([0.0, 0.0, 1.0])
     ways = [] if top is None else [body.way("hips", top)]
     for side in ("left", "right"):
-        for first, second in LIMBS[:2]:
+        for first, second in (("hip", "knee"), ("knee", "ankle")):
             if body.has(f"{side}_{first}", f"{side}_{second}"):
                 ways.append(-body.way(f"{side}_{first}", f"{side}_{second}"))
     pair = next((part for part in ("hip", "shoulder") if body.has(f"left_{part}", f"right_{part}")), None)
@@ -285,11 +279,19 @@ def _leg(body: _Body) -> float:
     return body.length("left_hip", "left_knee") + body.length("left_knee", "left_ankle")
 
 
+def _ratio(own: _Body, source: _Body, first: str, second: str) -> float:
+    return own.length(first, second) / max(source.length(first, second), SMALL)
+
+
 def _directed(own: _Body, source: _Body, first: str, second: str, start: Array) -> Array:
     """(n, 3) from a start along the skeleton's way from one role to another, at the figure's length."""
-    ratio = own.length(first, second) / max(source.length(first, second), SMALL)
-    found: Array = start + source.way(first, second) * ratio
+    found: Array = start + source.way(first, second) * _ratio(own, source, first, second)
     return found
+
+
+def known_bones(limb: tuple[str, ...], side: str, roles: Collection[str]) -> list[tuple[str, str]]:
+    """Both ends of what lies between the roles of a limb that are known: bones, or what is left of them."""
+    return list(pairwise(role for part in limb if (role := f"{side}_{part}") in roles))
 
 
 def _points(own: _Body, source: _Body, hips: Array, anchored: bool) -> dict[str, Array]:
@@ -298,14 +300,20 @@ def _points(own: _Body, source: _Body, hips: Array, anchored: bool) -> dict[str,
     Limbs of which nothing nearer to the trunk is known begin where the figure's do, if they are `anchored`.
     """
     points, top = _girdles(own, source, hips)
-    above = {second: first for first, second in LIMBS}
-    for side in ("left", "right"):
-        for first, second in LIMBS:
-            a, b = f"{side}_{first}", f"{side}_{second}"
-            if anchored and a not in points and own.has(a, b) and not own.has(f"{side}_{above.get(first)}"):
+    limbs = [(limb, known_bones(limb, side, own.places.keys())) for limb in LIMBS for side in ("left", "right")]
+    rigid = {
+        (a, b) for limb, bones in limbs for a, b in bones if (a.split("_")[1], b.split("_")[1]) in set(pairwise(limb))
+    }
+    size = float(np.median([_ratio(own, source, *ends) for ends in rigid])) if rigid else 1.0
+    for _, bones in limbs:
+        for k, (a, b) in enumerate(bones):
+            if anchored and k == 0 and a not in points:
                 points[a] = np.tile(own.places[a], (len(hips), 1))
-            if a in points and own.has(a, b) and source.has(a, b):
+            if a in points and (a, b) in rigid:
                 points[b] = _directed(own, source, a, b, points[a])
+            elif a in points:  # over a joint that is not known: the longest way in the recording may be a bent one
+                ratio = float(np.clip(_ratio(own, source, a, b), 0.85 * size, 1.15 * size))
+                points[b] = points[a] + source.way(a, b) * (ratio if rigid else _ratio(own, source, a, b))
     necks = [body.length("shoulders", "head") if body.has("shoulders", "head") else 0.0 for body in (own, source)]
     if top is not None and min(necks) > 0.0 and necks[1] > 0.4 * necks[0]:  # a shorter one has no direction
         points["head"] = _directed(own, source, "shoulders", "head", top)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -15,7 +14,7 @@ from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.posture_fit import Fitter, Goals, smooth
-from wholebody.motion.retarget_targets import Footfalls, Targets, footfalls, has_trunk, targets
+from wholebody.motion.retarget_targets import LIMBS, Footfalls, Targets, footfalls, has_trunk, known_bones, targets
 from wholebody.motion.roles import Roles, matched
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
 from wholebody.motion.stance import paths
@@ -52,7 +51,10 @@ def retarget(
     motion = checked_motion(motion, "retarget: motion")
     check_figure(figure, "retarget")
     function(progress, "progress")
-    roles = matched(motion.names, figure, names)
+    roles = matched(motion, figure, names)
+    if roles.told:
+        told = ", ".join(f"{role} is {roles.joints[role]!r}" for role in roles.told)
+        warn(f"retarget: {motion.name}: by the structure of the skeleton {told}; name joints with names={{...}} if not")
     if roles.missing:
         warn(
             f"retarget: no joint of {motion.name} is known for {', '.join(roles.missing)}, so these follow nothing; "
@@ -95,32 +97,21 @@ def bone_errors(
         raise InputError(
             f"bone_errors: the clip has {len(clip)} frames and the motion {len(motion)}; give its own clip"
         )
-    return errors_of(motion, clip, matched(motion.names, clip.figure, names))
+    return errors_of(motion, clip, matched(motion, clip.figure, names))
 
 
 def errors_of(motion: SkeletonMotion, clip: Clip, roles: Roles) -> dict[str, Array]:
     """`bone_errors` with known roles."""
-    places = dict(
-        zip(roles.frames, paths(clip.figure, clip.q, tuple(roles.frames.values())).swapaxes(0, 1), strict=True)
-    )
+    ways = paths(clip.figure, clip.q, tuple(roles.frames.values())).swapaxes(0, 1)
+    places = dict(zip(roles.frames, ways, strict=True))
     found = {}
-    for side in ("left", "right"):
-        for limb in (("shoulder", "elbow", "wrist", "hand"), ("hip", "knee", "ankle", "toe")):
-            for first, second in pairwise(limb):
-                ends = f"{side}_{first}", f"{side}_{second}"
-                if not all(end in places for end in ends):
-                    continue
-                theirs, ours = (
-                    there[ends[1]] - there[ends[0]]
-                    for there in (
-                        {end: motion.positions[:, motion.names.index(roles.joints[end])] for end in ends},
-                        places,
-                    )
-                )
-                lengths = np.linalg.norm(theirs, axis=1) * np.linalg.norm(ours, axis=1)
-                if lengths.min() > 1e-9:
-                    across = np.linalg.norm(np.cross(theirs, ours), axis=1)
-                    found[" to ".join(ends)] = np.arctan2(across, np.einsum("ni,ni->n", theirs, ours))
+    for ends in (ends for side in ("left", "right") for limb in LIMBS for ends in known_bones(limb, side, places)):
+        start, end = (motion.positions[:, motion.names.index(roles.joints[role])] for role in ends)
+        theirs, ours = end - start, places[ends[1]] - places[ends[0]]
+        lengths = np.linalg.norm(theirs, axis=1) * np.linalg.norm(ours, axis=1)
+        if lengths.min() > 1e-9:
+            across = np.linalg.norm(np.cross(theirs, ours), axis=1)
+            found[" to ".join(ends)] = np.arctan2(across, np.einsum("ni,ni->n", theirs, ours))
     return found
 
 
@@ -160,7 +151,12 @@ class _Retargeting:
         )
         self.root = wanted.root
         far = {"ankle": 2.0, "wrist": 1.5, "hand": 0.5, "neck": 0.5, "head": 0.7}  # weights of distances
-        self.point_weights = np.tile([far.get(role.split("_")[-1], 1.0) for role in self.points], (len(motion), 1))
+        # a hand stands for a wrist that is not known
+        ends = [
+            role if role.replace("hand", "wrist") in self.points else role.replace("hand", "wrist")
+            for role in self.points
+        ]
+        self.point_weights = np.tile([far.get(role.split("_")[-1], 1.0) for role in ends], (len(motion), 1))
         for column, role in enumerate(self.points):
             if role in steps.stands:
                 self.point_weights[steps.stands[role], column] = 30.0

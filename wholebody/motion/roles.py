@@ -13,6 +13,8 @@ from wholebody.base.checks import shown
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.files import packaged_table, parsed_toml, read_text
 from wholebody.figures.figure import Figure
+from wholebody.motion.skeleton import SkeletonMotion
+from wholebody.motion.structure import built
 
 ROWS = packaged_table(Path(__file__).parent / "data" / "roles.csv")
 
@@ -29,6 +31,7 @@ class Roles(NamedTuple):
         turns: role to the frame of the figure that has the orientation of the role.
         table: name of the table that matched the skeleton.
         missing: roles of the figure that no joint of the skeleton is known to have.
+        told: roles whose joints are known by the skeleton's structure alone.
     """
 
     joints: dict[str, str]
@@ -36,15 +39,16 @@ class Roles(NamedTuple):
     turns: dict[str, str]
     table: str
     missing: tuple[str, ...] = ()
+    told: tuple[str, ...] = ()
 
 
 def matched(
-    joints: tuple[str, ...], figure: Figure, names: str | os.PathLike[str] | Mapping[str, Mapping[str, str]] | None
+    motion: SkeletonMotion, figure: Figure, names: str | os.PathLike[str] | Mapping[str, Mapping[str, str]] | None
 ) -> Roles:
-    """The roles that a skeleton and a figure have in common.
+    """The roles that a skeleton and a figure have in common: as names tell, and where they do not, its structure.
 
     Args:
-        joints: names of the skeleton.
+        motion: of the skeleton.
         figure: the figure.
         names: a TOML file or a mapping with tables `skeleton` and `figure`, each role to name; what it leaves out is
             matched by the table `data/roles.csv`.
@@ -54,10 +58,12 @@ def matched(
         FileFormatError: the file cannot be read.
         InputError: less than two roles are common to both.
     """
-    given = _given(names)
+    given, joints = _given(names), motion.names
     table, found = _recognised(joints)
     said = _checked(given.get("skeleton", {}), joints, "joint of the skeleton")
     found = {role: joint for role, joint in found.items() if joint not in said.values()} | said
+    more = {} if said or set(ROLES) <= found.keys() else _by_structure(motion, found)
+    found |= more
     frames = _frames(figure)
     frames |= {
         role: frame
@@ -79,7 +85,24 @@ def matched(
         {role: segments.get(role, frames[role]) for role in common},
         table,
         tuple(role for role in ROLES if role in frames and role not in found),
+        tuple(role for role in common if role in more),
     )
+
+
+def _by_structure(motion: SkeletonMotion, known: Mapping[str, str]) -> dict[str, str]:
+    """Joints of roles that no names tell: all where none are known, else those between known ones that agree."""
+    found = built(motion)
+    same = [found.get(role) == joint for role, joint in known.items() if role not in ("chest", "neck", "head")]
+    if not known:
+        return found
+    if sum(same) < 0.7 * len(same):
+        return {}
+    parts = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist", "pelvis")
+    return {
+        role: joint
+        for role, joint in found.items()
+        if role not in known and role.endswith(parts) and joint not in known.values()
+    }
 
 
 def _recognised(joints: tuple[str, ...]) -> tuple[str, dict[str, str]]:

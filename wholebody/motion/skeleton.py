@@ -186,12 +186,6 @@ def longest_way(parents: Indices, offsets: Array) -> float:
     return longest
 
 
-def recognised_unit(parents: Indices, offsets: Array) -> str:
-    """The unit of `UNITS` in which a skeleton is nearest to the size of a person."""
-    size = max(longest_way(parents, offsets), 1e-12)
-    return min(UNITS, key=lambda unit: abs(np.log(size * UNITS[unit] / 2.2)))  # m, along the bones from foot to head
-
-
 UP = {
     "y": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
     "z": np.eye(3),

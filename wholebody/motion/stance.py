@@ -21,7 +21,7 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.geometry.swept_points import swept_points
+from wholebody.geometry.pieces import swept_points
 from wholebody.motion.clip import Clip
 from wholebody.motion.windows import Window, long_runs, runs
 from wholebody.tasks import Hold

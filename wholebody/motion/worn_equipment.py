@@ -21,9 +21,9 @@ from wholebody.base.checks import text as checked_text
 from wholebody.base.errors import InputError
 from wholebody.base.files import is_file
 from wholebody.figures.figure import Figure
+from wholebody.geometry.pieces import swept_points
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.geometry.shapes import Box, Mesh, Shape, Sphere
-from wholebody.geometry.swept_points import swept_points
 from wholebody.motion.sphere_filling import SphereFilling, fill_with_spheres
 from wholebody.scene.scene import Scene
 

@@ -17,8 +17,7 @@ from wholebody.geometry.placement import placement as to_placement
 from wholebody.geometry.proximity import PairTable
 from wholebody.geometry.shapes import Box, Capsule, Cylinder, Ellipsoid, Hull, Mesh, Shape, Sphere
 from wholebody.scene.geometry_model import Motion, SceneGeometry, SceneObject, assemble
-from wholebody.scene.matter.body import Body
-from wholebody.scene.matter.inertia import mass_properties
+from wholebody.scene.matter.body import Body, mass_properties
 from wholebody.scene.matter.materials import DEFAULT, Material
 from wholebody.scene.matter.materials import material as to_material
 
@@ -41,11 +40,7 @@ class SceneContents(checks.FixedAttributes):
     _correction = "make another with wb.Scene(figure), or change its things by add, move and remove"
 
     def __init__(self, figure: Figure) -> None:
-        """Make a scene with the figure alone.
-
-        Raises:
-            InputError: it is no figure.
-        """
+        """Make a scene with the figure alone; an InputError if it is none."""
         if not isinstance(getattr(figure, "model", None), pin.Model):
             raise InputError(f"Scene takes a figure, not {checks.shown(figure)}; load one with wb.load('human')")
         self.figure = figure
@@ -83,8 +78,8 @@ class SceneContents(checks.FixedAttributes):
     def geometry(self) -> pin.GeometryModel:
         """Pinocchio's geometry model: pieces of the figure, of carried things, of things around; all pairs.
 
-        Of more than 2,000 pieces it has no table of pair numbers, which takes gigabytes: do not call
-        `addCollisionPair`, `findCollisionPair` or `existCollisionPair` on it then.
+        Of more than 2,000 pieces it has no table of pair numbers: do not call `addCollisionPair`, `findCollisionPair`
+        or `existCollisionPair` on it then.
         """
         return self._build().geometry
 
@@ -120,12 +115,7 @@ class SceneContents(checks.FixedAttributes):
         return self._build()
 
     def frame_id(self, name: str) -> int:
-        """Index of a frame of the figure.
-
-        Raises:
-            UnknownNameError: there is none of that name.
-            InputError: the name is no text.
-        """
+        """Index of a frame of the figure."""
         return int(self.figure.frame_id(name))
 
     # ---- changes
@@ -140,7 +130,7 @@ class SceneContents(checks.FixedAttributes):
         body: Body | None = None,
         material: Material | str | None = None,
     ) -> Self:
-        """Add a thing to the world.
+        """Add a thing to the world, and return the scene.
 
         Args:
             shape: a `wholebody.geometry.shapes.Shape`.
@@ -149,9 +139,6 @@ class SceneContents(checks.FixedAttributes):
             color: red, green, blue and, if wanted, alpha, each from 0 to 1; a name such as "steelblue", or "#rrggbb".
             body: its mass, material and velocity, if it moves by itself.
             material: of a thing that does not; wood if none is given.
-
-        Returns:
-            The scene, so that calls can be chained.
 
         Raises:
             InputError: the name exists already, the shape, placement or color is invalid, or a half-space has a body.
@@ -185,12 +172,12 @@ class SceneContents(checks.FixedAttributes):
         lists those. It is tested against all others: a box in the hand does not pass through the thighs.
 
         Args:
-            shape: a `wholebody.geometry.shapes.Shape`.
+            shape: as for `add`.
             to: the segment or frame that carries it.
-            name: a name that nothing else in the scene has.
+            name: as for `add`.
             at: its placement in that frame; as for `add`.
             rests_on: more segments, and carried things, that it is not tested against.
-            color: red, green, blue and, if wanted, alpha, each from 0 to 1; a name such as "steelblue", or "#rrggbb".
+            color: as for `add`.
 
         Raises:
             InputError: the name exists already, or the shape, placement or color is invalid.
@@ -207,17 +194,12 @@ class SceneContents(checks.FixedAttributes):
         return self._put(name, shape, at, color, to, rests)
 
     def move(self, name: str, *, at: Any, over: float | None = None) -> Self:
-        """Move a thing to a new placement in the world, or in its segment's frame.
+        """Move a thing to a new placement in the world, or in its segment's frame; as for `add`.
 
-        With `over` it moves there from where it is, during the next frame of a tracker, a drag or a frame loop: its
-        centre goes straight, and it turns about its centre. What it meets on the way counts. Without `over` it is put
-        there, whatever is in between. If it is moved more than once before that frame, the frame sees one motion, from
-        where the frame before saw it to where it is.
-
-        Args:
-            name: of the thing.
-            at: its placement; as for `add`.
-            over: seconds that the motion takes, the time of a frame; None for a thing that is put there.
+        With `over` it moves there from where it is, during the next frame of a tracker, a drag or a frame loop, in so
+        many seconds: its centre goes straight, and it turns about its centre. What it meets on the way counts. Without
+        `over` it is put there, whatever is in between. If it is moved more than once before that frame, the frame sees
+        one motion, from where the frame before saw it to where it is.
 
         Raises:
             UnknownNameError: there is no such object.
@@ -238,12 +220,7 @@ class SceneContents(checks.FixedAttributes):
         return self
 
     def remove(self, name: str) -> Self:
-        """Remove a thing.
-
-        Raises:
-            UnknownNameError: there is no such object.
-            InputError: the name is no text.
-        """
+        """Remove a thing; an UnknownNameError if there is none of that name."""
         with self._lock:
             self._object(name)
             del self._objects[name]
@@ -261,14 +238,13 @@ class SceneContents(checks.FixedAttributes):
         body: Body | None = None,
         material: Material = DEFAULT,
     ) -> Self:
-        checks.text(name, "the name of an object")
         checks.instance(shape, Shape, repr(name), SHAPES)
         place = to_placement(at, f"{name!r}: at")
         _warn_of_units(name, place, shape)
         painted = None if color is None else checks.color(color, f"{name!r}: color")
         with self._lock:
             thing = SceneObject(name, shape, place, to, painted, rests_on, body=body, material=material)
-            self._objects[self._new_name(name)] = thing
+            self._objects[self._free_name(name)] = thing
             self._changed()
         return self
 
@@ -280,7 +256,9 @@ class SceneContents(checks.FixedAttributes):
         return self._objects[checks.known(name, self._objects, "object")]
 
     def _new_name(self, name: str) -> str:
-        checks.text(name, "the name of an object")
+        return self._free_name(checks.text(name, "the name of an object"))
+
+    def _free_name(self, name: str) -> str:
         if name in self._objects or name in self.figure.segments:
             raise InputError(
                 f"the scene already has a {name!r}; give the new object another name, or move() the old one"
@@ -318,7 +296,7 @@ class SceneContents(checks.FixedAttributes):
 def _warn_of_units(name: str, place: pin.SE3, shape: Shape | None = None) -> None:
     """Warn of a place and a size that are hardly metres."""
     # m: a thing farther than this from the origin is probably placed in millimetres
-    if (far := float(max(abs(place.translation)))) > 100.0:
+    if (far := max(map(abs, place.translation.tolist()))) > 100.0:
         told = f"{name!r} is {far:.4g} m away; lengths are in metres, so divide millimetres by 1000"
         checks.warn(told)
     extent = _extent(shape)

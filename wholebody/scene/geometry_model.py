@@ -15,8 +15,8 @@ from wholebody.base.arrays import Indices
 from wholebody.base.pool import Pool
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.continuous.moved_pairs import compiled_kernel
-from wholebody.geometry.large_models import geometry_model
-from wholebody.geometry.proximity import Joints, PairTable, Proximity
+from wholebody.geometry.large_models import geometry_model, pairs_of
+from wholebody.geometry.proximity import PairTable, Proximity
 from wholebody.scene.matter.materials import DEFAULT, Material
 
 if TYPE_CHECKING:
@@ -29,12 +29,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Motion:
-    """How a thing came to where it is.
-
-    Attributes:
-        start: where it was before, in the world, or in the segment's frame for a carried thing.
-        seconds: how long it took.
-    """
+    """How a thing came to where it is: where it was, in the world or in the frame of its segment, and the seconds."""
 
     start: pin.SE3
     seconds: float
@@ -109,13 +104,7 @@ class SceneGeometry:
         self._known: dict[Any, Any] = {}
 
     def place(self, name: str, base: pin.SE3, *, moving: bool = False) -> None:
-        """Place the pieces of an object whose placement in its joint's frame is `base`.
-
-        Args:
-            name: of the object.
-            base: its placement.
-            moving: whether it moves there, along the way in between; otherwise it was put there.
-        """
+        """Put the pieces of an object to its placement in its joint's frame, or move them there along the way."""
         with self.lock:
             self.moves += 1
             if not moving:
@@ -129,10 +118,7 @@ class SceneGeometry:
     ) -> int:
         """Update the placements of the pieces that moved since `seen`; returns the present number of moves.
 
-        Args:
-            proximity: of a run.
-            seen: number of moves that it has seen.
-            moved: takes the objects that moved, with their placements before and after; of those put, after as both.
+        `moved` takes the objects that moved, with their placements before and after; of those put, after as both.
         """
         if seen == self.moves:
             return seen
@@ -231,14 +217,8 @@ def assemble(figure: Figure, objects: Iterable[SceneObject], excluded: dict[tupl
     if body > own:
         outer, standing = (met[:, 0] >= own) & (met[:, 0] < body), joints[met[:, 1]] == 0
         met = met[(met[:, 0] >= body) | (outer == standing)]
-    pairs = np.concatenate([_own_pairs(figure), met])
+    pairs = np.concatenate([pairs_of(figure.geometry), met])
     return SceneGeometry(model, geometry_model(pieces, pairs), tuple(owners), pieces_of, pairs)
-
-
-def _own_pairs(figure: Figure) -> Indices:
-    """(k, 2) the figure's own pairs."""
-    listed = [[pair.first, pair.second] for pair in figure.geometry.collisionPairs]
-    return np.array(listed, dtype=np.intp).reshape(-1, 2)
 
 
 def _pairs_of_things(
@@ -311,4 +291,4 @@ def _touching_at_rest(
     data = figure.model.createData()
     pin.forwardKinematics(figure.model, data, rest)
     # m: a carried thing nearer than this to a segment in the first posture rests on it
-    return {(owners[a], owners[b]) for a, b in Proximity(PairTable(figure.model, probe)).query(Joints(data), 1e-3).pair}
+    return {(owners[a], owners[b]) for a, b in Proximity(PairTable(figure.model, probe)).query(data, 1e-3).pair}

@@ -57,7 +57,10 @@ def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Co
         if top in mine or (top in compiled.robots and not compiled.is_free(top)):
             continue
         if not compiled.is_free(top):
-            _add_fixed_tree(scene, compiled, top, left)
+            places = {0: pin.SE3.Identity()}
+            for body in compiled.tree(top):
+                places[body] = places[int(model.body_parentid[body])] * compiled.place(body)
+                _add_fixed(scene, compiled, body, places[body], left)
             continue
         parts = _parts(compiled, [top, *compiled.tree(top)[1:]], left)
         if parts:
@@ -69,13 +72,6 @@ def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Co
     if left:
         warn(f"{place}: height fields are not kept: {', '.join(left)}")
     return scene
-
-
-def _add_fixed_tree(scene: Scene, compiled: Compiled, top: int, left: list[str]) -> None:
-    places = {0: pin.SE3.Identity()}
-    for body in compiled.tree(top):
-        places[body] = places[int(compiled.model.body_parentid[body])] * compiled.place(body)
-        _add_fixed(scene, compiled, body, places[body], left)
 
 
 def _add_fixed(scene: Scene, compiled: Compiled, body: int, place: pin.SE3, left: list[str]) -> None:

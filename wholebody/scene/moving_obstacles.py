@@ -17,7 +17,6 @@ from wholebody.geometry.continuous.passing_through import OVERLAP, Entered, ente
 from wholebody.geometry.continuous.sweep import FirstContact, Sweep
 from wholebody.geometry.continuous.swept_depth import SweptDepth
 from wholebody.geometry.proximity import Contacts, PairTable
-from wholebody.scene.geometry_model import SceneGeometry
 from wholebody.scene.moving_scene import MovingScene
 
 LEAST_APPROACH, LARGEST_APPROACH = 5e-4, 0.02  # m: the same at least, and at most: rows are of first order only
@@ -40,37 +39,9 @@ class Collision(NamedTuple):
     inside: bool
 
     def __str__(self) -> str:
-        """Return the collision in words."""
         if self.inside:
             return f"{self.first} and {self.second} overlap by {1e3 * self.depth:.1f} mm"
         return f"{self.second} passed through {self.first}, or {1e3 * self.depth:.1f} mm into it and out"
-
-
-class MovingThings:
-    """The things that move in one run; sweeps of both sides are made for each set of them, and kept."""
-
-    def __init__(self, built: SceneGeometry, geometry: pin.GeometryModel) -> None:
-        """Begin without any.
-
-        Args:
-            built: the scene's geometry.
-            geometry: the same with the placements that the run sees.
-        """
-        self._built, self._geometry = built, geometry
-        self._made: dict[tuple[str, ...], _BothSides] = {}
-
-    def frame(self, moved: Mapping[str, tuple[pin.SE3, pin.SE3]]) -> FrameMotion:
-        """A frame in which things move from one placement to another, both in the frame of the joint that carries them.
-
-        Raises:
-            UnknownNameError: there is no such thing.
-        """
-        names = tuple(moved)
-        both = self._made.get(names)
-        if both is None:
-            both = self._made[names] = _BothSides(MovingScene(self._built, names, between_things=False))
-        both.scene.refresh(self._geometry)
-        return FrameMotion(both, moved)
 
 
 class FrameMotion:
@@ -82,8 +53,7 @@ class FrameMotion:
         still: whether nothing moves: things were put into the figure, or are still in it.
     """
 
-    def __init__(self, both: _BothSides, moved: Mapping[str, tuple[pin.SE3, pin.SE3]]) -> None:
-        """Take the placements of the things that move, at the start and at the end."""
+    def __init__(self, both: BothSides, moved: Mapping[str, tuple[pin.SE3, pin.SE3]]) -> None:
         self._both, self._scene, self.names = both, both.scene, both.scene.names
         nothing = np.zeros(self._scene.figure_nq)
         self._start, self._end = (
@@ -102,12 +72,8 @@ class FrameMotion:
     def next_share(self, share: float, near: Contacts, within: float) -> float:
         """The share of the frame up to which things may move before the figure is asked again.
 
-        No pair comes nearer until then than it is apart now, and a part of its width.
-
-        Args:
-            share: where things are now.
-            near: the pairs that are nearer than `within` metres.
-            within: query distance.
+        No pair comes nearer until then than it is apart now, and a part of its width. `near` are the pairs that are
+        nearer than `within` metres where things are now.
         """
         pairs, table = near.pair, self._both.table
         coming = self.way[pairs].sum(axis=1)
@@ -124,12 +90,9 @@ class FrameMotion:
         return self._both.sweep.first_contact(self._at(q0, 0.0), self._at(q1, 1.0), tolerance=tolerance)
 
     def collisions(self, path: Sequence[tuple[float, Array]]) -> tuple[Collision, ...]:
-        """What the figure and things could not avoid, the deepest first.
+        """What the figure and things could not avoid on a path of shares of the frame and postures, the deepest first.
 
         Nothing is in the way if the straight motion from the first posture to the last is free, or that along the path.
-
-        Args:
-            path: shares of the frame, from 0 to 1, and postures (nq,) of the figure at them.
         """
         along = [self._at(q, share) for share, q in path]
         found: list[Entered] = []
@@ -169,8 +132,8 @@ class FrameMotion:
         return way
 
 
-class _BothSides:
-    """A moving scene with its sweeps."""
+class BothSides:
+    """A moving scene with its sweeps: sweeps of both sides are made for each set of things that move, and kept."""
 
     def __init__(self, scene: MovingScene) -> None:
         self.scene = scene

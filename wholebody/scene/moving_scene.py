@@ -15,14 +15,11 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.checks import known, numbers
 from wholebody.base.errors import InputError
-from wholebody.geometry.large_models import add_pairs
+from wholebody.geometry.large_models import add_pairs, pairs_of
 from wholebody.scene.geometry_model import SceneGeometry
 
 PER_THING = 7
 """Numbers of a thing in a configuration: where its centre is, and how it is turned, x, y, z, w."""
-
-PER_MOTION = 6
-"""Numbers of its velocity: of the centre, and of the rotation, both in the thing's own axes for the rotation."""
 
 
 class MovingScene:
@@ -54,8 +51,7 @@ class MovingScene:
         Args:
             built: the scene's geometry, `scene.built`; later changes of placements are taken by `refresh`.
             names: the things that move. A carried thing moves relative to its segment.
-            centres: thing to the point (3,) in its own frame about which it turns, such as the centre of its mass; by
-                default the centre of its volume.
+            centres: thing to the point (3,) in its own frame about which it turns; by default the centre of its volume.
             between_things: whether to add the pairs of two things in the world of which one moves at least.
 
         Raises:
@@ -81,11 +77,7 @@ class MovingScene:
             self._add_pairs()
 
     def refresh(self, geometry: pin.GeometryModel | None = None) -> None:
-        """Put the things that stay to where they are now.
-
-        Args:
-            geometry: a geometry model of the same pieces with their placements; the scene's own by default.
-        """
+        """Put the things that stay to where a geometry model has them, by default the scene's."""
         given = self.built.geometry if geometry is None else geometry
         with self.built.lock:
             for index, _ in self._still:
@@ -111,8 +103,7 @@ class MovingScene:
     @property
     def pairs(self) -> Indices:
         """(pairs, 2) the pieces of each pair, the scene's own first."""
-        listed = [[pair.first, pair.second] for pair in self.geometry.collisionPairs]
-        return np.array(listed, dtype=np.intp).reshape(-1, 2)
+        return pairs_of(self.geometry)
 
     def _centre(self, name: str, given: Mapping[str, Array]) -> Array:
         if name in given:

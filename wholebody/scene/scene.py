@@ -29,9 +29,6 @@ if TYPE_CHECKING:
 class Scene(SceneContents):
     """A figure among things.
 
-    The geometry model is built when it is first needed, and again after objects were added or removed. Moving an object
-    keeps it.
-
     Threads may share a scene: every query and every solve has a workspace of its own, and uses the placements that the
     things had when it began. A solve during which objects are added or removed ends with an `InputError`.
 
@@ -47,11 +44,7 @@ class Scene(SceneContents):
         return Workspace(self.built)
 
     def state(self, q: Array) -> State:
-        """A new kinematic state at q, shape (nq,). `State.update` moves it to another posture far faster.
-
-        Raises:
-            InputError: q has the wrong shape or is not finite.
-        """
+        """A new kinematic state at q, shape (nq,). `State.update` moves it to another posture far faster."""
         return State(self.model).update(q)
 
     def contacts(self, q: Array, within: float = 0.05) -> Contacts:
@@ -70,11 +63,7 @@ class Scene(SceneContents):
     def penetration(self, q: Array) -> list[ObjectPenetration]:
         """Depth of overlap of owners (segments, objects) at q (nq,): PD_g and the least separating translation.
 
-        The deepest first; empty if nothing overlaps. The pairs are those of `overlapping`. See
-        `wholebody.geometry.penetration`.
-
-        Raises:
-            InputError: q has the wrong shape or is not finite.
+        The deepest first; empty if nothing overlaps. The pairs are those of `overlapping`.
         """
         from wholebody.geometry.penetration import object_penetrations
 
@@ -90,14 +79,8 @@ class Scene(SceneContents):
 
         Beside the pairs of the scene these are pairs of two things in the world, and of a thing and a part of the
         figure that cannot move. Left out are two half-spaces, which have no end, and things that a joint of their
-        `wb.Body` holds together, which do not collide. `number` is -1 for pairs that the scene does not have.
-
-        Args:
-            q: the posture.
-            workspace: a workspace of the scene, whose placements count; the scene's present ones by default.
-
-        Raises:
-            InputError: q has the wrong shape or is not finite.
+        `wb.Body` holds together, which do not collide. `number` is -1 for pairs that the scene does not have. The
+        placements are those of a workspace of the scene, or its present ones.
         """
         if workspace is None:
             self._warn_of_angles(q, "overlapping: q")
@@ -127,19 +110,19 @@ class Scene(SceneContents):
     ) -> FirstContact | None:
         """First contact of the motion from q0 to q1, both (nq,), along pin.interpolate; None if there is none.
 
-        The test is continuous and finds objects of any thickness. See `wholebody.geometry.continuous.sweep`.
+        The test is continuous and finds objects of any thickness.
 
         Args:
             q0: start of the motion.
             q1: its end.
-            tolerance: depth up to which an overlap is no contact, metres.
+            tolerance: depth up to which an overlap is no contact, metres, at least 1e-5.
             moves: thing to its placements at the start and at the end, as for `add`, if it moves at the same time: its
                 centre straight, and turning about it. All others stay where they are. Things that meet each other are
                 not looked at.
 
         Raises:
             InputError: postures of the wrong shape, not finite or with a quaternion that is not of unit length; a
-                tolerance below 1e-5 m; placements that cannot be read.
+                tolerance that is too small; placements that cannot be read.
             UnknownNameError: `moves` names no object.
         """
         nq = self.model.nq

@@ -14,7 +14,7 @@ from wholebody.base.errors import InputError
 from wholebody.base.pool import Loan
 from wholebody.figures.state import State
 from wholebody.geometry.contact_rows import ContactRowBuilder
-from wholebody.geometry.continuous.approach import largest_approach
+from wholebody.geometry.continuous.motion_bounds import largest_approach
 from wholebody.geometry.continuous.passing_through import INSIDE
 from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 from wholebody.scene.geometry_model import SceneGeometry
@@ -22,18 +22,13 @@ from wholebody.scene.geometry_model import SceneGeometry
 if TYPE_CHECKING:
     from wholebody.geometry.continuous.sweep import Sweep
     from wholebody.geometry.continuous.swept_depth import SweptDepth
-    from wholebody.scene.moving_obstacles import Collision, FrameMotion, MovingThings
+    from wholebody.scene.moving_obstacles import BothSides, Collision, FrameMotion
 
 
 class NotCopyable:
-    """What belongs to the run that made it, and is neither pickled nor copied."""
+    """What belongs to the run that made it: to pickle or to copy it is an InputError."""
 
     def __reduce__(self) -> NoReturn:
-        """Refuse.
-
-        Raises:
-            InputError: always.
-        """
         raise InputError(
             f"{a(type(self))} belongs to the run that made it and cannot be pickled or copied; make another one from "
             "its problem or scene"
@@ -70,7 +65,7 @@ class Workspace(NotCopyable):
         self.proximity = Proximity(built.table)
         self._sweep: Sweep | None = None
         self._depths: dict[float, SweptDepth] = {}
-        self._moving: MovingThings | None = None
+        self._moving: dict[tuple[str, ...], BothSides] = {}
         self._seen = built.update_placements(self.proximity, -1)
 
     def begin(self) -> None:
@@ -98,10 +93,8 @@ class Workspace(NotCopyable):
     def next_frame(self, q: Array) -> FrameMotion | None:
         """The frame in which the things go that moved since the last one; None if none did, and none is in the figure.
 
-        Things are where it ends. Those that were put into the figure are among them: it leaves them, or is told.
-
-        Args:
-            q: (nq,) posture of the figure at the beginning.
+        Things are where it ends. Those that were put into the figure are among them: it leaves them, or is told. The
+        figure begins at the posture q (nq,).
         """
         still = [name for name, (before, after) in self.moved.items() if before == after]
         if still:
@@ -122,11 +115,15 @@ class Workspace(NotCopyable):
 
     def frame(self, moved: Mapping[str, tuple[pin.SE3, pin.SE3]]) -> FrameMotion:
         """A frame in which these things move, from one placement to another in the frame of their joint."""
-        if self._moving is None:
-            from wholebody.scene.moving_obstacles import MovingThings
+        from wholebody.scene.moving_obstacles import BothSides, FrameMotion
+        from wholebody.scene.moving_scene import MovingScene
 
-            self._moving = MovingThings(self._built, self.geometry)
-        return self._moving.frame(moved)
+        both = self._moving.get(tuple(moved))
+        if both is None:
+            scene = MovingScene(self._built, moved, between_things=False)
+            both = self._moving[tuple(moved)] = BothSides(scene)
+        both.scene.refresh(self.geometry)
+        return FrameMotion(both, moved)
 
     @property
     def geometry(self) -> pin.GeometryModel:
@@ -152,11 +149,11 @@ class Workspace(NotCopyable):
 
     def near(self, q: Array, within: float, most: Array | None = None) -> Contacts:
         """Every pair nearer than `within` metres at the posture q, shape (nq,); see `Proximity.query`."""
-        return self.proximity.query(self.state.update(q), within, most)
+        return self.proximity.query(self.state.update(q).data, within, most)
 
     def near_views(self, q: Array, within: float, most: Array | None = None) -> Contacts:
         """What `near` returns, in arrays that the next call of this overwrites."""
-        return self.proximity.query_views(self.state.update(q), within, most)
+        return self.proximity.query_views(self.state.update(q).data, within, most)
 
     def largest_approach(self, most: Array) -> Array:
         """Most by which the distance of every pair (pairs,) can fall while no freedom moves more than `most` (nv,).
@@ -170,7 +167,7 @@ class Workspace(NotCopyable):
 
     def placements(self, q: Array) -> Array:
         """Where all pieces are at the posture q, shape (nq,); see `Contacts.placements`."""
-        return self.proximity.placements(self.state.update(q))
+        return self.proximity.placements(self.state.update(q).data)
 
 
 def borrowed(built: SceneGeometry, begin: Callable[[Workspace], Any] = Workspace.begin) -> Loan[Workspace]:

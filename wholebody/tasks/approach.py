@@ -13,7 +13,7 @@ import coal
 import numpy as np
 
 from wholebody.base.records import with_values
-from wholebody.geometry.swept_points import swept_points
+from wholebody.geometry.pieces import swept_points
 from wholebody.tasks.base import filled
 from wholebody.tasks.contact_parts import Gap, Near
 from wholebody.tasks.surfaces import Face, Surface

@@ -17,7 +17,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
 from wholebody.figures.state import State
-from wholebody.geometry.swept_points import swept_points
+from wholebody.geometry.pieces import swept_points
 from wholebody.tasks.axis import across
 from wholebody.tasks.contact_parts import Gap
 from wholebody.tasks.surfaces import Surface, between_pieces, nearest

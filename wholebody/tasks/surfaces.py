@@ -18,7 +18,7 @@ from wholebody.base.checks import shown
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures.link_pieces import drawn_pieces
 from wholebody.figures.state import State
-from wholebody.geometry.swept_points import SweptPoints, swept_points
+from wholebody.geometry.pieces import SweptPoints, swept_points
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import Surroundings
 

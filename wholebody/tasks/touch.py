@@ -13,7 +13,7 @@ from wholebody.base.checks import shown
 from wholebody.base.errors import InputError
 from wholebody.base.records import with_values
 from wholebody.figures.state import State
-from wholebody.geometry.swept_points import swept_points
+from wholebody.geometry.pieces import swept_points
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import Surroundings, filled

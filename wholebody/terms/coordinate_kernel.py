@@ -1,4 +1,4 @@
-"""Errors of postures in the joints' own coordinates, and heights of masses, as compiled loops: see `term_plan`."""
+"""Errors of postures in the joints' own coordinates, and heights of masses, as compiled loops: see `plan`."""
 
 from __future__ import annotations
 
@@ -144,7 +144,7 @@ def rhythms(
     measure: Array,
     squares: Array,
 ) -> None:
-    """See `tasks.Rhythm`; `squares` is as for `term_kernel.linearise`."""
+    """See `tasks.Rhythm`; `squares` is as for `kernel.linearise`."""
     if not len(elevations) + len(lumbars):
         return
     slopes, at = np.empty(5), np.empty(5, dtype=np.int64)

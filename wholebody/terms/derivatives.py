@@ -71,9 +71,7 @@ def check_derivatives(term: Goal | Constraint | Measure, scene: Scene, q: ArrayL
         q: (nq,) first posture; the figure's first posture by default.
 
     Raises:
-        InputError: not a term or not a scene, a value or derivative that is not finite, or a derivative of the wrong
-            shape.
-        UnknownNameError: the term names something that the figure does not have.
+        InputError: not a term or not a scene, a value or derivative that is not finite, or one of the wrong shape.
     """
     checks.instance(term, (Goal, Constraint, Measure), "check_derivatives: term", "give a goal, constraint or measure")
     checks.instance(scene, Scene, "check_derivatives: scene", "make one with wb.Scene(figure)")
@@ -123,11 +121,7 @@ def _dofs(model: pin.Model, joint: int) -> range:
 
 
 def _value(term: Any, state: State) -> Array:
-    """Values (m,) of a term.
-
-    Raises:
-        InputError: one is not finite.
-    """
+    """Values (m,) of a term."""
     value = term.error(state) if isinstance(term, Goal) else term.value(state)
     values = np.atleast_1d(np.asarray(value, dtype=float))
     if values.ndim != 1 or not np.isfinite(values).all():
@@ -136,11 +130,7 @@ def _value(term: Any, state: State) -> Array:
 
 
 def _derivative(term: Any, state: State) -> Array:
-    """Derivative (m, nv) of a term as it has it itself.
-
-    Raises:
-        InputError: an entry is not finite.
-    """
+    """Derivative (m, nv) of a term as it has it itself."""
     given = term.gradient(state) if isinstance(term, Measure) else term.jacobian(state)
     dense = state.wrench_jacobian(given) if isinstance(given, Wrench) else np.asarray(given, dtype=float)
     if not np.isfinite(dense).all():

@@ -1,4 +1,4 @@
-"""Built-in goals and constraints as rows of tables: what `term_plan` puts together and `term_kernel` evaluates."""
+"""Built-in goals and constraints as rows of tables: what `plan` puts together and `kernel` evaluates."""
 
 from __future__ import annotations
 
@@ -53,14 +53,9 @@ _NO_EDGES: Array = np.zeros((0, 15))
 
 
 class Entry(NamedTuple):
-    """One row of a table of goals or constraints.
+    """One row of a table of goals or constraints: which table, its integers without the first, and its floats.
 
-    Attributes:
-        table: which.
-        integers: its integers without the first.
-        floats: its floats.
-        rows: how many rows of the Jacobian it makes.
-        edges: (k, 15) planes of the edges of a reach cone, see `ReachCone.planes`; each edge is a row.
+    It makes `rows` rows of the Jacobian. `edges` (k, 15) are planes of the edges of a reach cone: `ReachCone.planes`.
     """
 
     table: int

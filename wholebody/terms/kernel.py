@@ -1,4 +1,4 @@
-"""A plan's terms at a posture, to first order, as compiled loops: see `term_plan` and `linearisation`."""
+"""A plan's terms at a posture, to first order, as compiled loops: see `plan` and `linearisation`."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array
 from wholebody.base.compiled import compiled
 from wholebody.tasks.discomfort import POWER, STEEPNESS
+from wholebody.terms import entries as kinds
 from wholebody.terms.coordinate_kernel import (
     balls,
     coordinates,
@@ -21,33 +22,7 @@ from wholebody.terms.coordinate_kernel import (
     roots,
     turns,
 )
-from wholebody.terms.entries import (
-    AXIS,
-    BALL,
-    BODY,
-    BOX,
-    COLUMN,
-    CONE,
-    COORDINATE,
-    COUPLED,
-    CURVATURE,
-    DISCOMFORT,
-    DISTANCE,
-    EDGE,
-    ELEVATION,
-    ELLIPSE,
-    HEIGHT,
-    LIMIT,
-    LUMBAR,
-    MASS_CENTER,
-    PLANE,
-    RESIDUAL,
-    ROOT,
-    ROOT_DISTANCE,
-    TURN,
-    TWIST,
-    Integers,
-)
+from wholebody.terms.entries import Integers
 from wholebody.terms.residual_kernel import axis_errors, cones, planes, residuals, twists
 
 Plan: TypeAlias = tuple[Array, Integers, Integers, NDArray[np.int8]]
@@ -97,78 +72,71 @@ def linearise(
     floats, integers, layout, support = plan
     nv = jacobian.shape[1]
     terms = len(value)
-    column, bodies = _integers(integers, layout, COLUMN), _integers(integers, layout, BODY)
+    column, bodies = _integers(integers, layout, kinds.COLUMN), _integers(integers, layout, kinds.BODY)
     jacobian[:terms] = 0.0
     wrench[:] = 0.0
-    residuals(_floats(floats, layout, RESIDUAL), _integers(integers, layout, RESIDUAL), joints, wrench, value)
-    if layout[PLANE, 1]:
-        planes(*_table(plan, PLANE), joints, wrench, value)
-    if layout[AXIS, 1]:
-        axis_errors(*_table(plan, AXIS), joints, wrench, value)
-    if layout[CONE, 1]:
-        cones(*_table(plan, CONE), _floats(floats, layout, EDGE), joints, wrench, value)
-    if layout[TWIST, 1]:
-        twists(*_table(plan, TWIST), joints, wrench, value)
-    for table, rows in ((RESIDUAL, 0), (PLANE, 1), (AXIS, 2), (CONE, 1), (TWIST, 1)):
+    poses, pose_entries = _floats(floats, layout, kinds.RESIDUAL), _integers(integers, layout, kinds.RESIDUAL)
+    residuals(poses, pose_entries, joints, wrench, value)
+    if layout[kinds.PLANE, 1]:
+        planes(*_table(plan, kinds.PLANE), joints, wrench, value)
+    if layout[kinds.AXIS, 1]:
+        axis_errors(*_table(plan, kinds.AXIS), joints, wrench, value)
+    if layout[kinds.CONE, 1]:
+        cones(*_table(plan, kinds.CONE), _floats(floats, layout, kinds.EDGE), joints, wrench, value)
+    if layout[kinds.TWIST, 1]:
+        twists(*_table(plan, kinds.TWIST), joints, wrench, value)
+    wrenched = ((kinds.RESIDUAL, 0), (kinds.PLANE, 1), (kinds.AXIS, 2), (kinds.CONE, 1), (kinds.TWIST, 1))
+    for table, rows in wrenched:
         entries = _integers(integers, layout, table)
         for e in range(len(entries)):
-            against = entries[e, 2] if table in (RESIDUAL, CONE, TWIST) else 0
-            count = 3 * (entries[e, 3] + entries[e, 4]) if table == RESIDUAL else rows
+            against = entries[e, 2] if table in (kinds.RESIDUAL, kinds.CONE, kinds.TWIST) else 0
+            count = 3 * (entries[e, 3] + entries[e, 4]) if table == kinds.RESIDUAL else rows
             for r in range(entries[e, 0], entries[e, 0] + count):
                 _row(wrench[r], entries[e, 1], against, columns, bodies, column, jacobian[r])
     for r in range(gaps):
         jacobian[terms + r] = 0.0
         _row(gap_wrench[r], gap_joints[r, 1], gap_joints[r, 0], columns, bodies, column, jacobian[terms + r])
-    if layout[MASS_CENTER, 1]:
-        _mass_centers(
-            _table(plan, MASS_CENTER),
-            _floats(floats, layout, BODY),
-            joints,
-            (columns, column, bodies),
-            value,
-            jacobian,
-        )
-    if layout[COORDINATE, 1]:
-        coordinates(*_table(plan, COORDINATE), q, value, jacobian)
-    if layout[TURN, 1]:
-        turns(*_table(plan, TURN), q, value, jacobian)
-    if layout[ROOT, 1]:
-        roots(*_table(plan, ROOT), q, value, jacobian)
-    if layout[COUPLED, 1]:
-        coupled_ranges(*_table(plan, COUPLED), q, value, jacobian)
-    if layout[ELLIPSE, 1]:
-        elliptic_ranges(*_table(plan, ELLIPSE), q, value, jacobian)
-    _box(_floats(floats, layout, LIMIT), _integers(integers, layout, LIMIT), _floats(floats, layout, BOX), q, box)
-    constant = _floats(floats, layout, CURVATURE)
+    if layout[kinds.MASS_CENTER, 1]:
+        masses, tree = _floats(floats, layout, kinds.BODY), (columns, column, bodies)
+        _mass_centers(_table(plan, kinds.MASS_CENTER), masses, joints, tree, value, jacobian)
+    if layout[kinds.COORDINATE, 1]:
+        coordinates(*_table(plan, kinds.COORDINATE), q, value, jacobian)
+    if layout[kinds.TURN, 1]:
+        turns(*_table(plan, kinds.TURN), q, value, jacobian)
+    if layout[kinds.ROOT, 1]:
+        roots(*_table(plan, kinds.ROOT), q, value, jacobian)
+    if layout[kinds.COUPLED, 1]:
+        coupled_ranges(*_table(plan, kinds.COUPLED), q, value, jacobian)
+    if layout[kinds.ELLIPSE, 1]:
+        elliptic_ranges(*_table(plan, kinds.ELLIPSE), q, value, jacobian)
+    limits, limit_places = _floats(floats, layout, kinds.LIMIT), _integers(integers, layout, kinds.LIMIT)
+    _box(limits, limit_places, _floats(floats, layout, kinds.BOX), q, box)
+    constant = _floats(floats, layout, kinds.CURVATURE)
     for v in range(nv):
         measure[0, v] = 0.0
         measure[1, v] = constant[0, v]
     measure[0, nv] = measure[1, nv] = 0.0
     if len(squares):
         measure[2] = 0.0
-    _measures(
-        _floats(floats, layout, DISTANCE),
-        _integers(integers, layout, DISTANCE),
-        _floats(floats, layout, DISCOMFORT),
-        _integers(integers, layout, DISCOMFORT),
-        q,
-        measure,
-    )
-    if layout[ROOT_DISTANCE, 1]:
-        root_distances(*_table(plan, ROOT_DISTANCE), q, measure)
-    if layout[ELEVATION, 1] + layout[LUMBAR, 1]:
-        rhythms(*_table(plan, ELEVATION), *_table(plan, LUMBAR), q, measure, squares)
-    if layout[BALL, 1]:
-        balls(*_table(plan, BALL), q, measure, squares, layout[ELEVATION, 1] + layout[LUMBAR, 1])
-    if layout[HEIGHT, 1]:
-        heights(*_table(plan, HEIGHT), joints, columns, support, column, measure)
+    distances, distance_places = _floats(floats, layout, kinds.DISTANCE), _integers(integers, layout, kinds.DISTANCE)
+    limited, limited_places = _floats(floats, layout, kinds.DISCOMFORT), _integers(integers, layout, kinds.DISCOMFORT)
+    _measures(distances, distance_places, limited, limited_places, q, measure)
+    if layout[kinds.ROOT_DISTANCE, 1]:
+        root_distances(*_table(plan, kinds.ROOT_DISTANCE), q, measure)
+    if layout[kinds.ELEVATION, 1] + layout[kinds.LUMBAR, 1]:
+        rhythms(*_table(plan, kinds.ELEVATION), *_table(plan, kinds.LUMBAR), q, measure, squares)
+    if layout[kinds.BALL, 1]:
+        first = layout[kinds.ELEVATION, 1] + layout[kinds.LUMBAR, 1]
+        balls(*_table(plan, kinds.BALL), q, measure, squares, first)
+    if layout[kinds.HEIGHT, 1]:
+        heights(*_table(plan, kinds.HEIGHT), joints, columns, support, column, measure)
 
 
 @compiled(error_model="numpy")
 def wrench_rows(wrench: Array, joint: int, against: int, columns: Array, plan: Plan, rows: Array) -> None:
     """Write the Jacobian rows (m, nv) of wrenches (m, 6) that work on the motion of a joint relative to another."""
     _, integers, layout, _ = plan
-    column, bodies = _integers(integers, layout, COLUMN), _integers(integers, layout, BODY)
+    column, bodies = _integers(integers, layout, kinds.COLUMN), _integers(integers, layout, kinds.BODY)
     rows[:] = 0.0
     for r in range(len(wrench)):
         _row(wrench[r], joint, against, columns, bodies, column, rows[r])

@@ -23,11 +23,43 @@ from wholebody.geometry.contact_rows import MOST_ENDS
 from wholebody.geometry.proximity import Contacts
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.answers import is_own
-from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
+from wholebody.tasks.base import MOST_PLANES, Bound, Constraint, Goal, Measure, Term
 from wholebody.tasks.bounds import StepLimit
 from wholebody.tasks.checks import undefined
 from wholebody.terms.plan import OtherTerm, TermPlan, Terms, checked_rows, make_plan
-from wholebody.terms.planes import TermPlanes, term_planes
+
+
+class TermPlanes(NamedTuple):
+    """Supporting planes of all terms; see `Goal.supporting_planes`.
+
+    Attributes:
+        value: (p,) not positive where the terms are met.
+        jacobian: (p, nv).
+        row: (p,) the first row of the term that a plane is of, goals' before constraints'.
+        key: (p,) names a plane from one posture to the next.
+        bend: (b, nv) rows b with the second derivatives of the terms' rows as sums of b' b.
+        bend_row: (b,) the row that a bend is of, goals' before constraints'.
+    """
+
+    value: Array
+    jacobian: Array
+    row: Indices
+    key: Indices
+    bend: Array
+    bend_row: Indices
+
+
+def term_planes(terms: Sequence[Goal | Constraint], counts: Sequence[int], state: State) -> TermPlanes | None:
+    """Supporting planes of resolved terms, of so many rows each, where a state is; None where none has any."""
+    found: list[TermPlanes] = []
+    row = 0
+    for term, count in zip(terms, counts, strict=True):
+        planes = term.supporting_planes(state)
+        if planes is not None:
+            rows, key = np.full(len(planes.value), row, dtype=np.intp), planes.key + row * MOST_PLANES
+            found.append(TermPlanes(planes.value, planes.jacobian, rows, key, planes.bend, planes.bend_row + row))
+        row += count
+    return TermPlanes(*(np.concatenate(part) for part in zip(*found, strict=True))) if found else None
 
 
 class Linearisation(NamedTuple):
@@ -87,17 +119,9 @@ NO_WRENCHES, NO_JOINTS = np.zeros((0, 6)), np.zeros((0, 2), dtype=np.intp)
 class PackedLinearisation(NamedTuple):
     """A linearisation in as few arrays as can be, which the next one overwrites; `Linearisation` says what they mean.
 
-    Attributes:
-        q: (nq,) the posture.
-        goals: how many rows goals have.
-        value: (g + c,) errors of the goals, then values of the constraints.
-        jacobian: (g + c + r, nv) their rows, then those of the gaps.
-        contacts: the pairs near enough to count.
-        gap: (r,) gaps of the contact rows.
-        gap_contact: (r,) the contact a row belongs to.
-        clearance: (r,) least gap asked of each row.
-        measure: (2, nv + 1) derivative and curvature of the measures; the last column holds their sum.
-        box: (2, nv) lower and upper bounds on dq.
+    `value` (g + c,) has errors of the goals, of `goals` rows, then values of the constraints; `jacobian` their rows,
+    then those of the gaps. `measure` (2, nv + 1) is derivative and curvature of the measures, with their sum in the
+    last column; `box` (2, nv) has lower and upper bounds on dq.
     """
 
     q: Array
@@ -154,11 +178,7 @@ class Lineariser:
         self.take(self.goals, clearances)
 
     def take(self, goals: Sequence[Goal], clearances: Array, constraints: Sequence[Constraint] | None = None) -> None:
-        """Put other goals and clearances in the place of the present ones, and other constraints where they are given.
-
-        Raises:
-            InputError: there is not one clearance for each pair.
-        """
+        """Put other goals and clearances in the place of the present ones, and constraints where they are given."""
         if clearances.shape != (len(self.workspace.table.pairs),):
             count = len(self.workspace.table.pairs)
             raise InputError(f"clearances have shape {clearances.shape}; give one for each of the {count} pairs")
@@ -225,11 +245,7 @@ class Lineariser:
         )  # fmt: skip
 
     def packed(self, q: Array, within: float) -> PackedLinearisation:
-        """What `at` returns, in arrays that the next call of this overwrites.
-
-        Raises:
-            InputError: as for `at`.
-        """
+        """What `at` returns, in arrays that the next call of this overwrites."""
         contacts, clearance, count = self._contacts(self.workspace.near_views, q, within)
         if self._packed is None or len(self._packed.jacobian) < len(self._packed.value) + count:
             self._packed = self._buffers()
@@ -331,14 +347,11 @@ class Lineariser:
             checked_rows(term, part, derivative, rows)
             value[row : row + rows] = part
             if isinstance(derivative, Wrench):
-                self._write_rows(derivative, jacobian[row : row + rows])
+                wrenches = np.ascontiguousarray(derivative.rows, dtype=float)
+                joint, against, mine = derivative.joint, derivative.against, jacobian[row : row + rows]
+                self._kernel.wrench_rows(wrenches, joint, against, state.columns, self._plan[:4], mine)
             else:
                 jacobian[row : row + rows] = derivative
-
-    def _write_rows(self, wrench: Wrench, rows: Array) -> None:
-        """Write the rows (m, nv) of a wrench."""
-        wrenches, joint, against = np.ascontiguousarray(wrench.rows, dtype=float), wrench.joint, wrench.against
-        self._kernel.wrench_rows(wrenches, joint, against, self.state.columns, self._plan[:4], rows)
 
     def _bound(self, bounds: Sequence[Bound], box: Array) -> None:
         for bound in bounds:

@@ -1,7 +1,7 @@
 """Built-in goals, constraints, bounds and measures as arrays, so that one compiled pass evaluates all of them.
 
 A plan is made for a problem and never changed. Terms of other classes are evaluated by their own methods: a plan only
-says in which rows they stand. `term_kernel` evaluates a plan.
+says in which rows they stand. `kernel` evaluates a plan.
 """
 
 from __future__ import annotations
@@ -22,28 +22,8 @@ from wholebody.figures.state import State, Wrench, extended_columns
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.distance import LEAST_CURVATURE, SquaredDistance
 from wholebody.tasks.rhythm import LUMBAR_MOST, LUMBAR_RATE, LUMBAR_WEIGHT
-from wholebody.terms.entries import (
-    BALL,
-    BODY,
-    BOX,
-    COLUMN,
-    CONE,
-    CURVATURE,
-    DISCOMFORT,
-    DISTANCE,
-    EDGE,
-    ELEVATION,
-    HEIGHT,
-    LIMIT,
-    LUMBAR,
-    ROOT_DISTANCE,
-    WIDTHS,
-    Entry,
-    Integers,
-    Row,
-    entries_of,
-    placement_floats,
-)
+from wholebody.terms import entries as kinds
+from wholebody.terms.entries import Entry, Integers, Row, entries_of, placement_floats
 
 
 class Terms(NamedTuple):
@@ -56,14 +36,7 @@ class Terms(NamedTuple):
 
 
 class OtherTerm(NamedTuple):
-    """A goal or constraint that is evaluated by its own methods.
-
-    Attributes:
-        term: the goal or constraint.
-        value: its error or value at a state.
-        row: its first row.
-        rows: how many rows it has.
-    """
+    """A goal or constraint that is evaluated by its own methods: its error or value at a state, first row and rows."""
 
     term: Goal | Constraint
     value: Callable[[State], Array]
@@ -103,24 +76,21 @@ class TermPlan(NamedTuple):
     @property
     def squares(self) -> int:
         """Number of squares that built-in measures are the sum of."""
-        return int(self.layout[ELEVATION, 1] + self.layout[LUMBAR, 1] + 3 * self.layout[BALL, 1])
+        return int(self.layout[kinds.ELEVATION, 1] + self.layout[kinds.LUMBAR, 1] + 3 * self.layout[kinds.BALL, 1])
 
     def with_terms(
         self, goals: Sequence[Goal], model: pin.Model, constraints: Sequence[Constraint] | None = None
     ) -> TermPlan | None:
-        """The plan with other terms, or None where they are not of the same classes for the same frames.
+        """The plan with other resolved terms, or None where they are not of the same classes for the same frames.
 
-        Args:
-            goals: resolved goals.
-            model: Pinocchio's model.
-            constraints: resolved constraints; None to keep those that it has.
+        Without constraints it keeps those that it has.
         """
         terms: list[Goal | Constraint] = [*goals, *(constraints or ())]
         old = self.goals if constraints is None else (*self.goals, *self.constraints)
         if len(goals) != len(self.goals) or len(terms) != len(old):
             return None
         floats = self.floats.copy()
-        filled = dict.fromkeys(WIDTHS, 0)
+        filled = dict.fromkeys(kinds.WIDTHS, 0)
         found: list[list[Entry] | None] = []
         others = list(self.others)
         number = 0
@@ -158,7 +128,7 @@ def make_plan(limits: Limits, terms: Terms, dt: float | None, state: State) -> T
         state: tells how many rows terms of other classes have; stays where it is.
     """
     model, (goals, constraints, bounds, measures) = state.model, terms
-    parts: dict[int, list[Row]] = {table: [] for table in range(EDGE + 1)}
+    parts: dict[int, list[Row]] = {table: [] for table in range(kinds.EDGE + 1)}
     others: list[OtherTerm] = []
     row = 0
 
@@ -171,9 +141,9 @@ def make_plan(limits: Limits, terms: Terms, dt: float | None, state: State) -> T
             return None
         for entry in entries:
             numbers = (row, *entry.integers)
-            if entry.table == CONE:
-                numbers += (len(entry.edges), len(parts[EDGE]))
-                parts[EDGE] += [((0,), edge) for edge in entry.edges]
+            if entry.table == kinds.CONE:
+                numbers += (len(entry.edges), len(parts[kinds.EDGE]))
+                parts[kinds.EDGE] += [((0,), edge) for edge in entry.edges]
             parts[entry.table].append((numbers, entry.floats))
             row += entry.rows
         return entries
@@ -181,15 +151,16 @@ def make_plan(limits: Limits, terms: Terms, dt: float | None, state: State) -> T
     goal_entries = tuple(add(goal, goal.error) for goal in goals)
     goal_rows = row
     constraint_entries = tuple(add(constraint, constraint.value) for constraint in constraints)
-    parts[BOX], other_bounds = _boxes(bounds, state, dt)
+    parts[kinds.BOX], other_bounds = _boxes(bounds, state, dt)
     other_measures, curvature = _measures(measures, model, parts)
-    parts[CURVATURE] = [((0,), curvature)]
-    braking = _braking(bounds, model.nv, dt)
-    parts[LIMIT] = [
+    parts[kinds.CURVATURE] = [((0,), curvature)]
+    # largest share of the way to its limit that each freedom goes in a step
+    braking = np.min([np.ones(model.nv), *(one.braking(dt) for one in bounds if type(one) is tasks.StepLimit)], axis=0)
+    parts[kinds.LIMIT] = [
         ((int(q), int(v)), np.array([low, high, braking[v]]))
         for q, v, low, high in zip(limits.idx_q, limits.idx_v, limits.lower, limits.upper, strict=True)
     ]
-    parts[BODY] = [
+    parts[kinds.BODY] = [
         ((parent, first, width), np.array([inertia.mass, *inertia.lever]))
         for parent, first, width, inertia in zip(
             model.parents.tolist(),
@@ -201,7 +172,7 @@ def make_plan(limits: Limits, terms: Terms, dt: float | None, state: State) -> T
     ]
     columns = extended_columns(model)
     places = np.arange(len(state.column_joint)) if columns is None else columns
-    parts[COLUMN] = [
+    parts[kinds.COLUMN] = [
         ((int(place), int(joint)), np.zeros(0)) for place, joint in zip(places, state.column_joint, strict=True)
     ]
     floats, integers, layout = _packed(parts)
@@ -218,7 +189,7 @@ def _packed(parts: dict[int, list[Row]]) -> tuple[Array, Integers, Integers]:
     begun = 0
     for table in sorted(parts):
         rows = parts[table]
-        wide = len(rows[0][1]) if rows else WIDTHS.get(table, (0, 0))[0]
+        wide = len(rows[0][1]) if rows else kinds.WIDTHS.get(table, (0, 0))[0]
         layout[table] = (begun, len(rows), wide, len(integers), len(rows), len(rows[0][0]) if rows else 0)
         begun += len(rows) * wide
         floats += [part for _, part in rows]
@@ -242,13 +213,6 @@ def _boxes(bounds: Sequence[Bound], state: State, dt: float | None) -> tuple[lis
     return rows, tuple(bound for bound in bounds if bound not in static)
 
 
-def _braking(bounds: Sequence[Bound], nv: int, dt: float | None) -> Array:
-    """Largest share (nv,) of the way to its limit that each freedom goes in a step."""
-    shares = [bound.braking(dt) for bound in bounds if type(bound) is tasks.StepLimit]
-    least: Array = np.min([np.ones(nv), *shares], axis=0)
-    return least
-
-
 def _measures(
     measures: Sequence[Measure], model: pin.Model, parts: dict[int, list[Row]]
 ) -> tuple[tuple[Measure, ...], Array]:
@@ -262,28 +226,28 @@ def _measures(
             curvature += term.weight * distance.curvature
             for ball in term.balls if isinstance(term, tasks.RotationEffort) else ():
                 numbers = np.concatenate([ball.axes.ravel(), ball.start.ravel(), term.weight * ball.weights])
-                parts[BALL].append(((*ball.idx_q, *ball.idx_v), numbers))
+                parts[kinds.BALL].append(((*ball.idx_q, *ball.idx_v), numbers))
         elif type(term) is tasks.Discomfort:
             curvature += term.weight * LEAST_CURVATURE
             joints = term.limited
             columns = np.column_stack([joints.neutral, joints.weights, joints.limits.T, joints.phase.T])
             for q, v, floats in zip(joints.idx_q.tolist(), joints.idx_v.tolist(), columns, strict=True):
-                parts[DISCOMFORT].append(((q, v), np.array([term.weight, *floats])))
+                parts[kinds.DISCOMFORT].append(((q, v), np.array([term.weight, *floats])))
         elif type(term) is tasks.PotentialEnergy:
             curvature += term.weight * LEAST_CURVATURE
             masses = term.masses
             for joint, centre, weight, height in zip(
                 masses.joints.tolist(), masses.centres, masses.weights, masses.heights, strict=True
             ):
-                parts[HEIGHT].append(((joint,), np.array([*centre, term.weight * weight, height])))
+                parts[kinds.HEIGHT].append(((joint,), np.array([*centre, term.weight * weight, height])))
         elif type(term) is tasks.Rhythm:
             curvature += term.weight * LEAST_CURVATURE
             for part in (*term.girdles, *term.knees):
                 numbers = np.array([term.weight * part.weight, part.most, part.rest, part.onset])
-                parts[ELEVATION].append(((*part.idx_q, *part.idx_v), numbers))
+                parts[kinds.ELEVATION].append(((*part.idx_q, *part.idx_v), numbers))
             if term.lumbar is not None:
                 share = np.array([term.weight * LUMBAR_WEIGHT, LUMBAR_MOST, LUMBAR_RATE, term.lumbar.rest])
-                parts[LUMBAR].append(((*term.lumbar.idx_q, *term.lumbar.idx_v), share))
+                parts[kinds.LUMBAR].append(((*term.lumbar.idx_q, *term.lumbar.idx_v), share))
         else:
             others.append(term)
     return tuple(others), curvature
@@ -307,16 +271,16 @@ def _distances(
         return False
     if any(v in own for v in weighed):
         target = placement_floats(pin.XYZQUATToSE3(distance.reference[:7]))
-        parts[ROOT_DISTANCE].append(((0, 0), np.concatenate([target, weight * distance.weights[:6]])))
+        parts[kinds.ROOT_DISTANCE].append(((0, 0), np.concatenate([target, weight * distance.weights[:6]])))
     for v in weighed:
         if v not in own:
             q = int(places[v])
-            parts[DISTANCE].append(((q, v), np.array([weight * distance.weights[v], distance.reference[q]])))
+            parts[kinds.DISTANCE].append(((q, v), np.array([weight * distance.weights[v], distance.reference[q]])))
     return True
 
 
 def checked_rows(term: Goal | Constraint, value: Array, jacobian: Wrench | Array, expected: int) -> None:
-    """Raise InputError where a term of one's own has not as many rows as values, or not as many as at the start."""
+    """A TermError where a term of one's own has not as many rows as values, or not as many as at the start."""
     rows = len(jacobian.rows) if isinstance(jacobian, Wrench) else len(jacobian)
     if rows != len(value):
         raise TermError(
@@ -326,7 +290,7 @@ def checked_rows(term: Goal | Constraint, value: Array, jacobian: Wrench | Array
 
 
 def checked_count(term: Goal | Constraint | Measure, rows: int, expected: int) -> None:
-    """Raise InputError where a term of one's own has another number of rows than at the start."""
+    """A TermError where a term of one's own has another number of rows than at the start."""
     if rows != expected:
         told = f"it has {rows} rows here, and had {expected} at the start; give each term one number of rows"
         raise TermError(term, type(term).__name__, f"{told} at all postures")

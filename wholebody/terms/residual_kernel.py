@@ -1,4 +1,4 @@
-"""Errors of frames, planes, axes, reach cones and twists with their wrenches, as compiled loops: see `term_plan`.
+"""Errors of frames, planes, axes, reach cones and twists with their wrenches, as compiled loops: see `plan`.
 
 Each function fills the rows of its table in `wrench` (rows, 6) and `value` (rows,), which are zero before.
 """
@@ -17,6 +17,16 @@ from wholebody.terms.entries import Integers
 
 SMALL = 1e-4
 """Angle [rad] below which the series of log and its derivative are exact to rounding."""
+
+
+@compiled(inner=True)
+def _turned(joint: Array, part: Array, turn: Array) -> None:
+    """Rotation (3, 3) in the world of a frame with the rotation `part` (9 or more,) in a joint (4, 3)."""
+    for i in range(3):
+        for j in range(3):
+            turn[i, j] = 0.0
+            for k in range(3):
+                turn[i, j] += joint[k, i] * part[3 * j + k]
 
 
 @compiled(inner=True)
@@ -219,10 +229,7 @@ def cones(tables: Array, entries: Integers, edges: Array, joints: Array, wrench:
         row, limb, reference = entries[e, 0], joints[entries[e, 1]], joints[entries[e, 2]]
         for i in range(3):
             world[i] = limb[0, i] * tables[e, 0] + limb[1, i] * tables[e, 1] + limb[2, i] * tables[e, 2]
-            for j in range(3):
-                turn[i, j] = 0.0
-                for k in range(3):
-                    turn[i, j] += reference[k, i] * tables[e, 3 + 3 * j + k]
+        _turned(reference, tables[e, 3:12], turn)
         for j in range(3):
             local[j] = turn[0, j] * world[0] + turn[1, j] * world[1] + turn[2, j] * world[2]
         value[row] = signed_angle(edges[entries[e, 4] : entries[e, 4] + entries[e, 3]], local, outward)
@@ -260,16 +267,6 @@ def twists(tables: Array, entries: Integers, joints: Array, wrench: Array, value
         along[2] -= sign
         for i in range(3):
             wrench[row, 3 + i] = base[i, 0] * along[0] + base[i, 1] * along[1] + base[i, 2] * along[2]
-
-
-@compiled(inner=True)
-def _turned(joint: Array, part: Array, turn: Array) -> None:
-    """Rotation (3, 3) in the world of a frame with the rotation `part` (9,) in a joint (4, 3)."""
-    for i in range(3):
-        for j in range(3):
-            turn[i, j] = 0.0
-            for k in range(3):
-                turn[i, j] += joint[k, i] * part[3 * j + k]
 
 
 @compiled(inner=True)

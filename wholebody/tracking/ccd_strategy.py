@@ -80,7 +80,7 @@ class RigidTranslation:
         began, queried = time.perf_counter(), self._workspace.proximity.seconds
         self._displacements, self._pairs = 0, 0
         self._out: list[Array] = []
-        note, q = "", self._with_fingers(shown, tracked)
+        note, q = "", self._displaced(np.concatenate([shown[:7], tracked[7:]]))
         if q is None:
             q, note = shown, "the fingers would be inside each other or have no room; they stay"
         for _ in range(6):  # most steps a frame: 3.6 m/s at 60 frames a second
@@ -92,10 +92,6 @@ class RigidTranslation:
         queried = self._workspace.proximity.seconds - queried
         spent = time.perf_counter() - began - queried
         return Resolution((q,), queried, spent, self._displacements, 0, self._pairs, note)
-
-    def _with_fingers(self, shown: Array, tracked: Array) -> Array | None:
-        """The shown hand with the tracked fingers, displaced out of overlap; None if that fails."""
-        return self._displaced(np.concatenate([shown[:7], tracked[7:]]))
 
     def _toward(self, q: Array, tracked: Array) -> Array:
         """A step of the root towards the tracked one, tangential to the obstacles of this frame, so that it slides."""

@@ -42,11 +42,6 @@ SHARES = (0.5, 0.25)
 """Shares of the motion that are tried if the whole is not free: an arc leaves a surface by the square of the share."""
 
 
-def check_scene(scene: object, what: str) -> None:
-    """Check that the argument is a scene; raises InputError."""
-    instance(scene, Scene, f"{what}: scene", "make one with wb.Scene(figure)")
-
-
 class FrameLoop(NotCopyable):
     """Computes the posture of a figure that follows a tracker, frame by frame, without penetration.
 
@@ -88,7 +83,7 @@ class FrameLoop(NotCopyable):
             UnknownNameError: another overlap, or no such thing.
             InputError: the start has the wrong shape, is not finite, or no posture near it is free of overlap.
         """
-        check_scene(scene, "FrameLoop")
+        instance(scene, Scene, "FrameLoop: scene", "make one with wb.Scene(figure)")
         known(overlap, OVERLAPS, "way to remove overlap", "overlap")
         dt = time_step(dt, "dt")
         SEED(seed, "seed")
@@ -121,7 +116,8 @@ class FrameLoop(NotCopyable):
             resolution = Resolution((self.shown,), 0.0, 0.0, 0, 0, 0, f"{reason}; the figure stays", swept=True)
         else:
             self._said = self._said or self.scene.figure.warn_of_angles(goal, "tracked")  # once for all frames
-            resolution = self._strategy.resolve(self.shown, self._within_limits(goal))
+            within = self.scene.figure.clamp(pin.normalize(self.scene.model, goal))
+            resolution = self._strategy.resolve(self.shown, within)
         if motion is None:
             return self._shown(self._kept_from_passing(resolution), began=began)
         if not motion.still:
@@ -154,10 +150,6 @@ class FrameLoop(NotCopyable):
             resolution.iterations, resolution.joints, resolution.pairs, note,
             collisions, path,
         )  # fmt: skip
-
-    def _within_limits(self, goal: Array) -> Array:
-        """The tracked posture within limits and with a quaternion of unit length."""
-        return self.scene.figure.clamp(pin.normalize(self.scene.model, goal))
 
     def _kept_from_passing(self, resolution: Resolution) -> Resolution:
         """The first posture to which the motion is free; otherwise a share of the motion, or the posture shown.
@@ -308,7 +300,7 @@ def follow(
         UnknownNameError, InputError: the track does not fit the figure, or no posture near its start is free; frame
             and place are named, before anything is computed.
     """
-    check_scene(scene, "follow")
+    instance(scene, Scene, "follow: scene", "make one with wb.Scene(figure)")
     instance(track, Track, "follow: track", "make one with Track.of(figure, q, dt)")
     function(progress, "progress")
     track.check(scene.figure)

@@ -229,17 +229,13 @@ class LivePage:
                 known = self._sent.get(number)
                 if known is None or not place.isApprox(known, STILL):
                     handle, self._sent[number] = self._pieces[number], place
-                    handle.position, handle.wxyz = place.translation, _wxyz(place)
+                    handle.position = place.translation
+                    handle.wxyz = np.roll(pin.Quaternion(place.rotation).coeffs(), 1)
 
 
 def _handle_color(held: bool) -> tuple[int, int, int]:
     """Red, green, blue of the handle of a frame."""
     return (225, 90, 40) if held else (70, 130, 220)
-
-
-def _wxyz(place: pin.SE3) -> Any:
-    x, y, z, w = pin.Quaternion(place.rotation).coeffs()
-    return np.array((w, x, y, z))
 
 
 def _bytes(color: tuple[float, float, float, float] | None, number: int) -> tuple[int, int, int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +20,15 @@ SLIDING = (
 ).format(ball='<collision><geometry><box size="0.1 0.2 0.05"/></geometry></collision>')
 
 
-def distances(scene: wb.Scene, q: np.ndarray) -> np.ndarray:
+def asker(scene: wb.Scene) -> Callable[[np.ndarray], np.ndarray]:
+    """Distances of all pairs at a posture, by coal."""
     data, placed = scene.model.createData(), pin.GeometryData(scene.geometry)
-    pin.computeDistances(scene.model, data, scene.geometry, placed, q)
-    return np.array([result.min_distance for result in placed.distanceResults])
+
+    def distances(q: np.ndarray) -> np.ndarray:
+        pin.computeDistances(scene.model, data, scene.geometry, placed, q)
+        return np.array([result.min_distance for result in placed.distanceResults])
+
+    return distances
 
 
 @pytest.mark.parametrize("name", ["human", "arm", "sliding"])
@@ -35,11 +41,11 @@ def test_no_pair_comes_nearer_than_the_bound_says(name: str, root: Path, tmp_pat
     rng, model = np.random.default_rng(5), scene.model
     most = rng.uniform(0.01, 0.3, model.nv)
     bound = scene.workspace().largest_approach(most)
-    tightest = np.inf
+    tightest, distances = np.inf, asker(scene)
     for _ in range(40):
         q = figure.clamp(pin.integrate(model, figure.neutral, 0.5 * rng.normal(size=model.nv)))
         ends = figure.clamp(pin.integrate(model, q, most * rng.choice([-1.0, 0.0, 1.0], model.nv)))
-        fallen = distances(scene, q) - distances(scene, ends)
+        fallen = distances(q) - distances(ends)
         assert (fallen <= bound + 2e-5).all()
         tightest = min(tightest, float((bound - fallen).min()))
     assert tightest < 0.7 * np.median(bound[np.isfinite(bound)])
@@ -70,7 +76,7 @@ def test_rows_that_a_step_leaves_out_cannot_be_missed() -> None:
     problem = wb.Problem(scene, constraints=[limit], clearance=0.001)
     lineariser = problem.lineariser(problem.workspace(), dt)
     whole = problem.lineariser(problem.workspace(), None)
-    rng, fewer = np.random.default_rng(3), 0
+    rng, fewer, distances = np.random.default_rng(3), 0, asker(scene)
     for _ in range(20):
         q = scene.figure.clamp(pin.integrate(model, scene.figure.neutral, 0.3 * rng.normal(size=model.nv)))
         at, every = lineariser.at(q, 0.06), whole.at(q, 0.06)
@@ -78,6 +84,6 @@ def test_rows_that_a_step_leaves_out_cannot_be_missed() -> None:
         fewer += len(left)
         for _ in range(5):
             dq = np.clip(rng.choice([-1.0, 1.0], model.nv), at.lower, at.upper)
-            after = distances(scene, pin.integrate(model, q, dq))
+            after = distances(pin.integrate(model, q, dq))
             assert (after[left] >= 0.001).all()
     assert fewer > 0

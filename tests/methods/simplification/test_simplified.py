@@ -14,7 +14,7 @@ from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State
-from wholebody.geometry.swept_points import swept_points
+from wholebody.geometry.pieces import swept_points
 from wholebody.methods.simplification.active_joints import active_joints
 from wholebody.methods.simplification.embedding import EmbeddedConstraint, EmbeddedGoal
 from wholebody.methods.simplification.simplified import Simplified

@@ -63,6 +63,13 @@ def test_positions_of_joints_are_offsets_or_added_to_them(tmp_path: Path, rows: 
     for there in ((0.0, 20.0, 0.0), (0.0, 0.0, 0.0)):
         given = np.hstack([rows[:, :6], np.tile(there, (8, 1)), rows[:, 6:]])
         np.testing.assert_allclose(read(tmp_path, text(hips(SIX), given)).positions, plain.positions, atol=1e-12)
+    lengths = 20.0 + 3.0 * np.arange(8.0)
+    stretched = read(
+        tmp_path, text(hips(SIX), np.hstack([rows[:, :6], np.outer(lengths, (0.0, 1.0, 0.0)), rows[:, 6:]]))
+    )
+    at = [stretched.positions[:, stretched.names.index(name)] for name in ("Hips", "Spine", "Head")]
+    np.testing.assert_allclose(np.linalg.norm(at[1] - at[0], axis=1), 0.01 * lengths, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(at[2] - at[1], axis=1), 0.4, atol=1e-12)
 
 
 def test_text_of_every_kind_is_read(tmp_path: Path, rows: np.ndarray) -> None:
@@ -84,3 +91,38 @@ def test_text_of_every_kind_is_read(tmp_path: Path, rows: np.ndarray) -> None:
     assert "a second joint is called 'Spine'; it is 'Spine_2' here" in twice.notes
     still = read(tmp_path, text(hips().replace(SIX, PLAIN), rows[:, 3:]))
     assert np.ptp(still.positions[:, 0]) == 0.0
+
+
+def skeleton_of_a_person(size: float) -> str:
+    """A text in which nothing but lengths says that it is a person: legs, trunk, arms, head."""
+    plain, count = "CHANNELS 3 Zrotation Xrotation Yrotation", iter(range(99))
+
+    def chain(*places: tuple[float, float, float], below: str = "") -> str:
+        (x, y, z), rest = places[0], places[1:]
+        offset = f"OFFSET {size * x} {size * y} {size * z}"
+        if not rest and not below:
+            return f"End Site {{ {offset} }}"
+        inside = chain(*rest, below=below) if rest else below
+        return f"JOINT b{next(count)} {{ {offset} {plain}\n{inside} }}"
+
+    legs = ((0.09, -0.05, 0), (0, -0.42, 0), (0, -0.41, 0), (0, -0.08, 0.13), (0, 0, 0.07))
+    arms = ((0.03, 0.1, 0), (0.15, 0, 0), (0.29, 0, 0), (0.25, 0, 0), (0.1, 0, 0))
+    lower, upper = ([chain(*((side * x, y, z) for x, y, z in limb)) for side in (1, -1)] for limb in (legs, arms))
+    head = chain((0, 0.15, 0), (0, 0.1, 0), (0, 0.15, 0))
+    trunk = chain((0, 0.2, 0), (0, 0.2, 0), below=" ".join([*upper, head]))
+    return f"ROOT b{next(count)} {{ OFFSET 0 0 0 CHANNELS {SIX}\n{' '.join([*lower, trunk])} }}"
+
+
+@pytest.mark.parametrize(("unit", "metres"), [("metres", 1.0), ("centimetres", 0.01), ("inches", 0.0254)])
+def test_units_are_those_that_make_a_person_of_a_persons_proportions(unit: str, metres: float, tmp_path: Path) -> None:
+    body = skeleton_of_a_person(1.0 / metres)
+    rows = np.zeros((2, 6 + 3 * (body.count("JOINT"))))
+    path = tmp_path / "a.bvh"
+    path.write_text(text(body, rows))
+    found = read_skeleton(path)
+    assert f"lengths are in {unit}" in found.notes
+    assert np.linalg.norm(found.offsets, axis=1).max() == pytest.approx(0.42)
+    # a hand of 18 cm, of which the size alone says nothing
+    path.write_text(text(f"ROOT h {{ OFFSET 0 0 0 CHANNELS {SIX}\nJOINT f {{ OFFSET 0 10 0 CHANNELS {PLAIN}\nEnd Site "
+                         "{ OFFSET 0 8 0 } } }", np.zeros((2, 9))))  # fmt: skip
+    assert "lengths are in centimetres" in read_skeleton(path).notes

@@ -10,7 +10,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.base.errors import InputError, UnknownNameError
-from wholebody.scene.matter.inertia import mass_properties
+from wholebody.scene.matter.body import mass_properties
 from wholebody.scene.matter.materials import MATERIALS, surface
 
 TABLE = {

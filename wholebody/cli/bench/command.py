@@ -82,10 +82,3 @@ def publish(
     for (svg, _), _ in drawn:
         shutil.copyfile(svg, folder / svg.name)
     print(f"wrote {arguments.update_docs / page}")
-
-
-def publish_page(name: str, text: str, arguments: argparse.Namespace) -> None:
-    """Write a page that a command makes whole, and into the documentation where that is asked for."""
-    for folder in filter(None, (arguments.out, arguments.update_docs)):
-        write_text(folder / name, text)
-        print(f"wrote {folder / name}")

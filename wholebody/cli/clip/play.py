@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from wholebody.cli.clip.arguments import ONE_MOTION, bar, clip_of
 from wholebody.cli.command import command, option
-
-if TYPE_CHECKING:
-    from wholebody.motion.clip import Clip
 
 NOTHING = "nothing"
 PICTURES = 8
@@ -48,6 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.base.checks import whole
     from wholebody.base.errors import InputError
     from wholebody.base.files import checked_target
+    from wholebody.figures.postures import lowest
     from wholebody.geometry.shapes import HalfSpace
     from wholebody.motion.reading import read_clip
     from wholebody.motion.worn_equipment import dressed
@@ -64,7 +61,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError(f"--ghost: {arguments.ghost.name} has {len(ghost)} frames and not {len(clip)}")
     scene = dressed(clip.figure, arguments.equipment)
     if clip.figure.root == "free":
-        scene.add(HalfSpace(), name="floor", at=(0.0, 0.0, _lowest(clip)))
+        floor = min(lowest(clip.figure, q) for q in clip.q)  # recordings do not all have it at 0
+        scene.add(HalfSpace(), name="floor", at=(0.0, 0.0, floor))
     with Viewer(scene, title=clip.name) as viewer:
         if clip.figure.root == "free":
             middle = 0.5 * (clip.q[:, :3].min(axis=0) + clip.q[:, :3].max(axis=0))
@@ -89,21 +87,3 @@ def run(arguments: argparse.Namespace) -> int:
                 )
             print(f"wrote {written}")
     return 0
-
-
-def _lowest(clip: Clip) -> float:
-    """Height of the lowest point of the figure in any frame, metres: recordings do not all have their floor at 0."""
-    import pinocchio as pin
-
-    from wholebody.tasks.balance import low_points
-
-    model, pieces = clip.figure.model, clip.figure.geometry.geometryObjects
-    data, lowest = model.createData(), 0.0
-    for frame, q in enumerate(clip.q):
-        pin.forwardKinematics(model, data, q)
-        here = min(
-            float(low_points(piece.geometry, data.oMi[piece.parentJoint] * piece.placement)[:, 2].min())
-            for piece in pieces
-        )
-        lowest = here if frame == 0 else min(lowest, here)
-    return lowest

@@ -1,11 +1,11 @@
-"""Bounds on the velocity with which pieces approach each other during the motion between two postures.
+"""How fast, and how much, pieces can approach each other during a motion.
 
 On the geodesic q(t) = integrate(q0, t v), v = difference(q0, q1), every joint moves with a twist (l, w) that is
 constant in its own frame. A point at distance r from the joint's origin then moves, relative to the joint's base,
 with a speed of at most |l| + |w| r. Here r is at most the sum of the distances between the moving joints from there to
 the point, plus the travel of the prismatic ones; these distances are constant, because the parts between two moving
 joints are rigid. The speed of approach of two pieces is at most the sum over the joints that carry exactly one of them
-(common ancestors move both).
+(common ancestors move both). `largest_approach` bounds in the same way, wherever the joints are.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
+from wholebody.geometry.proximity import PairTable
 
 TURNING_AXES = ("Composite", "SphericalZYX", "Universal", "Ellipsoid")
 """Joints whose twist is not constant along a geodesic, by a part of Pinocchio's name for them."""
@@ -35,12 +36,7 @@ class MotionBounds:
     """
 
     def __init__(self, model: pin.Model, joint: NDArray[np.intp], reach: Array) -> None:
-        """Read the tree once.
-
-        Args:
-            model: the model.
-            joint: (n,) the joint that carries each piece; 0 is the world.
-            reach: (n,) radius of each piece about its origin; infinite for a half-space.
+        """Read the tree once: `joint` (n,) carries each piece, and `reach` (n,) is its radius about its origin.
 
         Raises:
             InputError: a joint whose axis is not constant (composite, Euler angles, universal).
@@ -121,12 +117,7 @@ class MotionBounds:
 
         With the joints between the two pieces taken as a product of exponentials, the second derivative of the point
         is a sum over pairs of joints: each velocity counts twice for every joint nearer to the second piece, and once
-        by its own.
-
-        Args:
-            first: the piece with the points; of finite reach.
-            second: the reference piece.
-            gap: present distance of the two, metres.
+        by its own. The first piece is of finite reach; `gap` is the present distance of the two, metres.
         """
         a, b = self.carries[self.joint[first]], self.carries[self.joint[second]]
         near, far = a & ~b, b & ~a
@@ -137,3 +128,67 @@ class MotionBounds:
         across = max(gap, 0.0) + float(speed.sum()) + 2.0 * float(self.reach[first])
         speed = speed + self.turn * far * across
         return float((speed * (2.0 * turn.sum() - turn)).sum())
+
+
+def largest_approach(table: PairTable, centres: Array, most: Array) -> Array:
+    """Most by which the distance of every pair can fall (pairs,), metres; infinite where nothing is known.
+
+    Args:
+        table: the pieces and pairs.
+        centres: (n,) most that a piece's origin is away from that of its joint, metres; infinite where it may be placed
+            anew.
+        most: (nv,) largest displacement of every degree of freedom, radians and metres; may be infinite.
+    """
+    model = table.model
+    moved = np.array([_motion(model, joint, most) for joint in range(model.njoints)])
+    lengths = np.array([_length(model, joint) for joint in range(model.njoints)])
+    parents = np.array(list(model.parents), dtype=np.intp)
+    joint = table.joint[table.pairs]
+    fixed, turned, lever = np.zeros((3, *joint.shape))
+    with np.errstate(invalid="ignore"):  # an infinite lever of what does not turn
+        # a joint comes after the one that carries it: the later of two is never an ancestor of the other
+        while len(row := np.flatnonzero(joint[:, 0] != joint[:, 1])):
+            later = (row, (joint[row, 1] > joint[row, 0]).astype(np.intp))
+            number = joint[later]
+            slide, turn = moved[number].T
+            fixed[later] += slide + np.where(turn > 0.0, turn * lever[later], 0.0)
+            turned[later] += turn
+            lever[later] += lengths[number]
+            joint[later] = parents[number]
+        own = (centres + table.reach)[table.pairs]
+        ways = fixed + np.where(turned > 0.0, turned * own, 0.0)
+    return np.asarray(ways.sum(axis=1))
+
+
+def _motion(model: pin.Model, joint: int, most: Array) -> tuple[float, float]:
+    """How far a joint can slide, and how far it can turn."""
+    if joint == 0:
+        return 0.0, 0.0
+    kind: Any = model.joints[joint]
+    size = most[kind.idx_v : kind.idx_v + kind.nvExtended]
+    if not np.isfinite(size).all():
+        return np.inf, 0.0
+    if any(word in kind.shortname() for word in TURNING_AXES):
+        return np.inf, 0.0
+    part = np.abs(_axes(model, kind)) @ size
+    return float(np.linalg.norm(part[:3])), float(np.linalg.norm(part[3:]))
+
+
+def _length(model: pin.Model, joint: int) -> float:
+    """Most that the origin of a joint can be away from the origin of the one that carries it."""
+    kind: Any = model.joints[joint]
+    if joint == 0:
+        return 0.0
+    length = float(np.linalg.norm(model.jointPlacements[joint].translation))
+    if not _axes(model, kind)[:3].any():
+        return length
+    if kind.nq != 1:
+        return np.inf
+    return length + float(max(abs(model.lowerPositionLimit[kind.idx_q]), abs(model.upperPositionLimit[kind.idx_q])))
+
+
+def _axes(model: pin.Model, joint: Any) -> Array:
+    """(6, k) motions of a joint by its k degrees of freedom, in its own frame."""
+    data = joint.createData()
+    joint.calc(data, pin.neutral(model))
+    return np.asarray(data.S).reshape(6, -1)

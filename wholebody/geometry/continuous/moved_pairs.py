@@ -25,11 +25,7 @@ class QueryResult(NamedTuple):
 
 
 def far_moved(table: PairTable, before: QueryResult, after: QueryResult) -> Indices:
-    """Pairs that moved against each other by more than their distance.
-
-    Raises:
-        InputError: the placements are of other pieces.
-    """
+    """Pairs that moved against each other by more than their distance; an InputError for placements of other pieces."""
     count = len(table.joint)
     if len(before.placements) != count or len(after.placements) != count:
         raise InputError(
@@ -46,14 +42,8 @@ def far_moved(table: PairTable, before: QueryResult, after: QueryResult) -> Indi
 def separated(table: PairTable, before: QueryResult, after: QueryResult, pairs: Indices, overlap: float) -> Mask:
     """Which pairs (k,) the plane between their pieces before a motion, fixed to either, still separates after it.
 
-    The heights of the arcs that points describe are allowed for; a pair that was not near before is not separated.
-
-    Args:
-        table: the pieces and pairs.
-        before: near pairs before the motion.
-        after: near pairs after it.
-        pairs: (k,) places among the collision pairs.
-        overlap: metres by which a piece may be beyond the plane.
+    The heights of the arcs that points describe are allowed for; a piece may be beyond the plane by `overlap` metres. A
+    pair that was not near before is not separated.
     """
     known = before.contacts
     near = known.number, known.pair, known.normal, known.point_a, known.point_b

@@ -54,14 +54,7 @@ class Queries(Protocol):
 
 
 def is_free(queries: Queries, before: Array, after: Array, unswept: float) -> bool:
-    """Whether the motion between two postures (nq,) penetrates nothing.
-
-    Args:
-        queries: of the run.
-        before: start of the motion.
-        after: its end.
-        unswept: radians and metres: shorter motions are not swept.
-    """
+    """Whether a motion between two postures penetrates nothing; one shorter than `unswept`, rad and m, is not swept."""
     if np.isinf(unswept) or np.abs(pin.difference(queries.model, before, after)).max(initial=0.0) <= unswept:
         return True
     return queries.sweep.first_contact(before, after, tolerance=GRAZE) is None
@@ -84,15 +77,14 @@ class Entered(NamedTuple):
 def entered(sweep: Sweep, depths: SweptDepth, path: Sequence[Array], watched: NDArray[np.bool_]) -> list[Entered]:
     """The pairs that one motion after the other leads through each other, and those that overlap where it ends.
 
+    They get deeper on the way than at the beginning by `OVERLAP`, or overlap at the end by `INSIDE`: if they are not
+    watched, by that much more than at the beginning.
+
     Args:
         sweep: of the model and geometry.
         depths: of the same.
         path: configurations (nq,), at least one.
         watched: (pairs,) of which pairs an overlap at the end counts too that was there at the beginning.
-
-    Returns:
-        Pairs that get deeper on the way than at the beginning by `OVERLAP`, or overlap at the end by `INSIDE`: if they
-        are not watched, by that much more than at the beginning.
     """
     last = _by_pair(depths.start(path[-1]), len(watched))
     if not (last > INSIDE).any() and all(
@@ -117,17 +109,10 @@ def _by_pair(depths: Depths, pairs: int) -> Array:
 
 
 def last_free(model: pin.Model, free: Array, q: Array, overlaps: Callable[[Array], object], halvings: int) -> Array:
-    """Bisect the motion from a free posture to one that overlaps something; the result was tested to be free.
+    """Bisect the motion from a free posture (nq,) to one that overlaps something; the result was tested to be free.
 
-    Algorithm 1, step 4, of Schmidl and Lin. If the motion is free again after an overlap, the result may be on either
-    side.
-
-    Args:
-        model: of the figure.
-        free: (nq,) posture without overlap.
-        q: (nq,) posture with overlap.
-        overlaps: whether something overlaps at a posture (nq,).
-        halvings: number of halvings; the result is accurate to 2 to the power of minus this.
+    Algorithm 1, step 4, of Schmidl and Lin. The result is accurate to 2 to the power of minus the number of halvings.
+    If the motion is free again after an overlap, it may be on either side.
     """
     inside, outside = 0.0, 1.0
     for _ in range(halvings):
@@ -140,18 +125,11 @@ def last_free(model: pin.Model, free: Array, q: Array, overlaps: Callable[[Array
 
 
 def passes_through(queries: Queries, before: QueryResult, after: QueryResult, q0: Array, q1: Array) -> bool:
-    """Whether some pair has changed sides during a motion.
+    """Whether some pair has changed sides during a motion from posture q0 to q1 (nq,), near pairs known at both.
 
     A pair that touches during the motion and at its end is a collision, which its distance shows; a pair that touches
     and is separate again was passed through. The motion is halved a few times, which decides most pairs at a tenth of
-    the cost of a sweep; the remaining pairs are swept.
-
-    Args:
-        queries: of the run that makes the motion; its state is moved.
-        before: near pairs before the motion.
-        after: near pairs after it.
-        q0: (nq,) posture before the motion.
-        q1: (nq,) posture after it.
+    the cost of a sweep; the remaining pairs are swept. The state of `queries` is moved.
     """
     table = queries.table
     moved = far_moved(table, before, after)
@@ -185,7 +163,7 @@ def _halved(
 def _swept_through(queries: Queries, q0: Array, q1: Array, doubtful: Indices, end: Array) -> bool:
     """The same by a sweep of these pairs; `end` are the distances (pairs,) after the motion."""
     while len(doubtful):
-        hit = queries.sweep.first_contact(q0, q1, queries.table.pairs[doubtful], OVERLAP)
+        hit = queries.sweep.first_contact(q0, q1, doubtful, OVERLAP)
         if hit is None:
             return False
         if end[hit.index] > -OVERLAP:
@@ -197,20 +175,14 @@ def _swept_through(queries: Queries, q0: Array, q1: Array, doubtful: Indices, en
 def first_passed(
     queries: Queries, before: QueryResult, after: QueryResult, q0: Array, q1: Array, overlap: float
 ) -> FirstContact | None:
-    """First contact of a pair that may have changed sides, and is separate after the motion; None if there is none.
+    """First contact, deeper than `overlap`, of a pair that may have changed sides and is separate after the motion.
 
-    Args:
-        queries: of the run.
-        before: near pairs before the motion.
-        after: near pairs after it.
-        q0: (nq,) posture before the motion.
-        q1: (nq,) posture after it.
-        overlap: overlap during the motion that is ignored, metres.
+    The arguments are those of `passes_through`; None if there is none.
     """
     table = queries.table
     moved = far_moved(table, before, after)
     doubtful = moved[distances(after, len(table.pairs))[moved] > -overlap]
-    return queries.sweep.first_contact(q0, q1, table.pairs[doubtful], overlap) if len(doubtful) else None
+    return queries.sweep.first_contact(q0, q1, doubtful, overlap) if len(doubtful) else None
 
 
 def doubtful_pairs(table: PairTable, before: QueryResult, after: QueryResult) -> Indices:

@@ -22,7 +22,7 @@ from wholebody.base.errors import InputError
 from wholebody.geometry.continuous.motion_bounds import MotionBounds
 from wholebody.geometry.large_models import pairs_of
 from wholebody.geometry.pair_distances import PairDistances
-from wholebody.geometry.swept_points import swept_points
+from wholebody.geometry.pieces import swept_points
 
 TOLERANCE = 1e-4
 """Depth up to which an overlap is no contact, metres."""
@@ -73,13 +73,12 @@ class Sweep:
         joint = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
         reach = np.array([swept.reach for swept in self._swept], dtype=float)
         self._bounds = MotionBounds(model, joint, reach)
-        self._number: dict[tuple[int, int], int] = {}  # made when it is first needed
         self._reach = reach[self._pairs].sum(axis=1)
 
     def first_contact(
-        self, q0: Array, q1: Array, pairs: Indices | None = None, tolerance: float = TOLERANCE
+        self, q0: Array, q1: Array, numbers: Indices | None = None, tolerance: float = TOLERANCE
     ) -> FirstContact | None:
-        """First contact on the geodesic ``pinocchio.interpolate(model, q0, q1, t)``.
+        """First contact on the geodesic ``pinocchio.interpolate(model, q0, q1, t)``; None if the whole motion is free.
 
         A contact is a pair deeper by `tolerance` than touching, or, if it overlaps at the start already, deeper by
         `tolerance` than there: soles may stay on the floor and hands on a handle, and an overlap may be left, but not
@@ -89,11 +88,8 @@ class Sweep:
         Args:
             q0: (nq,) start of the motion.
             q1: (nq,) its end.
-            pairs: (k, 2) the pairs of pieces to test, collision pairs of the geometry model; all of them by default.
+            numbers: (k,) places of the pairs to test among the collision pairs of the geometry model; all by default.
             tolerance: metres.
-
-        Returns:
-            None if the whole motion is free.
 
         Raises:
             InputError: postures of the wrong shape, not finite or with a quaternion that is not of unit length; a
@@ -102,7 +98,7 @@ class Sweep:
         q0, q1 = self._checked(q0, "start"), self._checked(q1, "end")
         if not (np.isfinite(tolerance) and tolerance >= 1e-5):
             raise InputError(f"sweep: tolerance is {tolerance!r}; give at least 1e-5 m, ten times coal's own accuracy")
-        index = np.arange(len(self._pairs)) if pairs is None else self._indices(pairs)
+        index = np.arange(len(self._pairs)) if numbers is None else numbers
         if not len(index):
             return None
         self._distances.reset()  # the same motion has the same answer, whatever was swept before
@@ -154,14 +150,6 @@ class Sweep:
     def _found(self, fraction: float, q: Array, index: int, distance: float, certain: bool) -> FirstContact:
         first, second = (int(k) for k in self._pairs[index])
         return FirstContact(fraction, q, index, (first, second), distance, certain)
-
-    def _indices(self, pairs: Indices) -> Indices:
-        try:
-            if not self._number:
-                self._number.update({(i, j): k for k, (i, j) in enumerate(self._pairs.tolist())})
-            return np.array([self._number[int(i), int(j)] for i, j in np.asarray(pairs).reshape(-1, 2)], dtype=np.intp)
-        except KeyError as missing:
-            raise InputError(f"sweep: pieces {missing.args[0]} are not a collision pair; add the pair first") from None
 
     def _second_order(self, index: int, row: Array, level: float) -> float:
         """Share of the motion for which a plane between the pair, fixed to either piece, keeps them above `level`."""
@@ -233,15 +221,3 @@ class Sweep:
         if not pin.isNormalized(self.model, q, 1e-6):
             raise InputError(f"sweep: a quaternion of the {which} is not of unit length; use pinocchio.normalize")
         return q
-
-
-def first_contact(
-    model: pin.Model,
-    geometry: pin.GeometryModel,
-    pairs: Indices | None,
-    q0: Array,
-    q1: Array,
-    tolerance: float = TOLERANCE,
-) -> FirstContact | None:
-    """One sweep; see `Sweep.first_contact`. For many sweeps make a `Sweep`."""
-    return Sweep(model, geometry).first_contact(q0, q1, pairs, tolerance)

@@ -51,12 +51,7 @@ class SweptDepth:
     """Depths along one sequence of postures at a time."""
 
     def __init__(self, table: PairTable, geometry: pin.GeometryModel, tolerance: float) -> None:
-        """Read the pieces and pairs; they stand where `geometry` has them.
-
-        Args:
-            table: pieces and pairs of the geometry model.
-            geometry: with the present placements of the pieces; only read.
-            tolerance: depth that matters, metres.
+        """Read the pieces and pairs; they stand where `geometry` has them. Depths of `tolerance` metres matter.
 
         Raises:
             InputError: a joint whose motion cannot be bounded.

@@ -14,7 +14,6 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.geometry.continuous.moved_pairs import QueryResult
-from wholebody.geometry.proximity import Joints
 from wholebody.methods.ccd.chain import MARGIN, ChainResolver
 from wholebody.methods.ccd.guards import NOTHING_FIXED, Kept
 from wholebody.methods.ccd.limbs import movable
@@ -109,7 +108,7 @@ class OverlapResolver:
         began = time.perf_counter()
         self.counts.queries += 1
         pin.forwardKinematics(self.scene.model, self._data, q)
-        near = self.workspace.proximity.query(Joints(self._data), self._query_distance)
+        near = self.workspace.proximity.query(self._data, self._query_distance)
         self.placed = QueryResult(near, self._query_distance)
         depth = -near.distance if self.clearances is None else self.clearances[near.number] - near.distance
         self.deepest = float(depth.max(initial=0.0))

@@ -13,9 +13,9 @@ from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.model_check import Turning
 from wholebody.geometry.large_models import geometry_model
+from wholebody.geometry.pieces import swept_points
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.geometry.shapes import Shape
-from wholebody.geometry.swept_points import swept_points
 from wholebody.scene.geometry_model import SceneObject, assemble
 from wholebody.scene.scene import Scene
 

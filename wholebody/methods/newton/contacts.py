@@ -9,7 +9,6 @@ import numpy as np
 from wholebody.base.arrays import Array, Indices
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
-from wholebody.geometry.proximity import Joints
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.batches import Coincide
 from wholebody.methods.newton.settings import CONTACTS
@@ -43,7 +42,7 @@ class ContactSet:
 
     def measure(self, data: Any) -> None:
         """Measure at the joints' places in `data` (Pinocchio's), where a step leads."""
-        self._there = QueryResult(self.workspace.proximity.query(Joints(data), self._within), self._within)
+        self._there = QueryResult(self.workspace.proximity.query(data, self._within), self._within)
 
     def runs_into(self) -> bool:
         """Whether a pair that is no inequality overlaps at the end of the step; such pairs become inequalities."""
@@ -76,7 +75,7 @@ class ContactSet:
         self._here = self._there
         contacts = self._here.contacts
         if len(self._forced) and not np.isin(self._forced, contacts.number).all():
-            contacts = self.workspace.proximity.query(Joints(data), FAR + self._largest)
+            contacts = self.workspace.proximity.query(data, FAR + self._largest)
         spare = contacts.distance - self.clearances[contacts.number]
         member = np.zeros(len(self.clearances), dtype=bool)
         member[self.pairs] = True

@@ -26,8 +26,7 @@ from wholebody.methods.qp.rows import (
 )
 from wholebody.methods.qp.settings import PROGRAM, WEIGHTS
 from wholebody.problem import Problem
-from wholebody.terms.linearisation import Linearisation
-from wholebody.terms.planes import TermPlanes
+from wholebody.terms.linearisation import Linearisation, TermPlanes
 
 _NONE = np.zeros(0)
 

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import FileFormatError, InputError
 from wholebody.base.files import read_foreign_text, title_of
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
 from wholebody.motion.files.base import LARGEST_FILE, Frames, Motion
 from wholebody.motion.files.bvh_text import BvhText, parsed
-from wholebody.motion.files.nodes import OFF, angles_about, nodes_of, postures, rotations, wrapped
-from wholebody.motion.skeleton import UNITS, UP, SkeletonMotion, longest_way, recognised_unit
+from wholebody.motion.files.nodes import OFF, Node, angles_about, nodes_of, postures, rotations, wrapped
+from wholebody.motion.skeleton import UNITS, UP, SkeletonMotion, longest_way
+from wholebody.motion.structure import recognised_unit
 
 
 def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> SkeletonMotion:
@@ -32,26 +35,31 @@ def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> S
         FileFormatError: the file cannot be read; the line is named.
     """
     found = parsed(read_foreign_text(path, "motion", LARGEST_FILE), path.name)
+    mark, _, rest = found.joints[0].name.partition(":")
+    ours = mark == MARK and bool(rest)
+    if ours:
+        unit, up, found.joints[0].name = unit or MARK, up or "y", rest
     offsets, root, notes = _offsets(found)
     notes = [*found.notes, *notes]
     angles, local = _rotations(found)
     parents = np.array([joint.parent for joint in found.joints], dtype=np.intp)
     if longest_way(parents, offsets) == 0.0:
         raise FileFormatError(f"{path.name}: all joints of the skeleton are at one place; give their offsets")
+    top = _moved_joint(found, parents, offsets)
+    names = tuple(joint.name for joint in found.joints)
     if up is None:
-        up = _up(found, parents, offsets)
+        up = _up(names, parents, offsets, top)
         notes.append(f"{up} is up")
     if unit is None:
         unit = recognised_unit(parents, offsets)
         notes.append(f"lengths are in {unit}")
-    first = int(_begins_with_rest(angles[:, 1:]))
+    first = int(not ours and _begins_with_rest(angles[:, 1:]))
     if first:
         notes.append("the first frame is the rest posture and no part of the motion; it is left out")
     turn, scale = UP[up], UNITS[unit]
     local = turn @ local[first:] @ turn.T
-    names = tuple(joint.name for joint in found.joints)
-    top = _moved_joint(found, parents, offsets)
     places = scale * root[first:] @ turn.T
+    kept = list(range(len(names)))
     if top:
         places, local = _from_the_world(
             top, places, scale * _positions(found, top)[first:] @ turn.T, parents, local, offsets, scale * turn
@@ -63,11 +71,26 @@ def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> S
         offsets[0] = 0.0
         parents = np.array([kept.index(int(parents[k])) if k != top else -1 for k in kept], dtype=np.intp)
     try:
-        return SkeletonMotion.moved(
+        motion = SkeletonMotion.moved(
             names, parents, scale * offsets @ turn.T, local, places, found.dt, title_of(path), tuple(notes)
         )
+        return replace(motion, positions=_lengthened(motion, found, kept, first, scale * turn))
     except InputError as error:
         raise FileFormatError(f"{path.name}: {error}") from None
+
+
+def _lengthened(motion: SkeletonMotion, found: BvhText, kept: list[int], first: int, scale: Array) -> Array:
+    """Places (n, j, 3) of the joints where the lengths of bones change."""
+    positions, columns = np.array(motion.positions), _columns(found)
+    for joint, source in enumerate(kept[1:], 1):
+        parent = motion.parents[joint]
+        step: Array = motion.offsets[joint]
+        given = [values for (_, kind), values in columns[source].items() if kind == "position"]
+        if any(values.any() for values in given):
+            step = _positions(found, source)[first:] @ scale.T
+        turned = np.einsum("nij,nj->ni", motion.rotations[:, parent], np.broadcast_to(step, (len(motion), 3)))
+        positions[:, joint] = positions[:, parent] + turned
+    return positions
 
 
 def _positions(found: BvhText, joint: int) -> Array:
@@ -161,7 +184,9 @@ def _offsets(found: BvhText) -> tuple[Array, Array, list[str]]:
             if values is not None and not still[k]:
                 offsets[k, axis] = values.mean()
                 if np.ptp(values) > 0.01 * size:
-                    notes.append(f"the length of the bone to {joint.name} changes; its mean is taken")
+                    notes.append(
+                        f"the length of the bone to {joint.name} changes; its mean is that of the rest posture"
+                    )
     root = _positions(found, 0)
     offsets[0] = 0.0  # the root's channels are its place in the world
     return offsets, root, notes
@@ -183,12 +208,15 @@ def _rotations(found: BvhText) -> tuple[Array, Array]:
     return np.stack(angles, axis=1), local
 
 
-def _up(found: BvhText, parents: NDArray[np.intp], offsets: Array) -> str:
-    """The axis that is up in the rest posture: towards the head, or else of the largest extent; "y" for any but z."""
+def _up(joints: Sequence[str], parents: Indices, offsets: Array, root: int = 0) -> str:
+    """The axis that is up in the rest posture: towards the head, or else of the largest extent; "y" for any but z.
+
+    What moves the root, or stands above it, says nothing.
+    """
     rest = np.zeros_like(offsets)
-    for k in range(1, len(parents)):
+    for k in range(root + 1, len(parents)):
         rest[k] = rest[parents[k]] + offsets[k]
-    names = [joint.name.lower() for joint in found.joints]
+    names = [joint.lower() for joint in joints]
     tops = (rest[names.index(name)] for name in ("head", "neck", "chest", "spine") if name in names)
     extent = np.ptp(rest, axis=0)
     most = int(np.argmax(extent))
@@ -198,6 +226,7 @@ def _up(found: BvhText, parents: NDArray[np.intp], offsets: Array) -> str:
 
 
 ORDER = "ZXY"  # of rotations, as most writers of BVH have it
+MARK = "centimetres"  # before the name of a root, as a name space: an own file that would not be recognised as such
 
 
 def write(motion: Motion, path: Path) -> Path:
@@ -216,7 +245,8 @@ def write(motion: Motion, path: Path) -> Path:
         order.append(number)
         kind, channels = ("JOINT", "3") if indent else ("ROOT", "6 Xposition Yposition Zposition")
         rotating = " ".join(f"{axis}rotation" for axis in ORDER)
-        lines.extend([f"{indent}{kind} {node.name}", f"{indent}{{", offset(indent, node.offset)])
+        name = node.name if indent or plain else f"{MARK}:{node.name}"
+        lines.extend([f"{indent}{kind} {name}", f"{indent}{{", offset(indent, node.offset)])
         lines.append(f"{indent}\tCHANNELS {channels} {rotating}")
         for child, other in enumerate(nodes):
             if other.parent == number:
@@ -228,12 +258,24 @@ def write(motion: Motion, path: Path) -> Path:
     def offset(indent: str, place: Array) -> str:
         return f"{indent}\tOFFSET " + " ".join(f"{value:.6f}" for value in (scale * back @ place).tolist())
 
+    angles = np.degrees(_angles(back @ local @ back.T))
+    plain = _recognised(nodes, scale * back, angles)
     add(0, "")
     lines += ["MOTION", f"Frames: {len(motion.q)}", f"Frame Time: {motion.dt:.10g}", ""]
-    angles = np.degrees(_angles(back @ local @ back.T)[:, order])
+    angles = angles[:, order]
     table = io.StringIO()
     np.savetxt(table, np.column_stack([scale * root @ back.T, angles.reshape(len(angles), -1)]), fmt="%.6f")
     return write_file(path, "\n".join(lines) + table.getvalue())
+
+
+def _recognised(nodes: list[Node], scale: Array, angles: Array) -> bool:
+    """Whether a reader recognises unit, axes and first frame of the file by itself."""
+    ends = [(k, node.tip) for k, node in enumerate(nodes) if node.tip is not None]
+    parents = np.array([node.parent for node in nodes] + [k for k, _ in ends], dtype=np.intp)
+    offsets = np.array([node.offset for node in nodes] + [tip for _, tip in ends]) @ scale.T
+    names = [node.name for node in nodes] + ["end"] * len(ends)
+    known = recognised_unit(parents, offsets) == MARK and _up(names, parents, offsets) == "y"
+    return known and not _begins_with_rest(np.radians(angles[:, 1:]))
 
 
 def own(motion: SkeletonMotion, figure: Figure) -> Frames | None:

@@ -83,7 +83,7 @@ def nodes_of(figure: Figure) -> list[Node]:
     """
     model = figure.model
     data = model.createData()
-    pin.computeJointJacobians(model, data, pin.neutral(model))
+    columns = pin.computeJointJacobians(model, data, pin.neutral(model)).reshape(6, -1)
     pin.updateFramePlacements(model, data)
     places = [np.zeros(3)]
     found = [Node(figure.segments[0] if figure.segments else "base", -1, np.zeros(3), (), np.zeros((0, 3)), None)]
@@ -94,12 +94,12 @@ def nodes_of(figure: Figure) -> list[Node]:
         node_of[1], first = 0, 2
     for joint in range(first, model.njoints):
         parent = model.parents[joint]
-        if model.joints[joint].nv != 1 or np.linalg.norm(data.J[3:, model.joints[joint].idx_v]) < 0.5:
+        if model.joints[joint].nv != 1 or np.linalg.norm(columns[3:, model.joints[joint].idx_v]) < 0.5:
             raise InputError(
                 f"{figure.name}: joint {model.names[joint]!r} is no hinge, and files of skeletons hold rotations; "
                 "give .npz or .csv"
             )
-        axis = np.array(data.J[3:, model.joints[joint].idx_v])
+        axis = np.array(columns[3:, model.joints[joint].idx_v])
         place = np.array(data.oMi[joint].translation)
         at = node_of[parent]
         before = found[at]
@@ -183,8 +183,8 @@ def _angles(figure: Figure, node: Node, turns: Array) -> Array | None:
     else:
         axes = node.axes if count == 3 else np.vstack([node.axes, np.cross(node.axes[0], node.axes[1])])
         first = angles_about(turned, axes)
-        mirrored = -1.0 if abs(axes[0] @ axes[2]) > 0.5 else 1.0  # axes as Z X Z, or as Z X Y
-        other = first * (1.0, -mirrored, 1.0) + (np.pi, np.pi if mirrored > 0.0 else 0.0, np.pi)
+        proper = abs(axes[0] @ axes[2]) > 0.5  # axes as Z X Z, and not as Z X Y
+        other = first * (1.0, -1.0, 1.0) + (np.pi, 0.0 if proper else np.pi, np.pi)
         off = np.abs(wrapped(first[:, 2])) if count == 2 else np.zeros(len(first))
         # The other solution of two axes has half a turn about a third one, which the node has not.
         choices = first[:, :2][None] if count == 2 else np.stack([first, other])
@@ -194,7 +194,9 @@ def _angles(figure: Figure, node: Node, turns: Array) -> Array | None:
     middle = 0.5 * (lower + upper)
     choices = middle + wrapped(choices - middle)
     beyond = (np.maximum(lower - choices, 0.0) + np.maximum(choices - upper, 0.0)).sum(axis=2)
-    best = beyond.argmin(axis=0)
+    # of two solutions within the limits the one nearer to the neutral posture
+    resting = np.array([figure.joint_values(figure.neutral)[figure.model.names[joint]] for joint in node.joints])
+    best = (beyond + 1e-3 * np.abs(choices - resting).sum(axis=2)).argmin(axis=0)
     chosen: Array = choices[best, np.arange(len(turns))]
     return chosen
 

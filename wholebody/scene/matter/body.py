@@ -1,16 +1,33 @@
-"""What makes a thing in a scene a rigid body that moves by itself, and the joints that hold it."""
+"""What makes a thing in a scene a rigid body that moves by itself: mass, velocity, joints that hold it, inertia."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, TypeAlias
+from typing import Annotated, Any, NamedTuple, TypeAlias
+
+import numpy as np
+import pinocchio as pin
 
 from wholebody.base import checks
+from wholebody.base.arrays import Array
 from wholebody.base.checks import settle
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range, Vector
 from wholebody.geometry.placement import FARTHEST, unit_vector
+from wholebody.geometry.shapes import (
+    Box,
+    Capsule,
+    Compound,
+    Cylinder,
+    Ellipsoid,
+    HalfSpace,
+    Hull,
+    Mesh,
+    Shape,
+    Sphere,
+    Torus,
+)
 from wholebody.scene.matter.materials import DEFAULT, Material, material
 
 Three: TypeAlias = tuple[float, float, float]
@@ -25,9 +42,6 @@ class BallJoint(Checked):
     Attributes:
         at: (3,) the point in the thing's axes, metres; where it is at the start is where it stays.
         to: name of the thing that holds it; None for the world. The two do not collide with each other.
-
-    Raises:
-        InputError: `at` is not three finite numbers below 1,000 km, or `to` is no name.
     """
 
     at: Annotated[Three, Vector(3, Range(-FARTHEST, FARTHEST, "m"))] = (0.0, 0.0, 0.0)
@@ -36,26 +50,17 @@ class BallJoint(Checked):
 
 @dataclass(frozen=True)
 class Hinge(BallJoint):
-    """A thing turns about one axis, as a door does.
+    """A thing turns about one axis, as a door does; `at` is a point of it.
 
     Attributes:
-        at: (3,) a point of the axis, in the thing's axes, metres.
-        to: name of the thing that holds it; None for the world. The two do not collide with each other.
         axis: (3,) direction of the axis in the thing's axes.
-
-    Raises:
-        InputError: also if the axis has no direction.
     """
 
     axis: Annotated[Three, unit_vector] = (0.0, 0.0, 1.0)
 
 
 def joints(value: object, what: str) -> tuple[BallJoint, ...]:
-    """The joints of a body, checked.
-
-    Raises:
-        InputError: not a list of joints.
-    """
+    """The joints of a body, checked."""
     given = [value] if isinstance(value, BallJoint) else checks.listed(value, what, "[wb.dynamics.Hinge((0, 0.4, 0))]")
     for joint in given:
         checks.instance(joint, BallJoint, what, "give wb.dynamics.Hinge(...) or wb.dynamics.BallJoint(...)")
@@ -101,3 +106,86 @@ class Body(Checked):
     def resolved_material(self) -> Material:
         """The material itself, where it was given by name."""
         return material(self.material, "Body: material")
+
+
+class MassProperties(NamedTuple):
+    """What a rigid body is to dynamics.
+
+    Attributes:
+        mass: kg.
+        centre: (3,) centre of mass in the shape's axes, metres.
+        inertia: (3, 3) about the centre, along the shape's axes, kg m2.
+        note: what was assumed about a shape that is no closed surface; empty if nothing.
+    """
+
+    mass: float
+    centre: Array
+    inertia: Array
+    note: str = ""
+
+
+def mass_properties(shape: Shape, body: Body, name: str = "a body") -> MassProperties:
+    """Mass, centre and inertia of a shape with the density or the mass of a body.
+
+    A closed mesh counts as it is; of one that is not closed the convex pieces count, each whole, also where they
+    overlap.
+
+    Raises:
+        InputError: a shape without a finite volume, or a mass that is too small or too large.
+    """
+    unit, note = _of_density_one(shape, name)
+    density = body.density if body.mass is None else body.mass / unit.mass
+    mass = float(unit.mass * density)
+    MASS(mass, f"{name!r}: mass")
+    return MassProperties(mass, np.array(unit.lever), np.array(unit.inertia) * (mass / unit.mass), note)
+
+
+def _of_density_one(shape: Shape, name: str) -> tuple[pin.Inertia, str]:
+    if isinstance(shape, HalfSpace):
+        raise InputError(f"{name!r} is a half-space, which has no finite mass and cannot move; leave its body out")
+    if isinstance(shape, Box):
+        return pin.Inertia.FromBox(float(np.prod(shape.size)), *shape.size), ""
+    if isinstance(shape, Sphere):
+        return pin.Inertia.FromSphere(4.0 / 3.0 * np.pi * shape.radius**3, shape.radius), ""
+    if isinstance(shape, Ellipsoid):
+        axes = shape.semi_axes
+        return pin.Inertia.FromEllipsoid(4.0 / 3.0 * np.pi * float(np.prod(axes)), *axes), ""
+    if isinstance(shape, Capsule):
+        volume = np.pi * shape.radius**2 * (shape.length + 4.0 / 3.0 * shape.radius)
+        return pin.Inertia.FromCapsule(volume, shape.radius, shape.length), ""
+    if isinstance(shape, Cylinder):
+        volume = np.pi * shape.radius**2 * shape.length
+        return pin.Inertia.FromCylinder(volume, shape.radius, shape.length), ""
+    if isinstance(shape, Torus):
+        return _of_torus(shape), ""
+    if isinstance(shape, Compound):
+        made = [(at.act(found), note) for part, at in shape.parts for found, note in (_of_density_one(part, name),)]
+        return sum((found for found, _ in made), pin.Inertia.Zero()), next((note for _, note in made if note), "")
+    import trimesh
+
+    if isinstance(shape, Mesh):
+        mesh = trimesh.Trimesh(shape.vertices, shape.faces, process=True)
+        if mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0.0:
+            return _of_mesh(mesh), ""
+    elif isinstance(shape, Hull):
+        return _of_mesh(trimesh.convex.convex_hull(shape.points)), ""
+    total = pin.Inertia.Zero()
+    for piece in shape.pieces():
+        if not np.isfinite(piece.volume):
+            raise InputError(f"{name!r} has a piece without a finite volume and cannot move; leave its body out")
+        hull = trimesh.convex.convex_hull(np.array(piece.geometry.points()))
+        total = total + piece.placement.act(_of_mesh(hull))
+    return total, f"{name!r} is no closed mesh: its mass is that of its convex pieces"
+
+
+def _of_torus(shape: Torus) -> pin.Inertia:
+    """Of a ring with the radii R and r: I_z = m (R^2 + 3/4 r^2), I_x = I_y = m (R^2 / 2 + 5/8 r^2)."""
+    big, small = shape.radius**2, shape.tube**2
+    mass = 2.0 * np.pi**2 * shape.radius * small
+    moments = (0.5 * big + 0.625 * small, 0.5 * big + 0.625 * small, big + 0.75 * small)
+    return pin.Inertia(mass, np.zeros(3), mass * np.diag(moments))
+
+
+def _of_mesh(mesh: Any) -> pin.Inertia:
+    found = mesh.mass_properties
+    return pin.Inertia(float(found["mass"]), np.array(found["center_mass"]), np.array(found["inertia"]))

@@ -14,9 +14,8 @@ from wholebody.base.errors import InputError
 class Surface(NamedTuple):
     """What happens where two materials touch.
 
-    Attributes:
-        restitution: speed of separation as a share of the speed of approach, 0 to 1.
-        friction: greatest tangential force as a share of the normal one (Coulomb).
+    The restitution is the speed of separation as a share of the speed of approach, the friction the greatest tangential
+    force as a share of the normal one (Coulomb).
     """
 
     restitution: float
@@ -56,7 +55,6 @@ class Material:
             object.__setattr__(self, "others", _surface(self.others, f"material {self.name!r} against others"))
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Return the arguments that it is made from; a read-only mapping cannot be pickled."""
         return Material, (self.name, {other: tuple(pair) for other, pair in self.against.items()}, self.others)
 
 
@@ -86,12 +84,7 @@ DEFAULT = MATERIALS["wood"]
 
 
 def material(value: object, what: str) -> Material:
-    """A material, or one of table 1 by its name.
-
-    Raises:
-        InputError: neither.
-        UnknownNameError: table 1 has none of that name.
-    """
+    """A material, or one of table 1 by its name."""
     if isinstance(value, Material):
         return value
     if not isinstance(value, str):

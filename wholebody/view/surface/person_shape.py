@@ -73,8 +73,13 @@ class PersonShape:
         self.solids: tuple[Solid, ...] = spec.solids
         self.bind = {name: np.array(data.oMf[figure.frame_id(name)].homogeneous) for name in figure.segments}
         self._marks = {name: np.array(data.oMf[figure.frame_id(name)].translation) for name in figure.frames}
-        self._trunk = self._trunk_field()
-        self._limbs = {segment: self._limb_field(segment) for segment in self.bind if self._is_limb(segment)}
+        pieces = [
+            placed(piece_field(solid), self.bind[solid.segment]) for solid in self.solids if solid.segment in TRUNK
+        ]
+        hips, neck = self.bind["pelvis"][2, 3], self.bind["neck"][2, 3]
+        self._trunk = trunk(union(pieces), hips - 0.2, neck + 0.1, float(self.bind["upper_lumbar"][0, 3]))
+        parts = {"clavicle", "upper_arm", "forearm", "thigh", "shank"}
+        self._limbs = {name: self._limb_field(name) for name in self.bind if name.partition("_")[2] in parts}
 
     def garments(self) -> Iterator[Garment]:
         """Make the fields of all parts."""
@@ -90,16 +95,6 @@ class PersonShape:
         return np.asarray(self.bind[segment][:3, :3] @ np.asarray(point) + self.bind[segment][:3, 3])
 
     # ---- fields of segments
-
-    def _is_limb(self, segment: str) -> bool:
-        return segment.partition("_")[2] in ("clavicle", "upper_arm", "forearm", "thigh", "shank")
-
-    def _trunk_field(self) -> Field:
-        pieces = [
-            placed(piece_field(solid), self.bind[solid.segment]) for solid in self.solids if solid.segment in TRUNK
-        ]
-        hips, neck = self.bind["pelvis"][2, 3], self.bind["neck"][2, 3]
-        return trunk(union(pieces), hips - 0.2, neck + 0.1, float(self.bind["upper_lumbar"][0, 3]))
 
     def _limb_field(self, segment: str) -> Field:
         """Round cones through the balls of a segment's pieces, from joint to joint."""
@@ -161,7 +156,7 @@ class PersonShape:
             )
             if size.body.sex == "female":
                 chest = self.at("thorax", (0.0, 0.0, 0.0))
-                front = self._front(float(chest[2]) - 0.01 * scale)
+                front = self._trunk_ends(float(chest[2]) - 0.01 * scale)[1]
                 solids.append(
                     ellipsoid(
                         (front - 0.036 * scale, sign * 0.076 * scale, chest[2] - 0.012 * scale),
@@ -190,7 +185,7 @@ class PersonShape:
         hips = self.at("pelvis")
         solids = [self._trunk]
         for side, sign in SIDES:
-            back = self._back(float(hips[2]) - 0.01 * scale)
+            back = self._trunk_ends(float(hips[2]) - 0.01 * scale)[0]
             legs = [self._limbs[f"{side}_thigh"], self._limbs[f"{side}_shank"], self._calf(side, sign)]
             solids.append(union(legs, 0.03))
             solids.append(
@@ -309,14 +304,8 @@ class PersonShape:
         """Height of the trousers' upper edge."""
         return float(self.bind["lower_lumbar"][2, 3]) + 0.005 * self.size.stature
 
-    def _front(self, height: float) -> float:
-        """X of the trunk's front at a height."""
-        return float(self._trunk_ends(height)[1])
-
-    def _back(self, height: float) -> float:
-        return float(self._trunk_ends(height)[0])
-
     def _trunk_ends(self, height: float) -> tuple[float, float]:
+        """X of the trunk's back and front at a height."""
         inside = RAYS[self._trunk(np.column_stack([RAYS, np.zeros_like(RAYS), np.full_like(RAYS, height)])) < 0.0]
         return float(inside[0]), float(inside[-1])
 

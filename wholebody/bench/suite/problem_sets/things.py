@@ -12,8 +12,8 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
+from wholebody.geometry.pieces import swept_points
 from wholebody.geometry.placement import placement
-from wholebody.geometry.swept_points import swept_points
 
 KINDS = ("box", "sphere", "capsule", "hull")
 

@@ -1,0 +1,145 @@
+"""Which joints of a skeleton are which parts of a body by its structure, where their names do not tell.
+
+A body has two pairs of limbs: siblings of one length, of which two neighbouring bones are the longest. The pair of the
+longer ones are legs. What is between the pairs is the trunk; what goes on beyond the arms is the neck. Left is known by
+letters in the names, else by the feet, which point forward, and by the knees, which bend forward.
+"""
+
+from __future__ import annotations
+
+import re
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from wholebody.base.arrays import Array, Indices
+from wholebody.motion.skeleton import UNITS, SkeletonMotion, longest_way
+
+SHORT = 0.01  # of the skeleton's longest way: a bone that is shorter has no direction
+
+
+class _Limb(NamedTuple):
+    """Joints of a limb from the trunk outwards, and the place among them from which its two longest bones go on."""
+
+    joints: list[int]
+    first: int
+    bones: tuple[float, float]
+
+    @property
+    def length(self) -> float:
+        return sum(self.bones)
+
+
+def limb_pairs(parents: Indices, offsets: Array) -> tuple[tuple[int, _Limb, _Limb], ...]:
+    """Legs and arms: the joint from which the pair goes on, and both limbs; empty where the skeleton is no person's."""
+    lengths = np.linalg.norm(offsets, axis=1)
+    children: list[list[int]] = [[] for _ in parents]
+    reach = lengths.copy()
+    for joint in range(len(parents) - 1, 0, -1):
+        children[parents[joint]].append(joint)
+        reach[parents[joint]] = max(reach[parents[joint]], lengths[parents[joint]] + reach[joint])
+    found = []
+    for joint, below in enumerate(children):
+        limbs = [limb for each in below if (limb := _limb(each, children, lengths, reach)) is not None]
+        alike = [
+            (float(np.abs(np.log(np.divide(one.bones, other.bones))).max()), one, other)
+            for one, other in combinations(limbs, 2)
+            if len(one.joints) == len(other.joints)
+        ]
+        alike = [pair for pair in alike if pair[0] < 0.15]
+        if alike:
+            _, one, other = min(alike, key=lambda each: each[0])
+            found.append((joint, one, other))
+    found = sorted(found, key=lambda pair: pair[1].length + pair[2].length, reverse=True)[:2]
+    if len(found) < 2:
+        return ()
+    ratios = [
+        found[0][1].length / found[1][1].length,
+        *(max(limb.bones) / min(limb.bones) for _, *pair in found for limb in pair),
+    ]
+    inside = any(joint in limb.joints for joint, *_ in found for _, *pair in found for limb in pair)
+    return () if inside or ratios[0] > 2.5 or max(ratios[1:]) > 2.0 else tuple(found)
+
+
+def _limb(start: int, children: list[list[int]], lengths: Array, reach: Array) -> _Limb | None:
+    """The limb that goes on from a joint; None where two neighbouring bones are not its longest."""
+    joints = [start]
+    while children[joints[-1]]:
+        joints.append(max(children[joints[-1]], key=lambda child: float(reach[child])))
+    if len(joints) < 3:
+        return None
+    shorter = [min(lengths[joints[k + 1]], lengths[joints[k + 2]]) for k in range(len(joints) - 2)]
+    # of several the outermost that does not end the limb: a clavicle may be longer than a forearm, and hands follow
+    long = np.flatnonzero(np.array(shorter) >= 0.67 * max(shorter)).tolist()
+    first = next((k for k in reversed(long) if k + 3 < len(joints)), long[-1])
+    bones = float(lengths[joints[first + 1]]), float(lengths[joints[first + 2]])
+    return _Limb(joints, first, bones) if sum(bones) > 0.4 * reach[start] else None
+
+
+def built(motion: SkeletonMotion) -> dict[str, str]:
+    """Role to joint of a skeleton by its structure; empty where it is no person's."""
+    pairs = limb_pairs(motion.parents, motion.offsets)
+    if not pairs:
+        return {}
+    places = motion.positions[:: max(1, len(motion) // 50)]
+    (hips, *legs), (chest, *arms) = pairs
+    found = {"pelvis": hips} if hips == chest else {"pelvis": hips, "chest": chest}
+    for pair, parts in ((legs, ("hip", "knee", "ankle", "toe")), (arms, ("shoulder", "elbow", "wrist", "hand"))):
+        for side, limb in zip(("left", "right"), _sided(motion, places, pair, legs), strict=True):
+            found |= {f"{side}_{part}": joint for part, joint in zip(parts, _parts(motion, limb), strict=False)}
+    taken = {joint for limb in (*legs, *arms) for joint in limb.joints}
+    above = [k for k in range(len(motion.names)) if motion.parents[k] == chest and k not in taken]
+    if chest != hips and above:
+        neck = [max(above, key=lambda k: _reach(motion, k))]
+        while below := [k for k in range(len(motion.names)) if motion.parents[k] == neck[-1]]:
+            neck.append(max(below, key=lambda k: _reach(motion, k)))
+        turning = neck[:-1] or neck  # the last one is the end of the head
+        found |= {"head": turning[-1]} | ({"neck": turning[0]} if len(turning) > 1 else {})
+    return {role: motion.names[joint] for role, joint in found.items()}
+
+
+def _reach(motion: SkeletonMotion, joint: int) -> float:
+    return float(np.linalg.norm(motion.offsets[joint]))
+
+
+def _parts(motion: SkeletonMotion, limb: _Limb) -> list[int]:
+    """The three ends of the two longest bones, and the next joint that is apart."""
+    beyond = limb.joints[limb.first + 3 :]
+    size = SHORT * motion.length()
+    return [*limb.joints[limb.first : limb.first + 3], *[k for k in beyond if _reach(motion, k) > size][:1]]
+
+
+def _sided(motion: SkeletonMotion, places: Array, pair: list[_Limb], legs: list[_Limb]) -> list[_Limb]:
+    """The left and the right limb of a pair."""
+    signs = [sum(_letter(motion.names[joint]) for joint in limb.joints) for limb in pair]
+    if signs[0] * signs[1] < 0:
+        return pair if signs[0] > 0 else pair[::-1]
+    left = np.zeros((len(places), 3))
+    for limb in legs:
+        hip, knee, ankle, *toe = (places[:, joint] for joint in _parts(motion, limb))
+        left += np.cross(hip - ankle, toe[0] - ankle if toe else 2.0 * knee - hip - ankle)
+    apart = places[:, pair[0].joints[pair[0].first]] - places[:, pair[1].joints[pair[1].first]]
+    return pair if float((left * apart).sum()) >= 0.0 else pair[::-1]
+
+
+def _letter(name: str) -> int:
+    """1 for a name of the left side, -1 for one of the right, 0 for neither."""
+    plain = re.sub(r"^.*[:|]", "", name)
+    side = re.search(r"left|right", plain, re.IGNORECASE) or re.search(
+        r"(?:^|(?<=[^A-Za-z]))([LRlr])(?=[^a-z]|$)|(?<=[a-z])([LR])$", plain
+    )
+    return 0 if side is None else 1 if side[0].lower().startswith("l") else -1
+
+
+def recognised_unit(parents: Indices, offsets: Array) -> str:
+    """The unit of `UNITS` in which a skeleton of a person's structure is nearest to a person's size.
+
+    Of other skeletons the size says little: they are in metres up to 3, in centimetres up to 300, else in millimetres.
+    """
+    size = max(longest_way(parents, offsets), 1e-12)
+    if limb_pairs(parents, offsets):
+        return min(
+            UNITS, key=lambda unit: abs(np.log(size * UNITS[unit] / 2.2))
+        )  # m, along the bones from foot to head
+    return "metres" if size <= 3.0 else "centimetres" if size <= 300.0 else "millimetres"
