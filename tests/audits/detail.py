@@ -13,17 +13,17 @@ from wholebody.base.errors import WholebodyError
 from wholebody.bench.measure.scaling import TIP, chain, task
 from wholebody.bench.rows import Figure, Row, measured_ms
 from wholebody.bench.suite.problem_sets.registry import SETS
-from wholebody.methods.simplification.simplify import GROWTH, Parts, leave_out
+from wholebody.methods.simplification.simplify import Parts, leave_out
 from wholebody.problem import Problem
 
 SHOWN = "solved", "pairs", "a solve ms", "judgement ms", "inside", "worst deepest mm", "worst effort above %"
 """Figures of a level of modelling that the report shows."""
 
 LEVELS: dict[str, Parts] = {
-    "all": Parts(joints=False, pairs=False, growth=0.0),
-    "active joints": Parts(joints=True, pairs=False, growth=0.0),
-    "pairs in reach": Parts(joints=False, pairs=True, growth=0.0),
-    "simplified": Parts(joints=True, pairs=True, growth=GROWTH),
+    "all": Parts(joints=False, pairs=False),
+    "active joints": Parts(joints=True, pairs=False),
+    "pairs in reach": Parts(joints=False, pairs=True),
+    "simplified": Parts(joints=True, pairs=True),
 }
 
 

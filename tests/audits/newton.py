@@ -31,10 +31,10 @@ from wholebody.base.errors import WholebodyError
 from wholebody.bench.report import render
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
-from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.linear_algebra import LinearSystem, Pattern, linear_algebra
 from wholebody.methods.newton.settings import STEPS
 from wholebody.methods.newton.system import ActiveSystem
+from wholebody.methods.newton.terms import FigureSystem
 from wholebody.methods.newton.tracking import NewtonTracker
 
 SIZES = (10, 30, 100, 300, 1000)

@@ -52,7 +52,7 @@ def test_what_is_absent_but_not_needed_is_no_fault_and_says_how_it_is_had(fake: 
     assert mends == {
         "mujoco": "pip install 'wholebody[compare]'",
         "piqp": "pip install 'wholebody[solvers]'",
-        "chromium": "apt-get install chromium",
+        "chromium": "apt-get install chromium-headless-shell",
     }
 
 

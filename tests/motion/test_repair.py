@@ -43,7 +43,7 @@ def test_a_limb_that_goes_right_through_is_kept_on_one_side_before_rows_are_trie
     planar_arm: Callable[..., Figure], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """No rows free it: twenty programs were solved in vain."""
-    monkeypatch.setattr("wholebody.motion.repair.WindowProgram", None)
+    monkeypatch.setattr("wholebody.motion.repair.ClipRun", None)
     shoulder = np.concatenate([np.linspace(-0.9, -0.3, 20), np.linspace(0.3, 0.9, 20)])
     figure = planar_arm((0.5, 0.5), radius=0.03)
     clip, scene = wb.Clip(figure, np.stack([shoulder, np.full(40, 0.1)], axis=1), DT), wb.Scene(figure)

@@ -177,3 +177,11 @@ def test_a_gif_keeps_the_colours_of_what_is_small() -> None:
     shown = np.asarray(made.convert("RGB")).astype(int)
     assert np.abs(shown[50:70, 70:90] - face).mean() < 4.0
     assert np.abs(shown - picture).mean() < 4.0
+
+
+def test_the_shell_draws_where_it_is_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("WHOLEBODY_CHROMIUM", raising=False)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    for name in ("google-chrome", "chromium", "chromium-headless-shell"):
+        (tmp_path / name).touch(0o755)
+        assert find_chromium() == str(tmp_path / name)

@@ -76,11 +76,7 @@ class AllPairs:
         self.least = float(self._found[:, 0].min(initial=np.inf))
 
     def ask(self, within: Array | float) -> None:
-        """Let `distance` be exact for all pairs that are nearer than `within` metres, (pairs,) or one for all.
-
-        Raises:
-            InputError: a distance is not a number.
-        """
+        """Let `distance` be exact for all pairs that are nearer than `within` metres, (pairs,) or one for all."""
         if self._bounds is None:
             return
         number = self._below(within)

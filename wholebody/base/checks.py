@@ -169,11 +169,7 @@ def choice(value: object, options: Collection[str], what: str) -> str:
 def known(
     value: object, names: Collection[str], kind: str, where: str = "", offered: Collection[str] | None = None
 ) -> str:
-    """A known name of a kind of object such as "frame", in a place; only those `offered` are suggested, by default all.
-
-    Raises:
-        UnknownNameError: the name is unknown; it is a text.
-    """
+    """A known name of a kind of object such as "frame"; an UnknownNameError offers all names, or those `offered`."""
     if not isinstance(value, str):
         raise InputError(f"{f'{where}: ' if where else ''}{shown(value)} is not the name of {a(kind)}; give a text")
     if value not in names:

@@ -69,11 +69,7 @@ def read_text(path: str | PathLike[str], kind: str = "file", largest: int = LARG
 
 
 def read_foreign_text(path: str | PathLike[str], kind: str = "file", largest: int = LARGEST_TEXT) -> str:
-    """Read a text of another program: UTF-8, UTF-16 with its mark, or else Latin-1, without an end mark of DOS.
-
-    Raises:
-        FileFormatError: as for `read_bytes`, or the text in UTF-16 is cut.
-    """
+    """A text of another program: UTF-8, UTF-16 with its mark, or else Latin-1, without an end mark of DOS."""
     data = read_bytes(path, kind, largest)
     try:
         if data.startswith((b"\xff\xfe", b"\xfe\xff")):
@@ -92,11 +88,7 @@ def packaged_table(path: Path) -> tuple[dict[str, str], ...]:
 
 
 def parsed_toml(text: str, name: str) -> dict[str, Any]:
-    """What a text in TOML says; `name` is that of the file, for messages.
-
-    Raises:
-        FileFormatError: it is not TOML, or has keys, tables or numbers that a reader of TOML does not bear.
-    """
+    """What a text in TOML says; a FileFormatError names the file if it says nothing, or what a reader does not bear."""
     if sys.version_info >= (3, 11):
         import tomllib
     else:
@@ -226,11 +218,7 @@ def write(path: str | PathLike[str], content: str | bytes) -> Path:
 
 
 def check_writable(path: Path) -> Path:
-    """The path of a file whose folder is writable; call it before long work.
-
-    Raises:
-        InputError: the folder is missing or not writable.
-    """
+    """The path of a file, or an InputError if its folder is missing or not writable; call it before long work."""
     if not is_folder(path.parent):
         raise _unwritable(path, FileNotFoundError())
     if not os.access(path.parent, os.W_OK | os.X_OK):

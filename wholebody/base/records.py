@@ -13,9 +13,5 @@ def as_dict(record: tuple[Any, ...]) -> dict[str, Any]:
 
 
 def with_values(record: Record, **values: Any) -> Record:
-    """A copy of a record with other values of some fields.
-
-    Raises:
-        TypeError: the record has no such field.
-    """
+    """A copy of a record with other values of some fields; a TypeError if it has none of that name."""
     return type(record)(**{**as_dict(record), **values})

@@ -25,7 +25,7 @@ FLAGS = {
 Judge the posture of a result.json that `wholebody pose` wrote: goals, overlaps, limits, constraints. With --ergonomics
 print RULA, REBA, OWAS and the torques against published strength too; --json prints all of it.""",
     option("result", type=Path, metavar="RESULT.json", help="the result"),
-    option("--ergonomics", action="store_true", help="score the ergonomics of a person"),
+    flag("--ergonomics", "score the ergonomics of a person"),
     option("--load", type=float, default=0.0, metavar="KG", help="mass in both hands (default: 0)"),
     option("--coupling", default="good", metavar="WORD", help="grip: good, fair, poor, unacceptable"),
     *(flag(f"--{name.replace('_', '-')}", says) for name, says in FLAGS.items()),
@@ -36,7 +36,7 @@ print RULA, REBA, OWAS and the torques against published strength too; --json pr
     ),
     option("--sex", default="male", metavar="SEX", help="of the strength: male or female (default: male)"),
     option("--percentile", type=float, default=50.0, metavar="P", help="of the strength, 5 to 95 (default: 50)"),
-    option("--json", action="store_true", help="print JSON instead of tables"),
+    flag("--json", "print JSON instead of tables"),
     epilog="""\
 examples:
   wholebody assess out/shelf/result.json --ergonomics

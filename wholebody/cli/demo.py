@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from wholebody.cli.command import command, option
+from wholebody.cli.command import command, flag, option
 
 
 @command(
@@ -15,7 +15,7 @@ from wholebody.cli.command import command, option
 Pose a packaged task (by default a person who reaches between the boards of a shelf), and print where the pictures are.
 You can copy and change the task file.""",
     option("name", nargs="?", default="shelf", metavar="NAME", help="which task (default: shelf)"),
-    option("--list", action="store_true", help="list the tasks"),
+    flag("--list", "list the tasks"),
     option("--out", type=Path, default=Path("demo"), metavar="DIR", help="folder (default: demo)"),
 )
 def run(arguments: argparse.Namespace) -> int:

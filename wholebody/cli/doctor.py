@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from wholebody.cli.command import command, option
+from wholebody.cli.command import command, flag
 
 _MARKS = {"works": "[green]works[/]", "absent": "[dim]absent[/]", "broken": "[red]broken[/]"}
 
@@ -16,11 +16,7 @@ _MARKS = {"works": "[green]works[/]", "absent": "[dim]absent[/]", "broken": "[re
 Print the versions of all packages, use every method and QP solver once, and name wrong combinations of versions and
 wrong search paths with their repairs. Print the folder and size of the cache of mesh pieces. The exit code is 1 if
 something is wrong; an absent optional package is no fault.""",
-    option(
-        "--clear-cache",
-        action="store_true",
-        help="empty the cache of mesh pieces, and end",
-    ),
+    flag("--clear-cache", "empty the cache of mesh pieces, and end"),
 )
 def run(arguments: argparse.Namespace) -> int:
     """Examine and print; 1 if there are faults."""

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.command import command, option
+from wholebody.cli.command import command, flag, option
 from wholebody.methods import METHODS
 
 if TYPE_CHECKING:
@@ -28,8 +28,8 @@ docs/taskfile.md lists everything that a task file can contain.""",
     option("task", type=Path, metavar="TASK.toml", help="the task file"),
     option("--method", metavar="NAME", help=f"method, in place of the file's: {', '.join(METHODS)}"),
     option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-TASK)"),
-    option("--json", action="store_true", help="print the result as JSON instead of tables; no picture"),
-    option("--no-picture", action="store_true", help="do not draw scene.png, which takes seconds"),
+    flag("--json", "print the result as JSON instead of tables; no picture"),
+    flag("--no-picture", "do not draw scene.png, which takes seconds"),
     epilog="""\
 examples:
   wholebody pose shelf.toml

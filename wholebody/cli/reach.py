@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from wholebody.cli.arguments import JOINED
-from wholebody.cli.command import command, option
+from wholebody.cli.command import command, flag, option
 
 
 @command(
@@ -27,7 +27,7 @@ goals, and write into a folder:
     option("--step", default="0.1", metavar="M", help="metres between places, or X,Y,Z (default: 0.1)"),
     option("--jobs", type=int, default=1, metavar="N", help="processes (default: 1)"),
     option("--cluster", metavar="ADDRESS", help="dask scheduler that runs the searches"),
-    option("--goals", action="store_true", help="meet the task's goals too at every place"),
+    flag("--goals", "meet the task's goals too at every place"),
     option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-TASK)"),
     epilog="""\
 examples:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wholebody.cli.arguments import add_person, person_options
-from wholebody.cli.command import command, option
+from wholebody.cli.command import command, flag, option
 
 if TYPE_CHECKING:
     import numpy as np
@@ -33,7 +33,7 @@ Show in a browser. The command waits for the first tab, and ends when the last o
     option("what", metavar="FIGURE|TASK|RESULT", help="what to show"),
     add_person,
     option("--posture", metavar="NAME", help="name of a posture of the figure"),
-    option("--pieces", action="store_true", help="draw the pieces that contacts are measured with"),
+    flag("--pieces", "draw the pieces that contacts are measured with"),
     option("--save", type=Path, metavar="FILE", help="write FILE.html, FILE.png or FILE.glb (glTF); open no browser"),
     option("--port", type=int, default=0, metavar="N", help="port of the live page (default: a free one from 7000)"),
     option(

@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from wholebody.cli.command import command, option
+from wholebody.cli.command import command, flag, option
 
 
 @command(
@@ -21,7 +21,7 @@ Solve the task of a study file for each person, with each target, in each layout
     option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-FILE)"),
     option("--jobs", type=int, default=1, metavar="N", help="cases at a time (default: 1)"),
     option("--cluster", metavar="ADDRESS", help="dask scheduler that runs the cases"),
-    option("--parquet", action="store_true", help="write cases.parquet too (needs pyarrow)"),
+    flag("--parquet", "write cases.parquet too (needs pyarrow)"),
     epilog="""\
 a study file:
   task = "shelf.toml"                     # relative to the study file

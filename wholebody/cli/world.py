@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wholebody.cli.arguments import check_overlaps, scene_names, scene_options
-from wholebody.cli.command import command, option
+from wholebody.cli.command import command, flag
 
 if TYPE_CHECKING:
     from wholebody.bench.rows import Row
@@ -29,7 +29,7 @@ without a network).""",
         "qp or ccd (default: qp)",
         "out/world",
     ),
-    option("--picture", action="store_true", help="draw five moments too, by a headless Chromium"),
+    flag("--picture", "draw five moments too, by a headless Chromium"),
     epilog="""\
 examples:
   wholebody world --list

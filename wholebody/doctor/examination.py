@@ -18,7 +18,7 @@ SOLVERS = {"osqp": "osqp", "daqp": "daqp", "quadprog": "quadprog", "proxqp": "pr
 """QP solvers: name -> the distribution that provides it."""
 
 TOOLS = {
-    "chromium": ("draws pictures and movies; scenes as HTML need none", "apt-get install chromium"),
+    "chromium": ("draws pictures and movies; scenes as HTML need none", "apt-get install chromium-headless-shell"),
     "ffmpeg": ("writes MP4; GIF needs none", "apt-get install ffmpeg"),
 }
 """Programs outside Python: name -> its purpose, and its installation on Debian and Ubuntu."""

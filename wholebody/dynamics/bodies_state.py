@@ -12,14 +12,7 @@ from wholebody.scene.scene import Scene
 
 
 class BodiesState:
-    """Positions and velocities of all bodies.
-
-    Attributes:
-        pieces: the bodies and their pieces.
-        bodies: where they are, as the loops take them.
-        velocity: (n, 3) view of the velocities of the centres, m/s.
-        spin: (n, 3) view of the angular velocities, rad/s.
-    """
+    """Positions and velocities of all bodies; `velocity` [m/s] and `spin` [rad/s] (n, 3) are views of the twists."""
 
     def __init__(self, scene: Scene, pieces: Pieces) -> None:
         """Put all bodies where the scene has them, with the velocities of their `wb.Body`."""

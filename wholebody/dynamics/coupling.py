@@ -51,9 +51,6 @@ class Spring(Checked):
 
         With a = R / 2m and s^2 = a^2 - K / m it is exp(-a t) [[C + a S, S], [-K / m S, C - a S]], C = cosh(s t) and
         S = sinh(s t) / s, or cos and sin where s^2 is negative.
-
-        Raises:
-            InputError: the time is not within 1e-6 and 1e6 s.
         """
         time = number(time, "time", *TIME_STEP, "s")
         rate, stiff = 0.5 * self.damping / self.mass, self.stiffness / self.mass
@@ -73,34 +70,17 @@ class Spring(Checked):
 
 
 class Coupling:
-    """The driven posture of one figure on its spring.
-
-    Attributes:
-        spring: its constants.
-        velocity: (nv,) of the driven posture [rad/s, m/s].
-    """
+    """The driven posture of one figure on its spring, with its velocity (nv,) [rad/s, m/s]."""
 
     def __init__(self, model: pin.Model, q: Array, spring: Spring | None = None) -> None:
-        """Begin at rest, at the posture q (nq,), which is tracked too.
-
-        Raises:
-            InputError: q has another shape, or a value that is not finite.
-        """
+        """Begin at rest, at the posture q (nq,), which is tracked too."""
         self.spring = Spring() if spring is None else spring
         self._model = model
         self._shown = self._tracked = posture(q, model.nq)
         self.velocity: Array = np.zeros(model.nv)
 
     def toward(self, tracked: Array, dt: float) -> Array:
-        """The posture (nq,) to which the spring would bring the driven one in a frame of `dt` seconds, by itself.
-
-        Args:
-            tracked: (nq,) where the tracker is at the end of the frame.
-            dt: seconds.
-
-        Raises:
-            InputError: tracked is no posture of the figure, or dt is not within 1e-6 and 1e6 s.
-        """
+        """The posture (nq,) to which the spring brings the driven one in a frame, by itself; tracked is its end."""
         dt, model = time_step(dt, "dt"), self._model
         tracked = posture(tracked, model.nq, "tracked")
         steady = pin.difference(model, self._tracked, tracked) / dt
@@ -130,15 +110,7 @@ class PushedContacts:
     def __init__(
         self, engine: RigidBodies, state: State, table: PairTable, near: Contacts, bodies: Mapping[int, str]
     ) -> None:
-        """Gather them.
-
-        Args:
-            engine: with the things.
-            state: of the figure where it was stopped.
-            table: pieces and pairs of the scene.
-            near: pairs that touch there.
-            bodies: piece to the thing it is part of, of things that move by themselves.
-        """
+        """Gather pairs that touch where the figure was stopped; `bodies` are things by the pieces that move."""
         self._engine, self._state = engine, state
         self.rows: list[tuple[int, str, int, Array, Array]] = []
         """Joint, thing, piece of the figure or what it carries, point (3,), normal (3,) towards the thing."""
@@ -150,15 +122,7 @@ class PushedContacts:
                     self.rows.append((int(table.joint[own]), bodies[other], own, 0.5 * (a + b), out))
 
     def push(self, velocity: Array, surfaces: Mapping[tuple[int, str], Surface]) -> dict[str, Array]:
-        """Give the things the impulses of a figure that wants to move.
-
-        Args:
-            velocity: (nv,) of the figure.
-            surfaces: piece and thing to restitution and friction.
-
-        Returns:
-            Thing to its impulse (3,), N s.
-        """
+        """Give the things the impulses (3,) of a figure that wants to move with a velocity (nv,); by thing, N s."""
         engine, state = self._engine, self._state
         twists = (state.support * state.spread(velocity)) @ state.columns
         hands = [twists[joint, :3] + pin.skew(twists[joint, 3:]) @ point for joint, _, _, point, _ in self.rows]

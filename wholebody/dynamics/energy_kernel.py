@@ -125,16 +125,8 @@ def settle(
 ) -> None:
     """Scale the velocities of islands with joints, and of those that something moved pushes, after a step.
 
-    Afterwards they have no more energy than before the step and the work on them, and joints without contacts no less.
-
-    Args:
-        points: (m, 2) bodies of all points, those of joints after the `contacts` of contacts.
-        impulse: (m, 3) of the program.
-        work: (m,) of what is moved at each point, joules.
-        contacts: how many points are those of contacts.
-        bodies: after the step; their velocities are changed in place.
-        before: positions (n, 3), rotations (n, 3, 3) and velocities (n, 6) before it.
-        gravity: (3,) m/s2.
+    Afterwards they have no more energy than before the step and the work (m,) on them, and joints without contacts no
+    less. Of the points the first `contacts` are contacts; `before` are positions, rotations and velocities.
     """
     root, kind, pushed = _islands(points, impulse, contacts, bodies)
     count, moving = len(root), bodies.moving

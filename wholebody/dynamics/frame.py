@@ -16,12 +16,10 @@ from wholebody.geometry.placement import placement
 
 
 class Event(NamedTuple):
-    """One impact.
+    """One impact of A and B, which have names.
 
     Attributes:
         time: since the start of the frame, seconds.
-        first: name of body A.
-        second: name of body B.
         point: (3,) metres.
         normal: (3,) unit normal from A to B.
         speed: of approach, m/s.
@@ -70,17 +68,10 @@ class EngineFrame(NamedTuple):
 
 @dataclass
 class FrameRecord:
-    """A frame while it is being made; attributes as in `EngineFrame`.
+    """A frame while it is being made; attributes as in `EngineFrame`."""
 
-    Attributes:
-        stops: early ends of steps that are left.
-        time: since the start of the frame, seconds.
-        impulse: (n, 3) of each body.
-        given_up: steps that were halved as often as they may be, and still led too deep.
-    """
-
-    stops: int
-    impulse: Array
+    stops: int  # early ends of steps that are left
+    impulse: Array  # (n, 3) of each body
     time: float = 0.0
     events: list[Event] = field(default_factory=list)
     contacts: int = 0
@@ -89,7 +80,7 @@ class FrameRecord:
     signorini: float = 0.0
     coulomb: float = 0.0
     steps: int = 0
-    given_up: int = 0
+    given_up: int = 0  # steps that were halved as often as they may be, and still led too deep
 
     def finished(self, names: tuple[str, ...], energy: float, sleeping: int) -> EngineFrame:
         """The frame, with the names of the bodies."""
@@ -101,11 +92,7 @@ class FrameRecord:
 
 
 def given_placements(kinematic: object) -> dict[str, tuple[pin.SE3, pin.SE3]]:
-    """The placements before and after of what is moved in a frame, checked.
-
-    Raises:
-        InputError: it is no dictionary of two placements each.
-    """
+    """The placements before and after of what is moved in a frame, checked."""
     if kinematic is None:
         return {}
     given = checks.instance(kinematic, Mapping, "kinematic", "give {name: (placement before, after)}")

@@ -28,20 +28,10 @@ def resolve(
     touching: Indices, pair: Indices, rows: Rows, restitution: Array, laws: Laws, jointed: Mask, twist: Array,
     events: Array,
 ) -> tuple[int, bool]:  # fmt: skip
-    """Resolve impacts until none is left.
+    """Resolve impacts of points (k,) that touch until none is left; how many there were, and whether none is left.
 
-    Args:
-        touching: (k,) contact points that touch.
-        pair: (m - j,) pair of each contact point.
-        rows: of all points.
-        restitution: (m - j,).
-        laws: of all points; its targets are room.
-        jointed: (n,) bodies that have joints.
-        twist: (n, 6) changed in place.
-        events: (most, 5) room for the point, the approach [m/s] and the impulse [N s] along the world's axes.
-
-    Returns:
-        How many events there were, and whether all are resolved.
+    Each of the events (most, 5) is the point, the approach [m/s] and the impulse [N s] along the world's axes. The
+    targets of the laws are room, and the velocities change in place.
     """
     count = len(touching) + len(laws.hold)
     chosen, before, impulse = np.empty(count, dtype=np.intp), np.zeros((count, 3)), np.zeros((len(rows.bodies), 3))

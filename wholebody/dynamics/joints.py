@@ -20,11 +20,7 @@ from wholebody.scene.scene import Scene
 
 
 class Joints:
-    """All joints of a scene.
-
-    Attributes:
-        points: of all joints.
-    """
+    """All joints of a scene, as points."""
 
     def __init__(self, scene: Scene, pieces: Pieces) -> None:
         """Join what the scene's bodies say, where they stand."""
@@ -80,13 +76,7 @@ class Joints:
         return found
 
     def project_velocities(self, state: BodiesState, twist: Array, movable: Mask) -> None:
-        """Change velocities (n, 6) by impulses of the joints, so that all joint points stay together.
-
-        Args:
-            state: where the bodies are.
-            twist: (n, 6) changed in place.
-            movable: (n,) the bodies that joints move.
-        """
+        """Change velocities (n, 6) by impulses of the joints on movable bodies, so that all points stay together."""
         count = len(self)
         if count:
             rows = Rows.room(self.points.bodies, count, movable)

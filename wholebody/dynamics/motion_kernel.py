@@ -16,29 +16,17 @@ from wholebody.base.compiled import compiled
 
 
 class Bodies(NamedTuple):
-    """The bodies of a scene.
+    """The bodies of a scene."""
 
-    Attributes:
-        mass: (n,) kg; infinite where nothing is known.
-        inertia: (n, 3, 3) about the centre of mass, along the body's axes.
-        inverse: (n, 3, 3) inverses of these.
-        position: (n, 3) centres of mass.
-        rotation: (n, 3, 3).
-        twist: (n, 6) velocities of the centres and angular velocities along the world's axes, m/s and rad/s.
-        moving: (n,) bodies that move by themselves, and do not sleep.
-        given: (n,) bodies whose motion is given.
-        jointed: (n,) bodies that have joints.
-    """
-
-    mass: Array
-    inertia: Array
-    inverse: Array
-    position: Array
-    rotation: Array
-    twist: Array
-    moving: Mask
-    given: Mask
-    jointed: Mask
+    mass: Array  # (n,) kg; infinite where nothing is known
+    inertia: Array  # (n, 3, 3) about the centre of mass, along the body's axes
+    inverse: Array  # (n, 3, 3) inverses of these
+    position: Array  # (n, 3) centres of mass
+    rotation: Array  # (n, 3, 3)
+    twist: Array  # (n, 6) velocities of the centres and angular velocities along the world's axes, m/s and rad/s
+    moving: Mask  # (n,) bodies that move by themselves, and do not sleep
+    given: Mask  # (n,) bodies whose motion is given
+    jointed: Mask  # (n,) bodies that have joints
 
 
 @compiled(inner=True)
@@ -91,15 +79,7 @@ def angular_momentum(rotation: Array, inertia: Array, spin: Array, result: Array
 
 @compiled()
 def turn_freely(rotation: Array, inertia: Array, inverse: Array, spin: Array, time: float) -> None:
-    """Turn a free body for a time: `rotation` (3, 3) and `spin` (3,) are changed in place.
-
-    Args:
-        rotation: of the body.
-        inertia: (3, 3) in the body.
-        inverse: of the inertia.
-        spin: angular velocity in the world, rad/s.
-        time: seconds.
-    """
+    """Turn a free body for a time [s]: rotation (3, 3) and angular velocity (3,) in the world change in place."""
     speed = np.sqrt(spin[0] ** 2 + spin[1] ** 2 + spin[2] ** 2)
     if speed < 1e-12:  # rad/s: no motion, whose axis would be 0 / 0
         return
@@ -130,10 +110,10 @@ def turn_freely(rotation: Array, inertia: Array, inverse: Array, spin: Array, ti
             for k in range(3):
                 turn[k] = 0.5 * change / square * pull[k]
             _turned(turn, now, middle)
-            _write(middle, now)
+            now[:] = middle
             _spin(now, inverse, momentum, spin)
         _orthonormal(now)
-        _write(now, rotation)
+        rotation[:] = now
 
 
 @compiled(inner=True)
@@ -148,13 +128,6 @@ def invert(matrix: Array, result: Array) -> None:
             i, j = (column + 1) % 3, (column + 2) % 3
             k, m = (row + 1) % 3, (row + 2) % 3
             result[row, column] = (matrix[i, k] * matrix[j, m] - matrix[i, m] * matrix[j, k]) / determinant
-
-
-@compiled(inner=True)
-def _write(rotation: Array, result: Array) -> None:
-    for i in range(3):
-        for j in range(3):
-            result[i, j] = rotation[i, j]
 
 
 @compiled(inner=True)
@@ -176,14 +149,10 @@ def _orthonormal(rotation: Array) -> None:
 
 @compiled()
 def drift(bodies: Bodies, pushed: Mask, gravity: Array, time: float) -> None:
-    """Move all bodies for a time; positions, rotations and angular velocities change in place.
+    """Move all bodies for a time [s]: positions, rotations and angular velocities change in place.
 
-    Args:
-        bodies: with the velocities at the end of the time.
-        pushed: (n,) bodies on which a contact acts: they move with the velocity at the end, the others with the mean
-            of those at the start and at the end.
-        gravity: (3,) m/s2.
-        time: seconds.
+    Bodies on which a contact acts are pushed (n,): they move with the velocity at the end, the others with the mean of
+    those at the start and at the end.
     """
     now, turn = np.empty((3, 3)), np.empty(3)
     for b in range(len(bodies.mass)):
@@ -198,7 +167,7 @@ def drift(bodies: Bodies, pushed: Mask, gravity: Array, time: float) -> None:
             for k in range(3):
                 turn[k] = time * bodies.twist[b, 3 + k]
             _turned(turn, bodies.rotation[b], now)
-            _write(now, bodies.rotation[b])
+            bodies.rotation[b] = now
 
 
 @compiled()
@@ -210,23 +179,14 @@ def displace(bodies: Bodies, way: Array) -> None:
             for k in range(3):
                 bodies.position[b, k] += way[b, k]
             _turned(way[b, 3:], bodies.rotation[b], now)
-            _write(now, bodies.rotation[b])
+            bodies.rotation[b] = now
 
 
 @compiled()
 def place_pieces(
     position: Array, rotation: Array, centre: Array, body: Indices, local: Array, placement: Array
 ) -> None:
-    """Write where all pieces are.
-
-    Args:
-        position: (n, 3) centres of mass.
-        rotation: (n, 3, 3) of the bodies.
-        centre: (n, 3) centre of mass in the body's axes.
-        body: (pieces,) the body of each piece.
-        local: (pieces, 4, 3) placement of each in its body; see `Contacts.placements`.
-        placement: (pieces, 4, 3) room for their placements in the world.
-    """
+    """Write where all pieces (pieces, 4, 3) are, with the centres of mass and placements in their bodies."""
     for p in range(len(body)):
         b = body[p]
         for row in range(4):

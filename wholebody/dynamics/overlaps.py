@@ -12,16 +12,13 @@ from wholebody.scene.scene import Scene
 
 
 class Overlap(NamedTuple):
-    """Two objects that overlap.
+    """Two objects that overlap, which have names.
 
     Attributes:
-        first: name of the figure, or of a thing.
-        second: name of the other.
         depth: (3,) PD_g of the two, out of the second into the first, metres: equation 1 of Schmidl and Lin, over all
             pairs of pieces of the two objects.
-        moves_first: (3,) translation of the first that the estimate suggests: all of PD_g where only it may move, half
-            of it where both may.
-        moves_second: (3,) the same of the second.
+        moves_first, moves_second: (3,) translations that the estimate suggests: all of PD_g where only one may move,
+            half of it where both may.
         pairs: number of overlapping pairs of pieces.
         point: (3,) in the world, between the two surfaces where they overlap most.
     """

@@ -24,13 +24,7 @@ PASSING = 1e-4  # m: depth up to which pieces may dip into each other on the way
 
 
 class StepStart:
-    """The start of a step.
-
-    Attributes:
-        near: the pairs within margins (n,) of both bodies.
-        margin: (n,) metres.
-        kept: positions, rotations and velocities.
-    """
+    """The start of a step: positions, rotations and velocities, and the pairs within margins (n,) of both bodies."""
 
     def __init__(self, state: BodiesState, near: Contacts, margin: Array, finder: ContactFinder) -> None:
         """Keep it."""
@@ -45,12 +39,10 @@ class StepStart:
 
 
 class PassingCheck(NamedTuple):
-    """What is known of the way of a step.
+    """Whether no pieces can have been deeper than `PASSING` in each other on the way of a step.
 
-    Attributes:
-        free: whether no pieces can have been deeper than `PASSING` in each other.
-        meetings: shares of the step at which pieces meet or may meet, at least 0.1, before which points
-            are taken there; none where there are too many doubts.
+    Else `meetings` are shares of the step, at least 0.1, at which pieces meet or may meet; none where there are too
+    many doubts.
     """
 
     free: bool
@@ -58,29 +50,17 @@ class PassingCheck(NamedTuple):
 
 
 class Way(NamedTuple):
-    """How bodies moved during a step, and the near pairs at both ends of it.
+    """How bodies moved during a step, and the near pairs at both ends of it."""
 
-    Attributes:
-        pair: (k, 2) pieces.
-        body: (pieces,) the body of each piece.
-        gap: (2, k) their distances before the step, and at least those after it.
-        normal: (2, k, 3) from the first to the second; after it zero where none is known.
-        placement: (2, pieces, 4, 3) of all pieces.
-        shift: (n, 3) ways of the centres of mass, metres.
-        angle: (n,) by which each has turned, radians.
-        lever: (n,) greatest distance of a point from its centre of mass, metres.
-        fall: sag of the relative way because of gravity, metres.
-    """
-
-    pair: Indices
-    body: Indices
-    gap: Array
-    normal: Array
-    placement: Array
-    shift: Array
-    angle: Array
-    lever: Array
-    fall: float
+    pair: Indices  # (k, 2) pieces
+    body: Indices  # (pieces,) the body of each piece
+    gap: Array  # (2, k) their distances before the step, and at least those after it
+    normal: Array  # (2, k, 3) from the first to the second; after it zero where none is known
+    placement: Array  # (2, pieces, 4, 3) of all pieces
+    shift: Array  # (n, 3) ways of the centres of mass, metres
+    angle: Array  # (n,) by which each has turned, radians
+    lever: Array  # (n,) greatest distance of a point from its centre of mass, metres
+    fall: float  # sag of the relative way because of gravity, metres
 
 
 def check_passing(
@@ -169,15 +149,7 @@ def _meeting(state: BodiesState, before: StepStart, pair: list[int], way: Way) -
 
 @compiled()
 def highest(piece: int, placement: Array, direction: Array, sign: float, swept: SweptPoints) -> float:
-    """Greatest height of a piece along a direction, times `sign`.
-
-    Args:
-        piece: its index.
-        placement: (pieces, 4, 3).
-        direction: (3,) unit vector in the world.
-        sign: 1.0 or -1.0.
-        swept: points of all pieces.
-    """
+    """Greatest height of a piece along a direction (3,), times `sign`, 1.0 or -1.0."""
     base = 0.0
     local = np.empty(3)
     for k in range(3):
@@ -219,13 +191,7 @@ def _sag(way: Way, a: int, b: int) -> float:
 
 @compiled()
 def doubtful(way: Way, swept: SweptPoints, found: Mask) -> int:
-    """How many of the near pairs may have been deeper in each other than `PASSING` during a step.
-
-    Args:
-        way: of the step.
-        swept: points of all pieces.
-        found: (k,) room for which they are; all false.
-    """
+    """How many of the near pairs may have been deeper in each other than `PASSING` during a step; which, in `found`."""
     doubts = 0
     for c in range(len(way.pair)):
         p, q = way.pair[c, 0], way.pair[c, 1]
@@ -257,10 +223,7 @@ def doubtful(way: Way, swept: SweptPoints, found: Mask) -> int:
 
 @compiled(inner=True)
 def _parted(way: Way, swept: SweptPoints, c: int, own: int, end: int, sag: float) -> float:
-    """Share of the step, from its start (end 0) or its end (1), in which the normal there parts a pair.
-
-    The normal turns with the piece `own`.
-    """
+    """Share of the step from an end, 0 or 1, in which the normal there, turned with `own`, parts a pair."""
     here, there = way.placement[end, own], way.placement[1 - end, own]
     turned, size = np.zeros(3), 0.0
     for i in range(3):

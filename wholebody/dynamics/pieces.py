@@ -9,8 +9,9 @@ import pinocchio as pin
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.compiled import compiled
 from wholebody.base.errors import InputError
-from wholebody.dynamics import motion_kernel, witness_kernel
+from wholebody.dynamics import motion_kernel
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.proximity import Contacts, PairTable, Proximity
@@ -31,23 +32,14 @@ class PlacedProximity(Proximity):
 
 
 class SweptPoints(NamedTuple):
-    """The points that each piece is swept from, for its heights along directions.
+    """The points that each piece is swept from, for its heights along directions."""
 
-    Attributes:
-        points: (points, 3) of all pieces, in their axes.
-        start: (pieces,) the first of each.
-        number: (pieces,) how many.
-        radius: (pieces,) around the points.
-        axes: (pieces, 3) semi-axes of an ellipsoid; zero for others.
-        plane: (pieces, 4) normal and offset of a half-space; zero for others.
-    """
-
-    points: Array
-    start: Indices
-    number: Indices
-    radius: Array
-    axes: Array
-    plane: Array
+    points: Array  # (points, 3) of all pieces, in their axes
+    start: Indices  # (pieces,) the first of each
+    number: Indices  # (pieces,) how many
+    radius: Array  # (pieces,) around the points
+    axes: Array  # (pieces, 3) semi-axes of an ellipsoid; zero for others
+    plane: Array  # (pieces, 4) normal and offset of a half-space; zero for others
 
 
 class Pieces:
@@ -201,12 +193,7 @@ def segment_placements(scene: Scene, q: Array) -> dict[str, pin.SE3]:
 
 
 def joined(scene: Scene) -> tuple[tuple[str, str | None], ...]:
-    """Names of things that have joints, each with what holds it; None for the world.
-
-    Raises:
-        UnknownNameError: there is no such thing.
-        InputError: a thing is joined to itself.
-    """
+    """Names of things that have joints, each with what holds it; None for the world."""
     found = []
     known = [name for name, thing in scene.objects.items() if thing.segment is None]
     for name, thing in scene.objects.items():
@@ -220,21 +207,13 @@ def joined(scene: Scene) -> tuple[tuple[str, str | None], ...]:
 
 
 class ContactPoints(NamedTuple):
-    """Points of contacts, one row each.
+    """Points of contacts, one row each."""
 
-    Attributes:
-        pair: (m,) place of the pair among the pairs of pieces.
-        bodies: (m, 2) A and B.
-        normal: (m, 3) unit normal from A to B.
-        point: (m, 3) in the world, between the two surfaces.
-        gap: (m,) metres.
-    """
-
-    pair: Indices
-    bodies: Indices
-    normal: Array
-    point: Array
-    gap: Array
+    pair: Indices  # (m,) place of the pair among the pairs of pieces
+    bodies: Indices  # (m, 2) A and B
+    normal: Array  # (m, 3) unit normal from A to B
+    point: Array  # (m, 3) in the world, between the two surfaces
+    gap: Array  # (m,) metres
 
 
 class ContactFinder:
@@ -255,14 +234,7 @@ class ContactFinder:
         return self._proximity.asked
 
     def near(self, position: Array, rotation: Array, margin: Array, active: Mask) -> Contacts:
-        """Pairs that are nearer than the margins (n,) of both bodies together, metres, and have an active body.
-
-        Args:
-            position: (n, 3) centres of mass.
-            rotation: (n, 3, 3).
-            margin: (n,) of each body.
-            active: (n,) whether a body can make contact: it moves.
-        """
+        """Pairs that are nearer than the margins (n,) of both bodies together, metres, and have an active body."""
         pieces = self.pieces
         placement = np.empty((len(pieces.body), 4, 3))
         motion_kernel.place_pieces(position, rotation, pieces.centre, pieces.body, pieces.local, placement)
@@ -279,7 +251,51 @@ class ContactFinder:
         middle = 0.5 * (contacts.point_a + contacts.point_b)
         height = (normal * middle[owner]).sum(axis=1)
         point = np.cross(normal, rows.wrench[:, 3:]) + height[:, None] * normal
-        kept = witness_kernel.needed(owner, len(contacts.distance), normal, point, rows.gap, 1e-5)  # m: see `TOUCH`
+        kept = needed(owner, len(contacts.distance), normal, point, rows.gap, 1e-5)  # m: see `TOUCH`
         owner, normal, point = owner[kept], normal[kept], point[kept]
         bodies: Indices = self.pieces.body[contacts.pair[owner]]
         return ContactPoints(contacts.number[owner], bodies, normal, point, rows.gap[kept])
+
+
+@compiled()
+def needed(contact: Indices, count: int, normal: Array, point: Array, gap: Array, within: float) -> Mask:
+    """All points (m,) but the witness points between ends of their patch that touch when they do.
+
+    First come the witness points of all `count` contacts, then the ends, sorted by contact. Ends count whose gap is
+    larger than that of the witness point by no more than `within` [m]. Ends alone bear a face on a face, as in Bullet,
+    MuJoCo and ODE: friction at a witness point that bore all of it would not turn or stop a box that spins.
+    """
+    found, first, arm = np.ones(len(contact), dtype=np.bool_), count, np.empty((len(contact) - count, 3))
+    while first < len(contact):
+        c, arms, last = contact[first], 0, first
+        while last < len(contact) and contact[last] == c:
+            if gap[last] - gap[c] <= within:
+                for k in range(3):
+                    arm[arms, k] = point[last, k] - point[c, k]
+                arms += 1
+            last += 1
+        found[c] = not _surrounded(arm[:arms], normal[c])
+        first = last
+    return found
+
+
+@compiled(inner=True)
+def _surrounded(arm: Array, normal: Array) -> bool:
+    """Whether the origin is between points (k, 3) of a plane: seen from it, each has another half a turn on or more."""
+    for one in arm:
+        found = False
+        for other in arm:
+            cross, dot, square, other_square = 0.0, 0.0, 0.0, 0.0
+            for k in range(3):
+                i, j = (k + 1) % 3, (k + 2) % 3
+                cross += normal[k] * (one[i] * other[j] - one[j] * other[i])
+                dot += one[k] * other[k]
+                square += one[k] * one[k]
+                other_square += other[k] * other[k]
+            straight = 1e-3 * np.sqrt(square * other_square)  # on a line with the origin, but for coal's accuracy
+            if cross < -straight or (cross <= straight and dot < 0.0):
+                found = True
+                break
+        if not found:
+            return False
+    return len(arm) > 0

@@ -40,6 +40,9 @@ LEAST_GAP = 2e-6  # m: pieces nearer than this are parted before the next step
 class RigidBodies:
     """The things of a scene that have a `wb.Body`, and everything that they can touch.
 
+    Methods raise an `UnknownNameError` for a name that no body has, and an `InputError` for a value of another kind,
+    shape or range.
+
     Attributes:
         state: where all bodies are, and how they move.
         names: of the bodies.
@@ -90,28 +93,15 @@ class RigidBodies:
             )
 
     def placement(self, name: str) -> pin.SE3:
-        """Where a body is.
-
-        Raises:
-            UnknownNameError: there is none of that name.
-        """
+        """Where a body is."""
         return self.state.placement(self._number(name))
 
     def twist(self, name: str) -> Array:
-        """Velocity of a body's centre of mass [m/s] and angular velocity [rad/s], (6,), along the world's axes.
-
-        Raises:
-            UnknownNameError: there is none of that name.
-        """
+        """Velocity of a body's centre of mass [m/s] and angular velocity [rad/s], (6,), along the world's axes."""
         return np.array(self.state.bodies.twist[self._number(name)])
 
     def velocity_at(self, name: str, point: Array) -> Array:
-        """Velocity (3,) of a body's point at a place (3,) in the world, m/s.
-
-        Raises:
-            UnknownNameError: there is none of that name.
-            InputError: the place is not three numbers within 1e6 m.
-        """
+        """Velocity (3,) of a body's point at a place (3,) in the world, m/s."""
         number, point = self._number(name), _bounded(point, FARTHEST, "point")
         return self._velocity(number, point - self.state.bodies.position[number])
 
@@ -120,12 +110,7 @@ class RigidBodies:
         return np.asarray(self.state.velocity[number] + pin.skew(self.state.spin[number]) @ lever)
 
     def mobility(self, name: str, point: Array) -> Array:
-        """Change (3, 3) of the velocity of a body's point (3,) by an impulse there, 1/kg.
-
-        Raises:
-            UnknownNameError: there is none of that name.
-            InputError: the place is not three numbers within 1e6 m.
-        """
+        """Change (3, 3) of the velocity of a body's point (3,) by an impulse there, 1/kg."""
         number, point = self._number(name), _bounded(point, FARTHEST, "point")
         lever = pin.skew(point - self.state.bodies.position[number])
         inverse = self._inverse_inertia(number)
@@ -141,13 +126,7 @@ class RigidBodies:
         return found
 
     def push(self, name: str, impulse: Array, point: Array) -> None:
-        """Give a body that moves by itself an impulse (3,) at a place (3,) in the world, N s; it wakes.
-
-        Raises:
-            UnknownNameError: there is none of that name.
-            InputError: the impulse is not three numbers within 1e6 N s, the place not three within 1e6 m, or the body
-                does not move by itself.
-        """
+        """Give a body that moves by itself an impulse (3,) at a place (3,) in the world, N s; it wakes."""
         number, point = self._number(name), _bounded(point, FARTHEST, "point")
         impulse = _bounded(impulse, 1e6, "impulse")
         if not self._pieces.dynamic[number]:
@@ -185,10 +164,6 @@ class RigidBodies:
             dt: seconds.
             kinematic: name of a segment, or of a thing without a body, to its placements at the start and at the end of
                 the frame, between which it moves with constant velocity and angular velocity. What is not named stands.
-
-        Raises:
-            InputError: dt is no time step of at most 10 s, or a thing that moves by itself is named.
-            UnknownNameError: there is no such segment or thing.
         """
         dt = checks.number(dt, "dt", TIME_STEP[0], 10.0, "s, such as 1/60")
         state, given = self.state, {self._number(name): ways for name, ways in given_placements(kinematic).items()}
@@ -347,10 +322,7 @@ class RigidBodies:
         return np.asarray((speed + np.where(state.bodies.moving, np.linalg.norm(self.gravity) * time, 0.0)) * time)
 
     def _separate(self, least: float) -> tuple[float, float]:
-        """Part pieces that are nearer than `LEAST_GAP`, by the least displacements; the least distance then.
-
-        Bodies that are lifted pay with their kinetic energy; what they cannot pay [J] is returned too.
-        """
+        """Part pieces nearer than `LEAST_GAP`; the least distance then, and the energy that was not paid [J]."""
         state = self.state
         before, position = self.energy(), state.bodies.position.copy()
         for _ in range(4):

@@ -18,26 +18,17 @@ from wholebody.dynamics.pieces import ContactPoints
 
 
 class Rows(NamedTuple):
-    """What programs need of m points, of which the last j are those of joints.
+    """What programs need of m points, of which the last j are those of joints."""
 
-    Attributes:
-        bodies: (m, 2) A and B of each; twice B for a joint to the world.
-        axes: (m - j, 3, 3) n, t1, t2 of the contact points.
-        jacobian: (m, 3, 12) rows of J for the velocity and angular velocity of A, then of B.
-        response: (m, 3, 12) the same of J M^-1.
-        mobility: (m, 4) change of u by a unit impulse: along n by n, the most along a tangent by tangents, along t1 and
-            t2 by n. Of a joint point, the most along any axis in the first; zero where nothing moves.
-        effective_mass: (j, 3, 3) inverses of J M^-1 J^T of the joint points; zero where nothing moves.
-        movable: (n,) bodies that impulses move.
-    """
-
-    bodies: Indices
-    axes: Array
-    jacobian: Array
-    response: Array
+    bodies: Indices  # (m, 2) A and B of each; twice B for a joint to the world
+    axes: Array  # (m - j, 3, 3) n, t1, t2 of the contact points
+    jacobian: Array  # (m, 3, 12) rows of J for the velocity and angular velocity of A, then of B
+    response: Array  # (m, 3, 12) the same of J M^-1
+    # (m, 4) change of u by a unit impulse: along n by n, the most along a tangent by tangents, along t1 and t2 by n.
+    # Of a joint point, the most along any axis in the first; zero where nothing moves
     mobility: Array
-    effective_mass: Array
-    movable: Mask
+    effective_mass: Array  # (j, 3, 3) inverses of J M^-1 J^T of the joint points; zero where nothing moves
+    movable: Mask  # (n,) bodies that impulses move
 
     @staticmethod
     def room(bodies: Indices, joints: int, movable: Mask) -> Rows:
@@ -50,17 +41,11 @@ class Rows(NamedTuple):
 
 
 class JointPoints(NamedTuple):
-    """Points of joints.
+    """Points of joints."""
 
-    Attributes:
-        bodies: (j, 2) A and B; twice B for a joint to the world.
-        anchor: (j, 2, 3) in the body's axes, from the centre of mass; that of the world is in the world.
-        world: (j,) joints to the world.
-    """
-
-    bodies: Indices
-    anchor: Array
-    world: Mask
+    bodies: Indices  # (j, 2) A and B; twice B for a joint to the world
+    anchor: Array  # (j, 2, 3) in the body's axes, from the centre of mass; that of the world is in the world
+    world: Mask  # (j,) joints to the world
 
 
 @compiled()

@@ -31,25 +31,15 @@ BLUE, RED, OAK = (0.30, 0.42, 0.58, 1.0), (0.72, 0.25, 0.20, 1.0), (0.60, 0.48, 
 
 @dataclass(frozen=True)
 class WorldScene:
-    """A scene with a tracker, in which things move by themselves.
+    """A scene with a tracker, in which things move by themselves."""
 
-    Attributes:
-        name: its name on the command line.
-        about: one sentence.
-        scene: figure and things; those with a `wb.Body` move by themselves.
-        track: the tracked postures.
-        eye: position of the camera, metres; None for one that sees the figure.
-        target: the point in the middle of the picture, metres.
-        see_through: things to draw transparent.
-    """
-
-    name: str
+    name: str  # its name on the command line, and one sentence
     about: str
-    scene: Scene
-    track: Track
-    eye: Place | None = None
+    scene: Scene  # figure and things; those with a `wb.Body` move by themselves
+    track: Track  # the tracked postures
+    eye: Place | None = None  # the camera and the middle of the picture, metres; None for one that sees the figure
     target: Place | None = None
-    see_through: tuple[str, ...] = ()
+    see_through: tuple[str, ...] = ()  # things to draw transparent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,15 +50,8 @@ class _Plan(ScenePlan):
 def build_world_scene(name: str, *, frames: int | None = None, seed: int = 0, dt: float = FRAME) -> WorldScene:
     """Build a scene of `WORLD_SCENES`.
 
-    Args:
-        name: of the scene.
-        frames: number of frames; the script is cut, or repeated. By default the whole script once.
-        seed: of the tracked person's tremor.
-        dt: seconds from frame to frame.
-
-    Raises:
-        UnknownNameError: there is no such scene.
-        InputError: fewer than one frame.
+    Its script is cut or repeated to a number of frames, each dt seconds later; the seed is that of the tracked person's
+    tremor.
     """
     known(name, _PLANS, "scene")
     plan = _PLANS[name]
@@ -79,14 +62,7 @@ def build_world_scene(name: str, *, frames: int | None = None, seed: int = 0, dt
 
 
 def standing_scene(name: str, scene: Scene, q: Array, *, frames: int, dt: float = FRAME) -> WorldScene:
-    """A scene of one's own, in which the figure keeps a posture.
-
-    Args:
-        name: of files that are written.
-        scene: figure and things; at least one has a `wb.Body`.
-        q: (nq,) the posture.
-        frames: number of frames.
-        dt: seconds from frame to frame.
+    """A scene of one's own, in which the figure keeps the posture q (nq,) for a number of frames.
 
     Raises:
         InputError: nothing in the scene moves by itself, or a value of the wrong kind, shape or range.
@@ -109,18 +85,12 @@ def _table(scene: Scene) -> None:
         scene.add(Box((0.05, 0.05, leg)), name=f"leg {number + 1}", at=(x, y, 0.5 * leg), color=OAK)
 
 
-def _ball(scene: Scene, x: float, y: float, radius: float) -> None:
-    scene.add(Sphere(radius), name="ball", at=(x, y, TOP + radius + GAP), color=RED, body=Body(density=700.0))
+def _ball(x: float, radius: float) -> Callable[[Scene], object]:
+    def put(scene: Scene) -> None:
+        _table(scene)
+        scene.add(Sphere(radius), name="ball", at=(x, 0.0, TOP + radius + GAP), color=RED, body=Body(density=700.0))
 
-
-def _ball_to_flick(scene: Scene) -> None:
-    _table(scene)
-    _ball(scene, 0.30, 0.0, 0.02)
-
-
-def _ball_to_push(scene: Scene) -> None:
-    _table(scene)
-    _ball(scene, -0.05, 0.0, 0.03)
+    return put
 
 
 def _box_to_push(scene: Scene) -> None:
@@ -202,10 +172,7 @@ def _twenty_things(scene: Scene) -> None:
 
 
 def _hand(figure: Figure, at: Place, glove: str, curl: float = 0.0) -> Array:
-    """The hand with its fingers forward (x) and its palm down; the index is bent by `curl` radians at each joint more.
-
-    The wrist is at a place relative to the middle of the table's top.
-    """
+    """The hand with fingers forward (x) and palm down, its wrist at a place over the table's middle, the index bent."""
     q = figure.posture(glove)
     q[:3] = at[0], at[1], TOP + at[2]
     bent = {
@@ -263,42 +230,37 @@ def _aside(figure: Figure) -> Keys:
 # ---- the avatar
 
 
-def _walking(figure: Figure, x: float, degrees: Mapping[str, float]) -> Array:
-    """The avatar as it stands, with joints at some degrees, at a place along x."""
-    return standing_at(figure, x, 0.0, 0.0, degrees)
-
-
 HANGING = {"shoulder_flexion": 5.0, "elbow_flexion": 15.0}  # degrees: arms
 AHEAD = {"shoulder_flexion": 45.0, "elbow_flexion": 50.0, "shoulder_abduction": 8.0}
 
 
 def _walk_into(figure: Figure) -> Keys:
     return [
-        (0.0, _walking(figure, -0.4, HANGING)),
-        (0.8, _walking(figure, -0.2, AHEAD)),
-        (2.0, _walking(figure, 0.7, AHEAD)),
-        (0.8, _walking(figure, 0.7, AHEAD)),
-        (1.5, _walking(figure, -0.2, HANGING)),
-        (0.8, _walking(figure, -0.4, HANGING)),
+        (0.0, standing_at(figure, -0.4, 0.0, 0.0, HANGING)),
+        (0.8, standing_at(figure, -0.2, 0.0, 0.0, AHEAD)),
+        (2.0, standing_at(figure, 0.7, 0.0, 0.0, AHEAD)),
+        (0.8, standing_at(figure, 0.7, 0.0, 0.0, AHEAD)),
+        (1.5, standing_at(figure, -0.2, 0.0, 0.0, HANGING)),
+        (0.8, standing_at(figure, -0.4, 0.0, 0.0, HANGING)),
     ]
 
 
 def _walk_through(figure: Figure) -> Keys:
     return [
-        (0.0, _walking(figure, -0.4, HANGING)),
-        (0.8, _walking(figure, -0.2, AHEAD)),
-        (3.5, _walking(figure, 1.7, AHEAD)),
-        (0.8, _walking(figure, 1.9, HANGING)),
-        (1.0, _walking(figure, 1.9, HANGING)),
+        (0.0, standing_at(figure, -0.4, 0.0, 0.0, HANGING)),
+        (0.8, standing_at(figure, -0.2, 0.0, 0.0, AHEAD)),
+        (3.5, standing_at(figure, 1.7, 0.0, 0.0, AHEAD)),
+        (0.8, standing_at(figure, 1.9, 0.0, 0.0, HANGING)),
+        (1.0, standing_at(figure, 1.9, 0.0, 0.0, HANGING)),
     ]
 
 
 _PLANS: dict[str, _Plan] = {
     "flick": _Plan(
-        "a finger flicks a ball off a table", "hand", _flick, (1.9, -1.5, 1.5), (0.45, 0.0, 0.5), put=_ball_to_flick
+        "a finger flicks a ball off a table", "hand", _flick, (1.9, -1.5, 1.5), (0.45, 0.0, 0.5), put=_ball(0.30, 0.02)
     ),
     "push_ball": _Plan(
-        "a fist pushes a ball along a table", "hand", _push, (1.6, -1.6, 1.6), (0.3, 0.0, 0.5), put=_ball_to_push
+        "a fist pushes a ball along a table", "hand", _push, (1.6, -1.6, 1.6), (0.3, 0.0, 0.5), put=_ball(-0.05, 0.03)
     ),
     "push_box": _Plan(
         "a fist pushes a box along a table", "hand", _push, (0.6, -1.0, 1.35), (0.0, 0.0, 0.72), put=_box_to_push

@@ -73,12 +73,7 @@ class Sleepers:
         self._rotation = np.concatenate([self._rotation, state.bodies.rotation[both[:, 1]]])
 
     def wake(self, near: Contacts, came: Mask | None = None) -> bool:
-        """Wake what is touched by a body that moves; whether anything woke.
-
-        Args:
-            near: pairs, those of bodies that move and of what they touch among them.
-            came: (n,) bodies that were put where they are; none by default.
-        """
+        """Wake what is touched by a body that moves, or that `came` (n,) where it is; whether anything woke."""
         state, asleep = self._state, self._asleep()
         active = state.active if came is None else state.active | came
         if not (asleep.any() and active.any()):

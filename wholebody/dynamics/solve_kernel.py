@@ -25,26 +25,15 @@ FAST = {"contract", "reassoc"}  # the order of sums is the compiler's, and the s
 
 
 class Laws(NamedTuple):
-    """What a program asks of its points.
+    """What a program asks of its points."""
 
-    Attributes:
-        friction: (m - j,) coefficients of the contact points.
-        target: (m - j,) least u_n after it, m/s.
-        hold: (j, 3) u of the joint points after it, m/s.
-    """
-
-    friction: Array
-    target: Array
-    hold: Array
+    friction: Array  # (m - j,) coefficients of the contact points
+    target: Array  # (m - j,) least u_n after it, m/s
+    hold: Array  # (j, 3) u of the joint points after it, m/s
 
 
 class Limits(NamedTuple):
-    """Where a program ends.
-
-    Attributes:
-        tolerance: of u, m/s: two sweeps, one each way, that change none by more end it.
-        sweeps: most of them.
-    """
+    """Where a program ends: two sweeps, one each way, change no u by more than a tolerance [m/s]; or most sweeps."""
 
     tolerance: float
     sweeps: int
@@ -118,16 +107,10 @@ def _visit(c: int, rows: Rows, laws: Laws, twist: Array, impulse: Array) -> tupl
 
 @compiled(error_model="numpy", fastmath=FAST)
 def solve(chosen: Indices, rows: Rows, laws: Laws, twist: Array, impulse: Array, limits: Limits) -> int:
-    """Solve the program of the points `chosen`; how many sweeps it took.
+    """Solve the program of the points `chosen` (k,); how many sweeps it took.
 
-    Args:
-        chosen: (k,) points of the program; those of joints come last, and are visited in this order in every sweep,
-            which needs fewer of them.
-        rows: of all points.
-        laws: of all points.
-        twist: (n, 6) velocities with the impulses at the start; changed in place.
-        impulse: (m, 3) along n, t1, t2, N s; a start, changed in place.
-        limits: where it ends.
+    Points of joints come last, and are visited in this order in every sweep, which needs fewer of them. The velocities
+    (n, 6), with the impulses at the start, and the impulses (m, 3) along n, t1, t2 [N s] change in place.
     """
     count = len(chosen)
     before, way = np.zeros((count, 3)), np.zeros((count, 3))
@@ -166,14 +149,9 @@ def solve(chosen: Indices, rows: Rows, laws: Laws, twist: Array, impulse: Array,
 
 @compiled(error_model="numpy", fastmath=FAST)
 def solve_islands(rows: Rows, laws: Laws, twist: Array, impulse: Array, limits: Limits) -> int:
-    """Solve the program of all points, each island of bodies that bear each other apart; how many sweeps were over all.
+    """Solve the program of all points, each island of bodies that bear each other apart; the sweeps over all.
 
-    Args:
-        rows: of all points.
-        laws: of all points.
-        twist: (n, 6) as in `solve`, and so `impulse`.
-        impulse: (m, 3).
-        limits: of each island; one whose last sweep changes more than 30 tolerances has six times as many sweeps.
+    The limits are those of each island; one whose last sweep changes more than 30 tolerances has six times the sweeps.
     """
     count, bodies = len(rows.bodies), len(twist)
     listed, changes = np.empty(count, dtype=np.intp), np.zeros(count)
@@ -282,19 +260,9 @@ def solve_from(
     impulse: Array,
     limits: Limits,
 ) -> tuple[float, float]:
-    """Solve the program of all points from the impulses of the step before.
+    """Solve the program of all points from the impulses of the step before; returns the residuals.
 
-    Args:
-        old: as in `_warm_start`, and so `new`.
-        new: of the contact points.
-        rows: of all points.
-        laws: of all points.
-        twist: (n, 6) velocities without impulses; changed in place.
-        impulse: (m, 3) room; a start for those of joints.
-        limits: of each island.
-
-    Returns:
-        The residuals.
+    The velocities have no impulses yet; the impulses (m, 3) are room, but a start for those of joints.
     """
     impulse[: len(laws.target)] = 0.0
     _warm_start(old, new, rows.axes, impulse)
@@ -308,16 +276,10 @@ def solve_from(
 
 @compiled(inner=True)
 def _warm_start(old: tuple[Indices, Array, Array], new: tuple[Indices, Array], axes: Array, impulse: Array) -> None:
-    """Write the impulses of the nearest old points of the same pair.
+    """Write the impulses of the nearest old points (pair, place in the first body's axes, impulse) of a pair.
 
     An old point that is not the nearest of any new one within 0.01 m gives its impulse to the nearest new one, as
     witness points jump from corner to corner.
-
-    Args:
-        old: pair (k,) of each, the point (k, 3) in the first body's axes, and its impulse (k, 3) in the world.
-        new: pair (m,) of each, and the point (m, 3).
-        axes: (m, 3, 3) of the new points.
-        impulse: (m, 3) changed in place, along the axes of each point.
     """
     pair, local, world = old
     new_pair, new_local = new

@@ -14,9 +14,9 @@ from wholebody.dynamics import (
     impact_kernel,
     motion_kernel,
     passing,
+    pieces,
     rows_kernel,
     solve_kernel,
-    witness_kernel,
 )
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.impact_kernel import SLOW
@@ -31,21 +31,13 @@ TOUCH = 1e-5  # m: a gap larger than `SKIN` by this still touches
 
 
 class Impulses(NamedTuple):
-    """Impulses of a program, from which the next one starts.
+    """Impulses of a program, from which the next one starts."""
 
-    Attributes:
-        pair: (k,) pair of each point.
-        local: (k, 3) the point in the first body's axes.
-        impulse: (k, 3) on the second body, in the world, N s.
-        joint: (j, 3) of the joint points, likewise.
-        time: of the step, seconds.
-    """
-
-    pair: Indices
-    local: Array
-    impulse: Array
-    joint: Array
-    time: float
+    pair: Indices  # (k,) pair of each point
+    local: Array  # (k, 3) the point in the first body's axes
+    impulse: Array  # (k, 3) on the second body, in the world, N s
+    joint: Array  # (j, 3) of the joint points, likewise
+    time: float  # of the step, seconds
 
     @staticmethod
     def nothing(joints: int) -> Impulses:
@@ -209,12 +201,7 @@ class StepProgram:
         return -np.asarray((self._rates(moved) * self.impulse).sum(axis=1))
 
     def settle(self, before: tuple[Array, Array, Array], work: Array) -> None:
-        """Scale velocities after the step, so that joints and what is moved add no energy.
-
-        Args:
-            before: positions, rotations and velocities at its start.
-            work: (m + j,) as from `work`, before joints changed the velocities.
-        """
+        """Scale velocities after a step of this work (m + j,), so that joints and what is moved add no energy."""
         bodies, points = self.state.bodies, self.points
         if len(self.joints) or bodies.given[points.bodies[self._bearing()]].any():
             energy_kernel.settle(
@@ -284,7 +271,7 @@ def compiled_kernel() -> Any:
     motion_kernel.drift(bodies, mask, np.zeros(3), 1.0)
     motion_kernel.displace(bodies, twist)
     motion_kernel.place_pieces(one, unit, one, _integers(1), placed, placed.copy())
-    witness_kernel.needed(none, 0, vectors, vectors, some, 0.0)
+    pieces.needed(none, 0, vectors, vectors, some, 0.0)
     rows, joints = Rows.room(pairs, 0, mask), JointPoints(pairs, np.zeros((0, 2, 3)), no_mask)
     rows_kernel.contact_rows(ContactPoints(none, pairs, vectors, vectors, some), bodies, rows)
     rows_kernel.joint_rows(joints, bodies, rows)

@@ -78,7 +78,6 @@ class World(NotCopyable):
     Attributes:
         scene: figure and things.
         dt: seconds a frame.
-        q: (nq,) the posture that is shown.
         time: seconds since the start.
         engine: the things that move by themselves; None if there are none.
     """

@@ -10,6 +10,7 @@ from __future__ import annotations
 from itertools import combinations
 from typing import Any
 
+import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
@@ -69,8 +70,6 @@ def thickened(points: Array) -> Array:
 
 def coal_convex(corners: Array, faces: NDArray[np.int_]) -> Any:
     """Convex of coal with corners (n, 3) and outward triangles (m, 3)."""
-    import coal
-
     vertices = coal.StdVec_Vec3s()
     vertices.extend(list(corners))
     triangles = coal.StdVec_Triangle()

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeAlias
 
+import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -71,8 +72,6 @@ class ObjectPair:
         self, pieces_a: Sequence[Placed], pieces_b: Sequence[Placed], allowed: NDArray[np.bool_] | None = None
     ) -> None:
         """Read the pieces once; `allowed` (n, m) selects the pairs that count."""
-        import coal
-
         self.a, self.b = [_Body(p) for p in pieces_a], [_Body(p) for p in pieces_b]
         self._centers = np.array([x.center for x in self.a])[:, None] - np.array([x.center for x in self.b])
         self._reach = np.array([x.swept.reach for x in self.a])[:, None] + np.array([x.swept.reach for x in self.b])
@@ -100,8 +99,6 @@ class ObjectPair:
 
     def measure(self, i: int, j: int, translation: Array) -> tuple[float, Array]:
         """Depth (negative: gap) of piece i of A, moved, in piece j of B, and the unit normal out of B into A."""
-        import coal
-
         a, b = self.a[i], self.b[j]
         self._at_a[i].setTranslation(a.center + translation)
         self._result.clear()
@@ -171,8 +168,6 @@ class ObjectPair:
 
 
 def _transform(placement: pin.SE3) -> Any:
-    import coal
-
     return coal.Transform3s(placement.rotation, placement.translation)
 
 

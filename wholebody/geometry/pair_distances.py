@@ -40,6 +40,7 @@ class PairDistances:
         pairs: (p, 2) the pieces of its pairs.
         data: Pinocchio's; of more than `KEPT` pairs for the placements alone.
         kept: whether it has results of the pairs.
+        placed: (n, 4, 3) where the pieces are: columns of the rotation, then the translation; a view where possible.
         results: (p, 20) view of these results, see `memory_views.fields`; None if they are read in another way.
     """
 
@@ -55,15 +56,13 @@ class PairDistances:
             data.oMg[k] = pin.SE3(np.eye(3), np.array([AWAY * k, 0.0, 0.0]))
         for number in computed_first(len(data.distanceResults)):
             pin.computeDistance(geometry, data, number)
-        self.results, self._placed = result_view(data.distanceResults), placement_view(data.oMg)
+        self.results, view = result_view(data.distanceResults), placement_view(data.oMg)
+        self._viewed = view is not None
+        self.placed: Array = self._copied() if view is None else view
         self._guesses = guess_views(data.distanceRequests)
         self._single = SinglePairs(geometry)
 
-    @property
-    def placed(self) -> Array:
-        """(n, 4, 3) where the pieces are: columns of the rotation, then the translation; a view where there is one."""
-        if self._placed is not None:
-            return self._placed
+    def _copied(self) -> Array:
         return np.array([[*at.rotation.T, at.translation] for at in self.data.oMg], dtype=float).reshape(-1, 4, 3)
 
     def reset(self) -> None:
@@ -78,14 +77,14 @@ class PairDistances:
     def place(self, model: pin.Model, data: Any) -> None:
         """Move the pieces to where the joints are in Pinocchio's data."""
         pin.updateGeometryPlacements(model, data, self.geometry, self.data)
+        if not self._viewed:
+            self.placed = self._copied()
 
     def put(self, placements: Array) -> None:
         """Put the pieces to placements (n, 4, 3)."""
-        if self._placed is not None:
-            self._placed[:] = placements
-        else:
-            for k, rows in enumerate(placements):
-                self.data.oMg[k] = pin.SE3(rows[:3].T, rows[3])
+        self.placed[:] = placements
+        for k, rows in () if self._viewed else enumerate(placements):
+            self.data.oMg[k] = pin.SE3(rows[:3].T, rows[3])
 
     def measured(self, numbers: Indices) -> Array:
         """Distance, normal, and nearest points on both pieces (k, 10) of the pairs with these numbers (k,)."""

@@ -88,11 +88,7 @@ _SIDES = np.concatenate([np.eye(3), -np.eye(3)])
 
 
 def swept_points(geometry: Any) -> SweptPoints:
-    """Swept points of a coal shape: Sphere, Capsule, Box, Ellipsoid, Halfspace or Convex.
-
-    Raises:
-        InputError: another kind of geometry, which has no exact distance here.
-    """
+    """Swept points of a Sphere, Capsule, Box, Ellipsoid, Halfspace or Convex of coal; an InputError for others."""
     if isinstance(geometry, coal.Sphere):
         radius = geometry.radius
         return SweptPoints(_CENTER, radius, _NO_FACES, radius, _NO_AXIS, 2.0 * radius, np.full(3, radius))

@@ -68,22 +68,21 @@ class Contacts(NamedTuple):
 
 
 class _ContactBuffer:
-    """Room for so many contacts; `vectors` has normals, points on the first and on the second piece."""
+    """Room for so many contacts: distances; normals, points on the first and on the second piece; numbers; pairs."""
 
     def __init__(self, size: int) -> None:
-        self.size = size
-        self.distance, self.vectors = np.empty(size), np.empty((3, size, 3))
-        self.number, self.pair = np.empty(size, dtype=np.intp), np.empty((size, 2), dtype=np.intp)
-        self.arrays = self.distance, self.vectors, self.number, self.pair
+        number, pair = np.empty(size, dtype=np.intp), np.empty((size, 2), dtype=np.intp)
+        self.size, self.arrays = size, (np.empty(size), np.empty((3, size, 3)), number, pair)
         self._front: dict[int, Contacts] = {}
 
     def contacts(self, count: int, placements: Array) -> Contacts:
         """The first `count` of the contacts; the same object where both arguments are the same."""
         known = self._front.get(count)
         if known is None or known.placements is not placements:
-            normal, point_a, point_b = self.vectors[:, :count]
+            distance, vectors, number, pair = self.arrays
+            normal, point_a, point_b = vectors[:, :count]
             known = self._front[count] = Contacts(
-                self.pair[:count], self.distance[:count], normal, point_a, point_b, self.number[:count], placements
+                pair[:count], distance[:count], normal, point_a, point_b, number[:count], placements
             )
         return known
 
@@ -110,11 +109,7 @@ class PairTable:
     """
 
     def __init__(self, model: pin.Model, geometry: pin.GeometryModel, pairs: Indices | None = None) -> None:
-        """Read the pieces and pairs; to read a hundred thousand pairs takes half a second, where they are not given.
-
-        Raises:
-            InputError: a geometry that is not a convex piece.
-        """
+        """Read the pieces, and the pairs where they are not given; an InputError for what is no convex piece."""
         self.model, self.geometry = model, geometry
         self.swept = [swept_points(piece.geometry) for piece in geometry.geometryObjects]
         self.pairs: Indices = pairs_of(geometry) if pairs is None else pairs
@@ -160,13 +155,15 @@ class Proximity:
         self.results = self.distances.data
         self._kernel = compiled_kernel()
         count, pairs = self.geometry.ngeoms, len(table.pairs)
-        self._marks, self._count = np.zeros((3, pairs), dtype=np.intp), 0
+        marks, self._count = np.zeros((3, pairs), dtype=np.intp), 0
+        self._index, _, self._changed = marks
+        self._singly = pairs >= SINGLY
         self._travelled, self._endless = np.zeros(count), np.full(pairs, np.inf)
         self._bound = np.array([self._endless, table.points_meet])
         self._placed, self._buffer = np.zeros((count, 4, 3)), _ContactBuffer(64)
         self._looked = (
             table.pairs, table.reach, table.half, np.zeros((count, 4, 3)), self._travelled, self._bound,
-            np.zeros((count, 3)), self._marks,
+            np.zeros((count, 3)), marks,
         )  # fmt: skip
         self._gathered = table.pairs, self._travelled, self._bound
         # memory that is never written takes none
@@ -195,25 +192,23 @@ class Proximity:
         With `most`, shape (pairs,), a pair that is as far apart as its entry [m] is left out too. Nothing else is left
         out. Results of pairs that were culled are never read: coal leaves old numbers in them.
         """
-        began = time.perf_counter()
-        placements = self.placements(data)
-        most = self._endless if most is None else most
-        index = self._asked(placements, within, most)
-        contacts = self._gather(_ContactBuffer(len(index)), placements, index, within, most)
-        self.seconds += time.perf_counter() - began
-        return contacts
+        return self._query(self.placements(data), within, most, None)
 
     def query_views(self, data: Any, within: float, most: Array | None = None) -> Contacts:
         """What `query` returns, in arrays that the next call of this overwrites."""
-        began = time.perf_counter()
         self.distances.place(self.table.model, data)
-        placements = self._placed
-        placements[:] = self.distances.placed
+        self._placed[:] = self.distances.placed
+        return self._query(self._placed, within, most, self._buffer)
+
+    def _query(self, placements: Array, within: float, most: Array | None, room: _ContactBuffer | None) -> Contacts:
+        began = time.perf_counter()
         most = self._endless if most is None else most
         index = self._asked(placements, within, most)
-        if len(index) > self._buffer.size:
-            self._buffer = _ContactBuffer(2 * len(index))
-        contacts = self._gather(self._buffer, placements, index, within, most)
+        if room is None:
+            room = _ContactBuffer(len(index))
+        elif len(index) > room.size:
+            room = self._buffer = _ContactBuffer(2 * len(index))
+        contacts = self._gather(room, placements, index, within, most)
         self.seconds += time.perf_counter() - began
         return contacts
 
@@ -224,15 +219,15 @@ class Proximity:
             count, gone, came = self._kernel.look(placements, self._looked, within, most, self._count)
             self._count = count
             self.asked += count
-            numbers: Indices = self._marks[0, :count]
+            numbers = self._index[:count]
             if self._read is not None:
                 fields(self._read)[numbers] = self.distances.measured(numbers)
-            elif len(self.table.pairs) >= SINGLY:
+            elif self._singly:
                 for number in numbers.tolist():
                     pin.computeDistance(self.geometry, results, number)
             else:
                 if gone or came:
-                    changed = self._marks[2, : gone + came].tolist()
+                    changed = self._changed[: gone + came].tolist()
                     for number in changed[:gone]:
                         results.deactivateCollisionPair(number)
                     for number in changed[gone:]:

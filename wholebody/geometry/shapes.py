@@ -9,6 +9,7 @@ from itertools import pairwise
 from os import PathLike
 from typing import Annotated, Literal, Protocol, TypeAlias, runtime_checkable
 
+import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
@@ -79,8 +80,6 @@ class Box(Shape):
 
     def pieces(self) -> tuple[Piece, ...]:
         """One coal Box."""
-        import coal
-
         return (Piece(coal.Box(*self.size), pin.SE3.Identity(), math.prod(self.size)),)
 
 
@@ -96,8 +95,6 @@ class Sphere(Shape):
 
     def pieces(self) -> tuple[Piece, ...]:
         """One coal Sphere."""
-        import coal
-
         return (Piece(coal.Sphere(self.radius), pin.SE3.Identity(), 4.0 / 3.0 * math.pi * self.radius**3),)
 
 
@@ -115,8 +112,6 @@ class Capsule(Shape):
 
     def pieces(self) -> tuple[Piece, ...]:
         """One coal Capsule."""
-        import coal
-
         volume = math.pi * self.radius**2 * (self.length + 4.0 / 3.0 * self.radius)
         return (Piece(coal.Capsule(self.radius, self.length), pin.SE3.Identity(), volume),)
 
@@ -205,8 +200,6 @@ class Ellipsoid(Shape):
 
     def pieces(self) -> tuple[Piece, ...]:
         """One coal Ellipsoid."""
-        import coal
-
         volume = 4.0 / 3.0 * math.pi * math.prod(self.semi_axes)
         return (Piece(coal.Ellipsoid(*self.semi_axes), pin.SE3.Identity(), volume),)
 
@@ -228,8 +221,6 @@ class HalfSpace(Shape):
 
     def pieces(self) -> tuple[Piece, ...]:
         """One coal Halfspace, of infinite volume."""
-        import coal
-
         return (Piece(coal.Halfspace(np.array(self.normal), self.offset), pin.SE3.Identity(), math.inf),)
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib.util import find_spec
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from wholebody.base.imports import exported
@@ -29,8 +31,10 @@ __all__ = [
     "installed_methods",
 ]
 
-METHODS = ("qp", "ccd", "newton", "placo", "dls")
-"""Names of all methods, the same in Python, in task files and on the command line."""
+METHODS: Mapping[str, str] = MappingProxyType(
+    {"qp": "QP", "ccd": "CCD", "newton": "Newton", "placo": "Placo", "dls": "DampedLeastSquares"}
+)
+"""Names of all methods, the same in Python, in task files and on the command line -> their classes here."""
 
 EXTRAS = {"placo": "placo"}
 """Methods whose package an extra installs -> the package; the extra has the same name."""

@@ -109,27 +109,17 @@ class UnsupportedTermError(InputError):
     """A method cannot take some terms of a problem.
 
     Attributes:
-        terms: one text for each term: its name and the reason.
+        terms: one text for each term, such as "constraints[1], Balance", with the reason.
     """
 
     def __init__(self, method: str, terms: Sequence[str]) -> None:
-        """Build the sentence.
-
-        Args:
-            method: its name.
-            terms: texts such as "constraints[1], Balance".
-        """
+        """Build the sentence."""
         self.terms = tuple(terms)
         super().__init__(f"method {method!r} cannot take {'; '.join(terms)}; leave them out or use method='qp'")
 
 
 def refusal(method: str, terms: Sequence[str]) -> str | None:
-    """The return value of `Method.accepts`: None without unsupported terms, otherwise the sentence.
-
-    Args:
-        method: its name.
-        terms: texts as for `UnsupportedTermError`.
-    """
+    """The return value of `Method.accepts`: None without unsupported terms, otherwise the sentence."""
     return str(UnsupportedTermError(method, terms)) if terms else None
 
 
@@ -184,17 +174,7 @@ class SolvingTracker(NotCopyable):
     leaves_overlap = False
 
     def __init__(self, method: Method, problem: Problem, dt: float) -> None:
-        """Set up.
-
-        Args:
-            method: solves the steps.
-            problem: to be solved.
-            dt: seconds a step.
-
-        Raises:
-            InputError: dt is not a positive finite number, the scene changed after the problem was made, or the
-                method cannot take the problem.
-        """
+        """Set up; errors where dt is no time step, the scene changed, or the method cannot take the problem."""
         self.problem, self.dt = check_problem(problem, "tracker: problem"), time_step(dt, "dt")
         self.workspace = problem.workspace()
         self._method = method
@@ -249,20 +229,12 @@ class SolvesAnew:
     """Base of methods that follow goals by solving the problem anew at every step."""
 
     def tracker(self: Method, problem: Problem, dt: float) -> SolvingTracker:
-        """A tracker that solves the problem anew at every step.
-
-        Raises:
-            InputError: dt is not a positive finite number, or the scene changed after the problem was made.
-        """
+        """A tracker that solves the problem anew at every step."""
         return SolvingTracker(self, problem, dt)
 
 
 def begun(problem: Problem, q: Array) -> Array:
-    """The posture (nq,) at which a step begins; an angle that was probably meant in degrees is said.
-
-    Raises:
-        InputError: q is no posture.
-    """
+    """The posture (nq,) at which a step begins; an angle that was probably meant in degrees is said."""
     q = posture(q, problem.scene.model.nq)
     problem.scene.figure.warn_of_angles(q, "step: q")
     return q

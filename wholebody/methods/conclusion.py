@@ -20,34 +20,21 @@ from wholebody.tasks.balance import Balance
 
 @dataclass(frozen=True)
 class Ending:
-    """The end of a search.
+    """The end of a search."""
 
-    Attributes:
-        q: (nq,) the posture.
-        settled: whether the search converged, rather than ran out of iterations or time.
-        iterations: of the method.
-        trace: one entry an iteration.
-        how: text after "solved" in the message.
-        unit: name of what a method that did not converge ran out of.
-        failure: why the method could not continue, in words; "" if it could.
-        caveat: text of the message if a constraint is violated.
-        remark: text at the end of every message.
-        contradictions: contradictions of the problem that the search found; None if it did not look for any.
-        judgement: the assessment of the posture, if the search has made it already.
-        programs: number of quadratic programs that each solver closed; empty for a method without programs.
-    """
-
-    q: Array
-    settled: bool
-    iterations: int
-    trace: tuple[TraceEntry, ...]
-    how: str
-    unit: str = "iterations"
-    failure: str = ""
-    caveat: str = ""
-    remark: str = ""
+    q: Array  # (nq,) the posture
+    settled: bool  # whether the search converged, rather than ran out of iterations or time
+    iterations: int  # of the method
+    trace: tuple[TraceEntry, ...]  # one entry an iteration
+    how: str  # text after "solved" in the message
+    unit: str = "iterations"  # name of what a method that did not converge ran out of
+    failure: str = ""  # why the method could not continue, in words; "" if it could
+    caveat: str = ""  # text of the message if a constraint is violated
+    remark: str = ""  # text at the end of every message
+    # contradictions of the problem that the search found; None if it did not look for any
     contradictions: tuple[Contradiction, ...] | None = None
-    judgement: Assessment | None = None
+    judgement: Assessment | None = None  # the assessment of the posture, if the search has made it already
+    # number of quadratic programs that each solver closed; empty for a method without programs
     programs: Mapping[str, int] = field(default_factory=dict)
 
 
@@ -67,16 +54,7 @@ def meets(judgement: Assessment, tolerance: float) -> bool:
 def concluded(
     problem: Problem, ending: Ending, *, method: str, tolerance: float, control: Control, began: float
 ) -> Solution:
-    """The solution.
-
-    Args:
-        problem: to be solved.
-        ending: the end of the search.
-        method: name of the method and of its solver.
-        tolerance: metres and radians to which the method meets goals and constraints.
-        control: the control of the search.
-        began: `time.perf_counter` at the beginning of the call.
-    """
+    """The solution of a problem, whose search began at `began` by `time.perf_counter`."""
     judgement = assess(problem, ending.q) if ending.judgement is None else ending.judgement
     enough = assessed_tolerance(tolerance)
     if control.undefined is not None:

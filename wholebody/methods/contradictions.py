@@ -39,17 +39,12 @@ ON_SURFACE = 2e-6  # m: a point outside of a piece by less (twice coal's accurac
 
 
 class Contradiction(NamedTuple):
-    """Two requirements that exclude each other.
+    """Two requirements that exclude each other."""
 
-    Attributes:
-        status: the best possible status: "infeasible", or "unreachable" if one of the two is a goal.
-        text: both, and their difference.
-        least: lower bound of the goal's error, metres, if the error depends on the posture; otherwise zero.
-    """
-
+    # the best possible status: "infeasible", or "unreachable" if one of the two is a goal
     status: Literal["infeasible", "unreachable"]
-    text: str
-    least: float = 0.0
+    text: str  # both, and their difference
+    least: float = 0.0  # lower bound of the goal's error, metres, if the error depends on the posture; otherwise zero
 
 
 class _FixedGroup(NamedTuple):
@@ -60,12 +55,7 @@ class _FixedGroup(NamedTuple):
 
 
 def contradictions(problem: Problem, workspace: Workspace) -> tuple[Contradiction, ...]:
-    """All contradictions, those of constraints first.
-
-    Args:
-        problem: to be solved.
-        workspace: of the run; its state is left at the problem's start.
-    """
+    """All contradictions, those of constraints first; the workspace's state is left at the problem's start."""
     finder = _Finder(problem, workspace)
     finder.holds()
     finder.pairs()
@@ -312,10 +302,7 @@ def least_left(found: tuple[Contradiction, ...]) -> float | None:
 def proven(status: Status, found: tuple[Contradiction, ...], holds: bool) -> Status:
     """The status of an answer to a contradictory problem, which more iterations would not change.
 
-    Args:
-        status: without the contradictions.
-        found: the contradictions.
-        holds: whether the answer violates nothing; else it is never `unreachable`.
+    One that violates something, so that `holds` is false, is never `unreachable`.
     """
     if status == "stalled" and found and (holds or found[0].status == "infeasible"):
         return found[0].status
@@ -323,10 +310,6 @@ def proven(status: Status, found: tuple[Contradiction, ...], holds: bool) -> Sta
 
 
 def explanation(problem: Problem) -> str:
-    """One sentence about the contradictions of a problem; empty if there are none.
-
-    Raises:
-        InputError: objects were added to or removed from the scene after the problem was made.
-    """
+    """One sentence about the contradictions of a problem; empty if there are none."""
     with problem.borrow() as workspace:
         return in_words(contradictions(problem, workspace))

@@ -76,9 +76,6 @@ class Control:
             time_limit: seconds on the clock; None for `longest`, infinity for no limit.
             progress: see `Progress`.
             longest: seconds of processor time.
-
-        Raises:
-            InputError: `progress` cannot be called.
         """
         if progress is not None and not callable(progress):
             raise InputError(f"progress is {a(type(progress))}; give a function of one trace entry")

@@ -20,9 +20,7 @@ from wholebody.solution import Solution
 class Descends(ABC):
     """A dataclass of settings with `tolerance` and `time_limit`, and a search that `solve` and `tracker` run.
 
-    Attributes:
-        on_the_way: metres and radians to which goals are met in frames of a motion before its end, if that is more than
-            the tolerance.
+    In frames of a motion before its end goals are met to `on_the_way` [m, rad], if that is more than the tolerance.
     """
 
     on_the_way = 0.0
@@ -36,11 +34,7 @@ class Descends(ABC):
 
     @abstractmethod
     def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
-        """Search from the problem's start in a workspace on its scene.
-
-        Raises:
-            UnsupportedTermError: the problem has terms that this method cannot take.
-        """
+        """Search from the problem's start in a workspace on its scene."""
 
     def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture. Goals out of reach and starts in penetration are answers, not errors.
@@ -60,11 +54,7 @@ class Descends(ABC):
         return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
 
     def tracker(self, problem: Problem, dt: float) -> SolvingTracker:
-        """A tracker that searches anew at every step, from the present posture.
-
-        Raises:
-            InputError: dt is not a positive finite number, or the scene changed after the problem was made.
-        """
+        """A tracker that searches anew at every step, from the present posture."""
         return DescentTracker(self, problem, dt)
 
 

@@ -32,11 +32,7 @@ NEGLIGIBLE = 1e-4  # m, rad: a constraint violated by less than this is no reaso
 
 
 class Stopwatch(threading.local):
-    """Adds up the time that this thread spends within it.
-
-    Attributes:
-        seconds: so far, wall time.
-    """
+    """Adds up the time that this thread spends within it: `seconds` so far, wall time."""
 
     def __init__(self) -> None:
         """Begin at 0."""
@@ -63,40 +59,23 @@ class Stepper(Protocol):
     """A tool, set up for one problem."""
 
     def step(self, q: Array, weight: float, damping: float) -> Array:
-        """One step of the tool.
+        """One step of the tool from the posture q (nq,): the displacement (nv,); a `StepError` if it found none.
 
-        Args:
-            q: (nq,) the posture.
-            weight: of the measures, against goals of weight 1.
-            damping: weight of the motion itself.
-
-        Returns:
-            The displacement (nv,).
-
-        Raises:
-            StepError: the tool found none.
+        `weight` is that of the measures, against goals of weight 1, `damping` that of the motion itself.
         """
 
 
 class Settings(NamedTuple):
-    """How steps are iterated.
+    """How steps are iterated."""
 
-    Attributes:
-        tolerance: metres and radians to which goals and constraints are met.
-        iterations: most steps.
-        longest: most that a joint or the root moves in one step [rad, m].
-        decay: of the measures' weight from one step to the next.
-        best: whether the answer is the best posture of all, in place of the last one: for tools that may go in and do
-            not lead out again.
-        least: fewest steps before the goals count as met, for tools that get out of the way of what comes.
-    """
-
-    tolerance: float
-    iterations: int
-    longest: float
-    decay: float
+    tolerance: float  # metres and radians to which goals and constraints are met
+    iterations: int  # most steps
+    longest: float  # most that a joint or the root moves in one step [rad, m]
+    decay: float  # of the measures' weight from one step to the next
+    # whether the answer is the best posture of all, in place of the last one: for tools that may go in and do not lead
+    # out again
     best: bool = False
-    least: int = 0
+    least: int = 0  # fewest steps before the goals count as met, for tools that get out of the way of what comes
 
 
 class Iteration:

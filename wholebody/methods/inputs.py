@@ -29,9 +29,5 @@ TimeLimit: TypeAlias = Annotated[float, TIME_LIMIT] | None
 
 
 def check_problem(problem: object, what: str) -> Problem:
-    """A problem.
-
-    Raises:
-        InputError: it is something else.
-    """
+    """A problem; an error if it is something else."""
     return instance(problem, Problem, what, "state one with wb.Problem(scene, goals=[...])")

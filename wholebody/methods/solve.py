@@ -6,7 +6,9 @@ import os
 import sys
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from importlib import import_module
+from typing import Any
 
 import numpy as np
 
@@ -31,35 +33,14 @@ def method_named(name: str) -> Method:
     """
     if ":" in name:
         return as_method(imported(name)())
-    if name == "qp":
-        from wholebody.methods.qp.method import QP
-
-        return QP()
-    if name == "ccd":
-        from wholebody.methods.ccd.method import CCD
-
-        return CCD()
-    if name == "newton":
-        from wholebody.methods.newton.method import Newton
-
-        return Newton()
-    if name == "placo":
-        from wholebody.methods.placo.method import Placo
-
-        return Placo()
-    if name == "dls":
-        from wholebody.methods.damped_least_squares import DampedLeastSquares
-
-        return DampedLeastSquares()
-    raise UnknownNameError("method", name, METHODS)
+    if name not in METHODS:
+        raise UnknownNameError("method", name, METHODS)
+    method: Method = getattr(import_module("wholebody.methods"), METHODS[name])()
+    return method
 
 
 def imported(name: str) -> Callable[..., Method]:
-    """The class of a method of one's own, from "module:Class"; modules are looked for in the working folder too.
-
-    Raises:
-        InputError: the module or its class cannot be imported, or is no class of methods.
-    """
+    """The class of a method of one's own, from "module:Class"; modules are looked for in the working folder too."""
     module, _, kind = name.partition(":")
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())
@@ -89,24 +70,12 @@ def as_method(given: object) -> Method:
 
 
 def method_for_motions(given: object) -> Method:
-    """A method for motions: by name, with a tolerance of 1e-5 and no restarts; a configured one is used as it is.
-
-    Raises:
-        UnknownNameError: there is no such method.
-        InputError: it is neither a name nor a method.
-    """
-    if not isinstance(given, str):
-        return as_method(given)
-    if given == "qp":
-        from wholebody.methods.qp.method import QP
-
-        return QP(restarts=0)
-    if given == "ccd":
-        from wholebody.methods.ccd.method import CCD
-
-        # m, rad: tolerance of the goals at the end of a motion
-        return CCD(tolerance=1e-5, restarts=0)
-    return method_named(given)
+    """A method for motions: by name, with a tolerance of 1e-5 and no restarts; a configured one is used as it is."""
+    # m, rad: tolerance of the goals at the end of a motion
+    own: dict[str, Any] = {"qp": {"restarts": 0}, "ccd": {"tolerance": 1e-5, "restarts": 0}}
+    method: Any = as_method(given)
+    made: Method = replace(method, **own[given]) if isinstance(given, str) and given in own else method
+    return made
 
 
 def solve(problem: Problem, method: str | Method = "qp", progress: Progress | None = None) -> Solution:

@@ -20,13 +20,7 @@ TURN = 2.0 * np.pi  # rad: range of those
 
 
 def off_limits(problem: Problem, state: State, start: Array) -> Array | None:
-    """The start, shape (nq,), with every joint at a limit moved off it; None if no joint is at a limit.
-
-    Args:
-        problem: its bounds are kept.
-        state: of the run; it is moved.
-        start: (nq,).
-    """
+    """The start (nq,) with every joint at a limit moved off it; None if no joint is at a limit. It moves the state."""
     limits = problem.scene.figure.limits
     value = start[limits.idx_q]
     move = np.zeros(problem.scene.model.nv)
@@ -44,15 +38,9 @@ def restarts(
     count: int,
     spreads: Sequence[float] = (),
 ) -> Iterator[Array]:
-    """Random postures within limits, shape (nq,), at distances from the start that the spreads give in turn.
+    """Random postures (nq,) within limits and bounds, as far from the start as the spreads say in turn.
 
-    Args:
-        problem: its bounds are kept: frozen joints stay where they are.
-        state: of the run; it is moved.
-        start: (nq,).
-        rng: the random generator.
-        count: how many.
-        spreads: largest distances from the start as shares of each joint's range; `SPREADS` if empty.
+    Those are the largest distances as shares of each joint's range, `SPREADS` if empty. The state is moved.
     """
     lower, upper = _ranges(problem, start)
     span = upper - lower
@@ -63,13 +51,7 @@ def restarts(
 
 
 def hooked_hands(problem: Problem, state: State, start: Array) -> Iterator[Array]:
-    """The start with hooked fingers of every hand that takes a bar by a power grip, shape (nq,); nothing without them.
-
-    Args:
-        problem: its bounds are kept.
-        state: of the run; it is moved.
-        start: (nq,).
-    """
+    """The start with hooked fingers of every hand that takes a bar by a power grip, shape (nq,); nothing without."""
     figure, terms = problem.scene.figure, (*problem.goals, *problem.constraints)
     sides = sorted({term.hand.split("_")[0] for term in terms if isinstance(term, Grasp) and term.kind == "power"})
     for angles in opened_for_a_bar(sides):
@@ -82,14 +64,8 @@ def throughout(problem: Problem, state: State, start: Array, rng: np.random.Gene
     """Postures within limits, shape (nq,), of which each joint has every part of its range once.
 
     A Latin hypercube (M. D. McKay, R. J. Beckman, W. J. Conover, "A comparison of three methods for selecting values of
-    input variables", Technometrics 21, 1979): a limb of few joints is seen in all of its configurations.
-
-    Args:
-        problem: its bounds are kept.
-        state: of the run; it is moved.
-        start: (nq,) joints without limits stay near it.
-        rng: the random generator.
-        count: how many.
+    input variables", Technometrics 21, 1979): a limb of few joints is seen in all of its configurations. Joints without
+    limits stay near the start (nq,); the state is moved.
     """
     lower, upper = _ranges(problem, start)
     parts = rng.permuted(np.tile(np.arange(count), (len(lower), 1)), axis=1)

@@ -16,7 +16,6 @@ from types import MappingProxyType
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
 from wholebody.base.checks import a, flag, function, instance, listed, shown
 from wholebody.base.errors import InputError, UndefinedTermError, UnknownNameError
 from wholebody.base.records import with_values
@@ -42,12 +41,7 @@ METHODS: Mapping[str, str] = MappingProxyType(
 
 
 def as_avoider(given: object) -> Avoider:
-    """A method from its name, or a configured one as it is.
-
-    Raises:
-        UnknownNameError: there is no such method.
-        InputError: it is neither.
-    """
+    """A method from its name, or a configured one as it is; `UnknownNameError` or `InputError` for others."""
     if isinstance(given, str):
         if given not in METHODS:
             raise UnknownNameError("method of avoidance", given, METHODS)
@@ -107,7 +101,12 @@ def avoid(
     instance(scene, Scene, "avoid: scene", "make one with wb.Scene(clip.figure)")
     same_joints(clip, scene.figure, "avoid")
     function(progress, "avoid: progress")
-    chosen = _with_strength(as_avoider(method), dynamics)
+    chosen = as_avoider(method)
+    if isinstance(dynamics, Strength) or flag(dynamics, "avoid: dynamics"):
+        if not has_setting(chosen, "dynamics"):
+            raise InputError(f"avoid: the method {chosen.name} does not take dynamics; give method='trajectory'")
+        strength = dynamics if isinstance(dynamics, Strength) else Strength()
+        chosen = replace(chosen, dynamics=strength)  # type: ignore[type-var]
     given: tuple[Given, ...] = tuple(listed(constraints, "avoid: constraints", "[wb.Freeze('root')]"))
     if flag(hold_feet, "avoid: hold_feet") and not any(isinstance(term, StanceFeet) for term in given):
         given = (*given, StanceFeet()) if has_feet(scene.figure) else given
@@ -121,7 +120,10 @@ def avoid(
                 result = freed(chosen, run)
             seconds, report = time.perf_counter() - began, judge.report(result, run)
         except UndefinedTermError as error:  # terms of one's own are finite at the original postures, if nowhere else
-            why = str(error) if error.q is None else error.told_of(f"near frame {_nearest(clip, error.q)}")
+            why = str(error)
+            if error.q is not None:
+                away = [np.linalg.norm(pin.difference(clip.figure.model, frame, error.q)) for frame in clip.q]
+                why = error.told_of(f"near frame {int(np.argmin(away))}")
             result = MethodResult(clip.q.copy(), message=f"the postures stay as they were: {why}")
             seconds, report = time.perf_counter() - began, replace(judge.report(result, run), solved=False)
         # what is not free, or held, is not worth the time; a new timing, or loads, would be others after it
@@ -139,19 +141,8 @@ def avoid(
     return Avoided(clip.with_q(result.q), replace(report, seconds=seconds))
 
 
-def _nearest(clip: Clip, q: Array) -> int:
-    """The frame whose posture is nearest to one (nq,)."""
-    return int(np.argmin([np.linalg.norm(pin.difference(clip.figure.model, frame, q)) for frame in clip.q]))
-
-
 class _Judge:
-    """What a clip is before it is freed, and the requirements of the answer.
-
-    Attributes:
-        feet: segments or frames on which the figure stands.
-        terms: what holds in each frame.
-        asked: bounds on jerk, speed and deviation, resolved for the clip.
-    """
+    """What a clip is before it is freed, the feet it stands on, and the requirements of the answer."""
 
     def __init__(self, clip: Clip, scene: Scene, method: Avoider, given: tuple[Given, ...], keep_ends: bool) -> None:
         self._name, self._strength, self.feet = method.name, method.dynamics, usual_feet(scene.figure, given)
@@ -189,27 +180,8 @@ def freed(method: Avoider, run: Run) -> MethodResult:
     return with_values(result, q=q)
 
 
-def _with_strength(method: Avoider, dynamics: object) -> Avoider:
-    """The method with what `dynamics=` asks for.
-
-    Raises:
-        InputError: it does not take dynamics.
-    """
-    strength = dynamics if isinstance(dynamics, Strength) else Strength()
-    if not isinstance(dynamics, Strength) and not flag(dynamics, "avoid: dynamics"):
-        return method
-    if not has_setting(method, "dynamics"):
-        raise InputError(f"avoid: the method {method.name} does not take dynamics; give method='trajectory'")
-    made: Avoider = replace(method, dynamics=strength)  # type: ignore[type-var]
-    return made
-
-
 def _bounds(given: tuple[Given, ...], was: ClipCheck, terms: FrameTerms, keep_ends: bool) -> MotionBounds:
-    """The bounds on jerk, speed and deviation, resolved for a clip.
-
-    Raises:
-        InputError: two are given.
-    """
+    """The bounds on jerk, speed and deviation, resolved for a clip."""
     stated = [term for term in given if isinstance(term, MotionBounds)]
     if len(stated) > 1:
         raise InputError("avoid: constraints has two wb.motion.MotionBounds; give one")

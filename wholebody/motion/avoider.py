@@ -29,12 +29,7 @@ from wholebody.tasks.base import Bound, Constraint, Goal, filled
 
 
 class AvoidProgress(NamedTuple):
-    """Told while a clip is freed.
-
-    Attributes:
-        share: done so far, from 0 to 1.
-        note: what is being done.
-    """
+    """Told while a clip is freed: the share done so far, from 0 to 1, and what is being done."""
 
     share: float
     note: str
@@ -45,11 +40,7 @@ Progress = Callable[[AvoidProgress], Any]
 
 
 class Watch:
-    """Tells the caller how far a method is, and remembers whether the caller ended it.
-
-    Attributes:
-        ended: whether the caller ended it.
-    """
+    """Tells the caller how far a method is, and remembers in `ended` whether the caller ended it."""
 
     def __init__(self, progress: Progress | None) -> None:
         """Take what is called, or None."""
@@ -68,12 +59,7 @@ class Watch:
 
 @dataclass
 class Work:
-    """What freeing a clip took so far.
-
-    Attributes:
-        programs: quadratic programs that were solved.
-        posture_solves: postures that were solved for, each on its own.
-    """
+    """Quadratic programs, and postures on their own, that were solved so far."""
 
     programs: int = 0
     posture_solves: int = 0
@@ -115,7 +101,7 @@ class Follower:
             number: of the frame.
             q: (nq,) where the steps begin, once it is within the bounds of the frame.
             more: metres that are asked of every pair beyond the clearance.
-            goal: (nq,) posture that is followed in place of the original one.
+            goal: (nq,) followed in place of the original posture.
         """
         terms, problem = self._terms, self._problem
         if terms.kept(number):

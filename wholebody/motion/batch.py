@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array
@@ -28,17 +28,14 @@ from wholebody.motion.worn_equipment import NOTHING, Worn, dressed, label
 from wholebody.tracking.tracks import check_figure
 from wholebody.version import __version__
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
 Source = Clip | str | os.PathLike[str]
 
 
 class BatchProgress(NamedTuple):
-    """Told when a case is done.
-
-    Attributes:
-        done: cases, those of an earlier run included.
-        total: how many there are in all.
-        case: the one that was done last; None before the first.
-    """
+    """Told when a case is done: how many are, those of an earlier run included, of how many, and which was the last."""
 
     done: int
     total: int
@@ -53,11 +50,12 @@ class _Asked(NamedTuple):
     method: Avoider
 
 
-class _Held(NamedTuple):
-    """What holds in every frame of each case."""
+class AvoidOptions(TypedDict, total=False):
+    """What every case is asked for; see `avoid`."""
 
-    constraints: tuple[Given, ...]
-    feet: bool
+    constraints: Iterable[Given]
+    hold_feet: bool
+    keep_ends: bool
 
 
 def avoid_many(
@@ -67,11 +65,10 @@ def avoid_many(
     figure: Figure | None = None,
     equipment: Iterable[Worn] = (NOTHING,),
     methods: Iterable[str | Avoider] = ("trajectory",),
-    constraints: Iterable[Given] = (),
-    hold_feet: bool = True,
     jobs: int = 1,
     cluster: str | None = None,
     progress: Callable[[BatchProgress], Any] | None = None,
+    **options: Unpack[AvoidOptions],
 ) -> tuple[AvoidedCase, ...]:
     """Free clips of collisions: each clip, with each equipment, by each method.
 
@@ -87,11 +84,10 @@ def avoid_many(
         equipment: what is worn in turn: "nothing", names of `wb.motion.equipment` such as "pack", joined by "+" where
             they are worn together, paths of meshes for the back, `wb.motion.Equipment`, or tuples of these.
         methods: names or settings, see `avoid`.
-        constraints: what holds in every frame of each case, see `avoid`.
-        hold_feet: keep the feet where they stand, see `avoid`.
         jobs: cases at a time.
         cluster: address of a dask scheduler that runs them; None for this machine.
         progress: called with a `BatchProgress` after each case.
+        options: `constraints`, `hold_feet` and `keep_ends`, as of `avoid`.
 
     Returns:
         The rows of the table, in the order in which they were asked.
@@ -104,15 +100,20 @@ def avoid_many(
         WholebodyError: the cluster does not answer.
     """
     what = "avoid_many"
+    if unknown := options.keys() - AvoidOptions.__annotations__.keys():
+        raise TypeError(f"{what}() has no argument {min(unknown)!r}")
     sources = _sources(checks.listed(clips, f"{what}: clips", "['walk.bvh']"), figure, what)
-    given = checks.listed(constraints, f"{what}: constraints", "[wb.motion.StanceFeet()]")
+    given = tuple(checks.listed(options.get("constraints", ()), f"{what}: constraints", "[wb.motion.StanceFeet()]"))
     pieces = checks.listed(equipment, f"{what}: equipment", "['nothing', 'pack']")
     twice = first_twice(label(one) for one in pieces)
     if twice is not None:
         raise InputError(f"{what}: two pieces of equipment are named {checks.shown(twice)}; give each another name")
     worn: dict[str, Worn] = {label(one): one for one in pieces}
     ways = _ways([as_avoider(one) for one in checks.listed(methods, f"{what}: methods", "['trajectory']")])
-    hold_feet = checks.flag(hold_feet, f"{what}: hold_feet")
+    feet = checks.flag(options.get("hold_feet", True), f"{what}: hold_feet")
+    held: AvoidOptions = {"constraints": given, "hold_feet": feet}
+    if checks.flag(options.get("keep_ends", False), f"{what}: keep_ends"):
+        held["keep_ends"] = True
     jobs = checks.whole(jobs, f"{what}: jobs", 1, 4096)
     if cluster is not None:
         checks.text(cluster, f"{what}: cluster")
@@ -120,10 +121,9 @@ def avoid_many(
     owners = [source.figure if isinstance(source, Clip) else figure for source in sources.values()]
     for owner in {id(owner): owner for owner in owners if owner is not None}.values():
         for one in pieces:  # what does not fit is said before anything is computed
-            frame_terms(dressed(owner, one), owner.neutral[None], 1.0 / 30.0, tuple(given))
+            frame_terms(dressed(owner, one), owner.neutral[None], 1.0 / 30.0, given)
     batch = _Batch(sources, figure, BatchTable(checks.path(folder, f"{what}: folder")), jobs, cluster)
     marks, faults = batch.originals()
-    held = _Held(tuple(given), hold_feet)
     asked = [
         _Asked(AvoidedCase(name, wears, way, asked=_fingerprint(marks[name], one, method, held)), one, method)
         for name in sources
@@ -165,7 +165,7 @@ class _Batch(NamedTuple):
         return marks, faults
 
     def freed(
-        self, asked: Sequence[_Asked], faults: Mapping[str, str], held: _Held,
+        self, asked: Sequence[_Asked], faults: Mapping[str, str], held: AvoidOptions,
         progress: Callable[[BatchProgress], Any] | None,
     ) -> tuple[AvoidedCase, ...]:  # fmt: skip
         """The rows of the cases that were asked; those that the folder has not are done, if their file was read."""
@@ -206,36 +206,23 @@ class _Batch(NamedTuple):
         return read_clip(self.table.original(name), self.figure)
 
 
-def _case(clip: Clip, worn: Worn, method: Avoider, held: _Held) -> tuple[dict[str, Any], Array | None, float]:
+def _case(clip: Clip, worn: Worn, method: Avoider, held: AvoidOptions) -> tuple[dict[str, Any], Array | None, float]:
     """Free a clip, in a process of its own: the fields of its row, and its postures with their time step."""
     try:
-        avoided = avoid(
-            clip, dressed(clip.figure, worn), method=method, constraints=held.constraints, hold_feet=held.feet
-        )
+        avoided = avoid(clip, dressed(clip.figure, worn), method=method, **held)
     except WholebodyError as error:
         return {"outcome": "refused", "message": str(error)}, None, clip.dt
     return _measured(clip, avoided), avoided.clip.q, avoided.clip.dt
 
 
 def _measured(before: Clip, avoided: Avoided) -> dict[str, Any]:
+    """The fields of a row that are known of a clip that was freed."""
     report, after = avoided.report, avoided.clip
-    found: dict[str, Any] = {
-        "outcome": "free" if report.solved else "left",
-        "message": report.message,
-        "frames": len(after),
-        "duration": before.duration,
-        "seconds": report.seconds,
-        "colliding_before": report.before.colliding,
-        "colliding": report.after.colliding,
-        "dips": report.after.dips,
-        "deepest_before": report.before.deepest,
-        "deepest": report.after.deepest,
-        "deepest_between": report.after.deepest_between,
-        "missed": report.missed,
-        "frames_changed": report.frames_changed,
-        "posture_solves": report.posture_solves,
-        "programs": report.programs,
-    }
+    counts = ("message", "seconds", "missed", "frames_changed", "posture_solves", "programs")
+    found: dict[str, Any] = {name: getattr(report, name) for name in counts}
+    found |= {name: getattr(report.after, name) for name in ("colliding", "dips", "deepest", "deepest_between")}
+    found |= {f"{name}_before": getattr(report.before, name) for name in ("colliding", "deepest")}
+    found |= {"outcome": "free" if report.solved else "left", "frames": len(after), "duration": before.duration}
     if len(before) == len(after):  # and not retimed
         after = Clip(after.figure, after.q, before.dt, after.name)
         apart, jerk = deviation(before, after), jerk_ratio(before, after)
@@ -334,7 +321,7 @@ def _mark(source: Clip | Path, figure: Figure | None) -> str:
         return _hash(str(error))
 
 
-def _fingerprint(mark: str, worn: Worn, method: Avoider, held: _Held) -> str:
+def _fingerprint(mark: str, worn: Worn, method: Avoider, held: AvoidOptions) -> str:
     bytes_of_mesh = read_bytes(worn, "mesh") if isinstance(worn, str) and is_file(worn) else None
     return _hash(mark, worn, bytes_of_mesh, method, held, __version__)
 

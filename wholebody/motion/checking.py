@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -151,8 +151,8 @@ class ClipCheck:
             "deepest_between": self.deepest_between,
             "jerk": self.mean_jerk,
             "contacts": [contact_as_dict(contact, dt) for contact in self.contacts],
-            "limits": [_beyond_as_dict(beyond, dt) for beyond in self.limits],
-            "speeds": [_beyond_as_dict(beyond, dt) for beyond in self.speeds],
+            "limits": [asdict(each) | {"time": each.frame * dt} for each in self.limits],
+            "speeds": [asdict(each) | {"time": each.frame * dt} for each in self.speeds],
             "sliding": [
                 {
                     "frame_name": each.frame, "distance": each.distance, "frame": each.at, "time": each.at * dt,
@@ -226,11 +226,7 @@ def joint_jerk(clip: Clip) -> Array:
 
 
 def same_joints(clip: Clip, figure: Figure, what: str) -> None:
-    """Check that a scene's figure takes the postures of a clip.
-
-    Raises:
-        InputError: it has other joints.
-    """
+    """Raise `InputError` if a figure does not take the postures of a clip."""
     if figure.joints != clip.names or figure.model.nq != clip.q.shape[1]:
         raise InputError(
             f"{what}: the scene is of {figure.name}, which has other joints than {clip.figure.name} of {clip.name}; "
@@ -240,49 +236,33 @@ def same_joints(clip: Clip, figure: Figure, what: str) -> None:
 
 def beyond_limits(clip: Clip) -> tuple[Beyond, ...]:
     """Joints beyond their limits, the worst first."""
-    limits, names = clip.figure.limits, _joint_of(clip.figure)
-    found = []
-    for idx_q, low, high in zip(limits.idx_q.tolist(), limits.lower, limits.upper, strict=True):
-        values = clip.q[:, idx_q]
-        excess = np.maximum(low - values, values - high)
-        worst = int(np.argmax(excess))
-        if excess[worst] > ROUNDING:
-            broken = low if values[worst] < low else high
-            count = int((excess > ROUNDING).sum())
-            found.append(
-                (excess[worst], Beyond(names[idx_q], count, worst, float(values[worst]), float(broken)))
-            )  # fmt: skip
-    return _worst_first(found)
+    limits, joints = clip.figure.limits, clip.figure.model.joints
+    names = {joints[clip.figure.joint_id(name)].idx_q: name for name in reversed(clip.names)}
+    columns = zip(limits.idx_q.tolist(), limits.lower, limits.upper, strict=True)
+    return _worst_first((names[k], clip.q[:, k], low, high, ROUNDING) for k, low, high in columns)
 
 
 def too_fast(clip: Clip) -> tuple[Beyond, ...]:
     """Joints that are faster than their velocity limits from a frame to the next one, the worst first."""
-    model, found = clip.figure.model, []
-    speed = np.abs(velocities(model, clip.q, clip.dt))
-    limit = np.array(model.velocityLimit)
+    model, limits = clip.figure.model, np.array(clip.figure.model.velocityLimit)
+    speed, found = np.abs(velocities(model, clip.q, clip.dt)), list[tuple[str, Array, float, float, float]]()
     for name in clip.names:
         joint = model.joints[clip.figure.joint_id(name)]
         for column in range(joint.idx_v, joint.idx_v + joint.nv):
-            excess = speed[:, column] - limit[column] * (1.0 + ROUNDING)
-            if not len(excess) or excess.max() <= 0.0 or limit[column] <= 0.0:  # 0 where a description gives none
-                continue
-            worst = int(np.argmax(excess))
-            told = Beyond(name, int((excess > 0.0).sum()), worst, float(speed[worst, column]), float(limit[column]))
-            found.append((float(excess[worst]), told))
+            if limits[column] > 0.0 and len(speed):  # 0 where a description gives none
+                limit = float(limits[column])
+                found.append((name, speed[:, column], -np.inf, limit, limit * ROUNDING))
     return _worst_first(found)
 
 
-def _beyond_as_dict(beyond: Beyond, dt: float) -> dict[str, Any]:
-    return {
-        "joint": beyond.joint, "frames": beyond.frames, "frame": beyond.frame, "time": beyond.frame * dt,
-        "value": beyond.value, "limit": beyond.limit,
-    }  # fmt: skip
-
-
-def _worst_first(found: list[tuple[float, Beyond]]) -> tuple[Beyond, ...]:
+def _worst_first(columns: Iterable[tuple[str, Array, float, float, float]]) -> tuple[Beyond, ...]:
+    """Joints whose values (n,) are beyond their lower or upper limit by more than rounding, the worst first."""
+    found = []
+    for name, values, low, high, rounding in columns:
+        excess = np.maximum(low - values, values - high)
+        worst = int(np.argmax(excess))
+        if excess[worst] > rounding:
+            count, broken = int((excess > rounding).sum()), low if values[worst] < low else high
+            told = Beyond(name, count, worst, float(values[worst]), float(broken))
+            found.append((float(excess[worst]) - rounding, told))
     return tuple(each for _, each in sorted(found, key=lambda item: -item[0]))
-
-
-def _joint_of(figure: Figure) -> dict[int, str]:
-    """Name of the joint at each place of a posture."""
-    return {figure.model.joints[figure.joint_id(name)].idx_q: name for name in reversed(figure.joints)}

@@ -87,10 +87,7 @@ def _exchange(figure: Figure) -> tuple[Indices, Array]:
 
 
 def _along(own: Array, other: Array) -> float:
-    """Cosine between the mirrored axis of a joint and that of its partner, from their columns (6,) of the Jacobian.
-
-    An axis of rotation is an axial vector: its mirror image turns the other way round.
-    """
+    """Cosine between a joint's mirrored axis and its partner's, of their columns (6,); axes of rotation turn round."""
     if np.linalg.norm(own[3:]) > 0.5:
         return float(-(MIRROR @ own[3:]) @ other[3:])
     return float((MIRROR @ own[:3]) @ other[:3]) if np.linalg.norm(other[3:]) < 0.5 else 0.0
@@ -197,22 +194,11 @@ class Clip:
         return Clip(self.figure, self.q[first:last:step], self.dt * step, self.name)
 
     def with_q(self, q: ArrayLike, name: str | None = None) -> Clip:
-        """The clip with other postures, any number of them.
-
-        Args:
-            q: (n, nq).
-            name: a new name; the same one if left out.
-
-        Raises:
-            InputError: as for a new clip.
-        """
+        """The clip with other postures (m, nq), any number of them, and another name if one is given."""
         return Clip(self.figure, q, self.dt, self.name if name is None else name)  # type: ignore[arg-type]
 
     def at(self, t: float) -> Array:
-        """Posture (nq,) at a time, interpolated between two frames on the configuration manifold.
-
-        Args:
-            t: seconds, from 0 to `duration`.
+        """Posture (nq,) at a time from 0 to `duration`, interpolated between two frames on the configuration manifold.
 
         Raises:
             InputError: a time outside of the clip.
@@ -235,12 +221,9 @@ class Clip:
         return found
 
     def resampled(self, dt: float) -> Clip:
-        """The clip at another time step, interpolated on the configuration manifold.
+        """The clip at another time step, seconds, interpolated on the configuration manifold.
 
         The first frame is the same. The last one is at the last multiple of the new step within the clip.
-
-        Args:
-            dt: seconds from frame to frame.
 
         Raises:
             InputError: a time step that is not positive, or so short that there were more than a million frames.
@@ -277,8 +260,7 @@ class Clip:
     def velocities(self) -> Array:
         """Velocities (n, nv), rad/s and m/s, by differences on the manifold: central, and one-sided at both ends.
 
-        They are exact for joints whose motion is a quadratic polynomial of time. Those of a free root are in its own
-        axes. They are zero for a clip of one frame.
+        They are exact for quadratic motion. Those of a free root are in its own axes. One frame has none.
         """
         forward, backward = self._differences()
         v = np.zeros((len(self), self.figure.model.nv))
@@ -295,8 +277,7 @@ class Clip:
     def accelerations(self) -> Array:
         """Accelerations (n, nv), rad/s² and m/s², by second differences on the manifold, extrapolated at both ends.
 
-        They are exact for joints whose motion is a cubic polynomial of time, and zero for a clip of less than three
-        frames.
+        They are exact for cubic motion, and zero for a clip of less than three frames.
         """
         forward, backward = self._differences()
         a = np.zeros_like(forward)
@@ -319,20 +300,12 @@ class Clip:
 
     @classmethod
     def from_track(cls, track: Track, figure: Figure) -> Clip:
-        """The clip of a tracker's postures.
-
-        Raises:
-            UnknownNameError: the track has a joint that the figure does not have.
-            InputError: it lacks joints, or has them in another order.
-        """
+        """The clip of a tracker's postures; the figure's joints in its order, or `InputError` or `UnknownNameError`."""
         instance(track, Track, "Clip.from_track: track", "make one with Track.of(figure, q, dt)").check(figure)
         return cls(figure, track.q, track.dt, track.name)
 
     def write(self, path: str | os.PathLike[str]) -> Path:
-        """Write the clip to a file; the ending of its name chooses the format.
-
-        Returns:
-            The path.
+        """Write the clip to a file, whose path it returns; the ending of its name chooses the format.
 
         Raises:
             FileFormatError: an ending that is not known.

@@ -17,25 +17,19 @@ Kind = Literal["self", "equipment", "thing"]
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """Two segments or things that overlap somewhere in a clip.
-
-    A frame is in contact where the two overlap by more than the tolerance of the check; a gap, from a frame to the
-    next one, where they do so in between.
+    """Two segments or things that overlap in a clip by more than the tolerance, in frames or in gaps after them.
 
     Attributes:
-        first: a segment or thing.
-        second: the other one.
+        first, second: segments or things.
         kind: "self" for two segments of the figure, "equipment" if an attached thing takes part, otherwise "thing":
             something that stands in the world.
-        frames: number of frames in contact.
-        gaps: number of gaps in contact.
+        frames, gaps: number of frames in contact, and of gaps.
         start: the first frame in contact; where the contact begins in a gap, the frame before.
         deepest: greatest depth, metres.
         deepest_frame: the frame in which it is deepest; the one before, where it is deepest in a gap.
         deepest_between: whether it is deepest in a gap.
         longest: first and last frame of the longest contact; frames beside a gap in contact belong to it.
-        depth: (n,) depth in each frame, metres; 0 where the two do not overlap.
-        between: (n - 1,) depth in each gap, metres.
+        depth, between: (n,) and (n - 1,) depth in each frame and gap, metres; 0 where the two do not overlap.
     """
 
     first: str
@@ -61,12 +55,7 @@ class ContactTable:
     """Depths of all pairs of owners, filled frame by frame."""
 
     def __init__(self, scene: Scene, frames: int) -> None:
-        """Number the pairs of owners of a scene.
-
-        Args:
-            scene: the scene.
-            frames: number of frames of the clip.
-        """
+        """Number the pairs of owners of a scene."""
         owners, numbers = scene.piece_owner, dict[tuple[str, str], int]()
         pairs = scene.pair_table.pairs
         named = [(owners[a], owners[b]) for a, b in pairs.tolist()]
@@ -107,16 +96,7 @@ class ContactTable:
 
 
 def contact(first: str, second: str, kind: Kind, depth: Array, between: Array, tolerance: float) -> Contact:
-    """The contact of two owners from their depths, of which one is beyond the tolerance.
-
-    Args:
-        first: a segment or thing.
-        second: the other one.
-        kind: see `Contact`.
-        depth: (n,) in each frame, metres.
-        between: (n - 1,) in each gap, metres.
-        tolerance: metres.
-    """
+    """The contact of two owners, of depths in frames (n,) and gaps (n - 1,), one of them beyond the tolerance."""
     # frames and gaps in the order of time: 2 k is frame k, 2 k + 1 the gap after it
     times = np.zeros(2 * len(depth) - 1)
     times[::2], times[1::2] = depth, between

@@ -86,24 +86,17 @@ class Torques:
     def largest(self) -> dict[str, float]:
         """Largest absolute torque of each joint over the clip, N m, by name."""
         peaks = np.abs(self.torque).max(axis=0)
-        found = {}
-        for name in self.figure.joints:
-            joint = self.figure.model.joints[self.figure.joint_id(name)]
-            found[name] = float(peaks[joint.idx_v : joint.idx_v + joint.nv].max())
-        return found
+        return {name: float(peaks[first:end].max()) for name, first, end in self._columns()}
 
     def joint_of(self, column: int) -> str:
-        """Name of the joint of a column of `torque`.
-
-        Raises:
-            InputError: there is no such column.
-        """
+        """Name of the joint of a column of `torque`."""
         column = checks.whole(column, "column", 0, self.figure.model.nv - 1)
-        for name in self.figure.joints:
-            joint = self.figure.model.joints[self.figure.joint_id(name)]
-            if joint.idx_v <= column < joint.idx_v + joint.nv:
-                return name
-        return "root"
+        return next((name for name, first, end in self._columns() if first <= column < end), "root")
+
+    def _columns(self) -> list[tuple[str, int, int]]:
+        """Name of each joint, its first column of `torque`, and the one after its last."""
+        joints = [(name, self.figure.model.joints[self.figure.joint_id(name)]) for name in self.figure.joints]
+        return [(name, joint.idx_v, joint.idx_v + joint.nv) for name, joint in joints]
 
     def __str__(self) -> str:
         """Three lines: the joint nearest to its strength, what the ground cannot give, and how many frames stand."""
@@ -156,13 +149,8 @@ def torques(
     friction = checks.number(friction, "torques: friction", 1e-3, 100.0)
     if cutoff is not None:
         cutoff = checks.number(cutoff, "torques: cutoff", 1e-3, 1e6, "Hz")
-    strength = (
-        Strength()
-        if strength is None
-        else checks.instance(
-            strength, Strength, "torques: strength", "give wb.motion.Strength(percentile=50, sex='female')"
-        )
-    )
+    strength = Strength() if strength is None else strength
+    checks.instance(strength, Strength, "torques: strength", "give wb.motion.Strength(percentile=50, sex='female')")
     figure = clip.figure
     if feet is FEET:
         feet = [name for name in FEET if name in figure.segments]
@@ -177,15 +165,7 @@ def torques(
 def clip_torques(
     clip: Clip, stands: Mapping[str, Mask], strength: Strength, friction: float, cutoff: float | None
 ) -> Torques:
-    """Torques of a clip that stands on given feet in given frames; see `torques`.
-
-    Args:
-        clip: the motion.
-        stands: foot -> (n,) frames in which it stands.
-        strength: of the person.
-        friction: coefficient.
-        cutoff: Hz, or None.
-    """
+    """Torques of a clip that stands on given feet in given frames (foot -> (n,)); see `torques`."""
     figure, steady = clip.figure, smoothed(clip, cutoff)
     v, a = steady.velocities(), steady.accelerations()
     dynamics = InverseDynamics(figure, tuple(stands), friction)
@@ -233,7 +213,8 @@ def smoothed(clip: Clip, cutoff: float | None = CUTOFF) -> Clip:
     if reach < 1:
         return clip
     q = _continuous(clip)
-    return clip.with_q(_unit(clip.figure, sosfiltfilt(sections, q, axis=0, padtype="odd", padlen=reach)))
+    steady = sosfiltfilt(sections, q, axis=0, padtype="odd", padlen=reach)
+    return clip.with_q(np.array([pin.normalize(clip.figure.model, posture) for posture in steady]))
 
 
 def _continuous(clip: Clip) -> Array:
@@ -245,10 +226,6 @@ def _continuous(clip: Clip) -> Array:
             turns = np.sign(np.einsum("ij,ij->i", part[1:], part[:-1]))
             part[1:] *= np.cumprod(np.where(turns < 0.0, -1.0, 1.0))[:, None]
     return q
-
-
-def _unit(figure: Figure, q: Array) -> Array:
-    return np.array([pin.normalize(figure.model, posture) for posture in q])
 
 
 def _pressure(forces: Array, points: Array) -> Array:
@@ -269,7 +246,7 @@ PLACE = 2e-3
 
 @dataclass(frozen=True, eq=False)
 class LoadChange:
-    """Loads before and after.
+    """Loads before and after a change.
 
     Attributes:
         before: torques of the clip as it was.
@@ -343,14 +320,6 @@ class LoadChange:
 def load_change(
     before: Torques, after: Clip, places: Array | None, strength: Strength, feet: Sequence[str]
 ) -> LoadChange:
-    """Compare the loads of a clip before and after a change, both as `wb.motion.torques` measures them.
-
-    Args:
-        before: torques of the clip as it was.
-        after: what was made of it.
-        places: (m,) place of each frame of it in the frames before; None for the same ones.
-        strength: of the person.
-        feet: segments that may stand.
-    """
+    """Compare the loads of a clip before and after a change, whose frames are at places (m,) of those before."""
     places = np.arange(len(after), dtype=np.float64) if places is None else places
     return LoadChange(before, torques(after, feet=feet, strength=strength), places)

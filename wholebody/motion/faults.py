@@ -20,13 +20,7 @@ DEPTH = 5e-5  # m: of an overlap that is to go; half of what counts as a collisi
 
 
 def dipping(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, list[int]]:
-    """Gaps that dip, and the numbers of the pairs that do so in each, the deepest first.
-
-    Args:
-        workspace: of this run alone.
-        q: (n, nq) postures.
-        gaps: frames whose motion to the next frame is looked at, however thin the things in its way.
-    """
+    """Gaps that dip, however thin the things in their way, and the numbers of their pairs, the deepest first."""
     found = dict[int, list[int]]()
     for gap, passing in _swept(workspace, q, gaps):
         if passing.depth.max(initial=0.0) > DIP:
@@ -56,19 +50,15 @@ def dip_depth(workspace: Workspace, before: Array, after: Array) -> float:
 
 
 def dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, list[float]]:
-    """Gaps that dip, and the shares of each at which its pairs are deepest; see `dipping`.
-
-    Pairs that are deepest at nearly the same share are told once: a share has rows of all that is near there.
-    """
+    """Gaps that dip, and the shares of each at which its pairs are deepest; nearly the same share is told once."""
     found = dipping(workspace, q, gaps)
     return {gap: _deepest(workspace, q[gap], q[gap + 1], numbers[:6]) for gap, numbers in found.items()}
 
 
 def sampled_dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> list[tuple[int, float]]:
-    """Places between frames that overlap, or nearly so, if some of them dip.
+    """Places between frames that overlap, or nearly so, if some of them dip; a few of each gap are looked at.
 
-    Looks at a few places of each gap, so it may miss dips. What nearly overlaps is told too, because what pushes one
-    gap out pushes its neighbours in.
+    What nearly overlaps is told too, because what pushes one gap out pushes its neighbours in.
     """
     near, dipping = [], False
     for gap in gaps:
@@ -157,17 +147,10 @@ class Faults(NamedTuple):
 
 
 def faults(workspace: Workspace, terms: FrameTerms, q: Array, clearance: float = 0.0, first: int = 0) -> Faults:
-    """What is wrong with postures (n, nq) of a clip.
+    """What is wrong with postures (n, nq), of which the first belongs to frame `first` of a clip.
 
-    Args:
-        workspace: of this run alone.
-        terms: what is held.
-        q: (n, nq) postures.
-        clearance: least distance asked of every pair, metres.
-        first: frame of the clip that the first posture belongs to.
-
-    Returns:
-        Frames deeper than 0.05 mm, beyond a limit by 1e-6 rad or m, or that miss what is held by 1e-4 m or rad; gaps.
+    That is frames nearer than the clearance by more than 0.05 mm, beyond a limit by 1e-6 rad or m, or that miss what is
+    held by 1e-4 m or rad; and gaps that dip.
     """
     limits = terms.scene.figure.limits
     depths = np.array([depth(workspace, posture, clearance) for posture in q])

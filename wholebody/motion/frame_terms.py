@@ -1,8 +1,7 @@
 """What holds in every frame of a clip: constraints resolved at each original posture, and bounds on the deviations.
 
-A term that refers to the start ("as at the start") refers to the original posture of its own frame. So
-`Hold("left_hand", relative_to="right_hand")` keeps the grip that each frame has, `Hold("left_foot")` keeps the foot
-where it was in that frame, and `Freeze("root")` keeps the root's motion. A grip that overlaps itself is kept beside.
+A term that refers to the start refers to the original posture of its own frame: `Hold("left_hand",
+relative_to="right_hand")` keeps the grip that each frame has. A grip that overlaps itself is kept beside.
 """
 
 from __future__ import annotations
@@ -31,12 +30,7 @@ Given = Constraint | Goal | Bound | StanceFeet | MotionBounds
 
 
 class Miss(NamedTuple):
-    """By how much something that is held is missed.
-
-    Attributes:
-        by: metres or radians; 0 where it is met.
-        name: what is held, such as "Hold('left_palm')"; "" for nothing.
-    """
+    """By how much something that is held is missed, metres or radians, and what: "Hold('left_palm')", or ""."""
 
     by: float
     name: str
@@ -174,11 +168,7 @@ class FrameTerms:
         return np.maximum(bounds.slowest, -fastest), np.minimum(bounds.fastest, fastest)
 
     def at(self, times: Array) -> FrameTerms:
-        """The same of postures at other times of the clip, as many seconds apart as before.
-
-        Args:
-            times: (m,) seconds, ascending, within the clip.
-        """
+        """The same of postures at other times (m,) of the clip, seconds, ascending, as far apart as before."""
         places = np.asarray(times) / self.dt
         nearest = np.clip(np.rint(places).astype(int), 0, len(self.q) - 1)
         stands, shifts = (tuple(each[frame] for frame in nearest) for each in (self.stands, self.shifts))
@@ -209,10 +199,7 @@ class FrameTerms:
         return max(found, key=lambda each: each.by, default=Miss(0.0, ""))
 
     def past_speed(self, frame: int, q: Array, following: Array) -> float:
-        """By what share the motion from a posture (nq,) of a frame to the following one is faster than was given.
-
-        The figure's own speed limits do not count.
-        """
+        """By what share the motion from a posture (nq,) of a frame to the following one is faster than was given."""
         _, _, slow, fast = self.bounds(frame)
         step = np.asarray(pin.difference(self.scene.model, q, following))
         past, most = np.maximum(slow - step, step - fast), np.where(step < 0.0, -slow, fast)

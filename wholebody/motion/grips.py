@@ -1,16 +1,13 @@
 """Where a hand is held whose place at the other one overlaps it: beside that place, as near and as smooth as can be.
 
-`Hold("left_palm", relative_to="right_palm")` keeps the grip of each frame. No joint lies between two things that are
-held at each other, so where the recording has them in each other, contact and grip contradict. Recordings that were
-brought onto larger hands do. There the grip is shifted, by the shift s_t (3,) of each frame t for which
+`Hold("left_palm", relative_to="right_palm")` keeps the grip of each frame. Where the recording has both hands in each
+other, contact and grip contradict. There the grip is shifted, by the shift s_t (3,) of each frame t for which
 
     1/2 sum_t (|s_t|^2 + tau^4 |(s_(t+1) - 2 s_t + s_(t-1)) / dt^2|^2 + c |s_t - (u_t . s_t) u_t|^2)    is least, and
     n . s_t >= depth + room
 
-for every near pair of pieces with its normal n, in each frame and, where hands turn past each other, at places between
-two frames, where the room includes the clearance. u_t is the direction from one
-held frame to the other: two hands on one shaft may slide along it, and leave it only where that parts nothing. Normals
-turn with the shift, so the program is solved a few times.
+for every near pair of pieces with its normal n, in each frame and, where hands turn past each other, between two
+frames; u_t is the direction from one held frame to the other. Normals turn with the shift, so it is solved a few times.
 """
 
 from __future__ import annotations
@@ -33,10 +30,7 @@ SHARES = (0.25, 0.5, 0.75)  # of the way to the next frame: these places
 
 
 class _Row(NamedTuple):
-    """A near pair at a place (1.25: a quarter of the way from frame 1 to 2), its distance (m), and the normal (3,).
-
-    A shift along the normal parts it.
-    """
+    """A near pair at a place (1.25: a quarter of the way from frame 1 to 2), its distance (m), and the normal (3,)."""
 
     place: float
     distance: float
@@ -44,11 +38,7 @@ class _Row(NamedTuple):
 
 
 class _Grip:
-    """Pieces that are rigid with a frame, and those with the frame that it is held at.
-
-    Attributes:
-        model: Pinocchio's model of the figure.
-    """
+    """Pieces that are rigid with a frame, and those with the frame that it is held at."""
 
     def __init__(self, scene: Scene, term: Hold) -> None:
         model, table = scene.model, scene.pair_table
@@ -72,10 +62,7 @@ class _Grip:
         return way / length if length > 0.0 else way
 
     def rows(self, place: float, q: Array, shift: Array, clearance: float) -> list[_Row]:
-        """Near pairs at a posture (nq,) with a shift (3,) in the axes of the other frame.
-
-        Their distances are less the clearance, metres.
-        """
+        """Near pairs at a posture (nq,) with a shift (3,) in the other frame's axes, less the clearance, metres."""
         if not self._pairs:
             return []
         pin.forwardKinematics(self.model, self._data, q)
@@ -97,15 +84,7 @@ class _Grip:
 
 
 def grip_shifts(scene: Scene, q: Array, dt: float, term: Hold, clearance: float = 0.0) -> Array:
-    """(n, 3) shifts of a grip in the axes of the frame that it is relative to, metres; zero where nothing is too near.
-
-    Args:
-        scene: figure and things.
-        q: (n, nq) original postures.
-        dt: seconds from frame to frame.
-        term: holds a frame where it is at another one of the figure in each posture.
-        clearance: least distance of every pair, metres.
-    """
+    """(n, 3) shifts of a grip in the axes of the frame it is relative to, metres; zero where nothing is too near."""
     grip, shifts = _Grip(scene, term), np.zeros((len(q), 3))
     depths = np.array([_deepest(grip.rows(frame, one, shifts[frame], clearance)) for frame, one in enumerate(q)])
     overlap = 5e-5  # m: a grip that is nearer than asked by no more stays as it is
@@ -147,10 +126,7 @@ def _over_frames(row: _Row, count: int) -> Array:
 
 
 def _window(grip: _Grip, window: Window, passing: Sequence[int], q: Array, dt: float, clearance: float) -> Array | None:
-    """(frames, 3) shifts of a window; None where none is found that parts everything.
-
-    `passing` are the frames of it whose grips pass each other on the way to the next frame.
-    """
+    """(frames, 3) shifts of a window; None where none part all. Grips pass each other after frames in `passing`."""
     import scipy.sparse as sp
 
     from wholebody.motion.trajectory.interior_point import BandedQP, minimise

@@ -25,18 +25,10 @@ LIGHT = 0.2
 
 
 class Soles:
-    """Points of feet that bear force: the lowest corners of their pieces, toes included.
-
-    Attributes:
-        joints: number of the joint of each foot.
-    """
+    """Points of feet that bear force: the lowest corners of their pieces, toes included; and the feet's joints."""
 
     def __init__(self, figure: Figure, feet: tuple[str, ...]) -> None:
-        """Find the pieces of the feet.
-
-        Raises:
-            InputError: a foot has none.
-        """
+        """Find the pieces of the feet; `InputError` if one has none."""
         self.joints: list[int] = []
         self._pieces: list[list[Any]] = []
         for foot in feet:
@@ -89,16 +81,11 @@ class GroundForces(NamedTuple):
 
 
 def ground_forces(wrench: Array, about: Array, points: Array, friction: float) -> GroundForces:
-    """Forces at points of the soles, within their cones of friction, that give a wrench as nearly as can be.
+    """Forces at points (p, 3) of soles, within their cones of friction, that give a wrench (6,) as nearly as can be.
 
     Minimises |sum of the forces' wrenches - wrench|^2 + (e |forces|)^2 over combinations with coefficients >= 0 of the
-    edges of each point's friction pyramid (non-negative least squares, Lawson and Hanson 1974, chapter 23).
-
-    Args:
-        wrench: (6,) force, N, and moment about a point, N m; in the world.
-        about: (3,) the point, metres.
-        points: (points, 3) where the soles touch the level ground; there may be none.
-        friction: coefficient of friction, more than 0.
+    edges of each point's friction pyramid (non-negative least squares, Lawson and Hanson 1974, chapter 23). Moments
+    are about a point (3,).
     """
     if len(points) == 0:
         return GroundForces(np.zeros((0, 3)), wrench.copy(), np.zeros((0, 6)))
@@ -173,34 +160,23 @@ class Loads(NamedTuple):
 
 
 class Derivatives(NamedTuple):
-    """Derivatives with respect to posture (tangent), velocity and acceleration, while feet stand where they stand.
-
-    Attributes:
-        torque: three arrays (nv, nv).
-        place: three arrays (2, nv), of the zero moment point.
-    """
+    """Derivatives of torques (nv, nv) and of the zero moment point (2, nv) with respect to q, v and a."""
 
     torque: tuple[Array, Array, Array]
     place: tuple[Array, Array, Array]
 
 
 class InverseDynamics:
-    """Loads of frames of one figure.
+    """Loads of frames of one figure, with mass, on feet that may stand.
 
     Attributes:
-        feet: names of the segments or frames that may stand.
+        feet: names of the segments or frames that may stand; none for a root that is fixed.
         soles: of its feet.
         weight: N.
     """
 
     def __init__(self, figure: Figure, feet: Sequence[str], friction: float) -> None:
-        """Take a figure.
-
-        Args:
-            figure: with mass.
-            feet: that may stand; none for a root that is fixed.
-            friction: coefficient of friction of the ground.
-        """
+        """Take a figure, and the coefficient of friction of the ground."""
         self._model, self._data, self._friction = figure.model, figure.model.createData(), friction
         self.feet = tuple(feet)
         self.soles = Soles(figure, self.feet)
@@ -234,11 +210,7 @@ class InverseDynamics:
     def grounded(self, q: Array, torques: Array, shares: Array, stand: Stand) -> tuple[Array, Array]:
         """Parts of torques (k, nv) in the air, after the ground's forces, and the wrenches (k, 6) of the parts.
 
-        Args:
-            q: (nq,) posture.
-            torques: (k, nv) parts; the ground's forces are linear in them while the same edges of friction bear.
-            shares: (k,) of the parts in the sum, at which edges are chosen.
-            stand: where it stands.
+        The forces are linear in the parts while the same edges of friction bear: those at the sum with shares (k,).
         """
         model, data = self._model, self._data
         if not self.free:
@@ -302,10 +274,7 @@ class InverseDynamics:
         return Derivatives((parts[0], parts[1], parts[2]), _place_derivatives(here.wrench, wrenches, stand.height))
 
     def _turning(self, J: Array, joint: int, wrench: Array) -> Array:
-        """(nv, nv) derivative with respect to posture of a fixed wrench's moments about the axes of a chain.
-
-        Axis i is carried along by every joint j before it: its derivative is the motion product of axis j with axis i.
-        """
+        """(nv, nv) derivative with respect to posture of a fixed wrench's moments about the axes of a chain."""
         model, force = self._model, pin.Force(wrench)
         found, before = np.zeros((model.nv, model.nv)), []
         for number in model.supports[joint]:

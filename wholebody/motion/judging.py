@@ -32,25 +32,21 @@ class AvoidanceReport:
     """What a method did to a clip, and what it left.
 
     Attributes:
-        solved: whether the clip is free, limits hold and what is held is missed by at most 1 mm or 1 mrad, by a check
-            that shares nothing with the methods.
+        solved: whether the clip is free, limits hold, and what is held and asked is met, by a check of its own.
         message: one sentence that says what is left, or that all is free.
         method: name of the method.
         seconds: wall time of the method, without the judgement.
-        posture_solves: how many postures were solved for on their own.
-        programs: how many quadratic programs were solved.
+        posture_solves, programs: how many postures were solved for on their own, and quadratic programs.
         frames_changed: how many postures are others than those of the clip before at the same place of its timing.
         missed: largest miss of a constraint in any frame, metres or radians.
         stretch: factor by which the clip was slowed most, anywhere; 1 where its timing is as it was.
         duration: of the answer, seconds.
         times: (m,) seconds of the clip as it was at which each frame of the answer is.
-        before: the check of the clip as it was.
-        after: the check of the answer.
+        before, after: the check of the clip as it was, and of the answer.
         loads: torques and the zero moment point before and after, where `dynamics` was asked for; else None.
-        beside: by how much a frame is held at most beside its place at another one, because it overlaps what it is
-            held at there, metres; 0 where nothing does.
-        jerk: largest root mean square jerk over half a second, in parts of the original's; see `MotionBounds`.
-        speed: largest speed of a joint, in parts of the original's nearby; see `wb.motion.MotionBounds`.
+        beside: by how much a grip that overlaps is held at most beside its place, metres; 0 where none does.
+        jerk, speed: largest jerk over half a second, and speed of a joint, in parts of the original's nearby; see
+            `wb.motion.MotionBounds`.
         deviation: largest change of a posture that was free, radians or metres.
         smoothed: windows of frames that were too rough and were made smooth after the method.
         rough: whether jerk, speed or deviation are beyond their bounds, and nothing else is wrong.
@@ -95,12 +91,7 @@ class AvoidanceReport:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Avoided:
-    """The answer of `avoid`.
-
-    Attributes:
-        clip: the clip that the method made.
-        report: what is known of it.
-    """
+    """The answer of `avoid`: the clip that the method made, and the report on it."""
 
     clip: Clip
     report: AvoidanceReport
@@ -118,17 +109,7 @@ def judged(
     was: ClipCheck, terms: FrameTerms, asked: MotionBounds, result: MethodResult, work: Work, method: str,
     loads: LoadChange | None = None,
 ) -> AvoidanceReport:  # fmt: skip
-    """The report on what a method made of a clip; its wall time is not known here.
-
-    Args:
-        was: check of the clip before.
-        terms: what holds in its frames.
-        asked: bounds on jerk, speed and deviation, resolved for it.
-        result: what the method made of it.
-        work: what that took.
-        method: name of the method.
-        loads: before and after, where they are asked for.
-    """
+    """The report on what a method made of a clip, of its check before, what holds in it, and what is asked of it."""
     before, after = was.clip, was.clip.with_q(result.q)
     now = check(after, terms.scene, depth=COLLISION)
     times = before.times if result.times is None else result.times

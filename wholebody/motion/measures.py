@@ -47,11 +47,7 @@ class Deviation:
 
 
 def deviation(before: Clip, after: Clip) -> Deviation:
-    """How far a clip is from the one that it was made from.
-
-    Raises:
-        InputError: two clips of different figures or lengths.
-    """
+    """How far a clip is from the one that it was made from; `InputError` for other figures or lengths."""
     _same(before, after, "deviation")
     model = before.figure.model
     apart = np.array([pin.difference(model, *pair) for pair in zip(before.q, after.q, strict=True)])
@@ -67,12 +63,9 @@ def deviation(before: Clip, after: Clip) -> Deviation:
 
 
 def jerk_ratio(before: Clip, after: Clip) -> float:
-    """Root of the mean square jerk of the joints, in parts of that of the clip before.
+    """Root of the mean square jerk of the joints, in parts of that of the clip before; `InputError` as for `deviation`.
 
     It is 1 for clips of less than four frames, and infinite where only the clip before has no jerk.
-
-    Raises:
-        InputError: two clips of different figures or lengths.
     """
     _same(before, after, "jerk_ratio")
     old, new = (_rms(joint_jerk(clip)) for clip in (before, after))
@@ -82,14 +75,10 @@ def jerk_ratio(before: Clip, after: Clip) -> float:
 
 
 def foot_sliding(before: Clip, after: Clip) -> float:
-    """By how much feet slide that stood before, more than they did before: metres.
+    """By how much feet slide that stood before, more than they did before: metres; `InputError` as for `deviation`.
 
-    Points of the feet stand in the frames in which they do in the clip before. The result is the longest horizontal
-    way, over all times that a point stands, by which its offset from where it was before changes. It is 0 for a figure
-    that names no points of feet.
-
-    Raises:
-        InputError: two clips of different figures or lengths.
+    The result is the longest horizontal way, over all times that a point of a foot stands in the clip before, by
+    which its offset from where it was before changes. It is 0 for a figure that names no points of feet.
     """
     _same(before, after, "foot_sliding")
     stand, most = standing_points(before.figure, before.q, before.dt), 0.0
@@ -170,9 +159,8 @@ class Excess(NamedTuple):
     """What a changed clip has of jerk, speed and deviation, and where that is beyond its bounds.
 
     Attributes:
-        jerk: largest jerk over half a second, in parts of the original's.
-        speed: largest speed, in parts of the original's.
-        deviation: largest deviation of a posture that was free, radians or metres.
+        jerk, speed: the largest, in parts of the original's.
+        deviation: largest of a posture that was free, radians or metres.
         beyond: (n,) frames that are beyond a bound.
         said: what is beyond its bound, and by how much; empty where nothing is.
     """
@@ -185,13 +173,7 @@ class Excess(NamedTuple):
 
 
 def resolved(bounds: MotionBounds, free: Mask, passed: Mask) -> MotionBounds:
-    """Bounds with the largest deviation of each frame.
-
-    Args:
-        bounds: as they were given.
-        free: (n,) original postures that need not change.
-        passed: (n,) those beside a motion to the next frame, or from the one before, that passes through something.
-    """
+    """Bounds with the largest deviation of each frame: bounded where it is free and beside no motion that passes."""
     most = np.inf if bounds.deviation is None else bounds.deviation
     largest = np.where(free & ~passed, most, np.inf)
     if bounds.keep_ends:
@@ -200,13 +182,7 @@ def resolved(bounds: MotionBounds, free: Mask, passed: Mask) -> MotionBounds:
 
 
 def excess(before: Clip, after: Clip, bounds: MotionBounds) -> Excess:
-    """Compare a changed clip with the original at the same timing.
-
-    Args:
-        before: the original.
-        after: as many frames of the same figure.
-        bounds: resolved for these frames.
-    """
+    """Compare a changed clip with the original at the same timing, by bounds that are resolved for it."""
     model, dt, count = before.figure.model, before.dt, len(before)
     jerk, speed = _jerk_ratios(before, after), _speed_ratios(before, after)
     away = np.abs([pin.difference(model, *each) for each in zip(before.q, after.q, strict=True)]).max(axis=1, initial=0)
@@ -246,7 +222,7 @@ def _jerk_ratios(before: Clip, after: Clip) -> Array:
     old, new = (third_differences(model, clip.q, dt) for clip in (before, after))
     found = np.zeros(len(old))
     for part in _parts(before):
-        squares = [_mean_near(root_mean_square(each[:, part]) ** 2, dt) for each in (old, new)]
+        squares = [np.nanmean(_near(root_mean_square(each[:, part]) ** 2, dt, np.nan), axis=1) for each in (old, new)]
         plain = PLAIN_JERK**2 / max(1, old[:, part].shape[1])
         usual = max(plain, float((old[:, part] ** 2).mean()) if old[:, part].size else 0.0)
         found = np.maximum(found, np.sqrt(squares[1] / np.maximum(squares[0], usual)))
@@ -259,7 +235,7 @@ def _speed_ratios(before: Clip, after: Clip) -> Array:
     old, new = (np.abs(velocities(model, clip.q, dt)) for clip in (before, after))
     found = np.zeros(len(old))
     for part in _parts(before):
-        most = _largest_near(old[:, part].max(axis=1, initial=0.0), dt)
+        most = _near(old[:, part].max(axis=1, initial=0.0), dt, 0.0).max(axis=1)
         found = np.maximum(found, new[:, part].max(axis=1, initial=0.0) / np.maximum(most, PLAIN_SPEED))
     return found
 
@@ -269,24 +245,9 @@ def _parts(clip: Clip) -> tuple[slice, ...]:
     return (slice(0, 6), slice(6, None)) if clip.figure.root == "free" else (slice(None),)
 
 
-def _mean_near(values: Array, dt: float) -> Array:
-    """(k,) the mean of values (k,) within 0.25 s on both sides."""
-    reach = _reach(dt)
-    sums = np.concatenate([[0.0], np.cumsum(values)])
-    places = np.arange(len(values))
-    first, end = np.maximum(places - reach, 0), np.minimum(places + reach + 1, len(values))
-    found: Array = (sums[end] - sums[first]) / (end - first)
-    return found
-
-
-def _largest_near(values: Array, dt: float) -> Array:
-    """(k,) the largest of values (k,) within 0.25 s on both sides."""
-    reach = _reach(dt)
-    near = sliding_window_view(np.pad(values, reach), 2 * reach + 1)
-    found: Array = near.max(axis=1)[: len(values)]
-    return found
-
-
-def _reach(dt: float) -> int:
-    """0.25 s in frames: single frames say little, and the whole clip would hide a jump among many calm frames."""
-    return max(1, round(0.25 / dt))
+def _near(values: Array, dt: float, fill: float) -> Array:
+    """(k, r) the values (k,) within 0.25 s on both sides of each: a single one says little, the whole clip hides it."""
+    if not len(values):
+        return np.zeros((0, 1))
+    reach = max(1, round(0.25 / dt))
+    return sliding_window_view(np.pad(values, reach, constant_values=fill), 2 * reach + 1)

@@ -1,7 +1,7 @@
-"""Postures on one side of what the original motion passes through.
+"""Postures on one side of what the original motion passes through, which no rows of contact bring a limb out of.
 
-No rows of contact bring a limb from one side of a thin thing to the other. So from a posture on one side the original
-motion is followed frame by frame in contact, outwards or until the motion to the next frame as it is passes nothing.
+From a posture on one side the original motion is followed frame by frame in contact, outwards or until the motion to
+the next frame as it is passes nothing.
 """
 
 from __future__ import annotations
@@ -57,18 +57,15 @@ def one_sided(run: Run, q: Array) -> Array:
 def keep_back(
     run: Run, q: Array, gap: int, most: int, first: int = 0, *, cancelled: Callable[[], bool] | None = None
 ) -> bool:
-    """Keep frames beside a gap on one side of what the motion in it passes, in place, as few as can be.
+    """Keep frames beside a gap on one side of what its motion passes, in place, as few as can be; whether that is done.
 
     Args:
         run: of the clip.
-        q: (n, nq) postures; those that change are replaced.
+        q: (n, nq) postures of the frames from `first` on; at most `most` are replaced.
         gap: the frame before the motion that passes through something.
         most: how many frames may change.
-        first: frame of the clip that the first posture belongs to.
+        first: number of the first frame.
         cancelled: asked before each frame; True ends it.
-
-    Returns:
-        Whether a way back to the other frames was found; if not, q stays as it is.
     """
     ways = {side: _beside(run, q, gap, side, SHALLOW, first) for side in (1, -1)}
     found = dict[int, list[Array]]((side, []) for side in ways)
@@ -88,14 +85,7 @@ def keep_back(
 
 
 def kept_beside(run: Run, window: Window, q: Array, gaps: Iterable[int]) -> Array:
-    """(n, nq) postures of a window, on one side of what motions between them pass as far as that is found.
-
-    Args:
-        run: of the clip.
-        window: which frames.
-        q: (n, nq) its postures.
-        gaps: frames of the window whose motion to the next one passes something.
-    """
+    """(n, nq) postures q of a window, on one side of what motions after frames `gaps` pass as far as that is found."""
     q = np.array(q)
     for gap in sorted(gaps):
         if 0 <= gap < len(q) - 1 and dip_depth(run.workspace, q[gap], q[gap + 1]) > SHALLOW:
@@ -104,14 +94,9 @@ def kept_beside(run: Run, window: Window, q: Array, gaps: Iterable[int]) -> Arra
 
 
 def followed(run: Run, window: Window, middles: Iterable[int]) -> Iterator[Array]:
-    """Postures (n, nq) of a window, followed from the freed postures of frames; the nearest to the original first.
+    """Postures (n, nq) of a window, followed from the freed postures of its frames; the nearest to the original first.
 
     Iterations keep the side on which they begin. Following ends where another start is nearer already.
-
-    Args:
-        run: of the clip.
-        window: which frames.
-        middles: frames of it to begin at.
     """
     best, others = _Followed(np.zeros(0), np.inf, -1), list[int]()
     for middle in dict.fromkeys(middles):
@@ -152,10 +137,7 @@ def _put(q: Array, gap: int, side: int, found: Sequence[Array]) -> None:
 
 
 def _kept(run: Run, q: Array, passing: Sequence[int], side: int) -> Array:
-    """Postures (n, nq) of which those after motions that pass are kept on the side of the frame before.
-
-    For `side` -1, those before such motions are kept on the side of the frame after.
-    """
+    """Postures (n, nq) of which those after motions that pass are kept on the side before; for -1, those before."""
     q, waiting = np.array(q), list(passing[::-side])
     while waiting:
         gap, found = waiting.pop(), list[Array]()
@@ -173,8 +155,8 @@ def _kept(run: Run, q: Array, passing: Sequence[int], side: int) -> Array:
 def _beside(run: Run, q: Array, gap: int, side: int, passed: float, first: int = 0) -> Iterator[_Beside]:
     """Frames after (side 1) or before (-1) a gap, on the side of what the motion in it passes of the frame at its end.
 
-    They follow the original motion until the motion to the next one of q is no deeper than `passed`, metres. Each
-    begins at the posture before it: its deviation on the next original posture may be on the other side.
+    They follow the original until the motion to the next frame of q is no deeper than `passed`, metres. Each begins
+    at the posture before it: its deviation on the next original posture may be on the other side.
     """
     workspace = run.workspace
     here, frame = (q[gap], gap + 1) if side > 0 else (q[gap + 1], gap)
@@ -187,10 +169,7 @@ def _beside(run: Run, q: Array, gap: int, side: int, passed: float, first: int =
 
 
 def _outwards(run: Run, window: Window, middle: int, most: float) -> _Followed:
-    """What following from a freed frame gives; ended where the sum of squared deviations is more than `most`.
-
-    A run of a quarter of a second at the original postures ends the following of a side.
-    """
+    """What following from a freed frame gives, until squared deviations exceed `most`; calm for 0.25 s ends a side."""
     terms, model = run.terms, run.workspace.model
     q = np.array(terms.q[window.first : window.end])
     q[middle - window.first] = run.follower.freed(middle, terms.q[middle])

@@ -22,14 +22,7 @@ from wholebody.motion.windows import Window
 
 @dataclass(frozen=True)
 class PerFrame:
-    """Every frame by tracking, forward and backward.
-
-    Attributes:
-        clearance: least distance of every pair, metres.
-
-    Raises:
-        InputError: a value out of range.
-    """
+    """Every frame by tracking, forward and backward, with a least distance of every pair, metres."""
 
     name: ClassVar[str] = "frames"
     dynamics: ClassVar[None] = None

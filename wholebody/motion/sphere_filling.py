@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
-from scipy.spatial import ConvexHull, cKDTree
+from scipy.spatial import cKDTree
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.checks import array, flag, whole
@@ -30,22 +30,13 @@ UNCOVERED = 3.0  # weight of a volume that is uncovered against one that protrud
 
 @dataclass(frozen=True, eq=False)
 class Spheres(Shape):
-    """A union of balls.
-
-    Attributes:
-        centers: (n, 3) metres.
-        radii: (n,) metres.
-    """
+    """A union of balls: centers (n, 3) and radii (n,), metres; `InputError` for none, other shapes, or no lengths."""
 
     centers: Array
     radii: Array
 
     def __post_init__(self) -> None:
-        """Check the values.
-
-        Raises:
-            InputError: no sphere, other shapes, or a radius that is no length.
-        """
+        """Check the values."""
         centers = array(self.centers, "Spheres centers", "an array of shape (n, 3)").copy()
         radii = array(self.radii, "Spheres radii", "an array of shape (n,)").copy()
         if radii.ndim != 1 or not len(radii) or centers.shape != (len(radii), 3) or not np.isfinite(centers).all():
@@ -142,11 +133,7 @@ def fill_with_spheres(shape: Shape, count: int, *, envelope: bool = False) -> Sp
 
 
 def triangles_of(shape: Shape) -> tuple[Array, Faces]:
-    """Vertices (n, 3) and triangles (m, 3) of the surface of a solid, metres.
-
-    Raises:
-        InputError: a shape without a surface of triangles.
-    """
+    """Vertices (n, 3) and triangles (m, 3) of the surface of a solid, metres; `InputError` for a shape without any."""
     import trimesh
 
     if isinstance(shape, Mesh):
@@ -186,8 +173,7 @@ class _Grid:
 def _winding(corners: Array, xs: Array, ys: Array, zs: Array) -> Array:
     """How often the surface of triangles (m, 3, 3) winds about the points of a grid, (x, y, z).
 
-    A ray goes up from every point: a face that it leaves through counts 1, one that it enters through -1. Parts that
-    touch or overlap are right too, and nothing but signs of areas decides.
+    A ray goes up from every point: a face that it leaves through counts 1, one that it enters through -1.
     """
     crossed = np.zeros((len(xs), len(ys), len(zs) + 1))
     for a, b, c in corners:
@@ -222,16 +208,18 @@ def _fitted(grid: _Grid, count: int, seed: int) -> tuple[Array, Array, int, int]
     near_out, outer = _near(grid.around, centers, 1.2 * farthest + grid.cell)
     radii = np.maximum(farthest, grid.cell)
     covers_in, covers_out = np.zeros(len(grid.inside), dtype=int), np.zeros(len(grid.around), dtype=int)
+
+    def count_in(k: int, times: int) -> None:
+        covers_in[near_in[k][inner[k] <= radii[k]]] += times
+        covers_out[near_out[k][outer[k] <= radii[k]]] += times
+
     for k in range(len(radii)):
-        covers_in[near_in[k][inner[k] <= radii[k]]] += 1
-        covers_out[near_out[k][outer[k] <= radii[k]]] += 1
+        count_in(k, 1)
     for _ in range(4):  # over all radii, one after the other; later ones change less than a cell
         for k in range(len(radii)):
-            covers_in[near_in[k][inner[k] <= radii[k]]] -= 1
-            covers_out[near_out[k][outer[k] <= radii[k]]] -= 1
+            count_in(k, -1)
             radii[k] = _best_radius(inner[k][covers_in[near_in[k]] == 0], outer[k][covers_out[near_out[k]] == 0], grid)
-            covers_in[near_in[k][inner[k] <= radii[k]]] += 1
-            covers_out[near_out[k][outer[k] <= radii[k]]] += 1
+            count_in(k, 1)
     return centers, radii, int((covers_in == 0).sum()), int((covers_out > 0).sum())
 
 
@@ -293,15 +281,10 @@ def _wound(corners: Array, point: Array) -> float:
 
 def _envelope(points: Array) -> tuple[Array, Faces]:
     """Vertices and outward triangles of the convex hull of points."""
-    hull = ConvexHull(points)
-    vertices, faces = points[hull.vertices], hull.simplices.copy()
-    corners = points[faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    turned = np.einsum("ij,ij->i", normal, hull.equations[:, :3]) < 0.0
-    faces[turned] = faces[turned][:, ::-1]
-    place = np.full(len(points), -1, dtype=np.int64)
-    place[hull.vertices] = np.arange(len(hull.vertices))
-    return vertices, place[faces]
+    import trimesh
+
+    hull = trimesh.convex.convex_hull(points)
+    return np.array(hull.vertices, dtype=float), np.array(hull.faces, dtype=np.int64)
 
 
 def _closed(vertices: Array, faces: Faces) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array
-from wholebody.figures.anthropometry import Row, table
+from wholebody.figures.anthropometry import table
 from wholebody.figures.figure import Figure
 
 PERCENTILES = (5.0, 50.0, 95.0)
@@ -44,38 +44,24 @@ class Strength:
         checks.known(self.sex, ("male", "female"), "sex", "Strength")
 
     def limits(self, figure: Figure) -> tuple[Array, Array]:
-        """Least and largest torques (nv,) of a figure's joints, N m; infinite where none is published.
+        """Least and largest torques (nv,) of a figure's joints, N m; infinite where none is published, as of a root."""
+        from scipy.special import ndtri
 
-        The free root, if any, has infinite ones: the ground moves it, not a muscle.
-
-        Raises:
-            InputError: something else than a figure.
-        """
         checks.instance(figure, Figure, "Strength.limits: figure", "load one with wb.load('human')")
-        lower = np.full(figure.model.nv, -np.inf)
-        upper = np.full(figure.model.nv, np.inf)
+        lower, upper = np.full(figure.model.nv, -np.inf), np.full(figure.model.nv, np.inf)
         for name in figure.joints:
             joint = figure.model.joints[figure.joint_id(name)]
             for row in table("strength") if joint.nv == 1 else ():
                 if row["joint"] == _kind(name):
                     sign, bounds = (-1.0, lower) if row["sign"] == "-" else (1.0, upper)
-                    bounds[joint.idx_v] = sign * self._torque(row)
+                    logs = np.log([float(row[f"{self.sex}_{percentile:g}"]) for percentile in PERCENTILES])
+                    place = np.interp(ndtri(self.percentile / 100.0), ndtri(np.array(PERCENTILES) / 100.0), logs)
+                    bounds[joint.idx_v] = sign * np.exp(place)
         return lower, upper
-
-    def _torque(self, row: Row) -> float:
-        """N m of one strength at the percentile."""
-        from scipy.special import ndtri
-
-        logs = np.log([float(row[f"{self.sex}_{percentile:g}"]) for percentile in PERCENTILES])
-        return float(np.exp(np.interp(ndtri(self.percentile / 100.0), ndtri(np.array(PERCENTILES) / 100.0), logs)))
 
 
 def torque_limits(figure: Figure, strength: Strength) -> tuple[Array, Array]:
-    """Least and largest torques (nv,) of a figure's joints, N m; infinite where none is known.
-
-    Those of a person are published strength; those of a figure whose joints have none are the effort limits of its
-    description.
-    """
+    """Least and largest torques (nv,), N m: published strength, else the effort limits; infinite for none."""
     lower, upper = strength.limits(figure)
     if np.isfinite(lower).any() or np.isfinite(upper).any():
         return lower, upper

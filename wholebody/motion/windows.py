@@ -21,11 +21,7 @@ class Window(NamedTuple):
 
 
 def runs(wrong: Mask) -> list[Window]:
-    """The longest windows in which all frames are marked.
-
-    Args:
-        wrong: (n,) marked frames.
-    """
+    """The longest windows in which all frames are marked."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], wrong, [False]]).astype(np.int8)))
     return [Window(int(first), int(end)) for first, end in edges.reshape(-1, 2)]
 
@@ -40,12 +36,7 @@ def long_runs(marked: Mask, least: int) -> Mask:
 
 
 def windows(wrong: Mask, margin: int) -> list[Window]:
-    """Windows around marked frames; those that meet are one.
-
-    Args:
-        wrong: (n,) marked frames.
-        margin: frames before and after.
-    """
+    """Windows around marked frames, with a margin of frames before and after; those that meet are one."""
     count = len(wrong)
     near = np.zeros(count, dtype=bool)
     for run in runs(wrong):

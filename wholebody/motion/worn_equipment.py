@@ -58,11 +58,7 @@ class Equipment:
     filling: SphereFilling | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
-        """Check the values.
-
-        Raises:
-            InputError: a value of the wrong kind or range.
-        """
+        """Check the values."""
         where = f"Equipment {text(self.name, 'Equipment: name')!r}"
         instance(self.shape, Shape, f"{where}: shape", "give wb.Mesh('pack.obj'), wb.Box or another")
         text(self.to, f"{where}: to")
@@ -163,11 +159,7 @@ def group_of(figure: Figure, segment: str) -> tuple[str, ...]:
 
 
 def bounds(shape: Shape) -> tuple[Array, Array]:
-    """Least and greatest corner (3,) of a shape's bounding box, metres.
-
-    Raises:
-        InputError: it has none, as a half-space.
-    """
+    """Least and greatest corner (3,) of a shape's bounding box, metres; `InputError` for a half-space."""
     extents = [
         _along(piece.geometry, piece.placement, axis)
         for axis in np.vstack([np.eye(3), -np.eye(3)])
@@ -201,59 +193,40 @@ def _along(geometry: object, at: pin.SE3, direction: Array) -> float:
     return float(at.translation @ direction) + reach
 
 
-CLOTH = (0.35, 0.38, 0.28, 1.0)
-
-
-def side_sphere(figure: Figure) -> tuple[Equipment, ...]:
-    """A ball at the left side of the torso, half inside it."""
-    radius = 0.075  # m
-    ball = Equipment.worn(
-        Sphere(radius), figure, name="side_sphere", to="lower_thorax", side="left", height=-0.05, color=CLOTH
-    )
-    at = ball.at.translation - np.array([0.0, radius, 0.0])  # type: ignore[union-attr]
-    return (Equipment(ball.name, ball.shape, ball.to, at, ball.rests_on, CLOTH),)
-
-
-def pouches(figure: Figure) -> tuple[Equipment, ...]:
-    """A pouch at each side of the waist."""
-    depth, width, height = 0.05, 0.17, 0.20  # m, of a double magazine pouch
-    shape = Box((width, depth, height))
-    return tuple(
-        Equipment.worn(
-            shape, figure, name=f"{side}_pouch", to="lower_thorax", side=side, height=-0.15, sideways=0.1, color=CLOTH
-        )
-        for side in ("left", "right")
-    )
-
-
-def vest_plate(figure: Figure) -> tuple[Equipment, ...]:
-    """A plate on the chest."""
-    plate = Box((0.025, 0.24, 0.32))  # m, a medium plate of body armour
-    return (Equipment.worn(plate, figure, name="vest_plate", to="thorax", side="front", color=CLOTH),)
-
-
-def pack(figure: Figure) -> tuple[Equipment, ...]:
-    """A pack on the back."""
-    bag = Box((0.20, 0.32, 0.50))  # m, a day pack of 30 litres
-    return (Equipment.worn(bag, figure, name="pack", to="thorax", side="back", height=-0.08, color=CLOTH),)
-
-
-def torus(figure: Figure) -> tuple[Equipment, ...]:
-    """A horizontal ring at the left side of the waist; a hanging arm can get into its hole."""
-    mesh = Mesh(torus_mesh(0.13, 0.03))  # the hole is wide enough for a forearm
-    return (Equipment.worn(mesh, figure, name="torus", to="lower_thorax", side="left", height=-0.11, color=CLOTH),)
-
-
 NOTHING = "nothing"
 """In place of equipment: nothing is worn."""
 
-READY: dict[str, Callable[[Figure], tuple[Equipment, ...]]] = {
-    "side_sphere": side_sphere,
-    "pouches": pouches,
-    "vest_plate": vest_plate,
-    "pack": pack,
-    "torus": torus,
+CLOTH = (0.35, 0.38, 0.28, 1.0)
+
+
+def torus_mesh(radius: float, tube: float) -> tuple[Array, NDArray[np.int64]]:
+    """A torus about z of convex closed sections: vertices and triangles; radii of its circle and its tube, metres."""
+    sections, corners = 16, 12  # convex sections, and corners of each
+    turn = 2.0 * np.pi * np.arange(corners) / corners
+    ring = np.stack([radius + tube * np.cos(turn), np.zeros(corners), tube * np.sin(turn)], axis=1)
+    sides = [(k, (k + 1) % corners) for k in range(corners)]
+    section = [[a, b + corners, b] for a, b in sides] + [[a, a + corners, b + corners] for a, b in sides]
+    section += [[0, k, k + 1] for k in range(1, corners - 1)]
+    section += [[corners, corners + k + 1, corners + k] for k in range(1, corners - 1)]
+    vertices, faces = [], []
+    for k in range(sections):
+        # rad: between two sections, so that they stay separate parts, each convex
+        for angle in (2.0 * np.pi * k / sections + 1e-4, 2.0 * np.pi * (k + 1) / sections):
+            c, s = np.cos(angle), np.sin(angle)
+            vertices.append(ring @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]))
+        faces.append(np.array(section, dtype=np.int64) + 2 * corners * k)
+    return np.vstack(vertices), np.vstack(faces)
+
+
+READY: dict[str, tuple[Callable[[], Shape], str, tuple[Side, ...], float, float]] = {
+    "side_sphere": (lambda: Sphere(0.075), "lower_thorax", ("left",), -0.05, 0.0),
+    "pouches": (lambda: Box((0.17, 0.05, 0.20)), "lower_thorax", ("left", "right"), -0.15, 0.1),
+    "vest_plate": (lambda: Box((0.025, 0.24, 0.32)), "thorax", ("front",), 0.0, 0.0),
+    "pack": (lambda: Box((0.20, 0.32, 0.50)), "thorax", ("back",), -0.08, 0.0),
+    "torus": (lambda: Mesh(torus_mesh(0.13, 0.03)), "lower_thorax", ("left",), -0.11, 0.0),
 }
+"""Shape, segment, sides, height and sideways, metres: a ball half inside of the torso; double magazine pouches; a plate
+of body armour; a day pack of 30 litres; a ring whose hole is wide enough for a forearm."""
 
 
 def equipment(name: str, figure: Figure) -> tuple[Equipment, ...]:
@@ -274,7 +247,18 @@ def equipment(name: str, figure: Figure) -> tuple[Equipment, ...]:
             f"equipment {name!r} fits a person, and {figure.name!r} lacks lower_thorax, thorax; "
             "put it on with wb.motion.Equipment(name, shape, to=..., at=...)"
         )
-    return READY[name](figure)
+    make, to, sides, height, sideways = READY[name]
+    shape, found = make(), list[Equipment]()
+    for side in sides:
+        called = name if len(sides) == 1 else f"{side}_pouch"
+        one = Equipment.worn(
+            shape, figure, name=called, to=to, side=side, height=height, sideways=sideways, color=CLOTH
+        )
+        if isinstance(shape, Sphere):  # half inside
+            at = placement(one.at, name)
+            one = replace(one, at=at.translation - np.array([0.0, shape.radius, 0.0]))
+        found.append(one)
+    return tuple(found)
 
 
 Worn = str | Equipment | tuple["str | Equipment", ...]
@@ -310,11 +294,7 @@ def put_on(scene: Scene, worn: Worn) -> Scene:
 
 
 def label(worn: Worn) -> str:
-    """Name of what is worn, for tables and files.
-
-    Raises:
-        InputError: it is nothing of these.
-    """
+    """Name of what is worn, for tables and files."""
     if isinstance(worn, tuple) and worn:
         return "+".join(label(one) for one in worn)
     if isinstance(worn, Equipment):
@@ -325,27 +305,3 @@ def label(worn: Worn) -> str:
 def _names(worn: object) -> list[str]:
     text = checked_text(worn, "equipment")
     return [text] if is_file(text) else text.split("+")
-
-
-def torus_mesh(radius: float, tube: float) -> tuple[Array, NDArray[np.int64]]:
-    """A torus about z of convex closed sections, as vertices and triangles.
-
-    Args:
-        radius: of the circle of centres, metres.
-        tube: radius of its cross-section, metres.
-    """
-    sections, corners = 16, 12  # convex sections, and corners of each
-    turn = 2.0 * np.pi * np.arange(corners) / corners
-    ring = np.stack([radius + tube * np.cos(turn), np.zeros(corners), tube * np.sin(turn)], axis=1)
-    sides = [(k, (k + 1) % corners) for k in range(corners)]
-    section = [[a, b + corners, b] for a, b in sides] + [[a, a + corners, b + corners] for a, b in sides]
-    section += [[0, k, k + 1] for k in range(1, corners - 1)]
-    section += [[corners, corners + k + 1, corners + k] for k in range(1, corners - 1)]
-    vertices, faces = [], []
-    for k in range(sections):
-        # rad: between two sections, so that they stay separate parts, each convex
-        for angle in (2.0 * np.pi * k / sections + 1e-4, 2.0 * np.pi * (k + 1) / sections):
-            c, s = np.cos(angle), np.sin(angle)
-            vertices.append(ring @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]))
-        faces.append(np.array(section, dtype=np.int64) + 2 * corners * k)
-    return np.vstack(vertices), np.vstack(faces)

@@ -212,7 +212,7 @@ def assemble(figure: Figure, objects: Iterable[SceneObject], excluded: dict[tupl
 
     joints = np.array([piece.parentJoint for piece in pieces], dtype=int)
     carried = {thing.name: thing for thing in things if thing.segment is not None}
-    excluded.update(_leaning(figure, pieces, body, joints, owners, carried))
+    excluded.update(_leaning(figure, pieces, owners, carried))
     met = _pairs_of_things(body, joints, owners, excluded)
     if body > own:
         outer, standing = (met[:, 0] >= own) & (met[:, 0] < body), joints[met[:, 1]] == 0
@@ -243,12 +243,7 @@ def _pairs_of_things(
 
 
 def _leaning(
-    figure: Figure,
-    pieces: list[pin.GeometryObject],
-    body: int,
-    joints: NDArray[np.int_],
-    owners: list[str],
-    carried: Mapping[str, SceneObject],
+    figure: Figure, pieces: list[pin.GeometryObject], owners: list[str], carried: Mapping[str, SceneObject]
 ) -> dict[tuple[str, str], str]:
     """Pairs (segment, carried thing) that are not tested, with the reason."""
     if not carried:
@@ -256,8 +251,8 @@ def _leaning(
     count = len(figure.geometry.geometryObjects)
     segments = [figure.model.frames[piece.parentFrame].name for piece in figure.geometry.geometryObjects]
     tested = {frozenset((segments[pair.first], segments[pair.second])) for pair in figure.geometry.collisionPairs}
-    joint_of = dict(zip(segments, joints[:count], strict=True))
-    touching = _touching_at_rest(figure, pieces, body, joints, owners, carried)
+    joint_of = dict(zip(segments, (piece.parentJoint for piece in pieces[:count]), strict=True))
+    touching = _touching_at_rest(figure, pieces, owners, carried)
     found: dict[tuple[str, str], str] = {}
     for name, thing in carried.items():
         # A thing rests on things that were attached before it, whose pieces come first.
@@ -273,19 +268,14 @@ def _leaning(
 
 
 def _touching_at_rest(
-    figure: Figure,
-    pieces: list[pin.GeometryObject],
-    body: int,
-    joints: NDArray[np.int_],
-    owners: list[str],
-    carried: Mapping[str, SceneObject],
+    figure: Figure, pieces: list[pin.GeometryObject], owners: list[str], carried: Mapping[str, SceneObject]
 ) -> set[tuple[str, str]]:
     """Pairs (segment, carried thing) that touch in the figure's first posture."""
-    held = [k for k in range(body, len(pieces)) if owners[k] in carried]  # before what stands in the world
+    held = [k for k, owner in enumerate(owners) if owner in carried]  # before what stands in the world
     probe = geometry_model(pieces[: held[-1] + 1])
     for second in held:
         for first in range(len(figure.geometry.geometryObjects)):
-            if joints[first] != joints[second]:
+            if pieces[first].parentJoint != pieces[second].parentJoint:
                 probe.addCollisionPair(pin.CollisionPair(first, second))
     rest = figure.posture(figure.postures[0])
     data = figure.model.createData()

@@ -6,8 +6,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.figures.state import State
-from wholebody.methods.simplification.pairs import held_balls
-from wholebody.methods.simplification.reach import Balls, Reach
+from wholebody.methods.simplification.reach import Balls, Reach, held_balls
 from wholebody.problem import Problem
 
 SLACK = 1e-6  # m: for rounding: a place that is out of reach by no more may be reached

@@ -39,7 +39,7 @@ class StudyFile:
 
 _PLACES = ByName(PLACEMENT, "things that move", "table = [0.6, 0.0, 0.4]", "m")
 _PERSON: dict[str, Kind] = {key.name: key.kind for key in FIGURES["human"].keys}
-_TOP: dict[str, Kind] = {"task": Text(), "method": Choice(METHODS), "warm_start": Flag()}
+_TOP: dict[str, Kind] = {"task": Text(), "method": Choice(tuple(METHODS)), "warm_start": Flag()}
 _TABLES = ("person", "target", "layout")
 
 

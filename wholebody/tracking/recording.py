@@ -59,21 +59,11 @@ class Recording:
         moves: Mapping[str, Sequence[pin.SE3]] | None = None,
     ) -> Recording:
         """Collect frames."""
+        names = "q", "seconds", "cpu_seconds", "contact_seconds", "solve_seconds", "iterations", "joints", "pairs"
+        rows = {name: np.array([getattr(frame, name) for frame in frames]) for name in names}
+        notes, paths = tuple(frame.note for frame in frames), tuple(frame.path for frame in frames)
         return cls(
-            q=np.array([frame.q for frame in frames]),
-            tracked=np.array(tracked),
-            dt=dt,
-            overlap=overlap,
-            seconds=np.array([frame.seconds for frame in frames]),
-            cpu_seconds=np.array([frame.cpu_seconds for frame in frames]),
-            contact_seconds=np.array([frame.contact_seconds for frame in frames]),
-            solve_seconds=np.array([frame.solve_seconds for frame in frames]),
-            iterations=np.array([frame.iterations for frame in frames], dtype=np.intp),
-            joints=np.array([frame.joints for frame in frames], dtype=np.intp),
-            pairs=np.array([frame.pairs for frame in frames], dtype=np.intp),
-            notes=tuple(frame.note for frame in frames),
-            paths=tuple(frame.path for frame in frames),
-            moves={} if moves is None else dict(moves),
+            **rows, tracked=np.array(tracked), dt=dt, overlap=overlap, notes=notes, paths=paths, moves=dict(moves or {})
         )
 
     def __len__(self) -> int:

@@ -37,8 +37,9 @@ def find_chromium() -> str | None:
     named = os.environ.get("WHOLEBODY_CHROMIUM")
     if named:
         return shutil.which(named)
-    names = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
-    return next((path for name in (*names, "chromium-headless-shell") if (path := shutil.which(name))), None)
+    # the shell draws the same, and starts in half of the time
+    names = ("chromium-headless-shell", "chrome-headless-shell", "chromium", "chromium-browser", "google-chrome")
+    return next((path for name in (*names, "google-chrome-stable", "chrome") if (path := shutil.which(name))), None)
 
 
 class Browser:
@@ -66,7 +67,7 @@ class Browser:
         executable = find_chromium()
         if executable is None:
             raise MissingPackageError(
-                "pictures and movies need Chromium, and none was found; run: apt-get install chromium "
+                "pictures and movies need Chromium, and none was found; run: apt-get install chromium-headless-shell "
                 "(or name one in WHOLEBODY_CHROMIUM); save() writes HTML without a browser"
             )
         self.timeout = timeout

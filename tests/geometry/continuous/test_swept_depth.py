@@ -70,7 +70,7 @@ def test_a_person_who_swings_all_joints() -> None:
     size[:6] *= 0.3
     q = [
         figure.clamp(pin.integrate(figure.model, figure.posture("standing"), size * np.sin(phase + 0.13 * k)))
-        for k in range(12)
+        for k in range(7)
     ]
     _, dips = compare(scene, np.array(q), 33)
     assert dips > 0

@@ -131,13 +131,7 @@ def test_compiled_kinematics_and_sweeps_do_what_plain_floats_do(name: str) -> No
         aims = Aims(limbs, tips, here, there, (rng.random(count) < 0.6).tolist(), weights)
         aims.here[:] = here
         plan = aims.plan() if case % 2 else aims.plan(rng.choice(len(chosen), 3).tolist())
-        cuts = plan.first.tolist()
-        steps = [
-            (node, tuple(plan.moved[first:last].tolist()), points)
-            for node, first, last, points in zip(
-                plan.nodes.tolist(), cuts, cuts[1:], plan.points.tolist(), strict=False
-            )
-        ]
+        steps = [(node, tuple(plan.moved[k:last].tolist()), points) for node, k, last, points in plan.turns.tolist()]
         values, carried = limbs.values.tolist(), [tuple(place) for place in here.tolist()]
         targets = [tuple(place) for place in there.tolist()]
         expected = reference.sweep(limbs, values, carried, targets, aims.weights.tolist(), steps)
@@ -194,5 +188,5 @@ def test_a_slide_stays_where_there_are_directions_alone() -> None:
     _, limbs = _one_joint(pin.JointModelPrismaticUnaligned(np.array([1.0, 0.0, 0.0])), -1.0, 1.0)
     there = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     aims = Aims(limbs, [0] * 3, np.eye(3), there, [False] * 3)
-    assert len(aims.plan().nodes) == 0
+    assert len(aims.plan().turns) == 0
     assert aims.sweep(aims.plan()) == 0.0

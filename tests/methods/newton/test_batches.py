@@ -49,7 +49,7 @@ def _cones() -> list[Any]:
 NAMES = [""] * K
 EYES = np.broadcast_to(np.eye(3), (K, 3, 3))
 MAKERS: dict[str, Callable[[np.random.Generator], Batch]] = {
-    "unit": lambda g: Unit(_pairs(g)[:, :1], NAMES),
+    "unit": lambda g: Unit(NAMES),
     "spherical": lambda g: Coincide(
         _pairs(g), NAMES, g.normal(size=(K, 3)), g.normal(size=(K, 3)), EYES, np.zeros((K, 3))
     ),

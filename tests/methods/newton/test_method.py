@@ -13,12 +13,12 @@ import pytest
 
 import wholebody as wb
 from tests.answers import honest
-from wholebody.methods.newton.equations import unit_lengths
+from wholebody.methods.newton.batches import Unit
 from wholebody.methods.newton.feasibility import satisfy
 from wholebody.methods.newton.figure_bodies import FigureBodies
-from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.inequalities import SquaredSlacks
 from wholebody.methods.newton.system import System
+from wholebody.methods.newton.terms import FigureSystem
 from wholebody.tasks.base import Bound
 
 
@@ -51,7 +51,7 @@ def test_postures_go_in_and_out(name: str) -> None:
 
 def test_every_joint_of_the_human_holds_at_any_posture(human: wb.Figure) -> None:
     bodies = FigureBodies(human)
-    batches = [unit_lengths(bodies.names), *bodies.equations.batches()]
+    batches = [Unit(bodies.names), *bodies.equations.batches()]
     system = System(batches, bodies.weight)
     for name in human.postures:
         assert np.abs(system.residual(bodies.variables(human.posture(name)))).max() < 1e-12
@@ -94,7 +94,7 @@ def test_two_hands_on_one_box_close_a_loop(human: wb.Figure) -> None:
 
 def test_a_goal_out_of_reach_is_approached_and_said_to_be(human: wb.Figure) -> None:
     problem = _standing(wb.Scene(human), wb.Point("right_index_tip", (3.0, 0.0, 1.0)))
-    solution = wb.Newton(restarts=0).solve(problem)
+    solution = wb.Newton(restarts=0, iterations=40).solve(problem)
     assert solution.status in ("unreachable", "stalled")
     assert solution.assessment.holds(1.2e-5)
     reached = wb.QP(restarts=0).solve(problem).assessment.goal_error
@@ -164,7 +164,7 @@ def test_constraints_that_cannot_all_hold_end_near_all_of_them_and_in_nothing(hu
         "standing",
         constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Hold("head", at=(0.0, 0.0, 2.5))],
     )
-    solution = wb.Newton(restarts=0).solve(impossible)
+    solution = wb.Newton(restarts=0, iterations=15).solve(impossible)
     assert solution.status in ("infeasible", "stalled")
     assert "Hold" in solution.message
     assert solution.assessment.penetration < 1e-4

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
-from wholebody.motion.bisection.keyframes import collision_groups, fill, key_frames, linear, quadratic
+from wholebody.motion.bisection.method import collision_groups, fill, key_frames, linear, quadratic
 
 SEEDS = st.integers(0, 10_000)
 

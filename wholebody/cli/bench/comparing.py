@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from wholebody.base.errors import InputError
 from wholebody.bench.tables import machine, write_rows, write_text
 from wholebody.cli.bench.command import folders, listed, quick, seed
-from wholebody.cli.command import command, count, option
+from wholebody.cli.command import command, count, flag, option
 
 if TYPE_CHECKING:
     from wholebody.bench.suite.compare.settings import Settings
@@ -41,17 +41,8 @@ differs. --jobs works on cases beside each other through joblib; --cluster does 
     seed("of all problems"),
     count("--jobs", None, "cases beside each other (default: 1, or all of the cluster)"),
     option("--cluster", metavar="ADDRESS", help="of a dask scheduler, such as tcp://10.0.0.1:8786"),
-    option(
-        "--held-out",
-        action="store_true",
-        help="pose problems of distributions that no constant was tuned on",
-    ),
-    option(
-        "--again",
-        type=Path,
-        metavar="LOCK.json",
-        help="repeat the comparison that left this file",
-    ),
+    flag("--held-out", "pose problems of distributions that no constant was tuned on"),
+    option("--again", type=Path, metavar="LOCK.json", help="repeat the comparison that left this file"),
     *folders("out/compare"),
 )
 def compare(arguments: argparse.Namespace) -> int:

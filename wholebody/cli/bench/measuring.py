@@ -169,11 +169,7 @@ def motion(arguments: argparse.Namespace) -> None:
     publish("motion", motion.motion_report(rows, facts), arguments, charts=charts)
 
 
-WORLD = {
-    "throws": "Thrown at a person",
-    "drops": "The same drops in three engines",
-    "long": "For minutes",
-}
+WORLD = {"throws": "Thrown at a person", "drops": "The same drops in three engines", "long": "For minutes"}
 """Parts of `wholebody bench world`, and the titles of their tables."""
 
 

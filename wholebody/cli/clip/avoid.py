@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wholebody.cli.clip.arguments import EQUIPMENT, JOBS, MOTIONS, bar, figure_of, jobs_of
-from wholebody.cli.command import command, option
+from wholebody.cli.command import command, flag, option
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -39,13 +39,9 @@ ended goes on.""",
         help="how (default: trajectory); repeated, each in turn",
     ),
     EQUIPMENT,
-    option("--no-feet", action="store_true", help="let feet slide that stand; without it they are held"),
-    option("--keep-ends", action="store_true", help="keep the first and the last posture where free"),
-    option(
-        "--dynamics",
-        action="store_true",
-        help="keep torques within the strength of a median person, and the balance within the feet",
-    ),
+    flag("--no-feet", "let feet slide that stand; without it they are held"),
+    flag("--keep-ends", "keep the first and the last posture where free"),
+    flag("--dynamics", "keep torques within the strength of a median person, and the balance within the feet"),
     option(
         "--stretch",
         type=float,

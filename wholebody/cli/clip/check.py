@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wholebody.cli.clip.arguments import EQUIPMENT, JOBS, MOTIONS, bar, figure_of, jobs_of
-from wholebody.cli.command import command, option
+from wholebody.cli.command import command, flag, option
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -33,7 +33,7 @@ carries and with the things around it are told apart. Several motions, or pieces
     *JOBS,
     option("--scene", type=Path, metavar="TASK.toml", help="task file with the figure and its things"),
     option("--depth", type=float, metavar="MM", help="deepest overlap that is no contact (default: 0.1)"),
-    option("--json", action="store_true", help="print everything as JSON instead of tables"),
+    flag("--json", "print everything as JSON instead of tables"),
     option("--html", type=Path, metavar="FILE", help="write a timeline to look at; opens without a network"),
     epilog="""\
 examples:

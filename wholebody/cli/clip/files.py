@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from wholebody.cli.clip.arguments import JOBS, MOTIONS, ONE_MOTION, bar, clip_of, figure_of, jobs_of
-from wholebody.cli.command import command, option
+from wholebody.cli.command import command, flag, option
 
 
 @command(
@@ -55,7 +55,7 @@ A skeleton that is not the figure's own is retargeted.""",
     *ONE_MOTION,
     option("out", type=Path, metavar="OUT", help="the file to write"),
     option("--dt", type=float, metavar="S", help="seconds from frame to frame (default: as it is)"),
-    option("--mirror", action="store_true", help="exchange left and right"),
+    flag("--mirror", "exchange left and right"),
     epilog="""\
 examples:
   wholebody clip convert walk.npz walk.glb

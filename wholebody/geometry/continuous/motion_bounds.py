@@ -36,11 +36,7 @@ class MotionBounds:
     """
 
     def __init__(self, model: pin.Model, joint: NDArray[np.intp], reach: Array) -> None:
-        """Read the tree once: `joint` (n,) carries each piece, and `reach` (n,) is its radius about its origin.
-
-        Raises:
-            InputError: a joint whose axis is not constant (composite, Euler angles, universal).
-        """
+        """Read the tree: `joint` (n,) carries each piece of `reach` (n,); an InputError for axes that turn."""
         for name, kind in zip(model.names, model.joints, strict=True):
             if any(word in kind.shortname() for word in TURNING_AXES):
                 raise InputError(

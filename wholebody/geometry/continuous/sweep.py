@@ -60,11 +60,7 @@ class Sweep:
     """Sweeps of one model and geometry; one object serves many motions."""
 
     def __init__(self, model: pin.Model, geometry: pin.GeometryModel) -> None:
-        """Read the pieces and pairs once; placements of fixed pieces may change between sweeps.
-
-        Raises:
-            InputError: a geometry that is not a convex piece, or a joint whose motion cannot be bounded.
-        """
+        """Read the pieces and pairs once; an InputError for a joint whose motion cannot be bounded, or other shapes."""
         self.model, self.geometry = model, geometry
         self._data, self._pairs = model.createData(), pairs_of(geometry)
         self._distances = PairDistances(geometry, self._pairs)

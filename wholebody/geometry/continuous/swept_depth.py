@@ -51,11 +51,7 @@ class SweptDepth:
     """Depths along one sequence of postures at a time."""
 
     def __init__(self, table: PairTable, geometry: pin.GeometryModel, tolerance: float) -> None:
-        """Read the pieces and pairs; they stand where `geometry` has them. Depths of `tolerance` metres matter.
-
-        Raises:
-            InputError: a joint whose motion cannot be bounded.
-        """
+        """Read the pieces, which stand where `geometry` has them; `tolerance` metres matter. Raises as `Sweep`."""
         self._table, self._geometry, self._tolerance = table, geometry, tolerance
         self._bounds = MotionBounds(table.model, table.joint, table.reach)
         self._kernel = compiled_kernel()

@@ -9,8 +9,8 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.methods.ccd.guards import Kept, cone_guards, guards
-from wholebody.methods.ccd.limbs import Limbs, rotated, seen_from
-from wholebody.methods.ccd.links import Link, LinkFinder, Overlap, Vector
+from wholebody.methods.ccd.limbs import Limbs, Vector, rotated, seen_from, three
+from wholebody.methods.ccd.links import Link, LinkFinder, Overlap
 from wholebody.methods.ccd.sweep import Aims
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace
@@ -27,7 +27,7 @@ class ChainResolver:
     Attributes:
         limbs: its joints.
         reach: for each node, an upper bound of the distance from its joint to a point of the chain, metres.
-        translated: joints that hold the orientation of links that were moved out by translation, since it was cleared.
+        translated: joints that keep the orientation of links that were moved out by translation.
     """
 
     def __init__(
@@ -40,23 +40,13 @@ class ChainResolver:
         kept: Kept,
         exact: bool,
     ) -> None:
-        """Prepare a chain.
-
-        Args:
-            scene: figure and things.
-            workspace: of the run.
-            joints: Pinocchio's indices of its joints.
-            foreign: joints of the other chains.
-            tip: index of the frame at its end.
-            kept: cones and ranges.
-            exact: see `LinkFinder`.
-        """
+        """Prepare a chain; `foreign` are the joints of the other chains, `tip` is the frame at its end."""
         self.translated: set[int] = set()
         self.limbs = Limbs(scene.model, joints)
         self._finder = LinkFinder(workspace, self.limbs, foreign, exact)
         self._guards = guards(scene.figure, self.limbs, kept)
         self._cones = cone_guards(scene.figure, self.limbs, kept)
-        self._tip = _three(scene.model.frames[tip].placement.translation)
+        self._tip = three(scene.model.frames[tip].placement.translation)
         self._bearing = self._links_with_pieces(workspace)
         self.reach = self._reaches(workspace)
 
@@ -106,10 +96,7 @@ class ChainResolver:
     def push(self, link: Link, margin: float = MARGIN, tracked: Any = None) -> tuple[int, ...]:
         """Move the link out of the obstacle by `margin` metres; returns the nodes that moved. Call `read` first.
 
-        Args:
-            link: of the chain.
-            margin: metres.
-            tracked: joint placements whose orientation a link that is translated takes; None for its present one.
+        A link that is translated takes the orientation that it has in `tracked`, or keeps its own.
         """
         x, y, z = link.push
         length = (x * x + y * y + z * z) ** 0.5
@@ -161,8 +148,7 @@ class ChainResolver:
     def _translate(self, link: Link, push: Vector, inner: Sequence[int], there: Array) -> None:
         """Move the link by pure translation: its joint's origin moves, and its axes become `there` (3, 3).
 
-        Its own joints keep its orientation, and inner ones whose axes pass through the origin: the rotation of an upper
-        arm about its long axis moves no elbow.
+        Inner joints whose axes pass through the origin keep it too: an upper arm's rotation moves no elbow.
         """
         limbs = self.limbs
         own = tuple(node for node in link.nodes if node not in inner)
@@ -209,8 +195,3 @@ def _parallel(bone: Array, push: Vector, most: float) -> bool:
 def _columns(frame: Array) -> Array:
     """(3, 3) axes of a row of `Limbs.frames`, one a row."""
     return np.asarray(frame[:9].reshape(3, 3).T)
-
-
-def _three(vector: Any) -> Vector:
-    x, y, z = vector.tolist()
-    return x, y, z

@@ -31,33 +31,24 @@ ALLOWED_DEPTH = 4e-4  # m: allowed depth of the direct motion from one shown pos
 
 @dataclass(frozen=True)
 class OverlapResult:
-    """A posture without overlap, and the work to find it.
-
-    Attributes:
-        q: (nq,) the posture to show.
-        iterations: number of goals of cyclic coordinate descent.
-        joints: number of joints that moved, counted once for each goal.
-        pairs: number of different pairs of pieces that overlapped during the search.
-        contact_seconds: time of contact queries.
-        ik_seconds: time of cyclic coordinate descent.
-        deepest: deepest remaining overlap, metres.
-        swept: whether the direct motion from the posture shown before was swept and is free.
-    """
+    """A posture (nq,) without overlap, and the work to find it."""
 
     q: Array
-    iterations: int
-    joints: int
-    pairs: int
-    contact_seconds: float
+    iterations: int  # number of goals of cyclic coordinate descent
+    joints: int  # number of joints that moved, counted once for each goal
+    pairs: int  # number of different pairs of pieces that overlapped during the search
+    contact_seconds: float  # time of contact queries, and of cyclic coordinate descent
     ik_seconds: float
-    deepest: float
-    swept: bool
+    deepest: float  # deepest remaining overlap, metres
+    swept: bool  # whether the direct motion from the posture shown before was swept and is free
 
 
 def resolve_overlap(
     scene: Scene, q_free: Array, q_wanted: Array, rng: np.random.Generator, largest_motion: Array | None = None
 ) -> OverlapResult:
-    """The posture nearest to the wanted one that this frame can reach without overlap.
+    """The posture nearest to the wanted one that this frame can reach without overlap, and the work to find it.
+
+    It is within limits and reach cones and never NaN. If things were moved into `q_free`, leaving them comes first.
 
     Args:
         scene: figure and things. Prepared data of the scene are cached between calls.
@@ -65,11 +56,7 @@ def resolve_overlap(
         q_wanted: (nq,) the tracked posture. It may overlap; it is clamped to limits and cones.
         rng: of the order of the chains; the same seed gives the same answer.
         largest_motion: (nv,) of each degree of freedom, radians and metres; None for no limit. The remainder is left
-            to the next frame. If things were moved into `q_free`, leaving them comes first.
-
-    Returns:
-        The posture, within limits and reach cones and never NaN. If things were moved into `q_free`, that overlap is
-        removed first; `deepest` is the remaining overlap.
+            to the next frame.
 
     Raises:
         InputError: a posture of the wrong shape, or a value that is not finite.
@@ -81,9 +68,6 @@ def resolve_overlap(
 
 class Attraction:
     """Moves parts of a figure towards the tracked posture: its chains, and root and trunk as one more part.
-
-    Displaced joints are attracted back in every frame, in short steps or joint by joint, as far as contact allows (the
-    coach and trainee of Boulic and others 1997).
 
     Attributes:
         parts: degrees of freedom (k,) of each part, and for each the greatest distance of a point of the part, (k,).
@@ -113,11 +97,7 @@ class Attraction:
         self.parts.append((others, reach))
 
     def step(self, q: Array, wanted: Array, settled: list[bool]) -> tuple[Array, Array] | None:
-        """Move every part that is not settled a step towards the wanted posture; None if no part can move.
-
-        Returns:
-            The new posture, (nq,), and the share of its motion that each part made, (parts,).
-        """
+        """Move all parts that are not settled a step to the wanted posture; (nq,) and shares (parts,), or None."""
         way = np.asarray(pin.difference(self._model, q, wanted))
         shares = np.zeros(len(self.parts))
         for k, (dofs, reach) in enumerate(self.parts):
@@ -288,8 +268,7 @@ class FrameResolver:
     def _toward(self, q0: Array, q1: Array) -> Array | None:
         """The direct motion from q0 towards q1, as far as a frame may move; None if that is not free.
 
-        If the motion is too long, each part makes its own share of it, or, if that is not free, all make the least
-        share.
+        Each part makes its own share of a motion that is too long, or, if that is not free, all make the least.
         """
         way = np.asarray(pin.difference(self._model, q0, q1))
         shares = np.minimum(1.0, self._largest_motion / np.maximum(np.abs(way), 1e-12))

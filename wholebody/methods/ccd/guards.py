@@ -7,32 +7,24 @@ Cones and ranges that share joints, those of a shoulder or of a leg, are kept to
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.reach_cones import ReachCone
-from wholebody.methods.ccd.limbs import CarriedFrame, Limbs, rotated
-from wholebody.methods.ccd.ranges import range_guards
+from wholebody.methods.ccd.limbs import CarriedFrame, Limbs, Vector, rotated, three
+from wholebody.methods.ccd.ranges import RangeGuard, range_guards
 from wholebody.methods.ccd.sweep import Aims
-
-Direction = tuple[float, float, float]
 
 
 class Kept(NamedTuple):
-    """What descents keep.
+    """What descents keep."""
 
-    Attributes:
-        fixed: Pinocchio's indices of joints that must not move, not even to resolve overlap.
-        cones: names of the reach cones; None for all of the figure's.
-        ranges: names of the ranges of motion.
-    """
-
-    fixed: frozenset[int] = frozenset()
-    cones: tuple[str, ...] | None = None
-    ranges: tuple[str, ...] = ()
+    fixed: frozenset[int] = frozenset()  # Pinocchio's indices of joints that must not move, not even to resolve overlap
+    cones: tuple[str, ...] | None = None  # names of the reach cones; None for all of the figure's
+    ranges: tuple[str, ...] = ()  # names of the ranges of motion
 
 
 NOTHING_FIXED = Kept()
@@ -45,17 +37,17 @@ class Polygon:
         """Copy the planes of the cone."""
         following = np.roll(cone.vertices, -1, axis=0)
         slices = np.cross(cone.visible, cone.vertices)
-        self._middle: Direction = _three(cone.visible)
+        self._middle: Vector = three(cone.visible)
         self._wedges = [
-            (_three(slice_), _three(after), _three(edge))
+            (three(slice_), three(after), three(edge))
             for slice_, after, edge in zip(slices, np.roll(slices, -1, axis=0), cone.boundaries, strict=True)
         ]
         self._edges = [
-            (_three(normal), _three(start), _three(end), _three(np.cross(normal, start)), _three(np.cross(end, normal)))
+            (three(normal), three(start), three(end), three(np.cross(normal, start)), three(np.cross(end, normal)))
             for normal, start, end in zip(cone.boundaries, cone.vertices, following, strict=True)
         ]
 
-    def contains(self, direction: Direction) -> bool:
+    def contains(self, direction: Vector) -> bool:
         """Whether a unit direction is inside: find the wedge that contains it, then test the wedge's edge."""
         x, y, z = direction
         for (a, b, c), (d, e, f), (g, h, i) in self._wedges:
@@ -64,7 +56,7 @@ class Polygon:
         g, h, i = self._wedges[0][2]
         return g * x + h * y + i * z >= 0.0
 
-    def nearest(self, direction: Direction) -> Direction:
+    def nearest(self, direction: Vector) -> Vector:
         """The nearest direction inside to a unit direction outside, a little inside of the edge."""
         x, y, z = direction
         inward = 1e-6  # margin inside the cone, as a share of the distance to its middle; larger than rounding
@@ -74,7 +66,7 @@ class Polygon:
             px, py, pz = x - height * a, y - height * b, z - height * c
             length = (px * px + py * py + pz * pz) ** 0.5
             within = d * px + e * py + f * pz >= 0.0 and g * px + h * py + i * pz >= 0.0
-            candidates: Sequence[Direction] = (start, end)
+            candidates: Sequence[Vector] = (start, end)
             if within and length > inward:
                 candidates = ((px / length, py / length, pz / length),)
             for candidate in candidates:
@@ -88,13 +80,10 @@ class Polygon:
 
 
 class ConeGuard:
-    """Keeps one limb in its cone while the nodes of some limbs move.
+    """Keeps one limb in its cone while the nodes of some limbs move; `nodes` are those that turn it there.
 
     A limb that has left its cone is projected to the nearest direction inside (Wilhelms and Van Gelder 2001): the
     joints of the ball joint turn, each to its best, until the limb points there.
-
-    Attributes:
-        nodes: the nodes that turn the limb in its cone; none if these limbs do not turn it.
     """
 
     def __init__(self, figure: Figure, limbs: Limbs, name: str) -> None:
@@ -106,7 +95,7 @@ class ConeGuard:
 
     def holds(self, data: Any) -> bool:
         """Whether the limb is in its cone at the joint placements of Pinocchio's data."""
-        return self._polygon.contains(_three((self._limb.rotation(data) @ self._axis) @ self._base.rotation(data)))
+        return self._polygon.contains(three((self._limb.rotation(data) @ self._axis) @ self._base.rotation(data)))
 
     def read(self, q: Array, data: Any) -> None:
         """Read what the limbs do not move from `data` at the posture q (nq,); call `limbs.read` first."""
@@ -124,29 +113,12 @@ class ConeGuard:
         Aims(self._limbs, [self._limb.node], [local], [target], [False]).sweep_until(self.nodes, self.inside)
 
 
-class Part(Protocol):
-    """A cone or a range."""
-
-    @property
-    def nodes(self) -> tuple[int, ...]:
-        """The nodes that change it."""
-
-    def read(self, q: Array, data: Any) -> None:
-        """Read what the limbs do not move from `data` at the posture q (nq,); call `limbs.read` first."""
-
-    def inside(self) -> bool:
-        """Whether it is kept, after `limbs.forward`."""
-
-    def turn_back(self) -> None:
-        """Change the nodes until it is kept, as far as their limits allow, and call `limbs.forward`."""
+Part = ConeGuard | RangeGuard
+"""What is kept: `read` it at a posture, ask whether it is `inside`, and `turn_back` its `nodes`."""
 
 
 class Guard:
-    """Keeps cones and ranges that share nodes.
-
-    Attributes:
-        parts: the cones and ranges.
-    """
+    """Keeps cones and ranges that share nodes."""
 
     def __init__(self, limbs: Limbs, parts: Sequence[Part]) -> None:
         """Take the parts."""
@@ -162,10 +134,7 @@ class Guard:
         self._remember()
 
     def keep(self) -> bool:
-        """Bring the nodes back inside if they have left; true if they are inside then.
-
-        Call it after `limbs.forward()`; if it moves something, it calls `limbs.forward()` itself.
-        """
+        """Bring the nodes back inside, after `limbs.forward`, and call it; true if they are inside then."""
         if self._remember():
             return True
         for _ in range(2):  # to bring a limb back into one may take it out of another
@@ -219,8 +188,3 @@ def cone_guards(figure: Figure, limbs: Limbs, kept: Kept) -> list[ConeGuard]:
     """The kept cones that these limbs can leave."""
     made = [ConeGuard(figure, limbs, name) for name in (figure.cones if kept.cones is None else kept.cones)]
     return [guard for guard in made if guard.nodes]
-
-
-def _three(vector: Any) -> Direction:
-    x, y, z = vector.tolist()
-    return x, y, z

@@ -19,6 +19,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
 
+Vector = tuple[float, float, float]
 Placement = tuple[float, ...]
 """Twelve floats: the rotation row by row, then the translation."""
 
@@ -35,7 +36,7 @@ class Limbs:
     Attributes:
         joints: Pinocchio's index of each node's joint, ascending.
         values: (n,) radians or metres, one a node; change them and call `forward`.
-        lower, upper: (n,) limits of each node; infinite for no limit.
+        limits: (2, n) of each node, `lower` and `upper`; infinite for no limit.
         frames: (n + 1, 12) after `forward`: placement of each node in the world, rotation row by row, then translation;
             the last row is the world itself.
         lines: (n, 6) after `forward`: unit axis and origin of each node in the world.
@@ -49,18 +50,14 @@ class Limbs:
     """
 
     def __init__(self, model: pin.Model, joints: Iterable[int]) -> None:
-        """Find the tree of the joints; `read` then reads their values.
-
-        Args:
-            model: Pinocchio's model.
-            joints: indices of joints with one degree of freedom; see `movable`.
-        """
+        """Find the tree of joints with one degree of freedom, see `movable`; `read` then reads their values."""
         self.model = model
         self.joints = tuple(sorted(set(joints)))
         self.node_of = {joint: node for node, joint in enumerate(self.joints)}
         count = len(self.joints)
         self._kernel = compiled_kernel()
-        self.values, self.lower, self.upper = np.zeros(count), np.full(count, -inf), np.full(count, inf)
+        self.values, self.limits = np.zeros(count), np.array([np.full(count, -inf), np.full(count, inf)])
+        self.lower, self.upper = self.limits
         self.frames, self.lines = np.tile(np.array(WORLD), (count + 1, 1)), np.zeros((count, 6))
         self.parents = np.array([self.carrier(model.parents[joint]) for joint in self.joints], dtype=np.intp)
         self.paths: list[tuple[int, ...]] = []
@@ -158,11 +155,11 @@ class CarriedFrame:
         """(3, 3) rotation at the joint placements of Pinocchio's data."""
         return np.asarray(data.oMi[self._joint].rotation @ self._fixed.rotation)
 
-    def direction(self, x: float, y: float, z: float) -> tuple[float, float, float]:
+    def direction(self, x: float, y: float, z: float) -> Vector:
         """The world's components of a direction of this frame, after `Limbs.forward`."""
         return rotated(self._limbs.frame(self.node), *rotated(self.placement, x, y, z))
 
-    def seen(self, x: float, y: float, z: float) -> tuple[float, float, float]:
+    def seen(self, x: float, y: float, z: float) -> Vector:
         """A direction of the world in the components of this frame, after `Limbs.forward`."""
         return seen_from(self.placement, *seen_from(self._limbs.frame(self.node), x, y, z))
 
@@ -173,6 +170,12 @@ def compiled_kernel() -> Any:
     none, places = np.zeros(0), np.zeros(0, dtype=np.intp)
     forward(places, np.zeros((0, 12)), places, none, np.zeros((0, 3)), none, np.zeros((0, 12)), np.zeros((0, 6)))
     return sys.modules[__name__]
+
+
+def three(vector: Any) -> Vector:
+    """A vector (3,) as floats."""
+    x, y, z = vector.tolist()
+    return x, y, z
 
 
 def movable(model: pin.Model, joint: int) -> bool:
@@ -189,19 +192,19 @@ def floats(placement: Any) -> Placement:
     return (*placement.rotation.ravel().tolist(), *placement.translation.tolist())
 
 
-def moved(frame: Placement, x: float, y: float, z: float) -> tuple[float, float, float]:
+def moved(frame: Placement, x: float, y: float, z: float) -> Vector:
     """The world's coordinates of a point of a frame."""
     a, b, c, d, e, f, g, h, i, tx, ty, tz = frame
     return a * x + b * y + c * z + tx, d * x + e * y + f * z + ty, g * x + h * y + i * z + tz
 
 
-def rotated(frame: Placement, x: float, y: float, z: float) -> tuple[float, float, float]:
+def rotated(frame: Placement, x: float, y: float, z: float) -> Vector:
     """The world's components of a direction of a frame."""
     a, b, c, d, e, f, g, h, i, _, _, _ = frame
     return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
 
 
-def seen_from(frame: Placement, x: float, y: float, z: float) -> tuple[float, float, float]:
+def seen_from(frame: Placement, x: float, y: float, z: float) -> Vector:
     """A direction of the world in the components of a frame: the inverse of `rotated`."""
     a, b, c, d, e, f, g, h, i, _, _, _ = frame
     return a * x + d * y + g * z, b * x + e * y + h * z, c * x + f * y + i * z
@@ -213,7 +216,7 @@ def _settled(placement: Placement) -> Placement:
     return (*WORLD[:9], *placement[9:]) if near else placement
 
 
-def _kind(joint: Any) -> tuple[int, float, tuple[float, float, float]]:
+def _kind(joint: Any) -> tuple[int, float, Vector]:
     """Kind, sign and axis of a joint."""
     subspace = np.asarray(joint.createData().S).ravel().tolist()
     sliding = max(abs(value) for value in subspace[3:]) < SAME
@@ -237,18 +240,7 @@ def forward(
     frames: Array,
     lines: Array,
 ) -> None:
-    """Compute frames and lines from values.
-
-    Args:
-        parents: (n,) node that each hangs on; -1 is the world.
-        places: (n, 12) rotation from the parent, row by row, and translation.
-        kinds: (n,) X, Y, Z, OBLIQUE or SLIDE.
-        signs: (n,) -1 where the joint turns about the negative axis.
-        axes: (n, 3) unit axis in the joint's own frame.
-        values: (n,) radians or metres.
-        frames: (n + 1, 12) written: placements, the last being the world.
-        lines: (n, 6) written: unit axis and origin of each node.
-    """
+    """Write frames (n + 1, 12) and lines (n, 6) from values; arguments as the attributes of `Limbs`."""
     for k in range(len(parents)):
         base, place, frame, line = frames[parents[k]], places[k], frames[k], lines[k]
         for row in range(3):
@@ -284,7 +276,7 @@ def forward(
 
 
 @compiled(inner=True)
-def turned(line: Array, co: float, si: float, x: float, y: float, z: float) -> tuple[float, float, float]:
+def turned(line: Array, co: float, si: float, x: float, y: float, z: float) -> Vector:
     """A vector turned about a line's unit axis (Rodrigues)."""
     ux, uy, uz = line[0], line[1], line[2]
     along = (1.0 - co) * (ux * x + uy * y + uz * z)

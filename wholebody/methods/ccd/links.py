@@ -14,10 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.geometry.separation import least_separation
-from wholebody.methods.ccd.limbs import Limbs
+from wholebody.methods.ccd.limbs import Limbs, Vector
 from wholebody.scene.workspace import Workspace
-
-Vector = tuple[float, float, float]
 
 
 class Overlap(NamedTuple):
@@ -34,21 +32,13 @@ class Overlap(NamedTuple):
 
 
 class Link(NamedTuple):
-    """A link that overlaps, and its displacement.
+    """A link that overlaps, and its displacement."""
 
-    Attributes:
-        node: its node in the chain.
-        nodes: the nodes that move it relative to the obstacles.
-        effector: the mean of its contact points.
-        push: the translation that removes the overlap, from PD_g.
-        depth: depth of its deepest pair, metres.
-    """
-
-    node: int
-    nodes: tuple[int, ...]
-    effector: Vector
-    push: Vector
-    depth: float
+    node: int  # its node in the chain
+    nodes: tuple[int, ...]  # the nodes that move it relative to the obstacles
+    effector: Vector  # the mean of its contact points
+    push: Vector  # the translation that removes the overlap, from PD_g
+    depth: float  # depth of its deepest pair, metres
 
 
 class _Side(NamedTuple):
@@ -64,13 +54,9 @@ class LinkFinder:
     """Finds the overlapping link of one chain."""
 
     def __init__(self, workspace: Workspace, limbs: Limbs, foreign: frozenset[int], exact: bool = True) -> None:
-        """Prepare the joints of the chain.
+        """Prepare the joints of the chain; `exact` computes the least translation that separates if PD_g cancels.
 
-        Args:
-            workspace: of the run.
-            limbs: the joints of the chain.
-            foreign: joints of other chains: their links are no links of this chain, although this chain may move them.
-            exact: whether to compute the least translation that separates if PD_g cancels.
+        Links of the joints `foreign` are no links of this chain, although it may move them.
         """
         self._exact = exact
         self._workspace, self._limbs = workspace, limbs
@@ -83,20 +69,12 @@ class LinkFinder:
         self._masks: dict[tuple[tuple[int, ...], str], tuple[list[int], NDArray[np.bool_]]] = {}
 
     def nearest_root(self, overlaps: Sequence[Overlap]) -> Link | None:
-        """The overlapping link nearest to the root; None if no joint can change an overlap.
-
-        Args:
-            overlaps: of the figure, at the placements of the last query.
-        """
+        """The overlapping link nearest to the root; None if no joint can change an overlap."""
         links = self._links(overlaps)
         return self._link(links[min(links)]) if links else None
 
     def deepest(self, overlaps: Sequence[Overlap]) -> Link | None:
-        """The link that is deepest inside; None if no joint can change an overlap.
-
-        Args:
-            overlaps: of the figure, at the placements of the last query.
-        """
+        """The link that is deepest inside; None if no joint can change an overlap."""
         links = self._links(overlaps).values()
         return self._link(max(links, key=lambda found: max(item.overlap.depth for item in found))) if links else None
 

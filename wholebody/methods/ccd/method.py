@@ -103,13 +103,10 @@ class CCD(Checked, Descends):
         return CCDTracker(self, problem, dt)
 
     def pushed_out(self, problem: Problem, q: Array) -> Array:
-        """The result of overlap resolution at the posture q (nq,), without regard to the goals.
-
-        It may still overlap, if overlap resolution fails.
+        """The result of overlap resolution at the posture q (nq,), without regard to the goals; it may still overlap.
 
         Raises:
             UnsupportedTermError: the problem has terms that this method cannot take.
-            InputError: the scene changed after the problem was made.
         """
         check_problem(problem, "CCD.pushed_out: problem")
         q = posture(q, problem.scene.model.nq)

@@ -1,7 +1,4 @@
-"""Ranges of motion: joints that have left one are brought back by the least change of their values.
-
-The ranges are those of `wholebody.figures.motion_ranges`.
-"""
+"""Ranges of motion: joints that have left one are brought back by the least change of their values."""
 
 from __future__ import annotations
 
@@ -15,7 +12,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.motion_ranges import CoupledRange, EllipticRange, TwistRange
-from wholebody.methods.ccd.limbs import CarriedFrame, Limbs, floats, rotated, seen_from
+from wholebody.methods.ccd.limbs import CarriedFrame, Limbs, Vector, floats, rotated, seen_from
 from wholebody.methods.ccd.sweep import Aims
 
 INWARD = 1e-9  # margin inside a range, as a share of an ellipse and in radians of a twist; larger than rounding
@@ -63,11 +60,7 @@ class _Sum:
 
 
 class CoupledGuard:
-    """Keeps a weighted sum of joint values below its bound; see `CoupledRange`.
-
-    Attributes:
-        nodes: the nodes that change it.
-    """
+    """Keeps a weighted sum of joint values below its bound; see `CoupledRange`."""
 
     def __init__(self, figure: Figure, limbs: Limbs, part: CoupledRange) -> None:
         """Find the nodes among the range's joints."""
@@ -89,11 +82,7 @@ class CoupledGuard:
 
 
 class EllipticGuard:
-    """Keeps angles on or in an ellipse; see `EllipticRange`.
-
-    Attributes:
-        nodes: the nodes that change it.
-    """
+    """Keeps angles on or in an ellipse; see `EllipticRange`."""
 
     def __init__(self, figure: Figure, limbs: Limbs, part: EllipticRange) -> None:
         """Find the nodes among the range's joints."""
@@ -127,11 +116,7 @@ class EllipticGuard:
 
 
 class TwistGuard:
-    """Keeps the twist of a limb about its long axis within its bound; see `TwistRange`.
-
-    Attributes:
-        nodes: the nodes that turn the limb in its reference.
-    """
+    """Keeps the twist of a limb about its long axis within its bound; see `TwistRange`."""
 
     def __init__(self, figure: Figure, limbs: Limbs, part: TwistRange) -> None:
         """Find the nodes between the reference and the limb."""
@@ -164,7 +149,7 @@ class TwistGuard:
         along = sum(w * part for w, part in zip(self._slope, z, strict=True))
         return float(self._part.sign * atan2(b - d, a + e) - self._part.bound - along)
 
-    def _seen(self, x: float, y: float, z: float) -> tuple[float, float, float]:
+    def _seen(self, x: float, y: float, z: float) -> Vector:
         """A direction of the limb in the axes of the central rotation."""
         return seen_from(self._center, *self._base.seen(*self._limb.direction(x, y, z)))
 

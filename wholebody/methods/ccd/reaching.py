@@ -75,7 +75,7 @@ class Reach:
         aims = _aims(limbs, self._data, self._goals)
         plan = aims.plan()
         error, last = aims.error, inf
-        sweeps, converged = 0, not len(plan.nodes)
+        sweeps, converged = 0, not len(plan.turns)
         while error > tolerance and sweeps < most and not converged and not self._control.over:
             if sweeps % 25 == 0:  # near a goal convergence is linear, and sometimes slow
                 converged = error > 0.97 * last
@@ -94,13 +94,7 @@ class Reach:
         return q, Reached(error, sweeps, converged)
 
     def disturbed(self, q: Array, size: float, rng: np.random.Generator) -> Array:
-        """Copy of a posture q (nq,) with random joints, near their values or anywhere.
-
-        Args:
-            q: (nq,) posture.
-            size: standard deviation, radians or metres; infinite for anywhere within the limits.
-            rng: the random generator.
-        """
+        """Copy of a posture q (nq,) with random joints, of a deviation `size` [rad, m] or, if infinite, anywhere."""
         q = q.copy()
         limbs = self.limbs
         pin.forwardKinematics(self._model, self._data, q)

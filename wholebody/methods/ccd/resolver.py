@@ -50,7 +50,6 @@ class OverlapResolver:
     """Removes overlap from postures of one scene; one object serves many postures.
 
     Attributes:
-        workspace: of the run.
         placed: the pieces and pairs at the last query.
         counts: the work since it was last set.
         deepest: largest shortfall of a pair from its clearance in the last query, metres.
@@ -59,14 +58,7 @@ class OverlapResolver:
     """
 
     def __init__(self, scene: Scene, workspace: Workspace, kept: Kept = NOTHING_FIXED, *, exact: bool = True) -> None:
-        """Prepare for clearances of zero; `begin` takes others.
-
-        Args:
-            scene: figure and things.
-            workspace: of the run, for as long as this is used.
-            kept: joints that must not move, cones and ranges.
-            exact: whether to compute the least translation that separates if PD_g cancels, which takes up to 0.1 s.
-        """
+        """Prepare for clearances of zero; `begin` takes others, and `exact` is as in `LinkFinder`: up to 0.1 s."""
         self.exact, self.margin = exact, MARGIN
         self.tracked: Any = None
         self.scene, self.workspace, self._kept = scene, workspace, kept
@@ -76,13 +68,7 @@ class OverlapResolver:
         self.deepest = 0.0
 
     def begin(self, clearances: Array | None, tolerance: float, control: Control) -> None:
-        """Begin a run.
-
-        Args:
-            clearances: (pairs,) clearance of every collision pair, metres; None for zero.
-            tolerance: largest overlap that is ignored, metres.
-            control: may end the run early.
-        """
+        """Begin a run for clearances (pairs,), None for zero, and a largest overlap that is ignored, metres."""
         self.clearances, self.tolerance, self.control = clearances, tolerance, control
         self._query_distance = 0.0 if clearances is None else float(clearances.max(initial=0.0))
         self.counts = Counts()
@@ -132,16 +118,7 @@ class OverlapResolver:
         return found
 
     def resolve(self, q: Array, rng: np.random.Generator, most_work: float = np.inf) -> tuple[Array, list[Overlap]]:
-        """Move links out until nothing overlaps or no step gains.
-
-        Args:
-            q: (nq,) posture.
-            rng: of the order of the chains.
-            most_work: work after which no further chain is processed.
-
-        Returns:
-            The posture, and its remaining overlaps.
-        """
+        """Move links out until nothing overlaps, no step gains, or `most_work` is done; the rest overlaps."""
         q = q.copy()
         overlaps = self.query(q)
         names = list(self.chains)

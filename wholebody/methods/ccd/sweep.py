@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
 from wholebody.methods.ccd.limbs import SLIDE, Limbs, turned
 
@@ -31,29 +31,15 @@ TURN = 2.0 * pi
 
 
 class Plan(NamedTuple):
-    """Which nodes have their turns in a sweep, and what each moves.
+    """Which nodes have their turns in a sweep, and what each moves."""
 
-    Attributes:
-        nodes: (s,) nodes in the order of their turns.
-        first: (s + 1,) where in `moved` each of them begins.
-        moved: aims that each moves, points before directions.
-        points: (s,) how many of these are points.
-    """
-
-    nodes: Indices
-    first: Indices
-    moved: Indices
-    points: Indices
+    # (s, 4) node, where in `moved` it begins and ends, and how many of those are points, which come first
+    turns: Indices
+    moved: Indices  # aims that the nodes move
 
 
 class Aims:
-    """Points and directions that nodes of some limbs carry, with their targets.
-
-    Attributes:
-        here: (m, 3) where they are in the world.
-        there: (m, 3) their targets.
-        weights: (m,) factor on each squared distance.
-    """
+    """Points and directions (m, 3) that nodes of some limbs carry: where they are, their targets, and factors (m,)."""
 
     def __init__(
         self, limbs: Limbs, nodes: Sequence[int], local: ArrayLike, there: ArrayLike, points: Sequence[bool],
@@ -67,20 +53,20 @@ class Aims:
             local: (m, 3) each in its node's frame.
             there: (m, 3) targets in the world.
             points: (m,) which are points.
-            weights: (m,); None for all alike.
+            weights: (m,) factors on the squared distances; None for all alike.
         """
         self._limbs, self._kernel = limbs, compiled_kernel()
         self._carriers, self._are_points = tuple(nodes), tuple(points)
-        self._nodes, self._points = np.array(nodes, dtype=np.intp), np.array(points, dtype=bool)
-        self._local = np.array(local, dtype=float).reshape(-1, 3)
-        self.there: Array = np.array(there, dtype=float).reshape(-1, 3)
-        self.weights: Array = np.ones(len(self._nodes)) if weights is None else np.array(weights, dtype=float)
-        self.here: Array = np.zeros_like(self.there)
+        self._nodes = np.array(nodes, dtype=np.intp)
+        self._rows = np.zeros((len(self._nodes), 11))  # where each is, target, factor, in its node's frame, is a point
+        self.here, self.there, self.weights = self._rows[:, :3], self._rows[:, 3:6], self._rows[:, 6]
+        self.there[:], self._rows[:, 7:10] = (np.reshape(part, (-1, 3)) for part in (there, local))
+        self.weights[:], self._rows[:, 10] = 1.0 if weights is None else weights, points
         self.carry()
 
     def carry(self) -> None:
         """Update where they are, after `limbs.forward`."""
-        self._kernel.carry(self._limbs.frames, self._nodes, self._local, self._points, self.here)
+        self._kernel.carry(self._limbs.frames, self._nodes, self._rows)
 
     def plan(self, nodes: Iterable[int] | None = None) -> Plan:
         """Those of the nodes, or of all, that move an aim, from the tips inwards."""
@@ -92,27 +78,18 @@ class Aims:
         return plan
 
     def sweep(self, plan: Plan) -> float:
-        """Give each joint its best value, within its limits, and move the aims with it.
+        """Give each joint its best value, within its limits; returns the largest change of one, radians or metres.
 
         When a joint is processed, the joints farther out have moved, but its axis has not, so only the aims are
         updated: a sweep is linear in the number of joints. Call `limbs.forward` and `carry` before the next one.
-
-        Returns:
-            The largest change of a joint, radians or metres.
         """
         limbs = self._limbs
         return float(
-            self._kernel.sweep(
-                limbs.lines, limbs.kinds, limbs.values, limbs.lower, limbs.upper,
-                self.here, self.there, self.weights, *plan,
-            )
-        )  # fmt: skip
+            self._kernel.sweep(limbs.lines, limbs.kinds, limbs.values, limbs.limits, self._rows, plan.turns, plan.moved)
+        )
 
     def sweep_until(self, nodes: Sequence[int], done: Callable[[], bool]) -> None:
-        """Sweep with these nodes, and call `limbs.forward`, until `done` is true.
-
-        More than two sweeps are needed only near a singularity, or where a joint is at its limit.
-        """
+        """Sweep with these nodes, and call `limbs.forward`, until `done` is true: mostly twice."""
         plan = self.plan(nodes)
         for _ in range(12):
             self.sweep(plan)
@@ -124,91 +101,71 @@ class Aims:
     @property
     def error(self) -> float:
         """Largest remaining distance of a point, or angle of three directions, one after the other."""
-        return float(self._kernel.greatest_error(self.here, self.there, self._points))
+        return float(self._kernel.greatest_error(self._rows))
 
     @property
     def distance(self) -> float:
         """Root of the weighted sum of squared remaining distances."""
-        return float(self._kernel.distance(self.here, self.there, self.weights))
+        return float(self._kernel.distance(self._rows))
 
 
 def _plan(limbs: Limbs, carriers: tuple[int, ...], points: tuple[bool, ...], nodes: tuple[int, ...] | None) -> Plan:
-    steps: list[tuple[int, list[int], int]] = []
+    turns, moved = list[tuple[int, int, int, int]](), list[int]()
     for node in sorted(set(range(len(limbs.joints)) if nodes is None else nodes), reverse=True):
         mine = [k for k, tip in enumerate(carriers) if tip >= 0 and node in limbs.paths[tip]]
         places = [k for k in mine if points[k]]
-        arrows = [k for k in mine if not points[k]]
-        if places or (arrows and not limbs.slides(node)):
-            steps.append((node, [*places, *arrows], len(places)))
-    first = np.concatenate([[0], np.cumsum([len(mine) for _, mine, _ in steps])])
-    parts = ([step[0] for step in steps], first, [k for step in steps for k in step[1]], [step[2] for step in steps])
-    return Plan(*(np.array(part, dtype=np.intp) for part in parts))
+        if places or (mine and not limbs.slides(node)):
+            turns.append((node, len(moved), len(moved) + len(mine), len(places)))
+            moved += [*places, *(k for k in mine if not points[k])]
+    return Plan(np.array(turns, dtype=np.intp).reshape(-1, 4), np.array(moved, dtype=np.intp))
 
 
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
     """This module, after its loops are compiled or loaded from the cache; called before a solve, not during it."""
-    none, places, points = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros(0, dtype=bool)
-    three, six, twelve = np.zeros((0, 3)), np.zeros((0, 6)), np.zeros((0, 12))
-    sweep(six, places, none, none, none, three, three, none, places, places, places, places)
-    distance(three, three, none)
-    carry(twelve, places, three, points, three)
-    greatest_error(three, three, points)
+    places, six, rows = np.zeros(0, dtype=np.intp), np.zeros((0, 6)), np.zeros((0, 11))
+    sweep(six, places, np.zeros(0), np.zeros((2, 0)), rows, np.zeros((0, 4), dtype=np.intp), places)
+    distance(rows)
+    carry(np.zeros((0, 12)), places, rows)
+    greatest_error(rows)
     return sys.modules[__name__]
 
 
 @compiled()
 def sweep(
-    lines: Array,
-    kinds: Indices,
-    values: Array,
-    lower: Array,
-    upper: Array,
-    here: Array,
-    there: Array,
-    weights: Array,
-    nodes: Indices,
-    first: Indices,
-    moved: Indices,
-    points: Indices,
-) -> float:
+    lines: Array, kinds: Indices, values: Array, limits: Array, aims: Array, turns: Indices, moved: Indices
+) -> float:  # fmt: skip
     """Give each joint its best value and carry the aims along; return the largest change.
 
-    The arrays of limbs, aims and plan come one by one: a sweep of an arm takes some microseconds, and to unpack three
-    records at every call would take a good part of that.
+    The arrays come one by one: a sweep of an arm takes some microseconds, and to unpack records at every call would
+    take a good part of that.
 
     Args:
         lines: (n, 6) unit axis and origin of each node.
         kinds: (n,) what each does.
         values: (n,) changed in place.
-        lower: (n,) least values.
-        upper: (n,) greatest values.
-        here: (m, 3) points and directions, carried along in place.
-        there: (m, 3) where they should be.
-        weights: (m,) factor on each squared distance.
-        nodes: (s,) nodes in the order of their turns.
-        first: (s + 1,) where in `moved` each of them begins.
-        moved: what each moves, points before directions.
-        points: (s,) how many of these are points.
+        limits: (2, n) least and greatest values.
+        aims: (m, 11) of `Aims`, carried along in place.
+        turns: (s, 4) of the plan.
+        moved: of the plan.
     """
     largest = 0.0
-    for step in range(len(nodes)):
-        node, old = nodes[step], values[nodes[step]]
-        mine, places, line = moved[first[step] : first[step + 1]], points[step], lines[nodes[step]]
+    for node, first, last, places in turns:
+        old, lower, upper, mine, line = values[node], limits[0, node], limits[1, node], moved[first:last], lines[node]
         if kinds[node] == SLIDE:
-            new = min(max(old + _shift(line, here, there, weights, mine[:places]), lower[node]), upper[node])
+            new = min(max(old + _shift(line, aims, mine[:places]), lower), upper)
             values[node] = new
             for k in mine[:places]:
                 for axis in range(3):
-                    here[k, axis] += (new - old) * line[axis]
+                    aims[k, axis] += (new - old) * line[axis]
             largest = max(largest, abs(new - old))
             continue
-        turn = _turn(line, here, there, weights, mine, places)
+        turn = _turn(line, aims, mine, places)
         if turn == inf:
             continue
         new = old + turn
-        if not lower[node] <= new <= upper[node]:
-            new = within(new, lower[node], upper[node])
+        if not lower <= new <= upper:
+            new = within(new, lower, upper)
         change = new - old
         if change == 0.0:
             continue
@@ -218,25 +175,25 @@ def sweep(
         for n in range(len(mine)):
             k = mine[n]
             if n < places:
-                x, y, z = turned(line, co, si, here[k, 0] - ox, here[k, 1] - oy, here[k, 2] - oz)
-                here[k, 0], here[k, 1], here[k, 2] = x + ox, y + oy, z + oz
+                x, y, z = turned(line, co, si, aims[k, 0] - ox, aims[k, 1] - oy, aims[k, 2] - oz)
+                aims[k, 0], aims[k, 1], aims[k, 2] = x + ox, y + oy, z + oz
             else:
-                here[k, 0], here[k, 1], here[k, 2] = turned(line, co, si, here[k, 0], here[k, 1], here[k, 2])
+                aims[k, 0], aims[k, 1], aims[k, 2] = turned(line, co, si, aims[k, 0], aims[k, 1], aims[k, 2])
     return largest
 
 
 @compiled(inner=True)
-def _turn(line: Array, here: Array, there: Array, weights: Array, mine: Indices, points: int) -> float:
+def _turn(line: Array, aims: Array, mine: Indices, points: int) -> float:
     """The best rotation about a line (6,) for what it moves, radians; infinite where it cannot change the distances."""
     ux, uy, uz, ox, oy, oz = line
     cosine, sine, size = 0.0, 0.0, 0.0
     for n in range(len(mine)):
         k = mine[n]
-        x, y, z = here[k, 0], here[k, 1], here[k, 2]
-        tx, ty, tz = there[k, 0], there[k, 1], there[k, 2]
+        x, y, z = aims[k, 0], aims[k, 1], aims[k, 2]
+        tx, ty, tz = aims[k, 3], aims[k, 4], aims[k, 5]
         if n < points:
             x, y, z, tx, ty, tz = x - ox, y - oy, z - oz, tx - ox, ty - oy, tz - oz
-        weight = weights[k]
+        weight = aims[k, 6]
         cosine += weight * (x * tx + y * ty + z * tz - (ux * x + uy * y + uz * z) * (ux * tx + uy * ty + uz * tz))
         sine += weight * (tx * (uy * z - uz * y) + ty * (uz * x - ux * z) + tz * (ux * y - uy * x))
         size += weight
@@ -246,13 +203,13 @@ def _turn(line: Array, here: Array, there: Array, weights: Array, mine: Indices,
 
 
 @compiled(inner=True)
-def _shift(line: Array, here: Array, there: Array, weights: Array, mine: Indices) -> float:
+def _shift(line: Array, aims: Array, mine: Indices) -> float:
     """The best displacement along a line (6,): the mean distance of its points from their targets, along it, metres."""
     total, weight = 0.0, 0.0
     for k in mine:
         for axis in range(3):
-            total += weights[k] * line[axis] * (there[k, axis] - here[k, axis])
-        weight += weights[k]
+            total += aims[k, 6] * line[axis] * (aims[k, 3 + axis] - aims[k, axis])
+        weight += aims[k, 6]
     return total / weight if weight > 0.0 else 0.0  # no slide moves axes alone
 
 
@@ -270,46 +227,36 @@ def within(best: float, lower: float, upper: float) -> float:
 
 
 @compiled()
-def distance(here: Array, there: Array, weights: Array) -> float:
+def distance(aims: Array) -> float:
     """Root of the weighted sum of squared distances left."""
     total = 0.0
-    for k in range(len(here)):
+    for k in range(len(aims)):
         for axis in range(3):
-            total += weights[k] * (there[k, axis] - here[k, axis]) ** 2
+            total += aims[k, 6] * (aims[k, 3 + axis] - aims[k, axis]) ** 2
     return float(total**0.5)
 
 
 @compiled()
-def carry(frames: Array, nodes: Indices, local: Array, points: Mask, here: Array) -> None:
-    """Write where points and directions are now.
-
-    Args:
-        frames: (n + 1, 12) of the limbs.
-        nodes: (m,) that carry each; -1 is the world.
-        local: (m, 3) each in its node's frame.
-        points: (m,) which are points.
-        here: (m, 3) written.
-    """
+def carry(frames: Array, nodes: Indices, aims: Array) -> None:
+    """Write where points and directions, which nodes (m,) carry, are now."""
     for k in range(len(nodes)):
-        frame = frames[nodes[k]]
+        frame, x, y, z = frames[nodes[k]], aims[k, 7], aims[k, 8], aims[k, 9]
         for row in range(3):
-            here[k, row] = (
-                frame[3 * row] * local[k, 0] + frame[3 * row + 1] * local[k, 1] + frame[3 * row + 2] * local[k, 2]
-            )
-            if points[k]:
-                here[k, row] += frame[9 + row]
+            aims[k, row] = frame[3 * row] * x + frame[3 * row + 1] * y + frame[3 * row + 2] * z
+            if aims[k, 10] > 0.0:
+                aims[k, row] += frame[9 + row]
 
 
 @compiled()
-def greatest_error(here: Array, there: Array, points: Mask) -> float:
-    """Largest distance of a point (m, 3) from its place, or angle of three directions, one after the other."""
+def greatest_error(aims: Array) -> float:
+    """Largest distance of a point from its target, or angle of three directions, one after the other."""
     worst, k = 0.0, 0
-    while k < len(here):
-        square = 0.0
-        for n in range(k, k + 1 if points[k] else k + 3):
+    while k < len(aims):
+        square, point = 0.0, aims[k, 10] > 0.0
+        for n in range(k, k + 1 if point else k + 3):
             for axis in range(3):
-                square += (here[n, axis] - there[n, axis]) ** 2
-        if points[k]:
+                square += (aims[n, axis] - aims[n, 3 + axis]) ** 2
+        if point:
             worst = max(worst, square**0.5)
             k += 1
         else:  # the sum over the three axes is 4 (1 - cos angle) = 8 sin^2(angle / 2)

@@ -13,7 +13,7 @@ from wholebody.figures.state import State, joint_support
 from wholebody.geometry.placement import placement
 from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.ccd.guards import Kept
-from wholebody.methods.ccd.limbs import movable
+from wholebody.methods.ccd.limbs import Vector, movable
 from wholebody.problem import Problem
 from wholebody.tasks.bounds import Freeze, StepLimit
 from wholebody.tasks.frame import Frame, Orientation
@@ -25,32 +25,18 @@ from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
 
 @dataclass(frozen=True)
 class GoalPlace:
-    """A frame, or a point of it, and its target.
+    """A frame, or a point of it, and its target."""
 
-    Attributes:
-        frame: index in the model.
-        offset: the point in the frame, metres.
-        place: target position in the world; None if only the orientation counts.
-        rotation: (3, 3) target rotation in the world; None if only the position counts.
-        weight: factor on the squared error.
-    """
-
-    frame: int
-    offset: tuple[float, float, float]
-    place: tuple[float, float, float] | None
-    rotation: Any
-    weight: float
+    frame: int  # index in the model
+    offset: Vector  # the point in the frame, metres
+    place: Vector | None  # target position in the world; None if only the orientation counts
+    rotation: Any  # (3, 3) target rotation in the world; None if only the position counts
+    weight: float  # factor on the squared error
 
 
 @dataclass(frozen=True)
 class Request:
-    """A problem in the form that cyclic coordinate descent takes.
-
-    Attributes:
-        goals: the goals.
-        joints: Pinocchio's indices of the joints that move for the goals.
-        kept: what must not move, cones and ranges.
-    """
+    """A problem as cyclic coordinate descent takes it: goals, joints that move for them, and what is kept."""
 
     goals: tuple[GoalPlace, ...]
     joints: tuple[int, ...]
@@ -73,13 +59,7 @@ def read(problem: Problem, state: State | None = None) -> Request:
 
 
 class _Reader:
-    """Reads the terms of one problem.
-
-    Attributes:
-        refused: what cannot be taken, in words.
-        joints: that move for the goals.
-        fixed: that must not move.
-    """
+    """Reads the terms of one problem: what is `refused`, in words, and the joints that move and that must not."""
 
     def __init__(self, problem: Problem, state: State) -> None:
         self._problem, self._figure, self._state = problem, problem.scene.figure, state
@@ -148,11 +128,7 @@ class _Reader:
 
 
 def reaching(figure: Figure, frame: str) -> tuple[int, ...]:
-    """The joints that move a frame to its goal.
-
-    These are the joints of the chain that carries it, from the chain's beginning to the frame; without a chain, all
-    joints between the frame and the root.
-    """
+    """The joints of the frame's chain up to it; without a chain, all between the frame and the root."""
     carrier = _joint(figure, frame)
     for chain in figure.chains.values():
         joints = [figure.joint_id(name) for name in chain.joints]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,24 +16,83 @@ from wholebody.base.checks import choice, flag, known, number, shown, whole
 from wholebody.base.errors import InputError
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
+from wholebody.geometry.memory_views import placement_view
 from wholebody.geometry.placement import PlacementLike
 from wholebody.methods.inputs import ITERATIONS, TOLERANCE
-from wholebody.methods.newton.assembly_goals import AssemblyGoal, to_target
+from wholebody.methods.newton import quaternions as quat
+from wholebody.methods.newton.assembly_geometry import AssemblyFigure
 from wholebody.methods.newton.assembly_joints import AssemblyJoints
-from wholebody.methods.newton.assembly_solution import AssemblySolution, AssemblyStep, explained
-from wholebody.methods.newton.assembly_system import AssemblySystem
-from wholebody.methods.newton.batches import Batch
-from wholebody.methods.newton.equations import EquationSet, unit_lengths
-from wholebody.methods.newton.feasibility import satisfy
+from wholebody.methods.newton.assembly_solution import (
+    AssemblyGoal,
+    AssemblySolution,
+    AssemblyStep,
+    explained,
+    to_target,
+)
+from wholebody.methods.newton.batches import Batch, EquationSet, Unit
+from wholebody.methods.newton.feasibility import Projection, kkt_algebra, project, satisfy
 from wholebody.methods.newton.inequalities import KINDS, Kind
-from wholebody.methods.newton.linear_algebra import NAMES
+from wholebody.methods.newton.linear_algebra import NAMES, QuasiDefinite
 from wholebody.methods.newton.settings import CONTACTS, FRAMES
-from wholebody.methods.newton.system import System, unit
+from wholebody.methods.newton.system import ActiveSystem, System, unit
 from wholebody.scene.moving_obstacles import FrameMotion
+from wholebody.scene.scene import Scene
 from wholebody.tasks.inputs import point
 
 if TYPE_CHECKING:
     from typing_extensions import Self
+
+
+class AssemblySystem(ActiveSystem):
+    """An assembly's equations, renewed from state to state."""
+
+    def __init__(
+        self,
+        held: Sequence[Batch],
+        weight: Array,
+        algebra: str,
+        figures: Sequence[AssemblyFigure],
+        to_scene: Callable[[Array], Array],
+        revision: int,
+    ) -> None:
+        """Take constraints and weights (7 n,); `to_scene` gives the scene's posture (nq,) at variables (7 n,)."""
+        super().__init__(held, weight, algebra, figures)
+        self._to_scene, self.revision = to_scene, revision
+        self._nearest: tuple[System, QuasiDefinite] | None = None
+
+    def among(self, scene: Scene, clearance: float) -> None:
+        """Let the pairs of a scene of the bodies touch, at a distance of at least `clearance` metres."""
+        if len(scene.pair_table.pairs):
+            self.workspace = scene.workspace()
+            data = pin.Data()  # without the tensors of a model's data, which grow with the cube of its freedoms
+            data.oMi.extend([pin.SE3.Identity()] * self.workspace.model.njoints)
+            self._find_contacts(np.full(len(scene.pair_table.pairs), clearance), self.workspace, data)
+
+    def nearest(self, x: Array, anchor: Array, tolerance: float, iterations: int) -> Projection:
+        """The place nearest to the anchor from x (both (7 n,)); analysed once while the pattern stays."""
+        if self._nearest is None or self._nearest[0] is not self.system:
+            self._nearest = self.system, kkt_algebra(self.system)
+        return project(self.system, self._nearest[1], x, anchor, tolerance=tolerance, iterations=iterations)
+
+    def _projected(self, x: Array) -> Array:
+        x = unit(x)
+        for figure in self._figures:
+            figure.retract(x)
+        if self.contacts is not None:
+            self.q = self._to_scene(x)
+            self._place(x)
+        return x
+
+    def _place(self, x: Array) -> None:
+        """Write the placements of the bodies at x (7 n,) into the data."""
+        bodies, joints = x.reshape(-1, 7), placement_view(self._data.oMi)
+        if joints is None:
+            for number, body in enumerate(bodies):
+                self._data.oMi[number + 1] = pin.XYZQUATToSE3(body)
+            return
+        joints[1:, 3] = bodies[:, :3]
+        for axis, unit_vector in enumerate(np.eye(3)):
+            joints[1:, axis] = quat.rotate(bodies[:, 3:], np.broadcast_to(unit_vector, (len(bodies), 3)))
 
 
 class Assembly(AssemblyJoints):
@@ -44,22 +104,16 @@ class Assembly(AssemblyJoints):
     Bodies with shapes touch, and do not penetrate, each other and the things around; not tested are bodies that a joint
     connects or that fixed joints make one, and pairs that `ignore` names. Whole figures may be bodies too.
 
-    A solve moves the bodies, so an assembly serves one thread at a time. It can be pickled; a copy is independent.
+    A solve moves the bodies, so an assembly serves one thread at a time. It can be pickled; a copy is independent. All
+    methods raise an `UnknownNameError` for a name that nothing has, and an `InputError` for a value of another kind,
+    shape or range, a name that is taken, and a body that is joined to itself.
 
     Attributes:
         clearance: least distance of every tested pair, metres.
-        structures: number of patterns that were laid out and analysed.
     """
 
     def __init__(self, *, clearance: float = 0.0) -> None:
-        """Make an assembly with the world alone.
-
-        Args:
-            clearance: least distance of shapes, metres.
-
-        Raises:
-            InputError: the clearance is negative or more than half a metre.
-        """
+        """Make an assembly with the world alone, and a least distance of shapes, metres."""
         super().__init__(clearance)
         self._goals: list[AssemblyGoal] = []
         self._prepared: AssemblySystem | None = None
@@ -84,12 +138,7 @@ class Assembly(AssemblyJoints):
     # ---- goals
 
     def point_goal(self, body: str, target: ArrayLike, *, place: ArrayLike = (0.0, 0.0, 0.0)) -> Self:
-        """Move a point of a body, (3,) in its frame, to a position in the world (3,), if possible; metres.
-
-        Raises:
-            UnknownNameError: there is no such body.
-            InputError: target or place are no positions.
-        """
+        """Move a point of a body, (3,) in its frame, to a position in the world (3,), if possible; metres."""
         what = f"the goal of {shown(body)}"
         index, local = self._moved(body, what)
         offset = local * pin.SE3(np.eye(3), point(place, f"{what}: place"))
@@ -97,12 +146,7 @@ class Assembly(AssemblyJoints):
         return self
 
     def frame_goal(self, body: str, target: PlacementLike) -> Self:
-        """Move a body to a placement in the world, if possible.
-
-        Raises:
-            UnknownNameError: there is no such body.
-            InputError: the target is no placement.
-        """
+        """Move a body to a placement in the world, if possible."""
         what = f"the goal of {shown(body)}"
         index, local = self._moved(body, what)
         self._goals.append(AssemblyGoal(what, index, local, to_target(target, True, what), whole=True))
@@ -114,54 +158,31 @@ class Assembly(AssemblyJoints):
         return tuple(self._goals)
 
     def retarget(self, goal: int, target: Any) -> Self:
-        """Move a goal to another position, or placement for a goal of `frame_goal`; nothing is analysed anew.
-
-        Args:
-            goal: its index, in the order in which goals were given.
-            target: as for `point_goal` and `frame_goal`.
-
-        Raises:
-            InputError: there is no such goal, or the target is not one.
-        """
+        """Move a goal, by its index, to another position, or placement; nothing is analysed anew."""
         index = self.goal_index(goal)
         self._goals[index] = self._goals[index].moved(target)
         return self
 
     def goal_index(self, goal: int) -> int:
-        """The index of a goal.
-
-        Raises:
-            InputError: there is none.
-        """
+        """The index of a goal, checked."""
         if not self._goals:
             raise InputError("the assembly has no goals; give it one by point_goal or frame_goal")
         return whole(goal, "the number of the goal", 0, len(self._goals) - 1)
 
     def goal_error(self, goal: int) -> float:
-        """Error of a goal at the present placements: the larger of metres and radians.
-
-        Raises:
-            InputError: there is no such goal.
-        """
+        """Error of a goal at the present placements: the larger of metres and radians."""
         one = self._goals[self.goal_index(goal)]
         error = one.error(self._placed(one.index))
         return max(float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:])))
 
     def interpolate_goal(self, goal: int, share: float, target: Any) -> Self:
-        """Move a goal to a share (0 to 1) of the way from where its body is now to a target.
-
-        Raises:
-            InputError: there is no such goal, the target does not fit it, or the share is not within 0 and 1.
-        """
+        """Move a goal to a share (0 to 1) of the way from where its body is now to a target."""
         one = self._goals[self.goal_index(goal)].moved(target)
         self._goals[goal] = one.between(self._placed(one.index), number(share, "share", 0.0, 1.0))
         return self
 
     def drop_goals(self) -> Self:
-        """Take all goals out.
-
-        Where others of the same bodies come in their place, what earlier solves laid out and analysed serves again.
-        """
+        """Take all goals out; where others of the same bodies come, what earlier solves analysed serves again."""
         self._goals = []
         return self
 
@@ -197,10 +218,6 @@ class Assembly(AssemblyJoints):
             inequalities: "slack" or "barrier".
             nearest: find the placements nearest to those before (eq. 1), which many least steps miss by a
                 little; without inequalities, shapes and figures only.
-
-        Raises:
-            InputError: there are no bodies, a setting is out of range, or another thread solves this assembly.
-            UnknownNameError: no such linear algebra.
         """
         tolerance = _tolerance(tolerance)
         iterations = int(ITERATIONS(iterations, "iterations"))
@@ -250,12 +267,6 @@ class Assembly(AssemblyJoints):
 
         The bodies keep their new placements. A frame whose iterations were not enough for joints and contacts, or whose
         motion passes through something, leaves the bodies where they were.
-
-        Args:
-            tolerance: of the goals, metres and radians.
-
-        Raises:
-            InputError: there are no bodies, the tolerance is out of range, or another thread solves this assembly.
         """
         tolerance = _tolerance(tolerance)
         with self._alone:
@@ -335,7 +346,7 @@ class Assembly(AssemblyJoints):
         """What must hold, in batches."""
         if not self._places:
             raise InputError("the assembly has no bodies; add some with body(...)")
-        held = [unit_lengths(list(self._names)), *self._holding.batches()]
+        held = [Unit(list(self._names)), *self._holding.batches()]
         return held + [batch for figure in self._figures.values() for batch in figure.batches]
 
 

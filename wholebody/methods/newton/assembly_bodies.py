@@ -17,6 +17,7 @@ from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.geometry.shapes import LENGTH, Shape
 from wholebody.methods.newton.assembly_geometry import (
+    AssemblyFigure,
     LooseBodies,
     Owner,
     ShapeLike,
@@ -25,13 +26,11 @@ from wholebody.methods.newton.assembly_geometry import (
     figure_owners,
     figure_pairs,
     rim,
-    scene_of,
     solids,
 )  # fmt: skip
-from wholebody.methods.newton.assembly_system import AssemblyFigure
 from wholebody.methods.newton.system import unit
 from wholebody.problem import CLEARANCE, Problem
-from wholebody.scene.geometry_model import SceneObject
+from wholebody.scene.geometry_model import SceneObject, assemble
 from wholebody.scene.scene import Scene
 from wholebody.tasks.base import Bound, Constraint
 from wholebody.tasks.inputs import target_placement
@@ -87,10 +86,6 @@ class AssemblyBodies:
             size: metres from its origin to its rim, 0.3 by default for a body without shape and otherwise read from it;
                 a rotation of the body counts as the motion of the rim.
             color: red, green, blue and, if wanted, alpha, each from 0 to 1; a name such as "steelblue", or "#rrggbb".
-
-        Raises:
-            InputError: the name exists already, the size is not positive, the placement or the color cannot be read,
-                or a shape is none or a half-space.
         """
         self._check_new(text(name, "the name of a body"), "body")
         where = f"body {name!r}"
@@ -127,11 +122,10 @@ class AssemblyBodies:
             name: one that no body and no other figure has.
             figure: such as `wb.load("human")`.
             start: (nq,) posture, or the name of one of the figure's; None for its first posture.
-            constraints: of it, such as `wb.Hold("left_foot")` and `wb.Balance()`.
+            constraints: of it, such as `wb.Hold("left_foot")` and `wb.Balance()`, none of a class of your own.
             color: of its pieces.
 
         Raises:
-            InputError: the name exists already, or a constraint is of a class of your own.
             UnsupportedTermError: a joint or a constraint has no equations.
         """
         self._check_new(text(name, "the name of a figure"), "figure")
@@ -176,22 +170,12 @@ class AssemblyBodies:
         return {name: part.problem.scene.figure for name, part in self._figures.items()}
 
     def placement(self, name: str) -> Any:
-        """Placement (pin.SE3) of a body, or of a frame of a figure.
-
-        Raises:
-            UnknownNameError: there is neither.
-            InputError: the name is no text.
-        """
+        """Placement (pin.SE3) of a body, or of a frame of a figure."""
         index, local = self._frame(name, "placement")
         return self._placed(index) * local
 
     def posture(self, name: str) -> Array:
-        """The posture (nq,) of a figure.
-
-        Raises:
-            UnknownNameError: there is no such figure.
-            InputError: the name is no text.
-        """
+        """The posture (nq,) of a figure."""
         return self._figures[known(name, self._figures, "figure", "posture")].posture(self.variables())
 
     def variables(self) -> Array:
@@ -216,14 +200,7 @@ class AssemblyBodies:
         return np.concatenate(parts)
 
     def place(self, variables: Any) -> Self:
-        """Set the placements of the bodies.
-
-        Args:
-            variables: (7 n,) as `variables` returns them: for each body its origin [m] and quaternion (x, y, z, w).
-
-        Raises:
-            InputError: another number of values, one that is not finite, or a quaternion that is not of unit length.
-        """
+        """Set the placements of the bodies to (7 n,) numbers as `variables` returns them."""
         bodies = numbers(variables, (7 * len(self._places),), "place: variables").reshape(-1, 7)
         if (np.abs(np.linalg.norm(bodies[:, 3:], axis=1) - 1.0) > UNIT_TOLERANCE).any():
             raise InputError("place: variables holds a quaternion that is not of unit length; divide it by its length")
@@ -247,9 +224,6 @@ class AssemblyBodies:
             name: one that nothing else has.
             at: its placement.
             color: red, green, blue and, if wanted, alpha, each from 0 to 1; a name such as "steelblue", or "#rrggbb".
-
-        Raises:
-            InputError: the name exists already, or the shape, placement or color is invalid.
         """
         self._check_new(text(name, "the name of a thing"), "thing")
         instance(shape, Shape, repr(name), "give wb.Box, wb.Sphere, wb.Mesh or another")
@@ -259,11 +233,7 @@ class AssemblyBodies:
         return self._changed()
 
     def add_things(self, scene: Scene) -> Self:
-        """Add the things that stand in a scene; what its figure carries is left out.
-
-        Raises:
-            InputError: it is no scene, or a name exists already.
-        """
+        """Add the things that stand in a scene; what its figure carries is left out."""
         things = instance(scene, Scene, "add_things: scene", "make one with wb.Scene(figure)").objects.values()
         for thing in things:
             if thing.segment is None:
@@ -278,10 +248,6 @@ class AssemblyBodies:
             at: its new placement.
             over: seconds that the motion takes: in the next frame of a drag it goes there from where it is, and pushes
                 bodies or collides with them; None for a thing that is put there, whatever is in between.
-
-        Raises:
-            UnknownNameError: there is no such thing.
-            InputError: the placement cannot be read, or the time is not positive and finite.
         """
         known(name, self._things, "thing")
         self.scene.move(name, at=at, over=over)
@@ -289,12 +255,7 @@ class AssemblyBodies:
         return self
 
     def ignore(self, first: str, second: str) -> Self:
-        """Do not test two owners of shapes against each other; a figure's name stands for all its segments.
-
-        Raises:
-            UnknownNameError: no body, segment, figure or thing has this name.
-            InputError: a name is no text.
-        """
+        """Do not test two owners of shapes against each other; a figure's name stands for all its segments."""
         owners = {owner.name: owner for owner in self._owners()}
         for name in (first, second):
             known(name, [*owners, *self._figures, *self._things], "body with a shape, figure or thing", "ignore")
@@ -328,7 +289,10 @@ class AssemblyBodies:
                 for name in self._parts
             ]
             loose = LooseBodies(parts, owners, lambda one, other: self._tested(one, other, still), own)
-            self._scene = scene_of(loose, self._things, apart)
+            figure: Any = loose  # a scene asks of its figure what LooseBodies has
+            excluded = dict.fromkeys(apart, "said to touch, or standing still")
+            built = assemble(figure, self._things.values(), excluded)
+            self._scene = Scene.of_parts(figure, self._things.values(), built)
         return self._scene
 
     def _owners(self) -> list[Owner]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import pinocchio as pin
@@ -12,12 +12,16 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.model_check import Turning
+from wholebody.figures.state import State
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.pieces import swept_points
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.geometry.shapes import Shape
-from wholebody.scene.geometry_model import SceneObject, assemble
-from wholebody.scene.scene import Scene
+from wholebody.methods.newton.batches import Batch
+from wholebody.methods.newton.figure_bodies import FigureBodies
+from wholebody.methods.newton.own_rows import TangentRows
+from wholebody.methods.newton.terms import bound_equations, constraint_equations
+from wholebody.problem import Problem
 
 Solid = tuple[Shape, Any]
 """A shape, and its placement (pin.SE3) in its body."""
@@ -26,14 +30,7 @@ ShapeLike = Shape | Iterable[Shape | tuple[Shape, PlacementLike]]
 
 
 class Owner(NamedTuple):
-    """What has pieces: a body with its solids, or a segment of a figure with the figure's pieces.
-
-    Attributes:
-        name: of the body, or "<figure>/<segment>".
-        body: index of the body.
-        figure: name of the figure; empty for other bodies.
-        pieces: name, placement in the body and geometry of each piece.
-    """
+    """A body with its pieces, or a segment "<figure>/<segment>" with them: name, placement in the body, geometry."""
 
     name: str
     body: int
@@ -42,11 +39,7 @@ class Owner(NamedTuple):
 
 
 def solids(shape: ShapeLike | None, where: str) -> tuple[Solid, ...]:
-    """The shapes of a body, each with its placement in the body.
-
-    Raises:
-        InputError: something else, a placement that cannot be read, or a half-space.
-    """
+    """The shapes of a body, each with its placement in the body."""
     if shape is None:
         return ()
     listed = [shape] if isinstance(shape, Shape) else checks.listed(shape, f"{where}: shape", "[wb.Box((1, 1, 1))]")
@@ -100,16 +93,39 @@ def figure_pairs(name: str, figure: Figure) -> list[tuple[str, str]]:
     return [(pieces[pair.first], pieces[pair.second]) for pair in figure.geometry.collisionPairs]
 
 
+class AssemblyFigure(FigureBodies):
+    """A figure among the bodies of an assembly: `batches` are its joints, limits and constraints."""
+
+    def __init__(self, name: str, problem: Problem, first: int) -> None:
+        """Read the joints; `first` is the index of the first body."""
+        super().__init__(problem.scene.figure, problem.start, first)
+        self.name, self.problem = name, problem
+        constraints = constraint_equations(problem, self)
+        bounds = bound_equations(problem, self, State(problem.scene.model))
+        sets = (self.equations, constraints, bounds)
+        self.batches: list[Batch] = [self.limits, *(batch for one in sets for batch in one.batches())]
+        for batch in self.batches:
+            if isinstance(batch, TangentRows):
+                raise InputError(
+                    f"figure {name!r}: {batch.labels[0]} is of a class of your own, which figures of an assembly "
+                    "do not take; write it as a wb.methods.AssemblyConstraint"
+                )
+            batch.labels = [f"{name!r}, {label}" for label in batch.labels]
+
+    def __getstate__(self) -> tuple[str, Problem, int]:
+        """Return the arguments that it is made from; Pinocchio's data are computed anew."""
+        return self.name, self.problem, self.first
+
+    def __setstate__(self, state: tuple[str, Problem, int]) -> None:
+        self.__init__(*state)  # type: ignore[misc]
+
+
 class LooseBodies:
     """What a `wholebody.Scene` asks of its figure: a free joint a body, the figures' own joints, all pieces and pairs.
 
-    Figures keep their joints, because Pinocchio's data of a model grow with the cube of its degrees of freedom: by
-    0.2 GB for 30 free bodies, by 7 GB for 100.
-
-    Attributes:
-        model: joint k + 1 is body k; a posture has seven numbers for a body, and the posture of each figure.
-        geometry: the pieces and the pairs.
-        segments: names of the bodies and segments with pieces.
+    Joint k + 1 of `model` is body k; a posture has seven numbers for a body, and the posture of each figure. Figures
+    keep their joints, because Pinocchio's data of a model grow with the cube of its degrees of freedom: by 0.2 GB for
+    30 free bodies, by 7 GB for 100.
     """
 
     root = "free"
@@ -126,14 +142,7 @@ class LooseBodies:
         tested: Callable[[Owner, Owner], bool],
         pairs: Iterable[tuple[str, str]],
     ) -> None:
-        """Build the model.
-
-        Args:
-            parts: names of bodies, and names and figures, in the order of their bodies.
-            owners: of all pieces.
-            tested: whether the pieces of two different owners can touch.
-            pairs: more pairs of pieces that can touch, by name.
-        """
+        """Build the model."""
         self.model = pin.Model()
         for part in parts:
             if isinstance(part, str):
@@ -172,18 +181,5 @@ class LooseBodies:
             self.model.addJoint(carrier, own.joints[joint], own.jointPlacements[joint], f"{name}/{own.names[joint]}")
 
     def frame_id(self, name: str) -> int:
-        """Index of the frame of a body or segment with pieces.
-
-        Raises:
-            UnknownNameError: there is none of that name.
-        """
+        """Index of the frame of a body or segment with pieces."""
         return int(self.model.getFrameId(checks.known(name, self.segments, "body with a shape")))
-
-
-def scene_of(
-    bodies: LooseBodies, things: Mapping[str, SceneObject], apart: Iterable[tuple[str, str]]
-) -> Scene:  # fmt: skip
-    """The bodies among things; pairs (body, thing) of `apart` are not tested."""
-    excluded = dict.fromkeys(apart, "said to touch, or standing still")
-    figure: Any = bodies  # a scene asks of its figure what LooseBodies has
-    return Scene.of_parts(figure, things.values(), assemble(figure, things.values(), excluded))

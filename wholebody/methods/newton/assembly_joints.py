@@ -14,9 +14,9 @@ from wholebody.base.checks import choice, flag, instance, known, numbers, shown
 from wholebody.base.errors import InputError
 from wholebody.geometry.placement import PlacementLike
 from wholebody.methods.newton.assembly_bodies import WORLD, AssemblyBodies
-from wholebody.methods.newton.batches import HARD, ONE_SIDED
-from wholebody.methods.newton.equations import EquationSet, axes_along
+from wholebody.methods.newton.batches import HARD, ONE_SIDED, EquationSet
 from wholebody.methods.newton.own_rows import AssemblyConstraint, OwnRows, checked, names_of
+from wholebody.methods.newton.quaternions import axes_along
 from wholebody.methods.newton.task_batches import OnSurface, surface
 from wholebody.tasks.inputs import direction, point, target_placement
 
@@ -32,17 +32,9 @@ class JointRegister:
         self._known: dict[tuple[str, frozenset[str]], list[dict[str, Array]]] = {}
 
     def add(self, kind: str, first: str, second: str, places: tuple[Array, Array] | None = None) -> None:
-        """Add a joint.
+        """Add a joint of a kind between two bodies, with its positions (3,) in either; None if it has none.
 
-        Args:
-            kind: such as "revolute joint".
-            first: name of a body.
-            second: another.
-            places: (3,) positions of the joint in either body; joints at different positions are different, such as two
-                hinges. None for joints without a position.
-
-        Raises:
-            InputError: the joint exists already.
+        Joints at different positions are different, such as two hinges; one that exists already is refused.
         """
         listed = self._known.setdefault((kind, frozenset((first, second))), [])
         at = (np.zeros(3), np.zeros(3)) if places is None else places
@@ -63,14 +55,9 @@ class AssemblyJoints(AssemblyBodies):
         self._holding = EquationSet()
 
     def spherical(self, first: str, second: str, **where: Any) -> Self:
-        """A point of one body stays at a point of the other. Takes `at`, or `at_first` and `at_second`.
-
-        Raises:
-            UnknownNameError: there is no such body.
-            InputError: the bodies are one, or a position is none.
-        """
+        """A point of one body stays at a point of the other. Takes `at`, or `at_first` and `at_second`."""
         a, b = self._pair(first, second, "spherical joint")
-        ends = self._ends(a, b, "spherical joint", first, second, **where)
+        ends = self._ends(a, b, "spherical joint", (first, second), **where)
         self._holding.coincide(a[0], b[0], f"the spherical joint of {first!r} and {second!r}", *ends)
         return self._connected(a[0], b[0])
 
@@ -93,10 +80,6 @@ class AssemblyJoints(AssemblyBodies):
             limits: least and greatest angle from the present one, radians.
             axis_second: (3,) the direction in the second body's frame.
             where: `at`, or `at_first` and `at_second`.
-
-        Raises:
-            UnknownNameError: there is no such body.
-            InputError: the bodies are one, or a position, an axis or the limits are none.
         """
         what = f"the revolute joint of {shown(first)} and {shown(second)}"
         (a, in_a), (b, in_b) = self._pair(first, second, "revolute joint")
@@ -110,7 +93,7 @@ class AssemblyJoints(AssemblyBodies):
         low, high = (-np.inf, np.inf) if limits is None else numbers(limits, (2,), f"{what}: limits").tolist()
         if low >= high:
             raise InputError(f"{what}: limits {low:g} and {high:g} leave no room; give the lower one first")
-        ends = self._ends((a, in_a), (b, in_b), "revolute joint", first, second, **where)  # registers it, after checks
+        ends = self._ends((a, in_a), (b, in_b), "revolute joint", (first, second), **where)
         basis_a = axes_along(ours)
         # the second body's axes agree with the first's at the present placements, so that the angle is zero now
         basis_b = (turn_b.inverse() * turn_a * basis_a) if axis_second is None else axes_along(theirs)
@@ -121,12 +104,7 @@ class AssemblyJoints(AssemblyBodies):
         return self._connected(a, b)
 
     def prismatic(self, first: str, second: str, *, axis: ArrayLike) -> Self:
-        """Two bodies translate along one direction (3,) in the world, without rotation.
-
-        Raises:
-            UnknownNameError: there is no such body.
-            InputError: the bodies are one, or the axis is no direction.
-        """
+        """Two bodies translate along one direction (3,) in the world, without rotation."""
         what = f"the prismatic joint of {shown(first)} and {shown(second)}"
         (a, _), (b, _) = self._pair(first, second, "prismatic joint")
         along = direction(axis, f"{what}: axis")
@@ -141,12 +119,7 @@ class AssemblyJoints(AssemblyBodies):
         return self._connected(a, b)
 
     def fixed(self, first: str, second: str, *, placement_second: PlacementLike | None = None) -> Self:
-        """Two bodies keep their relative placement: the present one, or the second's given one in the first's frame.
-
-        Raises:
-            UnknownNameError: there is no such body.
-            InputError: the bodies are one, or the placement is none.
-        """
+        """Two bodies keep their relative placement: the present one, or the second's given one in the first's frame."""
         what = f"the fixed joint of {shown(first)} and {shown(second)}"
         (a, in_a), (b, in_b) = self._pair(first, second, "fixed joint")
         if placement_second is None:
@@ -171,10 +144,6 @@ class AssemblyJoints(AssemblyBodies):
             through: (3,) a point of the plane, in the frame of `of`.
             of: name of the body to which the plane is fixed.
             side: "on", or "above" if the point may move along the normal.
-
-        Raises:
-            UnknownNameError: there is no such body.
-            InputError: the bodies are one, or a point, the normal or the side are none.
         """
         what = f"the plane of {shown(body)} and {shown(of)}"
         choice(side, ("on", "above"), f"{what}: side")
@@ -195,10 +164,6 @@ class AssemblyJoints(AssemblyBodies):
             place: (3,) the point, metres.
             of: a body or a thing with one shape, which is a box, a sphere or a capsule. A thing must not be moved
                 afterwards: the point stays where the surface was.
-
-        Raises:
-            UnknownNameError: there is no such body or thing.
-            InputError: the shape is another, or there are several, or the point is none.
         """
         what = f"the surface of {shown(of)} under {shown(body)}"
         b, in_b = self._moved(body, what)
@@ -217,14 +182,7 @@ class AssemblyJoints(AssemblyBodies):
         return self._changed()
 
     def constrain(self, term: AssemblyConstraint) -> Self:
-        """Add a constraint of a class of your own.
-
-        Its derivative is compared with finite differences at the present placements.
-
-        Raises:
-            InputError: it is none, or returns something of another shape or a wrong derivative.
-            UnknownNameError: it names an unknown body.
-        """
+        """Add a constraint of a class of your own; its derivative is compared with finite differences."""
         label = f"constraint {type(term).__name__}"
         instance(
             term, AssemblyConstraint, "constrain: term", "give an object of a subclass of wb.methods.AssemblyConstraint"
@@ -254,14 +212,13 @@ class AssemblyJoints(AssemblyBodies):
         a: tuple[int, Any],
         b: tuple[int, Any],
         kind: str,
-        first: str,
-        second: str,
+        names: tuple[str, str],
         at: Any = None,
         at_first: Any = None,
         at_second: Any = None,
     ) -> tuple[Array, Array]:
-        """The joint's position in either body."""
-        where = f"{kind} of {first!r} and {second!r}"
+        """The joint's position in either body; the joint is registered."""
+        where = f"{kind} of {names[0]!r} and {names[1]!r}"
         if (at is None) == (at_first is None) or (at_first is None) != (at_second is None):
             raise InputError(f"{where}: give its place as at=(x, y, z) in the world, or as at_first and at_second")
         if at is None:
@@ -270,5 +227,5 @@ class AssemblyJoints(AssemblyBodies):
             place = point(at, f"{where}: at")
             sides = [self._placed(index).actInv(place) for index in (a[0], b[0])]
             ends = np.array(sides[0]), np.array(sides[1])
-        self._joints.add(kind, first, second, ends)
+        self._joints.add(kind, *names, ends)
         return ends

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.base.arrays import Array
+from wholebody.methods.newton.batches import EquationSet, Role
 from wholebody.methods.newton.feasibility import FeasibilityResult
 from wholebody.methods.newton.system import System
 from wholebody.scene.moving_obstacles import Collision
 from wholebody.solution import Status
+from wholebody.tasks.inputs import point, target_placement
 
 
 @dataclass(frozen=True)
@@ -95,3 +98,47 @@ def explained(system: System, x: Array, found: FeasibilityResult, tolerance: flo
     why = {"infeasible": "the joints cannot all hold", "unreachable": "all joints hold, the goals cannot"}
     missed = f"{worst} is missed by {counted.max():.3g} m or rad"
     return status, f"{why.get(status, 'ran out of iterations')}: {missed}"
+
+
+@dataclass(frozen=True)
+class AssemblyGoal:
+    """A point or a frame of a body (`local` in the body `index`), and where in the world it is to be (pin.SE3).
+
+    Of a point, which is not `whole`, only the translation counts.
+    """
+
+    label: str
+    index: int
+    local: Any
+    target: Any
+    whole: bool
+
+    def moved(self, target: Any) -> AssemblyGoal:
+        """The same goal at another position, or placement."""
+        return replace(self, target=to_target(target, self.whole, self.label))
+
+    def error(self, body: Any) -> Array:
+        """(6,) metres and radians in the world, from where it is to the target; `body` is the body's placement."""
+        here = body * self.local
+        turn = pin.log3(self.target.rotation @ here.rotation.T) if self.whole else np.zeros(3)
+        return np.concatenate([self.target.translation - here.translation, turn])
+
+    def between(self, body: Any, share: float) -> AssemblyGoal:
+        """The goal at a share of the way from where it is now to the target."""
+        error, here = self.error(body), body * self.local
+        turned = pin.exp3(share * error[3:]) @ here.rotation
+        return replace(self, target=pin.SE3(turned, here.translation + share * error[:3]))
+
+    def enter(self, equations: EquationSet) -> None:
+        """Add the goal's equations."""
+        local, target = self.local, self.target
+        ends = np.array(local.translation), np.array(target.translation)
+        equations.coincide(self.index, -1, self.label, *ends, Role(weight=1.0))
+        if self.whole:
+            turns = pin.Quaternion(local.rotation), pin.Quaternion(target.rotation)
+            equations.turn(self.index, -1, self.label, *turns, 3, Role(weight=1.0))
+
+
+def to_target(target: Any, whole: bool, where: str) -> Any:
+    """A target as pin.SE3: a position, or a placement if the goal is a whole frame."""
+    return target_placement(target, where) if whole else pin.SE3(np.eye(3), point(target, f"{where}: target"))

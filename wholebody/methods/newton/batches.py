@@ -9,13 +9,15 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Hashable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.errors import InputError
 from wholebody.methods.newton import quaternions as quat
+from wholebody.methods.newton.quaternions import relative_forms
 
 PLACE, TURN = slice(0, 3), slice(3, 7)
 OTHER_PLACE, OTHER_TURN = slice(7, 10), slice(10, 14)
@@ -29,10 +31,8 @@ def with_world(x: Array) -> Array:
 class Role(NamedTuple):
     """What equations are for.
 
-    Attributes:
-        weight: of goals, which may be violated; None for constraints and measures.
-        one_sided: whether they are inequalities, residual >= 0.
-        objective: whether they need not hold, and their squares are minimised.
+    Goals have a `weight` and may be violated; equations that are `one_sided` are inequalities, residual >= 0; those of
+    the `objective` need not hold, and their squares are minimised.
     """
 
     weight: float | None = None
@@ -52,11 +52,10 @@ class Batch(ABC):
     """Equations of one type.
 
     Attributes:
-        role: what they are for; `HARD` unless it is set.
         bodies: (k, b) indices of the bodies of each equation group, -1 for the world; b is 1 or 2.
         size: rows of each group.
         pattern: (size, 7 b) structural non-zeros of the Jacobian.
-        labels: (k,) names of the groups in messages.
+        role, labels: what they are for, and names (k,) of the groups in messages.
         half_sines: whether the norm of a group is twice the sine of half the angle that is left, not a distance.
 
     Residual and Jacobian at the same array of bodies share their work, so do not change such an array in place.
@@ -70,10 +69,9 @@ class Batch(ABC):
     def __init__(self, bodies: Indices, labels: list[str]) -> None:
         self.bodies = np.asarray(bodies, dtype=np.intp)
         self.labels = labels
-        self._seen: tuple[Array, Array, Array] | None = None
+        self._seen: tuple[Array, ...] | None = None
 
     def __len__(self) -> int:
-        """Number of equation groups."""
         return len(self.bodies)
 
     @property
@@ -90,19 +88,18 @@ class Batch(ABC):
         """(k, size, 7 b) derivative of the residual."""
 
     def curvature(self, x: Array, force: Array) -> Array:
-        """(k, 7 b, 7 b) second derivative of the sum over rows of force (k, size) times residual.
-
-        Raises:
-            InputError: this type has none; assemblies use only types that have one.
-        """
+        """(k, 7 b, 7 b) second derivative of the sum over rows of force (k, size) times residual."""
         raise InputError(f"{self.labels[0]}: it has no second derivatives; leave the nearest place out")
 
 
 class Unit(Batch):
-    """Euler parameters of unit length: (e.e - 1) / 2 = 0."""
+    """Euler parameters of unit length, of all bodies with some names: (e.e - 1) / 2 = 0."""
 
     size = 1
     pattern = np.array([[False] * 3 + [True] * 4])
+
+    def __init__(self, names: list[str]) -> None:
+        super().__init__(np.arange(len(names))[:, None], [f"the Euler parameters of {name!r}" for name in names])
 
     def residual(self, x: Array) -> Array:  # noqa: D102
         e = x[self.bodies[:, 0], 3:]
@@ -138,13 +135,11 @@ class Coincide(Batch):
         if self.size == 3 and bool((directions == np.eye(3)).all()):
             self.pattern[:, PLACE] = self.pattern[:, OTHER_PLACE] = np.eye(3, dtype=bool)
         # n . R(e) c = e' Q e / 2 for either body, with the sign of its side
-        k = len(self)
-        along = directions.reshape(-1, 3)
-        self._forms = np.empty((k, self.size, 2, 4, 4))
+        self._forms = np.empty((len(self), self.size, 2, 4, 4))
         for side, point, sign in ((0, first, 2.0), (1, second, -2.0)):
-            forms = quat.rotate_form(np.repeat(point, self.size, axis=0), along)
-            self._forms[:, :, side] = sign * forms.reshape(k, self.size, 4, 4)
-        self._sides = np.concatenate([directions, -directions], axis=2).reshape(k, self.size, 2, 3)
+            forms = quat.rotate_form(np.repeat(point, self.size, axis=0), directions.reshape(-1, 3))
+            self._forms[:, :, side] = sign * forms.reshape(-1, self.size, 4, 4)
+        self._sides = np.concatenate([directions, -directions], axis=2).reshape(-1, self.size, 2, 3)
 
     def _slopes(self, x: Array) -> tuple[Array, Array]:
         """The two bodies (k, 2, 7), and the derivatives (k, size, 2, 4) by their quaternions."""
@@ -287,18 +282,15 @@ class Angle(Batch):
         """Take forms (k, 2, 4, 4) of z and w, and centers, bounds [rad] and signs (k,)."""
         super().__init__(bodies, labels)
         self.forms, self.center, self.bound, self.sign = forms, center, bound, sign
-        self._parts: tuple[Array, tuple[Array, Array, Array]] | None = None
 
     def _components(self, x: Array) -> tuple[Array, Array, Array]:
         """Components (k, 2) z and w, and their derivatives by either quaternion, (k, 2, 4)."""
-        if self._parts is not None and self._parts[0] is x:
-            return self._parts[1]
-        first, second = x[self.bodies[:, 0], 3:], x[self.bodies[:, 1], 3:]
-        right = np.einsum("kiab,kb->kia", self.forms, second)
-        left = np.einsum("ka,kiab->kib", first, self.forms)
-        parts = np.einsum("kia,ka->ki", right, first), right, left
-        self._parts = (x, parts)
-        return parts
+        if self._seen is None or self._seen[0] is not x:
+            first, second = x[self.bodies[:, 0], 3:], x[self.bodies[:, 1], 3:]
+            right = np.einsum("kiab,kb->kia", self.forms, second)
+            left = np.einsum("ka,kiab->kib", first, self.forms)
+            self._seen = (x, np.einsum("kia,ka->ki", right, first), right, left)
+        return self._seen[1], self._seen[2], self._seen[3]
 
     def angle(self, x: Array) -> Array:
         """(k,) the angles [rad]."""
@@ -337,3 +329,71 @@ class Angle(Batch):
         second -= (2.0 / square)[:, None, None] * row[:, :, None] * radial[:, None, :]
         result: Array = (2.0 * self.sign * force[:, 0] / square)[:, None, None] * second
         return result
+
+
+class EquationSet:
+    """Groups of equations by type, and by what they are for."""
+
+    def __init__(self) -> None:
+        self._rows: dict[tuple[str, Role], list[tuple[Any, ...]]] = {}
+        self._made: list[Batch] = []
+
+    def add(self, batch: Batch, role: Role) -> None:
+        """Add a batch of its own."""
+        batch.role = role
+        self._made.append(batch)
+
+    def coincide(self, a: int, b: int, label: str, first: Array, second: Array, role: Role = HARD) -> None:
+        """A point (3,) of one body coincides with a point of the other."""
+        self._add("coincide", role, a, b, label, first, second)
+
+    def turn(self, a: int, b: int, label: str, first: Any, second: Any, size: int, role: Role = HARD) -> None:
+        """Axes (pin.Quaternion) of two bodies agree: in z (size 2) or in all axes (size 3)."""
+        self._add(f"turn{size}", role, a, b, label, first.coeffs(), second.coeffs())
+
+    def slide(
+        self, a: int, b: int, label: str, normals: Array, place: Array, heights: ArrayLike, role: Role = HARD
+    ) -> None:
+        """A point (3,) of the second body in planes of the first with normals (m, 3) or (3,), or above them."""
+        normals = np.atleast_2d(normals)
+        self._add(f"slide{len(normals)}", role, a, b, label, normals, place, np.atleast_1d(heights))
+
+    def limit(self, a: int, b: int, label: str, first: Any, second: Any, low: float, high: float) -> None:
+        """The angle about z of two axes (pin.Quaternion) stays between bounds, which may be infinite."""
+        center = 0.5 * (low + high) if np.isfinite(low + high) else 0.0
+        for bound, sign in ((low, 1.0), (high, -1.0)):
+            if np.isfinite(bound):
+                self._add("angle", ONE_SIDED, a, b, label, first.coeffs(), second.coeffs(), center, bound, sign)
+
+    def angle(
+        self, a: int, b: int, label: str, axes: tuple[Array, Array], center: float, value: float, role: Role
+    ) -> None:
+        """The angle about z of two axes (quaternions), chosen nearest to the center, has a value."""
+        self._add("angle", role, a, b, label, *axes, center, value, 1.0)
+
+    def batches(self) -> list[Batch]:
+        """The groups in batches."""
+        listed = []
+        for (kind, role), rows in self._rows.items():
+            batch = _batch(kind, rows)
+            batch.role = role
+            listed.append(batch)
+        return [*listed, *self._made]
+
+    def _add(self, kind: str, role: Role, a: int, b: int, label: str, *numbers: Any) -> None:
+        self._rows.setdefault((kind, role), []).append((a, b, label, *numbers))
+
+
+def _batch(kind: str, rows: list[tuple[Any, ...]]) -> Batch:
+    """Groups of one type, each with its two bodies, its label and its parameters."""
+    k, bodies, labels = len(rows), np.array([row[:2] for row in rows], dtype=np.intp), [row[2] for row in rows]
+    columns = [np.array(column, dtype=float) for column in zip(*(row[3:] for row in rows), strict=True)]
+    if kind == "coincide":
+        axes = np.broadcast_to(np.eye(3), (k, 3, 3))
+        return Coincide(bodies, labels, columns[0], columns[1], axes, np.zeros((k, 3)))
+    if kind.startswith("slide"):
+        return Slide(bodies, labels, *columns)
+    forms = relative_forms(columns[0], columns[1])
+    if kind == "angle":
+        return Angle(bodies, labels, forms[:, 2:], columns[2], columns[3], columns[4])
+    return Turn(bodies, labels, 2.0 * forms[:, : int(kind[-1])])

@@ -12,8 +12,7 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.memory_views import placement_view
 from wholebody.methods.base import UnsupportedTermError
-from wholebody.methods.newton.batches import ONE_SIDED, Angle, Role, with_world
-from wholebody.methods.newton.equations import EquationSet
+from wholebody.methods.newton.batches import ONE_SIDED, Angle, EquationSet, Role, with_world
 from wholebody.methods.newton.quaternions import axes_with_z, relative_forms
 
 
@@ -32,16 +31,7 @@ class FigureBodies:
     """
 
     def __init__(self, figure: Figure, start: Array | None = None, first: int = 0) -> None:
-        """Read the joints.
-
-        Args:
-            figure: the figure.
-            start: (nq,) where terms of one's own tell how many rows they have; None for the neutral configuration.
-            first: index of the first body.
-
-        Raises:
-            UnsupportedTermError: a joint of a type that has no equations here.
-        """
+        """Read the joints; `start` (nq,) tells how many rows terms of one's own have."""
         self.figure, self.model, self.first = figure, figure.model, first
         self.count = self.model.njoints - 1
         self.names = list(self.model.names)[1:]

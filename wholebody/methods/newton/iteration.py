@@ -209,10 +209,7 @@ class Iteration:
         return trial, length, self.active_system.passes()
 
     def advance(self, trial: Array, length: float) -> bool:
-        """Accept a trial, which is this share of the last step, and evaluate its equations.
-
-        False, and nothing changes, where a term of one's own is not finite there.
-        """
+        """Accept a trial, this share of the last step; false, and nothing changes, where a term is not finite."""
         here = self.x
         try:
             if self.active_system.arrive(trial):

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import sys
 from functools import lru_cache
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,12 +30,7 @@ class SingularSystemError(WholebodyError, ArithmeticError):
 
 
 class Pattern(NamedTuple):
-    """Structural non-zeros of a sparse Jacobian.
-
-    Attributes:
-        rows, columns: (nnz,) indices of the entries.
-        height, width: the Jacobian's shape.
-    """
+    """Structural non-zeros of a sparse Jacobian (height, width): rows and columns (nnz,) of the entries."""
 
     rows: Indices
     columns: Indices
@@ -67,23 +62,6 @@ class LinearSystem(NamedTuple):
     damping: Array
     gradient: Array
     residual: Array
-
-
-class LinearAlgebra(Protocol):
-    """A factorisation for one pattern."""
-
-    name: str
-
-    @property
-    def fill(self) -> int:
-        """Non-zeros of the last factor."""
-
-    def solve(self, system: LinearSystem) -> tuple[Array, Array]:
-        """Displacement (width,) and multipliers (height,).
-
-        Raises:
-            SingularSystemError: it has no unique solution to working accuracy.
-        """
 
 
 class NormalEquations:
@@ -159,11 +137,7 @@ class NormalEquations:
 
 
 class Gram:
-    """Lower triangle of J D^-1 J' + M in compressed columns.
-
-    Attributes:
-        matrix: scipy's csc_matrix, whose data `refill` overwrites.
-    """
+    """Lower triangle of J D^-1 J' + M as scipy's csc_matrix, whose data `refill` overwrites."""
 
     def __init__(self, pattern: Pattern) -> None:
         """Pair the entries of J that share a column, and find the entries of their products."""
@@ -239,12 +213,7 @@ class QuasiDefinite:
     name = "kkt/ldlt"
 
     def __init__(self, pattern: Pattern, second: tuple[Indices, Indices] | None = None) -> None:
-        """Build and analyse.
-
-        Args:
-            pattern: of J.
-            second: rows and columns (k,) of the lower triangle of second derivatives, which may repeat.
-        """
+        """Build and analyse; `second` are rows and columns (k,) of the lower triangle of second derivatives."""
         import eigenpy
         from scipy.sparse import csc_matrix
 
@@ -302,6 +271,10 @@ class QuasiDefinite:
         return result
 
 
+LinearAlgebra = NormalEquations | QuasiDefinite
+"""A factorisation for one pattern."""
+
+
 def dense_columns(pattern: Pattern) -> Indices:
     """Columns that would fill the normal equations, such as a hub's: of more than sixty rows; fewer = more splits."""
     return np.flatnonzero(np.bincount(pattern.columns, minlength=pattern.width) > 60)
@@ -311,9 +284,6 @@ def linear_algebra(pattern: Pattern, name: str = "auto") -> LinearAlgebra:
     """The factorisation of this name for a pattern; "auto" splits off up to fifty dense columns.
 
     With hundreds of them, as of a body near everything, the small dense systems of a step took 2 s.
-
-    Raises:
-        UnknownNameError: there is no such factorisation.
     """
     known(name, NAMES, "linear algebra")
     dense = dense_columns(pattern)

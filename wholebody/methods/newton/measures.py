@@ -53,13 +53,7 @@ class Objective:
     """
 
     def __init__(self, problem: Problem, bodies: FigureBodies, state: State) -> None:
-        """Prepare the rows for the figure's revolute joints.
-
-        Args:
-            problem: to be solved.
-            bodies: of its figure.
-            state: of the run; it is moved.
-        """
+        """Prepare the rows for the figure's revolute joints."""
         self._state, self._bodies = state, bodies
         self.rows, tangent = bodies.distance(problem.start)
         self.root = RootMotion(0, "the root") if bodies.floating and _counts_root(problem, state) else None
@@ -155,13 +149,9 @@ def _depends_on(measure: Measure, tangent: Indices, start: Array, state: State) 
 def refine(
     active_system: ActiveSystem, x: Array, measure: Callable[[Array], float], *, tolerance: float
 ) -> tuple[Array, int]:
-    """Lower the measures from x (7 n,), where all equations hold.
+    """Lower the measures, a function of the variables (7 n,), from x, where all equations hold to the tolerance.
 
-    Args:
-        active_system: the equations.
-        x: the start.
-        measure: the measures as a function of the variables (7 n,).
-        tolerance: of the equations; a round that moves nothing by more, metres and radians, is the last.
+    A round that moves nothing by more, metres and radians, is the last.
 
     Returns:
         The variables, and the number of iterations.
@@ -178,11 +168,7 @@ def refine(
 
 
 class _Descent:
-    """A descent of measures along the equations.
-
-    Attributes:
-        best: (7 n,) the state with the least measures.
-    """
+    """A descent of measures along the equations; `best` (7 n,) is the state with the least."""
 
     def __init__(self, run: Iteration, measure: Callable[[Array], float], tolerance: float) -> None:
         self._run, self._measure, self._tolerance = run, measure, tolerance

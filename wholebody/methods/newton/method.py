@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.control import Control, Progress
 from wholebody.methods.inputs import check_problem
-from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.multistart import Search, Settings
-from wholebody.methods.newton.terms import state_equations
+from wholebody.methods.newton.terms import FigureSystem, state_equations
 from wholebody.methods.newton.tracking import NewtonTracker
 from wholebody.problem import Problem
 from wholebody.solution import Solution

@@ -20,11 +20,11 @@ from wholebody.methods.conclusion import Ending, assessed_tolerance, concluded, 
 from wholebody.methods.contradictions import Contradiction, contradictions, least_left
 from wholebody.methods.inputs import Iterations, Restarts, Seed, TimeLimit, Tolerance
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
-from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.linear_algebra import NAMES
 from wholebody.methods.newton.measures import refine
 from wholebody.methods.newton.settings import STARTS
+from wholebody.methods.newton.terms import FigureSystem
 from wholebody.methods.starts import Minima, off_limits, restarts
 from wholebody.solution import Solution, TraceEntry
 
@@ -42,12 +42,7 @@ class Settings(Checked):
     time_limit: TimeLimit = None
 
     def __post_init__(self) -> None:
-        """Check the settings.
-
-        Raises:
-            InputError: a setting out of range.
-            UnknownNameError: no such linear algebra.
-        """
+        """Check the settings."""
         super().__post_init__()
         known(self.algebra, NAMES, "linear algebra")
 
@@ -58,14 +53,7 @@ class Settings(Checked):
 
 
 class SearchResult(NamedTuple):
-    """The result from one start.
-
-    Attributes:
-        q: (nq,) the posture.
-        judgement: its assessment.
-        reached: how the iteration ended.
-        how: the start, in words.
-    """
+    """The result from one start: the posture (nq,), its assessment, how the iteration ended, and the start in words."""
 
     q: Array
     judgement: Assessment

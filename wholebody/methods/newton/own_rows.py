@@ -24,35 +24,23 @@ from wholebody.tasks.base import Constraint, Goal, Measure
 from wholebody.tasks.checks import defined
 from wholebody.terms.plan import checked_count
 
+_Function = tuple[Callable[[State], Array], Callable[[State], Array]]
+"""Values (m,) and derivatives (m, nv) at a state."""
+
 
 class TangentRows(Batch):
     """Rows sign (value(posture) - bound) of all bodies of a figure."""
 
     def __init__(
-        self,
-        bodies: FigureBodies,
-        label: str,
-        value: Callable[[State], Array],
-        jacobian: Callable[[State], Array],
-        chosen: Indices,
-        sign: Array,
-        bound: Array,
+        self, bodies: FigureBodies, label: str, function: _Function, chosen: Indices, sign: Array, bound: Array,
         depends: Mask | None = None,
-    ) -> None:
-        """Take a function with its derivative.
+    ) -> None:  # fmt: skip
+        """Take a function, of whose rows those with the indices `chosen` (size,) are used.
 
-        Args:
-            bodies: of the figure, whose joints are revolute ones and a free root.
-            label: its name in messages.
-            value: (m,) at a state.
-            jacobian: (m, nv) at a state.
-            chosen: (size,) indices of the used rows among the m.
-            sign: (size,) 1 or -1.
-            bound: (size,) subtracted from the value.
-            depends: (size, nv) the degrees of freedom that each used row depends on; None for all.
+        The degrees of freedom on which each used row depends are `depends` (size, nv); None for all.
         """
         super().__init__(np.arange(bodies.count)[None], [label])
-        self._figure, self._value, self._slope = bodies, value, jacobian
+        self._figure, (self._value, self._slope) = bodies, function
         self.chosen, self.sign, self.bound = chosen, sign, bound
         self.size = len(chosen)
         self.pattern = np.tile(_reads(bodies), (self.size, 1))
@@ -78,7 +66,7 @@ def goal_rows(bodies: FigureBodies, goal: Goal, label: str) -> TangentRows:
     """Rows of a goal: its error."""
     error = np.atleast_1d(goal.error(bodies.start_state))
     return TangentRows(
-        bodies, label, *_of_rows(goal, goal.error, len(error)),
+        bodies, label, _of_rows(goal, goal.error, len(error)),
         np.arange(len(error)), np.ones(len(error)), np.zeros(len(error)),
     )  # fmt: skip
 
@@ -102,14 +90,12 @@ def square_rows(bodies: FigureBodies, measure: Measure, label: str) -> TangentRo
     seen = [squares(state)[1] != 0.0 for state in defined(measure, map(bodies.state_of, postures))]
     depends = np.any(seen, axis=0) if seen else np.ones((count, bodies.model.nv), dtype=bool)
     return TangentRows(
-        bodies, label, lambda state: squares(state)[0], lambda state: squares(state)[1], np.arange(count),
+        bodies, label, (lambda state: squares(state)[0], lambda state: squares(state)[1]), np.arange(count),
         np.ones(count), np.zeros(count), depends,
     )  # fmt: skip
 
 
-def _of_rows(
-    term: Goal | Constraint, ask: Callable[[State], Array], count: int
-) -> tuple[Callable[[State], Array], Callable[[State], Array]]:
+def _of_rows(term: Goal | Constraint, ask: Callable[[State], Array], count: int) -> _Function:
     """Values and derivatives of a term, which has as many rows at all postures as at the start."""
 
     def value(state: State) -> Array:
@@ -138,7 +124,7 @@ def constraint_rows(
     def rows(chosen: Indices, sign: Array, bound: Array) -> TangentRows | None:
         if not len(chosen):
             return None
-        return TangentRows(bodies, label, *_of_rows(term, term.value, size[0]), chosen, sign, bound)
+        return TangentRows(bodies, label, _of_rows(term, term.value, size[0]), chosen, sign, bound)
 
     sides = np.concatenate([np.ones(len(above)), -np.ones(len(below))])
     return (
@@ -180,11 +166,7 @@ class AssemblyConstraint(ABC):
         """(m, b, 7) its derivative by the bodies."""
 
     def curvature(self, x: Array, force: Array) -> Array:
-        """(b, 7, b, 7) second derivative of force (m,) times residual; only `solve(nearest=True)` needs it.
-
-        Raises:
-            InputError: the class does not write it.
-        """
+        """(b, 7, b, 7) second derivative of force (m,) times residual; only `solve(nearest=True)` needs it."""
         raise InputError(f"{type(self).__name__} has no second derivatives; write curvature, or leave nearest out")
 
 
@@ -214,11 +196,7 @@ class OwnRows(Batch):
 
 
 def checked(term: AssemblyConstraint, x: Array, label: str) -> int:
-    """How many rows a constraint has, after its derivative was compared with differences at the bodies x (b, 7).
-
-    Raises:
-        InputError: a value of the wrong shape, one that is not finite, or a derivative that is wrong.
-    """
+    """How many rows a constraint has, after its derivative was compared with differences at the bodies x (b, 7)."""
     first = np.asarray(term.residual(x.copy()), dtype=float)
     if first.ndim != 1 or not len(first):
         raise InputError(f"{label}: residual has shape {first.shape}; return m values, shape (m,)")
@@ -242,11 +220,7 @@ def checked(term: AssemblyConstraint, x: Array, label: str) -> int:
 
 
 def names_of(term: AssemblyConstraint, label: str) -> list[str]:
-    """The names of a constraint's bodies.
-
-    Raises:
-        InputError: there are none, or one is twice in the list.
-    """
+    """The names of a constraint's bodies."""
     given = getattr(term, "bodies", ())
     names = [text(name, f"{label}: a name in bodies") for name in listed(given, f"{label}: bodies", "('crank',)")]
     if not names or len(set(names)) < len(names):

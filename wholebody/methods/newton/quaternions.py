@@ -10,7 +10,10 @@ derivatives. A relative orientation conj(a) b is bilinear, so the equations of j
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import pinocchio as pin
 
 from wholebody.base.arrays import Array
 
@@ -86,14 +89,9 @@ RELATIVE = np.array([[product(conjugate(a), b) for b in _BASIS] for a in _BASIS]
 
 
 def relative_forms(first: Array, second: Array) -> Array:
-    """Bilinear forms of the relative orientation of two frames that are fixed to two bodies.
+    """Bilinear forms (k, 4, 4, 4) of the relative orientation of axes (k, 4) in a first and in a second body.
 
-    Args:
-        first: (k, 4) orientation of the axes in the first body.
-        second: (k, 4) in the second.
-
-    Returns:
-        (k, 4, 4, 4): component i of conj(a first) (b second) is a' [.., i] b.
+    Component i of conj(a first) (b second) is a' [.., i] b.
     """
     turn = product(conjugate(first)[:, None, :], product(_BASIS[None], second[:, None, :]))  # (k, basis, component)
     result: Array = np.einsum("kji,jab->kiab", turn, RELATIVE)
@@ -108,3 +106,8 @@ def axes_with_z(direction: Array) -> Array:
     result[back] = (1.0, 0.0, 0.0, 0.0)
     result /= np.linalg.norm(result, axis=1, keepdims=True)
     return result
+
+
+def axes_along(direction: Array) -> Any:
+    """Axes (pin.Quaternion) whose z axis is a unit direction (3,)."""
+    return pin.Quaternion(axes_with_z(direction[None])[0])

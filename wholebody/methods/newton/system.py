@@ -11,8 +11,8 @@ import numpy as np
 from wholebody.base.arrays import Array, Indices
 from wholebody.methods.control import Control
 from wholebody.methods.newton.batches import ONE_SIDED, Batch, with_world
-from wholebody.methods.newton.contacts import ContactSet
 from wholebody.methods.newton.figure_bodies import FigureBodies
+from wholebody.methods.newton.inequalities import ContactSet
 from wholebody.methods.newton.linear_algebra import LinearAlgebra, Pattern, linear_algebra
 from wholebody.methods.newton.settings import CONTACTS
 from wholebody.scene.workspace import Workspace
@@ -22,16 +22,14 @@ class System:
     """Equations c(x) = 0 and inequalities c(x) >= 0 of n bodies: the pattern is made once, the values at every step.
 
     Attributes:
-        batches: the equations.
         pattern: structural non-zeros of the Jacobian (m, 7 n).
-        goal: (m,) rows of goals, which may be violated.
-        inequality: (m,) rows that must be at least zero.
+        goal, inequality, objective: (m,) rows that may be violated, that must be at least zero, whose squares are
+            minimised.
         share: (m,) root of each goal's weight, as a share of the greatest; 1 for constraints.
-        objective: (m,) rows whose squares are minimised.
         group_starts: (g,) first row of each group of rows whose norm is one error: a distance or an angle. Rows of
             inequalities are groups of their own.
         goal_groups: (g,) which groups are goals.
-        stiffness: (m,) their factors, 1 by default.
+        stiffness: (m,) factors on the squares of the objective.
         weight: (7 n,) weight of each variable in the least motion.
     """
 
@@ -163,8 +161,7 @@ class ActiveSystem:
     once while they are remembered, as contacts come and go.
 
     Attributes:
-        system: the equations.
-        algebra: factorisation for the system's pattern.
+        system, algebra: the equations, and the factorisation for their pattern.
         contacts: the pairs that can touch; None without any.
         q: (nq,) posture at the last `retract`, where pairs can touch.
         longest: largest motion of any part of a body in a step, metres.
@@ -172,7 +169,6 @@ class ActiveSystem:
         path: the states (7 n,) since `begin`.
         even: whether goals count alike, whatever their weights.
         structures: number of patterns that were analysed.
-        laying: processor's time of these analyses [s].
     """
 
     system: System
@@ -187,14 +183,7 @@ class ActiveSystem:
     def __init__(
         self, held: Sequence[Batch], weight: Array, algebra: str, figures: Sequence[FigureBodies] = ()
     ) -> None:
-        """Take equations, and goals by `begin`.
-
-        Args:
-            held: what holds.
-            weight: (7 n,) of each variable in the least motion.
-            algebra: name of the factorisation.
-            figures: whose bodies are placed by their postures.
-        """
+        """Take what holds, weights (7 n,) of the variables in the least motion, and figures; goals by `begin`."""
         self.algebra_name, self._weight = algebra, weight
         self._held, self._figures, self._goals = list(held), tuple(figures), list[Batch]()
         self._known: dict[Hashable, tuple[System, LinearAlgebra]] = {}

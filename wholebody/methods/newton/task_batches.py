@@ -224,11 +224,7 @@ class OnSurface(Batch):
 
 
 def surface(shape: Shape, where: str) -> tuple[Array, float]:
-    """Half sizes (3,) and radius of a shape's surface as that of a rounded box, metres.
-
-    Raises:
-        InputError: a shape of another kind.
-    """
+    """Half sizes (3,) and radius of a shape's surface as that of a rounded box, metres."""
     if isinstance(shape, Sphere):
         return np.zeros(3), shape.radius
     if isinstance(shape, Capsule):

@@ -11,12 +11,15 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.figures.state import State
 from wholebody.methods.base import UnsupportedTermError
-from wholebody.methods.newton.batches import HARD, ONE_SIDED, Batch, Role
-from wholebody.methods.newton.equations import EquationSet, axes_along
+from wholebody.methods.newton.batches import HARD, ONE_SIDED, Batch, EquationSet, Role, Unit
 from wholebody.methods.newton.figure_bodies import FigureBodies
+from wholebody.methods.newton.measures import Objective
 from wholebody.methods.newton.own_rows import constraint_rows, goal_rows
+from wholebody.methods.newton.quaternions import axes_along
+from wholebody.methods.newton.system import ActiveSystem
 from wholebody.methods.newton.task_batches import Cone, MassCenter, Toward
 from wholebody.problem import Problem
+from wholebody.scene.workspace import Workspace
 from wholebody.tasks import (
     Axis,
     Balance,
@@ -32,16 +35,14 @@ from wholebody.tasks import (
     Relative,
     StepLimit,
 )  # fmt: skip
+from wholebody.tasks.answers import is_own
 from wholebody.tasks.base import Goal
+from wholebody.tasks.checks import undefined
 from wholebody.tasks.residuals import PlacementResidual
 
 
 def state_equations(problem: Problem, state: State) -> None:
-    """Build all equations of a problem once, to find unsupported terms.
-
-    Args:
-        problem: to be solved.
-        state: it is moved to the problem's start.
+    """Build all equations of a problem once, to find unsupported terms; the state is moved to the start.
 
     Raises:
         UnsupportedTermError: a term or a joint has no equations here.
@@ -53,11 +54,7 @@ def state_equations(problem: Problem, state: State) -> None:
 
 
 def goal_equations(problem: Problem, bodies: FigureBodies, goals: Sequence[Goal]) -> EquationSet:
-    """Equations of goals.
-
-    Raises:
-        UnsupportedTermError: a goal has no equations here.
-    """
+    """Equations of goals."""
     result = EquationSet()
     for number, goal in enumerate(goals):
         label, role = f"goals[{number}], {type(goal).__name__}", Role(goal.weight)
@@ -79,11 +76,7 @@ def goal_equations(problem: Problem, bodies: FigureBodies, goals: Sequence[Goal]
 
 
 def constraint_equations(problem: Problem, bodies: FigureBodies) -> EquationSet:
-    """Equations of constraints.
-
-    Raises:
-        UnsupportedTermError: one has no equations here.
-    """
+    """Equations of constraints."""
     result = EquationSet()
     for number, term in enumerate(problem.constraints):
         label = f"constraints[{number}], {type(term).__name__}"
@@ -107,16 +100,7 @@ def constraint_equations(problem: Problem, bodies: FigureBodies) -> EquationSet:
 
 
 def bound_equations(problem: Problem, bodies: FigureBodies, state: State) -> EquationSet:
-    """Equations of bounds.
-
-    Args:
-        problem: gives the bounds.
-        bodies: of its figure.
-        state: of the run; it is moved to the problem's start.
-
-    Raises:
-        UnsupportedTermError: one has no equations here.
-    """
+    """Equations of bounds; the state is moved to the problem's start."""
     result = EquationSet()
     for number, bound in enumerate(problem.bounds):
         if isinstance(bound, Freeze):
@@ -189,11 +173,76 @@ def _local(bodies: FigureBodies, frame: int) -> Any:
 
 
 def _check_own(bodies: FigureBodies, label: str) -> None:
-    """Refuse a term of a user's class if the figure's tangent is not a function of its bodies here.
-
-    Raises:
-        UnsupportedTermError: the figure has joints other than revolute ones and one free root.
-    """
+    """Refuse a term of a user's class if the figure's tangent is not a function of its bodies here."""
     if bodies.uncharted:
         reason = f"its rows need turning joints and one free root, and {bodies.uncharted[0]!r} is neither"
         raise UnsupportedTermError("newton", [f"{label} ({reason})"])
+
+
+class FigureSystem(ActiveSystem):
+    """A problem's equations, renewed from posture to posture: every iterate is a posture."""
+
+    def __init__(self, problem: Problem, workspace: Workspace, algebra: str, *, yielding: bool = False) -> None:
+        """Build the equations, for the violation of the constraints in place of the goals where `yielding`.
+
+        Raises:
+            InputError: a term or a joint that has no equations here.
+        """
+        self.problem, self.workspace, self._yielding = problem, workspace, yielding
+        self.bodies = bodies = FigureBodies(problem.scene.figure, problem.start)
+        held = [Unit(bodies.names), bodies.limits, *bodies.equations.batches()]
+        held += bound_equations(problem, bodies, workspace.state).batches()
+        if not yielding:
+            held += constraint_equations(problem, bodies).batches()
+        self.objective = Objective(problem, bodies, workspace.state)
+        super().__init__([*held, *self.objective.batches()], bodies.weight, algebra, [bodies])
+        self._find_contacts(problem.clearances, workspace, bodies.data)
+        self._own = tuple(filter(is_own, problem.measures))
+        self.retarget()
+        self.arrive(self.variables(problem.start))
+
+    def variables(self, q: Array) -> Array:
+        """Move to the posture q (nq,); returns its variables."""
+        self.q = self.bodies.q = q
+        self._here = self.bodies.variables(q)
+        if self.contacts is not None:
+            self.contacts.measure(self.bodies.data)
+        return self._here
+
+    def posture(self, x: Array) -> Array:
+        """The posture (nq,) of the bodies x (7 n,)."""
+        return self.q if x is self._here else self.bodies.posture(x)
+
+    def defined(self, q: Array) -> bool:
+        """Whether all terms of one's own are finite at a posture (nq,)."""
+        problem, state = self.problem, self.workspace.state.update(q)
+        return undefined((*problem.goals, *problem.constraints, *problem.measures), state) is None
+
+    def retarget(self) -> None:
+        """Update to the problem's new goals."""
+        problem = self.problem
+        if any(map(is_own, problem.goals)):
+            self.bodies.state_of(problem.start)  # where they are asked for their rows: a step may have been taken back
+        if self._yielding:
+            asked = constraint_equations(problem, self.bodies).batches()
+            for batch in asked:
+                batch.role = batch.role if batch.role.one_sided else Role(weight=1.0)
+        else:
+            asked = goal_equations(problem, self.bodies, problem.goals).batches()
+        self.aim(asked)
+
+    def arrive(self, x: Array) -> bool:
+        """Renew limits, measures and contacts at x; returns whether the pattern changed."""
+        x = self.retract(x)
+        if self._own and (error := undefined(self._own, self.workspace.state.update(self.q))) is not None:
+            raise error  # measures are read where a step ends, and not on the way there
+        self.objective.renew(self.q)
+        changed = super().arrive(x)
+        self.objective.enter(self.system)
+        return changed
+
+    def _projected(self, x: Array) -> Array:
+        x = x.copy()
+        self.bodies.retract(x)
+        self.q = self.bodies.q
+        return x

@@ -17,10 +17,9 @@ from wholebody.methods.base import begun, judged, nearest_to
 from wholebody.methods.control import BUDGET
 from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
-from wholebody.methods.newton.figure_system import FigureSystem
-from wholebody.methods.newton.linear_algebra import Pattern
 from wholebody.methods.newton.multistart import Search, Settings
 from wholebody.methods.newton.settings import FRAMES, STARTS
+from wholebody.methods.newton.terms import FigureSystem
 from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import Collision
 from wholebody.scene.workspace import NotCopyable
@@ -29,15 +28,7 @@ from wholebody.tasks import StepLimit
 
 
 class NewtonStep(NamedTuple):
-    """Answer of one frame.
-
-    Attributes:
-        q: (nq,) the next posture.
-        iterations: Newton iterations.
-        systems: linear systems solved.
-        structures: number of patterns analysed since the tracker was made.
-        collisions: what things that moved meanwhile (`Scene.move` with `over`) passed through, or are inside of.
-    """
+    """Answer of one frame: posture (nq,), iterations, linear systems, patterns so far, and collisions."""
 
     q: Array
     iterations: int
@@ -66,17 +57,7 @@ class NewtonTracker(NotCopyable):
     def __init__(
         self, problem: Problem, settings: Settings, dt: float | None, solve: Callable[[Problem], Solution]
     ) -> None:
-        """Build the equations.
-
-        Args:
-            problem: to be solved whose goals it follows.
-            settings: of whole solves.
-            dt: seconds a frame; None for frames without a time step.
-            solve: the method, for solves with measures relative to another posture.
-
-        Raises:
-            InputError: the problem has a term that this method has no equations for, or dt is not positive and finite.
-        """
+        """Build the equations; `settings` are those of whole solves, and `solve` is the method."""
         self.problem = check_problem(problem, "tracker: problem")
         self.dt = None if dt is None else time_step(dt, "dt")
         self._settings, self._solve = settings, solve
@@ -85,11 +66,7 @@ class NewtonTracker(NotCopyable):
         self._lay_out()
 
     def step(self, q: Array, tolerance: float = FRAMES.tolerance) -> NewtonStep:
-        """The same as `frame`; what things that moved meanwhile met is named.
-
-        Raises:
-            InputError: as for `frame`.
-        """
+        """The same as `frame`; what things that moved meanwhile met is named."""
         q = begun(self.problem, q)
         self.workspace.refresh()
         motion, step = self.workspace.next_frame(q), self.frame(q, tolerance)
@@ -102,10 +79,6 @@ class NewtonTracker(NotCopyable):
 
         Weights count where goals conflict. So all goals are first followed alike; the frame is made again with their
         weights if that reduced light goals at the expense of heavy ones.
-
-        Args:
-            q: posture at the beginning of the frame.
-            tolerance: of the goals, metres and radians; 1e-4 where None.
 
         Raises:
             InputError: objects were added to or removed from the scene, a new term has no equations, or another thread
@@ -172,21 +145,12 @@ class NewtonTracker(NotCopyable):
         return ()
 
     def solve(self, q: Array) -> Solution:
-        """Solve for the problem's present goals from the posture q (nq,), without other starts.
-
-        Raises:
-            InputError: as for `step`.
-        """
+        """Solve for the problem's present goals from the posture q (nq,), without other starts."""
         began = time.perf_counter()
         q = posture(q, self.workspace.model.nq)
         with self._alone:
             search = Search(self._renewed(), self._settings)
             return search.solution(search.from_here(q), began)
-
-    @property
-    def pattern(self) -> Pattern:
-        """Structural non-zeros of the Jacobian."""
-        return self._active_system.system.pattern
 
     @property
     def laid_out(self) -> tuple[int, float]:

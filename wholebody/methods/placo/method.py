@@ -65,12 +65,7 @@ class Placo(Checked, Descends):
         return refusal(self.name, unsupported(problem))
 
     def prepare(self, problem: Problem) -> None:
-        """Build placo's robot for a problem; `solve` does it if this was not called.
-
-        Raises:
-            InputError: placo cannot express the problem, or its scene changed after it was stated.
-            MissingPackageError: placo is not installed.
-        """
+        """Build placo's robot for a problem; `solve` does it if this was not called."""
         check_problem(problem, "Placo.prepare: problem")
         with problem.borrow() as workspace, problem.scene.built.pool(_RobotCache, _RobotCache).borrow() as cache:
             cache.robot(problem, workspace, self.pairs(problem))
@@ -81,12 +76,7 @@ class Placo(Checked, Descends):
         return np.arange(len(problem.clearances))
 
     def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
-        """See `Descends._descend`.
-
-        Raises:
-            UnsupportedTermError: placo cannot express the problem.
-            MissingPackageError: placo is not installed.
-        """
+        """See `Descends._descend`."""
         with problem.scene.built.pool(_RobotCache, _RobotCache).borrow() as cache:
             robot = cache.robot(problem, workspace, self.pairs(problem))
             stepper = _Programs(problem, robot, self.tolerance, HOLDS[self.holds])

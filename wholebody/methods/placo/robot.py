@@ -43,11 +43,7 @@ class Robot:
     """
 
     def __init__(self, figure: Figure, frames: Mapping[str, tuple[int, pin.SE3]]) -> None:
-        """Build it, without pieces.
-
-        Args:
-            figure: whose joints and frames it gets.
-            frames: names of the frames that tasks use -> joint of our model and placement in it.
+        """Build it, without pieces; `frames` are those that tasks use -> joint of our model and placement in it.
 
         Raises:
             InputError: placo has no joint of a kind that the figure has.

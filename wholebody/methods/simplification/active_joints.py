@@ -32,19 +32,12 @@ NOTHING = 1e-9  # entries of a Jacobian below this are rounding
 
 @dataclass(frozen=True)
 class ActiveJoints:
-    """The joints of a problem: active, frozen, or locked.
+    """The joints of a problem: active, frozen, or locked."""
 
-    Attributes:
-        moving: (njoints,) the active joints.
-        frozen: (njoints,) the joints that a bound keeps in place.
-        helpers: names of the inequalities that a locked joint could have helped to keep.
-        excess: the measures of the locked joints alone minus their least value.
-    """
-
-    moving: Mask
-    frozen: Mask
-    helpers: tuple[str, ...]
-    excess: float
+    moving: Mask  # (njoints,) the active joints
+    frozen: Mask  # (njoints,) the joints that a bound keeps in place
+    helpers: tuple[str, ...]  # names of the inequalities that a locked joint could have helped to keep
+    excess: float  # the measures of the locked joints alone minus their least value
 
 
 def active_joints(problem: Problem, lock: bool = True) -> ActiveJoints:
@@ -52,14 +45,14 @@ def active_joints(problem: Problem, lock: bool = True) -> ActiveJoints:
     model = problem.scene.model
     walk = _Walk(problem)
     joint_of = np.repeat(np.arange(1, model.njoints), [joint.nv for joint in list(model.joints)[1:]])
-    frozen = _frozen(problem, joint_of)
+    frozen = _frozen(problem, walk.start(), joint_of)
     moving = np.zeros(model.nv, dtype=bool)
     for goal in problem.goals:
         moving |= _columns(goal, walk).any(axis=0)
     for measure in problem.measures:
         if not isinstance(measure, (*SEPARABLE, Rhythm, RotationEffort)):
             moving |= _slopes(measure, walk)
-    moving |= _out_of_limits(problem) | _too_near(problem)
+    moving |= _out_of_limits(problem) | _too_near(problem, walk.start())
     rows = [(term, _columns(term, walk), *_kinds(term, walk.start())) for term in problem.constraints]
     squares = _squares(problem)
     moving = _closed(moving & ~frozen[joint_of], rows, squares, frozen[joint_of])
@@ -71,7 +64,7 @@ def active_joints(problem: Problem, lock: bool = True) -> ActiveJoints:
     locked = ~joints[joint_of] & ~frozen[joint_of]
     helpers = [type(term).__name__ for term, columns, equal, _ in rows if columns[~equal][:, locked].any()]
     kept = sum(value for places, value in squares if locked[places].any() and not joints[joint_of[places]].any())
-    return ActiveJoints(joints, frozen, tuple(dict.fromkeys(helpers)), _excess(problem, locked) + kept)
+    return ActiveJoints(joints, frozen, tuple(dict.fromkeys(helpers)), _excess(problem, walk.state, locked) + kept)
 
 
 def _squares(problem: Problem) -> list[tuple[list[int], float]]:
@@ -89,10 +82,7 @@ def _squares(problem: Problem) -> list[tuple[list[int], float]]:
 
 
 def _closed(
-    moving: Mask,
-    rows: list[tuple[Constraint, Mask, Mask, Mask]],
-    squares: list[tuple[list[int], float]],
-    frozen: Mask,
+    moving: Mask, rows: list[tuple[Constraint, Mask, Mask, Mask]], squares: list[tuple[list[int], float]], frozen: Mask
 ) -> Mask:
     """Add joints until none is new.
 
@@ -116,7 +106,7 @@ class _Walk:
 
     def __init__(self, problem: Problem) -> None:
         self.state = State(problem.scene.model)
-        self.postures = np.vstack([problem.start, random_postures(problem.scene.model, 6, seed=0)])
+        self.postures = np.vstack([problem.start, random_postures(problem.scene.model, 3, seed=0)])
         if problem.scene.figure.root == "free":
             self.postures[:, :7] = problem.start[:7]
 
@@ -157,9 +147,8 @@ def _kinds(term: Constraint, state: State) -> tuple[Mask, Mask]:
     return lower == upper, (value < lower - COAL_ACCURACY) | (value > upper + COAL_ACCURACY)
 
 
-def _frozen(problem: Problem, joint_of: NDArray[np.intp]) -> Mask:
-    """(njoints,) joints none of whose degrees of freedom may move."""
-    state = State(problem.scene.model).update(problem.start)
+def _frozen(problem: Problem, state: State, joint_of: NDArray[np.intp]) -> Mask:
+    """(njoints,) joints none of whose degrees of freedom may move from the state at the start."""
     still = np.zeros(len(joint_of), dtype=bool)
     for bound in problem.bounds:
         low, high = bound.bounds(state, None)
@@ -175,10 +164,9 @@ def _out_of_limits(problem: Problem) -> Mask:
     return np.asarray((low > 0.0) | (high < 0.0))
 
 
-def _too_near(problem: Problem) -> Mask:
+def _too_near(problem: Problem, state: State) -> Mask:
     """Degrees of freedom between the pieces of pairs that are nearer at the start than their clearance."""
     scene = problem.scene
-    state = scene.state(problem.start)
     near = scene.contacts(problem.start, problem.clearance + COAL_ACCURACY)
     wrong = near.pair[near.distance < problem.clearances[near.number] - COAL_ACCURACY]
     joint = scene.pair_table.joint
@@ -186,28 +174,26 @@ def _too_near(problem: Problem) -> Mask:
     return _dofs(state, between.any(axis=0))
 
 
-def _excess(problem: Problem, locked: Mask) -> float:
+def _excess(problem: Problem, state: State, locked: Mask) -> float:
     """The locked joints' share of the separable measures minus its least value within their limits.
 
-    All of them move from limit to limit together: the gradient has the slope of every joint's own share.
+    All of them move to a limit together: the gradient has the slope of every joint's own share.
     """
-    figure, state = problem.scene.figure, State(problem.scene.model)
+    figure = problem.scene.figure
     terms = [measure for measure in problem.measures if isinstance(measure, SEPARABLE)]
     idx_q, idx_v, low, high = figure.limits
     chosen = locked[idx_v] & np.isfinite(low) & np.isfinite(high)
     if not terms or not chosen.any():
         return 0.0
     idx_q, idx_v, low, high = idx_q[chosen], idx_v[chosen], low[chosen], high[chosen]
-    begin = np.clip(problem.start[idx_q], low, high)
-    share = np.linspace(0.0, 1.0, 201)
-    slopes = []
-    q = problem.start.copy()
-    for part in share:
-        q[idx_q] = low + part * (high - low)
-        state.update(q)
-        slopes.append(sum((term.weight * term.gradient(state)[idx_v] for term in terms), np.zeros(len(idx_v))))
-    slope = np.array(slopes) * (share[1] * (high - low))
-    along = np.vstack([np.zeros(len(idx_v)), np.cumsum(0.5 * (slope[1:] + slope[:-1]), axis=0)])
-    at = np.divide(begin - low, high - low, out=np.zeros_like(begin), where=high > low)
-    now = np.array([np.interp(x, share, values) for x, values in zip(at, along.T, strict=True)])
-    return float(np.maximum(now - along.min(axis=0), 0.0).sum())
+    begin, share = np.clip(problem.start[idx_q], low, high), np.linspace(0.0, 1.0, 26)
+    least, q = np.zeros(len(idx_v)), problem.start.copy()
+    for end in (low, high):
+        slopes = []
+        for part in share:
+            q[idx_q] = begin + part * (end - begin)
+            state.update(q)
+            slopes.append(sum((term.weight * term.gradient(state)[idx_v] for term in terms), np.zeros(len(idx_v))))
+        slope = np.array(slopes) * (share[1] * (end - begin))
+        least = np.minimum(least, np.cumsum(0.5 * (slope[1:] + slope[:-1]), axis=0).min(axis=0))
+    return -float(least.sum())

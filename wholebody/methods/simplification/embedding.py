@@ -8,8 +8,10 @@ columns of its derivatives.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TypeVar
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -17,9 +19,10 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.errors import UndefinedTermError
+from wholebody.figures.figure import Figure
 from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State
-from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings, Term
+from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
 
 SAME = 1e-7  # largest difference in the values and derivatives of one function, relative to their size
 
@@ -48,6 +51,11 @@ class Embedding:
         whole: Array = self._start.copy()
         whole[self.idx_q] = q
         return whole
+
+    @property
+    def trivial(self) -> bool:
+        """Whether the smaller model is the whole one."""
+        return len(self.idx_v) == int(self._model.nv)
 
     def whole(self, state: State) -> State:
         """The state of the whole figure at the posture of the small one; it belongs to the owner of the small state."""
@@ -156,20 +164,49 @@ class EmbeddedBound(Bound):
         return np.asarray(low)[self.embedding.idx_v], np.asarray(high)[self.embedding.idx_v]
 
 
-def restated_term(
-    term: Term, scene: Surroundings, start: Array, embedding: Embedding, *, holds: bool = False
-) -> Term | None:
-    """The term on the smaller figure: resolved anew if that gives the same function, otherwise embedded.
+@dataclass(frozen=True)
+class SmallerScene:
+    """The part of the smaller scene that terms need, before the scene is made, with its start (small nq,)."""
 
-    Rows of a constraint that no joint moves, and that hold, are dropped; None if all rows are dropped.
+    figure: Figure
+    geometry: pin.GeometryModel
+    piece_owner: tuple[str, ...]
+    start: Array
+
+    @property
+    def model(self) -> pin.Model:
+        """The smaller figure's."""
+        return self.figure.model
+
+    @cached_property
+    def state(self) -> State:
+        """A state for all terms."""
+        return State(self.model)
+
+    @cached_property
+    def postures(self) -> list[Array]:
+        """The start and another posture (small nq,), at which functions are compared."""
+        return [self.start, *random_postures(self.model, 1, seed=1)]
+
+
+def restated(terms: Sequence[_T], small: SmallerScene, embedding: Embedding, *, holds: bool = False) -> list[_T]:
+    """Terms on a smaller figure: resolved anew if that gives the same function, otherwise embedded.
+
+    Rows of a constraint that no joint moves, and that hold, are dropped; a constraint of which none is left, too.
 
     Args:
-        term: a resolved term of the whole figure.
-        scene: of the smaller figure.
-        start: (small nq,).
+        terms: resolved ones of the whole figure.
+        small: the smaller scene.
         embedding: of the smaller in the whole figure.
-        holds: whether a term that is a goal and a constraint stands among the constraints.
+        holds: whether terms that are goals and constraints stand among the constraints.
     """
+    found = (
+        term if embedding.trivial and not term.touching else _restated(term, small, embedding, holds) for term in terms
+    )
+    return [term for term in found if term is not None]
+
+
+def _restated(term: Any, small: SmallerScene, embedding: Embedding, holds: bool) -> Any:
     embedded: Term
     if isinstance(term, Goal) and not holds:
         embedded = EmbeddedGoal(term, embedding)
@@ -178,22 +215,20 @@ def restated_term(
     elif isinstance(term, Measure):
         embedded = EmbeddedMeasure(term, embedding)
     else:
-        assert isinstance(term, Bound)
         return EmbeddedBound(term, embedding)
-    state = State(scene.model)
     try:
-        wanted = _values(embedded, state, start)
+        wanted = _values(embedded, small)
     except UndefinedTermError:  # of one's own, at a posture that was tried
         return embedded
     if isinstance(embedded, Constraint):
         wanted, rows = _moving_rows(wanted)
         if not rows:
             return None
-    if term.touching:  # of the whole scene's pieces, which the smaller scene may leave out or enlarge
+    if term.touching:  # of the whole scene's pieces, which the smaller scene may leave out
         return embedded
     try:
-        anew = term.resolve(scene, start)
-        values = _values(anew, state, start)
+        anew = term.resolve(small, small.start)
+        values = _values(anew, small)
     except Exception:  # a user's term may raise any error on another figure
         return embedded
     alike = len(values) == len(wanted) and all(
@@ -203,9 +238,9 @@ def restated_term(
     return anew if alike else embedded
 
 
-def _values(term: Term, state: State, start: Array) -> list[Array]:
-    """Values of a term at a few postures: all that a method reads, except the constant part of a measure."""
-    postures = [start, *random_postures(state.model, 3, seed=1)]
+def _values(term: Term, small: SmallerScene) -> list[Array]:
+    """Values of a term at the postures: all that a method reads, except the constant part of a measure."""
+    state = small.state
     ask: list[Callable[[], object]] = []
     if isinstance(term, Goal):
         ask = [lambda: term.error(state), lambda: state.dense_jacobian(term.jacobian(state)), lambda: term.angular]
@@ -215,7 +250,7 @@ def _values(term: Term, state: State, start: Array) -> list[Array]:
     elif isinstance(term, Measure):
         ask = [lambda: term.gradient(state), lambda: term.curvature(state)]
     values = []
-    for q in postures:
+    for q in small.postures:
         state.update(q)
         values += [np.nan_to_num(np.array(question(), dtype=float), posinf=1e300, neginf=-1e300) for question in ask]
     return values

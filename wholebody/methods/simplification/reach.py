@@ -1,4 +1,4 @@
-"""Balls that contain a piece in every posture within the limits, relative to another joint.
+"""Balls that contain a piece in every posture within the limits, and the pairs of pieces that can come near by them.
 
 A ball with centre p and radius r on a revolute joint of angle a - h ... a + h stays within one ball: the arc of p, at
 distance d from the axis, has the enclosing ball of radius d sin h about the point at distance d cos h from the axis (of
@@ -9,24 +9,23 @@ reference. Balls grow from joint to joint and cover every posture: the bound is 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.records import with_values
+from wholebody.figures.figure import Figure
+from wholebody.geometry.pieces import COAL_ACCURACY
+from wholebody.geometry.proximity import PairTable
+from wholebody.tasks.base import Constraint
+from wholebody.tasks.hold import Hold
 
 
 class Range(NamedTuple):
-    """The motion of a joint with one degree of freedom: rotation or translation along an axis, between two values.
-
-    Attributes:
-        axis: (3,) unit vector in the joint's frame.
-        turns: whether it rotates; otherwise it translates.
-        low, high: least and greatest value, radians or metres; infinite without a limit.
-    """
+    """Rotation, or translation, of a joint along a unit axis (3,) between two values [rad or m], maybe infinite."""
 
     axis: Array
     turns: bool
@@ -35,17 +34,11 @@ class Range(NamedTuple):
 
 
 class Balls(NamedTuple):
-    """Balls that contain pieces, in the frame of one joint.
+    """Balls that contain pieces, in the frame of one joint; there is none for a piece without a bound."""
 
-    Attributes:
-        center: (k, 3) metres.
-        radius: (k,) metres; infinite for a piece without a bound.
-        piece: (k,) indices of the pieces.
-    """
-
-    center: Array
-    radius: Array
-    piece: Indices
+    center: Array  # (k, 3) metres
+    radius: Array  # (k,) metres
+    piece: Indices  # (k,) indices of the pieces
 
 
 class Reach:
@@ -61,45 +54,49 @@ class Reach:
             joint: (n,) that joint.
             frozen: degrees of freedom (tangent indices) that stay as at the start.
         """
-        self.model, self.start = model, start
-        self._resting, self._joint = resting, joint
-        self._frozen = set(frozen)
-        self._ranges = {j: self._range(j) for j in range(1, model.njoints)}
-        self._data = model.createData()
-        pin.forwardKinematics(model, self._data, start)
-        self._still = {j: self._placement_at_start(j) for j in range(1, model.njoints) if self._stays(j)}
+        self._model, self._start, self._frozen = model, start, set(frozen)
+        data = model.createData()
+        pin.forwardKinematics(model, data, start)
+        self._still: dict[int, pin.SE3] = {}
+        self._ranges: dict[int, Range | None] = {}
         self._near: list[list[int]] = [[] for _ in range(model.njoints)]
         for j in range(1, model.njoints):
+            if self._frozen.issuperset(range(model.idx_vs[j], model.idx_vs[j] + model.nvs[j])):
+                self._still[j] = model.jointPlacements[j].actInv(data.liMi[j])
+            else:
+                self._ranges[j] = self._range(j)
             self._near[j].append(model.parents[j])
             self._near[model.parents[j]].append(j)
+        self._own = [_chosen(resting, np.flatnonzero(joint == j)) for j in range(model.njoints)]
+        self._beyond: dict[tuple[int, int], Balls] = {}  # joint and neighbour: what is on its side, as that sees it
 
     def seen_from(self, joint: int) -> Balls:
-        """Balls of all pieces in the frame of a joint; 0 is the world."""
+        """Balls of all pieces with a bound in the frame of a joint; 0 is the world."""
         order, toward = [joint], {joint: -1}
         for node in order:
             for other in self._near[node]:
                 if other not in toward:
                     toward[other] = node
                     order.append(other)
-        arrived: Mapping[int, list[Balls]] = {node: [self._own(node)] for node in order}
         for node in reversed(order[1:]):
-            balls = _joined(arrived[node])
-            if len(balls.piece):
-                arrived[toward[node]].append(self._across(balls, node, toward[node]))
-        return _joined(arrived[joint])
+            edge = node, toward[node]
+            if edge not in self._beyond:
+                self._beyond[edge] = self._across(self._gathered(*edge), *edge)
+        return self._gathered(joint, -1)
 
-    def _own(self, joint: int) -> Balls:
-        mine = np.flatnonzero(self._joint == joint)
-        return Balls(self._resting.center[mine], self._resting.radius[mine], mine)
+    def _gathered(self, node: int, to: int) -> Balls:
+        """The balls of a joint and of all its neighbours but one, in its frame."""
+        parts = [self._own[node], *(self._beyond[other, node] for other in self._near[node] if other != to)]
+        parts = [part for part in parts if len(part.piece)] or parts[:1]
+        return parts[0] if len(parts) == 1 else Balls(*map(np.concatenate, zip(*parts, strict=True)))
 
     def _across(self, balls: Balls, node: int, to: int) -> Balls:
         """Transform balls from the frame of one joint to that of a neighbour in the tree."""
-        up = self.model.parents[node] == to
-        joint = node if up else to
-        place = self.model.jointPlacements[joint]
-        if up:
-            return placed(self._moved(balls, joint, 1.0), place)
-        return self._moved(placed(balls, place.inverse()), joint, -1.0)
+        if not len(balls.piece):
+            return balls
+        if self._model.parents[node] == to:
+            return placed(self._moved(balls, node, 1.0), self._model.jointPlacements[node])
+        return self._moved(placed(balls, self._model.jointPlacements[to].inverse()), to, -1.0)
 
     def _moved(self, balls: Balls, joint: int, sign: float) -> Balls:
         """Balls after motion of the joint, or with sign -1 of its base relative to it."""
@@ -108,18 +105,17 @@ class Reach:
             return placed(balls, still if sign > 0 else still.inverse())
         bound = self._ranges[joint]
         if bound is None:
-            if self.model.joints[joint].shortname().startswith("JointModelSpherical"):
-                return Balls(
-                    np.zeros_like(balls.center), balls.radius + np.linalg.norm(balls.center, axis=1), balls.piece
-                )
-            return with_values(balls, radius=np.full_like(balls.radius, np.inf))
+            if self._model.joints[joint].shortname().startswith("JointModelSpherical"):
+                return about_point(balls, np.zeros(3))
+            return _chosen(balls, np.zeros(0, dtype=np.intp))
         half = 0.5 * (bound.high - bound.low)
         middle = 0.5 * sign * (bound.high + bound.low) if np.isfinite(half) else 0.0
         if not bound.turns:
-            return with_values(balls, center=balls.center + middle * bound.axis, radius=balls.radius + half)
+            moved = with_values(balls, center=balls.center + middle * bound.axis, radius=balls.radius + half)
+            return moved if np.isfinite(half) else _chosen(moved, np.zeros(0, dtype=np.intp))
         along = np.outer(balls.center @ bound.axis, bound.axis)
         across = balls.center - along
-        lever = np.linalg.norm(across, axis=1)
+        lever = np.sqrt((across * across).sum(axis=1))
         if half >= 0.5 * np.pi:
             return with_values(balls, center=along, radius=balls.radius + lever)
         turned = np.cos(middle) * across + np.sin(middle) * across @ pin.skew(bound.axis).T
@@ -127,7 +123,7 @@ class Reach:
 
     def _range(self, index: int) -> Range | None:
         """Range of a revolute or prismatic joint; None for any other."""
-        joint = self.model.joints[index]
+        joint = self._model.joints[index]
         if joint.nv != 1 or joint.nq > 2 or "Mimic" in joint.shortname() or "Composite" in joint.shortname():
             return None
         twist = np.asarray(joint.createData().S).reshape(6)
@@ -136,17 +132,70 @@ class Reach:
             return None
         if joint.nq == 2:
             return Range(turn, True, -np.inf, np.inf)
-        value = float(self.start[joint.idx_q])
-        low, high = self.model.lowerPositionLimit[joint.idx_q], self.model.upperPositionLimit[joint.idx_q]
+        value = float(self._start[joint.idx_q])
+        low, high = self._model.lowerPositionLimit[joint.idx_q], self._model.upperPositionLimit[joint.idx_q]
         low, high = min(float(low), value), max(float(high), value)
         return Range(turn if turn.any() else slide, bool(turn.any()), low, high)
 
-    def _stays(self, index: int) -> bool:
-        joint = self.model.joints[index]
-        return self._frozen.issuperset(range(joint.idx_v, joint.idx_v + joint.nv))
 
-    def _placement_at_start(self, index: int) -> Any:
-        return self.model.jointPlacements[index].actInv(self._data.liMi[index])
+def reachable_pairs(
+    figure: Figure,
+    reach: Reach,
+    geometry: pin.GeometryModel,
+    table: PairTable,
+    numbers: Indices,
+    clearances: Array,
+    constraints: Iterable[Constraint],
+) -> Mask:
+    """The pairs (k,) that can come as near as their clearance, for all that is proven; the others never do.
+
+    Args:
+        figure: the figure.
+        reach: of all pieces, on its joints.
+        geometry: the pieces, on its joints.
+        table: pieces and pairs, whose pieces may be on other joints.
+        numbers: (k,) of the pairs in the table.
+        clearances: (k,) of each pair, metres.
+        constraints: resolved ones; frames held in the world bound the positions of all pieces.
+    """
+    pieces, pairs = geometry.geometryObjects, table.pairs[numbers]
+    joint: Indices = np.array([piece.parentJoint for piece in pieces], dtype=np.intp)
+    turn = np.array([piece.placement.rotation for piece in pieces]).reshape(-1, 3, 3)
+    center = np.array([piece.placement.translation for piece in pieces]).reshape(-1, 3)
+    seats, seat = np.unique(joint, return_inverse=True)
+    views = [(seat, [reach.seen_from(int(one)) for one in seats], 0.0)]
+    # m: largest displacement of a piece by errors of holds; an accepted answer has less
+    views += [(np.where(joint == 0, 0, -1), [balls], 1e-3) for balls in held_balls(figure, reach, constraints)]
+    open_ = np.ones(len(pairs), dtype=bool)
+    for row_of, seen, slack in views:
+        place, radius = np.zeros((len(seen) + 1, len(pieces), 3)), np.full((len(seen) + 1, len(pieces)), np.inf)
+        for row, balls in enumerate(seen):
+            place[row, balls.piece], radius[row, balls.piece] = balls.center, balls.radius
+        for fixed, moving in ((0, 1), (1, 0)):
+            other, own = pairs[:, moving], pairs[:, fixed]
+            at = row_of[own]
+            away = np.einsum("kji,kj->ki", turn[own], place[at, other] - center[own])  # in the axes of the piece
+            room = radius[at, other] + clearances + slack + COAL_ACCURACY
+            apart = np.sqrt((away * away).sum(axis=1)) - table.reach[own] > room
+            apart |= np.sqrt((np.maximum(np.abs(away) - table.half[own], 0.0) ** 2).sum(axis=1)) > room
+            for k in np.flatnonzero(np.isinf(table.reach)):
+                plane, mine = table.swept[k].faces[0], own == k
+                apart[mine] |= away[mine] @ plane[:3] - plane[3] > room[mine]
+            open_ &= ~(apart & (joint[own] != joint[other]))
+    return open_
+
+
+def held_balls(figure: Figure, reach: Reach, constraints: Iterable[Constraint]) -> list[Balls]:
+    """Balls of all pieces in the world, from each frame that is held there."""
+    found = []
+    for hold in constraints:
+        if not isinstance(hold, Hold) or hold.relative_to is not None:
+            continue
+        frame = figure.model.frames[figure.frame_id(hold.frame)]
+        kept = hold.kept_at
+        balls = placed(reach.seen_from(frame.parentJoint), kept * frame.placement.inverse())
+        found.append(balls if hold.orientation else about_point(balls, kept.translation))
+    return found
 
 
 def about_point(balls: Balls, point: Array) -> Balls:
@@ -155,12 +204,10 @@ def about_point(balls: Balls, point: Array) -> Balls:
     return Balls(np.tile(point, (len(radius), 1)), radius, balls.piece)
 
 
-def placed(balls: Balls, place: Any) -> Balls:
+def placed(balls: Balls, place: pin.SE3) -> Balls:
     """Balls in another frame, given the placement of the old frame in it."""
     return with_values(balls, center=balls.center @ place.rotation.T + place.translation)
 
 
-def _joined(parts: list[Balls]) -> Balls:
-    if len(parts) == 1:
-        return parts[0]
-    return Balls(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+def _chosen(balls: Balls, places: Indices) -> Balls:
+    return Balls(balls.center[places], balls.radius[places], balls.piece[places])

@@ -1,67 +1,121 @@
-"""Makes a smaller problem from a problem."""
+"""Makes a smaller problem from a problem, and takes its answers back to the whole figure."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, field, replace
 
-import coal
 import numpy as np
 import pinocchio as pin
 
+from wholebody.assessment.posture import assess
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Indices
 from wholebody.figures.description import ROOT_JOINT
 from wholebody.figures.figure import Figure
-from wholebody.geometry.hull import hull_piece, simplified_hull
 from wholebody.geometry.large_models import geometry_model
-from wholebody.geometry.pieces import COAL_ACCURACY, Piece
 from wholebody.methods.simplification.active_joints import ActiveJoints, active_joints
-from wholebody.methods.simplification.embedding import Embedding, restated_term
-from wholebody.methods.simplification.pairs import PROBE, reachable_pairs
-from wholebody.methods.simplification.simplified import LeftOut, Simplified
+from wholebody.methods.simplification.embedding import Embedding, SmallerScene, restated
+from wholebody.methods.simplification.reach import Balls, Reach, reachable_pairs
 from wholebody.problem import Problem
 from wholebody.scene.geometry_model import SceneGeometry, SceneObject
 from wholebody.scene.scene import Scene
-from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
+from wholebody.solution import Solution
 from wholebody.tasks.bounds import Freeze
-
-GROWTH = 2e-3  # m: how far a piece with fewer corners may protrude from the original one
 
 
 @dataclass(frozen=True)
 class Parts:
-    """The kinds of parts to leave out, separately, so that their effects can be measured.
+    """The kinds of parts to leave out, separately, so that their effects can be measured."""
 
-    Attributes:
-        joints: leave out joints that the problem freezes.
-        lock: also lock joints that are not active.
-        pairs: drop pairs that cannot come near, and things without a remaining pair.
-        growth: how far a piece with fewer corners may protrude from the original one, metres; 0 keeps all pieces.
-    """
-
-    joints: bool = True
-    lock: bool = True
-    pairs: bool = True
-    growth: float = GROWTH
+    joints: bool = True  # leave out joints that the problem freezes
+    lock: bool = True  # also lock joints that are not active
+    pairs: bool = True  # drop pairs that cannot come near, and things without a remaining pair
 
 
 @dataclass(frozen=True)
-class _Smaller:
-    """The part of the smaller scene that terms need, before the scene is made."""
+class LeftOut:
+    """The parts that a simplified problem omits, with bounds on the effect.
 
-    figure: Figure
-    geometry: pin.GeometryModel
-    piece_owner: tuple[str, ...]
+    Attributes:
+        locked: joints that stay as at the start although no bound freezes them.
+        frozen: joints that a bound keeps in place; leaving them out changes nothing.
+        helpers: inequalities for which a locked joint could have helped. An answer in which none of them is at its
+            bound loses at most `excess` by the locking.
+        excess: the measures of the locked joints alone minus their least value. An answer's measure is at most this
+            much higher if no helper and no pair of a locked joint is at its bound.
+        pairs: number of pairs left out. None can come nearer than its clearance in any posture within the limits (and
+            with the frames held that the problem holds); exact.
+        rigid: number of pairs left out because no joint between the two is active.
+        things: names of things without a remaining pair; they are not in the smaller scene.
+        counts: kind of part -> (number in the whole problem, number in the simplified one), for the report.
+    """
+
+    locked: tuple[str, ...]
+    frozen: tuple[str, ...]
+    helpers: tuple[str, ...]
+    excess: float
+    pairs: int
+    rigid: int
+    things: tuple[str, ...]
+    counts: dict[str, tuple[int, int]]
 
     @property
-    def model(self) -> pin.Model:
-        """The smaller figure's."""
-        return self.figure.model
+    def exact(self) -> bool:
+        """Whether the answers are unchanged: no joint is locked but those that the problem freezes."""
+        return not self.locked
+
+    def __str__(self) -> str:
+        """One line for each kind of part left out, with its bound."""
+        lines = [f"{name}: {after} of {before}" for name, (before, after) in self.counts.items()]
+        lines.append(
+            f"{self.pairs} pairs cannot come nearer than their clearance, {self.rigid} do not move to each other: exact"
+        )
+        if self.things:
+            lines.append(f"{len(self.things)} things cannot be reached: exact")
+        if self.frozen:
+            lines.append(f"{len(self.frozen)} joints are frozen by the problem: exact")
+        if self.locked:
+            helped = f"; could have helped {', '.join(self.helpers)}" if self.helpers else ""
+            lines.append(
+                f"{len(self.locked)} joints stay as they start, and move no goal: measure at most {self.excess:.3g} "
+                f"higher by their own share{helped}"
+            )
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True)
+class Simplified:
+    """A smaller problem whose answers are answers of the whole one.
+
+    Attributes:
+        problem: the smaller problem. It has the placements that things had when it was made: simplify anew when they
+            move.
+        whole: the original problem.
+        left_out: the parts that were left out, with bounds.
+    """
+
+    problem: Problem
+    whole: Problem
+    left_out: LeftOut
+    _embedding: Embedding = field(repr=False)
+
+    def posture(self, q: Array) -> Array:
+        """Posture of the whole figure, (nq,), of one of the smaller figure (small nq,)."""
+        return self._embedding.embed(checks.posture(q, self.problem.scene.model.nq))
+
+    def restored(self, solution: Solution) -> Solution:
+        """A method's answer to `problem` for the whole problem: its posture, with that one's assessment."""
+        checks.instance(solution, Solution, "restored: solution", "give what wb.solve(part.problem) returns")
+        q = self.posture(solution.q)
+        judged = assess(self.whole, q)
+        status, message = solution.status, solution.message
+        if status == "solved" and not judged.holds(1e-4):  # m, rad
+            status, message = "infeasible", "what was left out does matter here; solve the whole problem from this one"
+        return replace(solution, q=q, status=status, assessment=judged, message=message)
 
 
 def simplify(problem: Problem, *, lock: bool = True) -> Simplified:
-    """A smaller problem whose answers are answers of this one, with fewer joints, pairs and corners.
+    """A smaller problem whose answers are answers of this one, with fewer joints and pairs.
 
     Args:
         problem: any problem; it is not changed.
@@ -74,42 +128,43 @@ def simplify(problem: Problem, *, lock: bool = True) -> Simplified:
         InputError: it is no problem, or objects were added to or removed from its scene after it was made.
     """
     checks.instance(problem, Problem, "simplify: problem", "state one with wb.Problem(scene, goals=[...])")
-    lock = checks.flag(lock, "lock")
-    return leave_out(problem, Parts(lock=lock))
+    return leave_out(problem, Parts(lock=checks.flag(lock, "lock")))
 
 
 def leave_out(problem: Problem, parts: Parts) -> Simplified:
-    """Leave some kinds of parts out of a problem.
-
-    Raises:
-        InputError: objects were added to or removed from the scene after the problem was made.
-    """
+    """Leave some kinds of parts out of a problem."""
     problem.check_fresh()
     whole = problem.scene
     part = active_joints(problem, parts.lock) if parts.joints else None
     figure, geometry = _smaller_figure(problem, part)
     embedding = Embedding(whole.model, figure.model, problem.start)
     start = problem.start[embedding.idx_q]
-    numbers, rigid = _moving_pairs(problem, geometry)
-    terms = _terms(problem, _Smaller(figure, geometry, whole.piece_owner), start, embedding)
+    table = whole.pair_table
+    joint = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
+    moves = joint[table.pairs[:, 0]] != joint[table.pairs[:, 1]]
+    numbers = np.flatnonzero(moves)
+    small = SmallerScene(figure, geometry, whole.piece_owner, start)
+    constraints = restated(problem.constraints, small, embedding, holds=True)
+    bounds = [bound for bound in problem.bounds if embedding.trivial or not isinstance(bound, Freeze)]  # those lock
+    kept = list(range(geometry.ngeoms))
     if parts.pairs:
+        center = np.array([piece.placement.translation for piece in geometry.geometryObjects]).reshape(-1, 3)
         frozen = np.flatnonzero(part.frozen).tolist() if part is not None else []
         still = [dof for j in frozen for dof in _dofs(figure, whole.model.names[j])]
-        near = reachable_pairs(
-            figure, list(geometry.geometryObjects), whole.pair_table.reach, whole.pair_table.pairs[numbers], start,
-            problem.clearances[numbers], terms[1], still,
-        )  # fmt: skip
+        reach = Reach(figure.model, start, Balls(center, table.reach, np.arange(len(kept))), joint, still)
+        near = reachable_pairs(figure, reach, geometry, table, numbers, problem.clearances[numbers], constraints)
         numbers = numbers[near]
-    pieces, grown = _pieces(problem, geometry, numbers, parts.growth)
-    kept = _kept_pieces(whole, numbers) if parts.pairs else list(range(geometry.ngeoms))
-    small = _scene(whole, figure, geometry, kept, numbers, pieces)
+        used = {whole.piece_owner[index] for index in np.unique(table.pairs[numbers]).tolist()}
+        kept = [k for k, owner in enumerate(whole.piece_owner) if owner in used or owner not in whole.objects]
     made = Problem(
-        small, start, goals=terms[0], constraints=[*terms[1], *terms[2]], measures=terms[3],
+        _scene(whole, figure, geometry, kept, numbers), start, goals=restated(problem.goals, small, embedding),
+        constraints=[*constraints, *restated(bounds, small, embedding)],
+        measures=restated(problem.measures, small, embedding),
         clearance=problem.clearance, range_of_motion=False, balance=False,
     )  # fmt: skip
     made.clearances = problem.clearances[numbers]
     made.measures_given = problem.measures_given
-    return Simplified(made, problem, _left_out(problem, made, part, len(numbers), rigid, grown), embedding)
+    return Simplified(made, problem, _left_out(problem, made, part, int((~moves).sum())), embedding)
 
 
 def _smaller_figure(problem: Problem, part: ActiveJoints | None) -> tuple[Figure, pin.GeometryModel]:
@@ -125,181 +180,49 @@ def _smaller_figure(problem: Problem, part: ActiveJoints | None) -> tuple[Figure
     return figure, geometries[0]
 
 
-def _moving_pairs(problem: Problem, geometry: pin.GeometryModel) -> tuple[Indices, int]:
-    """Numbers of the pairs whose pieces still move relative to each other, and how many do not."""
-    joint = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
-    pairs = problem.scene.pair_table.pairs
-    moves = joint[pairs[:, 0]] != joint[pairs[:, 1]]
-    return np.flatnonzero(moves), int((~moves).sum())
-
-
-def _terms(
-    problem: Problem, small: _Smaller, start: Array, embedding: Embedding
-) -> tuple[list[Goal], list[Constraint], list[Bound], list[Measure]]:
-    """Goals, constraints, bounds and measures on the smaller figure."""
-    same = small.figure is problem.scene.figure
-
-    def restated(terms: tuple[Term, ...], *, holds: bool = False) -> list[Term]:
-        found = [
-            term if same and not term.touching else restated_term(term, small, start, embedding, holds=holds)
-            for term in terms
-        ]
-        return [term for term in found if term is not None]
-
-    if same:
-        goals, constraints = restated(problem.goals), restated(problem.constraints, holds=True)
-        return goals, constraints, list(problem.bounds), list(problem.measures)  # type: ignore[return-value]
-    bounds = tuple(bound for bound in problem.bounds if not isinstance(bound, Freeze))  # frozen joints are locked
-    return (
-        restated(problem.goals), restated(problem.constraints, holds=True),
-        restated(bounds), restated(problem.measures),
-    )  # type: ignore[return-value]  # fmt: skip
-
-
-def _pieces(
-    problem: Problem, geometry: pin.GeometryModel, numbers: Indices, growth: float
-) -> tuple[dict[int, pin.GeometryObject], dict[str, float]]:
-    """Pieces with fewer corners, by index; not if one would be nearer at the start than its clearance."""
-    if growth <= 0.0:
-        return {}, {}
-    scene = problem.scene
-    pairs = scene.pair_table.pairs
-    near = scene.contacts(problem.start, problem.clearance + 2.0 * growth)
-    tight = near.distance < problem.clearances[near.number] + 2.0 * growth
-    crowded = set(near.pair[tight].ravel().tolist())
-    found, grown = {}, {}
-    for index in np.unique(pairs[numbers]).tolist():
-        piece = geometry.geometryObjects[index]
-        made = None if index in crowded else simplified_piece(piece, growth)
-        if made is not None:
-            found[index], grown[piece.name] = made
-    return found, grown
-
-
-def _kept_pieces(scene: Scene, numbers: Indices) -> list[int]:
-    """All pieces of the figure, and those of things with a remaining pair."""
-    used = {scene.piece_owner[index] for index in np.unique(scene.pair_table.pairs[numbers]).tolist()}
-    return [k for k, owner in enumerate(scene.piece_owner) if owner in used or owner not in scene.objects]
-
-
-def _scene(
-    whole: Scene,
-    figure: Figure,
-    geometry: pin.GeometryModel,
-    kept: range | list[int],
-    numbers: Indices,
-    coarse: dict[int, pin.GeometryObject] | None = None,
-) -> Scene:
+def _scene(whole: Scene, figure: Figure, geometry: pin.GeometryModel, kept: list[int], numbers: Indices) -> Scene:
     """A scene of these pieces and pairs, in their original order."""
-    place = {old: new for new, old in enumerate(kept)}
-    chosen = [(coarse or {}).get(old, geometry.geometryObjects[old]) for old in kept]
-    both = [(place[first], place[second]) for first, second in whole.pair_table.pairs[numbers].tolist()]
-    pairs = np.array(both, dtype=np.intp).reshape(-1, 2)
-    made = geometry_model([pin.GeometryObject(piece) for piece in chosen], pairs)
+    place = np.full(geometry.ngeoms, -1, dtype=np.intp)
+    place[kept] = np.arange(len(kept))
+    pairs: Indices = place[whole.pair_table.pairs[numbers]]
+    made = geometry_model([pin.GeometryObject(geometry.geometryObjects[old]) for old in kept], pairs)
     owners = tuple(whole.piece_owner[old] for old in kept)
-    objects = [thing for name, thing in whole.objects.items() if name in set(owners)]
-    places = _places_in_things(objects, owners, geometry, kept, chosen)
-    built = SceneGeometry(figure.model, made, owners, places, pairs)
-    return Scene.of_parts(figure, objects, built)
-
-
-def _places_in_things(
-    objects: list[SceneObject],
-    owners: tuple[str, ...],
-    geometry: pin.GeometryModel,
-    kept: range | list[int],
-    chosen: list[pin.GeometryObject],
-) -> dict[str, list[tuple[int, pin.SE3]]]:
-    """Index of each piece of a thing, and its placement in the thing."""
-    pieces: dict[str, list[int]] = {thing.name: [] for thing in objects}
+    objects: list[SceneObject] = [thing for name, thing in whole.objects.items() if name in set(owners)]
+    pieces: dict[str, list[int]] = {}
     for index, owner in enumerate(owners):
-        if owner in pieces:
-            pieces[owner].append(index)
-    places = {}
-    for thing in objects:
-        places[thing.name] = [
-            (index, part.placement * geometry.geometryObjects[kept[index]].placement.actInv(chosen[index].placement))
-            for index, part in zip(pieces[thing.name], thing.shape.pieces(), strict=True)
+        pieces.setdefault(owner, []).append(index)
+    places = {
+        thing.name: [
+            (index, part.placement) for index, part in zip(pieces[thing.name], thing.shape.pieces(), strict=True)
         ]
-    return places
+        for thing in objects
+    }
+    return Scene.of_parts(figure, objects, SceneGeometry(figure.model, made, owners, places, pairs))
 
 
 def _dofs(figure: Figure, joint: str) -> list[int]:
     """Degrees of freedom of a joint, none if it is not in this figure."""
-    index = list(figure.model.names).index(joint) if joint in list(figure.model.names) else 0
-    first = figure.model.joints[index].idx_v if index else 0
-    return list(range(first, first + figure.model.joints[index].nv)) if index else []
+    names = list(figure.model.names)
+    if joint not in names[1:]:
+        return []
+    made = figure.model.joints[names.index(joint)]
+    return list(range(made.idx_v, made.idx_v + made.nv))
 
 
-def _left_out(
-    whole: Problem, small: Problem, part: ActiveJoints | None, pairs: int, rigid: int, grown: dict[str, float]
-) -> LeftOut:
+def _left_out(whole: Problem, small: Problem, part: ActiveJoints | None, rigid: int) -> LeftOut:
     names = list(whole.scene.model.names)
-    frozen = tuple(names[j] for j in np.flatnonzero(part.frozen & ~part.moving)) if part is not None else ()
-    locked = tuple(names[j] for j in range(1, len(names)) if not (part.moving[j] or part.frozen[j])) if part else ()
-    before = len(whole.scene.pair_table.pairs)
+    before, after = (len(problem.scene.pair_table.pairs) for problem in (whole, small))
     return LeftOut(
-        locked=locked,
-        frozen=frozen,
-        helpers=part.helpers if part is not None else (),
-        excess=part.excess if part is not None else 0.0,
-        pairs=before - rigid - pairs,
+        locked=tuple(names[j] for j in range(1, len(names)) if not (part.moving[j] or part.frozen[j])) if part else (),
+        frozen=tuple(names[j] for j in np.flatnonzero(part.frozen & ~part.moving)) if part else (),
+        helpers=part.helpers if part else (),
+        excess=part.excess if part else 0.0,
+        pairs=before - rigid - after,
         rigid=rigid,
         things=tuple(name for name in whole.scene.objects if name not in small.scene.objects),
-        pieces=grown,
         counts={
             "degrees of freedom": (whole.scene.model.nv, small.scene.model.nv),
-            "pairs": (before, pairs),
+            "pairs": (before, after),
             "pieces": (whole.scene.geometry.ngeoms, small.scene.geometry.ngeoms),
         },
     )
-
-
-def simplified_piece(piece: pin.GeometryObject, growth: float) -> tuple[pin.GeometryObject, float] | None:
-    """A piece with fewer corners around a hull.
-
-    Args:
-        piece: any piece.
-        growth: how far the new piece may protrude from the hull, metres.
-
-    Returns:
-        The piece and how far it protrudes at most; None if the piece has few corners, or cannot be simplified.
-    """
-    if not isinstance(piece.geometry, coal.Convex):
-        return None
-    points = np.array(piece.geometry.points())
-    if len(points) <= 64:  # simplifying fewer corners saves no measurable time
-        return None
-    found = _around(points.tobytes(), growth)
-    if found is None:
-        return None
-    made, out = found
-    coarse = pin.GeometryObject(
-        piece.name, piece.parentJoint, piece.parentFrame, piece.placement * made.placement, made.geometry
-    )
-    coarse.meshColor[:] = piece.meshColor
-    return coarse, out
-
-
-@lru_cache(maxsize=256)
-def _around(corners: bytes, growth: float) -> tuple[Piece, float] | None:
-    """The simplest hull around these corners that protrudes no farther, and how far it does."""
-    points = np.frombuffer(corners).reshape(-1, 3)
-    whole = hull_piece(points)
-    for most in (8, 16, 32, 48):
-        outer = simplified_hull(points, most)
-        out = farthest(outer - whole.placement.translation, whole.geometry)
-        if out <= growth:
-            return hull_piece(outer), out
-    return None
-
-
-def farthest(points: Array, hull: coal.Convex) -> float:
-    """How far a polytope with these corners, (n, 3), protrudes from a hull: the distance is convex, so a corner's."""
-    probe, here, request = coal.Sphere(PROBE), coal.Transform3s.Identity(), coal.DistanceRequest()
-    out = 0.0
-    for point in points:
-        there = coal.Transform3s(np.eye(3), point)
-        # a new result for each query: coal keeps the least distance of all queries of one result
-        out = max(out, float(coal.distance(hull, here, probe, there, request, coal.DistanceResult())) + PROBE)
-    return out + COAL_ACCURACY

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import ClassVar
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -18,10 +18,12 @@ from wholebody.methods.base import Method
 from wholebody.methods.qp.method import QP
 from wholebody.methods.solve import method_for_motions
 from wholebody.motion.avoider import MethodResult, Run
-from wholebody.motion.bisection.keyframes import Group, Kind, collision_groups, fill, key_frames
 from wholebody.motion.bisection.prediction import Prediction, Predictor, path_planes
+from wholebody.motion.windows import runs
 from wholebody.tasks import Freeze, Plane
 from wholebody.tracking.tracks import MOST_FRAMES
+
+Kind = Literal["linear", "quadratic"]
 
 FAR = 0.3  # rad, m: a prediction that goes farther may be a poor local answer, and others are tried
 
@@ -70,12 +72,7 @@ class Bisection:
     short: int = 25
 
     def __post_init__(self) -> None:
-        """Check the settings.
-
-        Raises:
-            InputError: a setting out of range.
-            UnknownNameError: no such method.
-        """
+        """Check the settings."""
         if self.evaluation is not None:
             frames = listed(self.evaluation, "Bisection: evaluation", "[0, 12, 40]")
             checked = tuple(whole(frame, "Bisection: evaluation", 0, MOST_FRAMES) for frame in frames)
@@ -94,12 +91,7 @@ class Bisection:
         method_for_motions(self.method)
 
     def avoid(self, run: Run) -> MethodResult:
-        """Free a clip; see `wholebody.motion.avoider.Avoider`.
-
-        Raises:
-            InputError: an evaluation point beyond the clip's frames.
-            UnknownNameError: a plane or a frozen joint names what the figure does not have.
-        """
+        """Free a clip; see `wholebody.motion.avoider.Avoider`."""
         figure = run.scene.figure
         for frame in self.evaluation or ():
             whole(frame, f"Bisection: evaluation, {run.clip.name}", 0, len(run.clip) - 1)
@@ -137,13 +129,12 @@ class Bisection:
 class Recursion:
     """The recursion of figure 3.2 of the thesis: predict a middle frame, interpolate beside it, go into both halves.
 
-    Every frame that was predicted is a key: it does not change again, and groups end at keys. So the recursion ends
-    after at most one prediction a frame.
+    Groups end at frames that were predicted, so it ends after at most one prediction a frame.
 
     Attributes:
         q: (n, nq) the present postures.
         bad: (n,) which of them overlap.
-        keys: frames that were predicted and are free, and evaluation points.
+        keys: frames that were predicted and are free, and evaluation points; they do not change again.
         stuck: frames whose prediction failed.
     """
 
@@ -160,17 +151,12 @@ class Recursion:
         self._state, self._whole = State(run.scene.model), True
         self.q = np.array(run.terms.q)
         self.bad: Mask = np.array([not predictor.free(posture) for posture in self.q])
-        self.at_first = int(self.bad.sum())
+        self._at_first = max(1, int(self.bad.sum()))
         self.keys: set[int] = set()
         self.stuck: set[int] = set()
 
     def free(self, evaluation: Iterable[int], *, whole: bool = True) -> None:
-        """Free the evaluation points and both ends, then everything between them.
-
-        Args:
-            evaluation: frames.
-            whole: go on where a frame cannot be freed; else that ends it.
-        """
+        """Free the evaluation points and both ends, then all between; `whole`: also after a frame that is stuck."""
         self._whole = whole
         last = len(self.q) - 1
         points = sorted({0, last, *evaluation})
@@ -208,19 +194,13 @@ class Recursion:
         while waiting and not self._ended():
             low, high = waiting.pop()
             for group in collision_groups(self.bad, low, high, self._settings.buffer / 100.0, self._settings.least):
-                if not self._ended() and self._bisect(group):
+                if not self._ended() and self._key(group.middle):
+                    self._fill(group.first - 1, group.middle, group.last + 1)
                     waiting += [(group.first - 1, group.middle), (group.middle, group.last + 1)]
-
-    def _bisect(self, group: Group) -> bool:
-        """Predict the middle and interpolate the others; whether the middle is free now."""
-        if not self._key(group.middle):
-            return False
-        self._fill(group.first - 1, group.middle, group.last + 1)
-        return True
 
     def _key(self, frame: int) -> bool:
         """Predict the posture of a frame with planes; where that fails or goes far, the least effort of several."""
-        if self._run.watch.tell(self.share_done(), f"frame {frame}"):
+        if self._run.watch.tell(1.0 - int(self.bad.sum()) / self._at_first, f"frame {frame}"):
             return False
         planes = path_planes(self._run.scene.figure, self.q, frame, self._swinging(frame), self._state)
         short = self._short
@@ -287,16 +267,9 @@ class Recursion:
                 self.q[frame] = self._run.terms.within(frame, self.q[frame])
                 self.bad[frame] = not self._predictor.free(self.q[frame])
 
-    def share_done(self) -> float:
-        """Share of the frames that overlapped at first which no longer do."""
-        return 1.0 - int(self.bad.sum()) / max(1, self.at_first)
-
 
 def hold_between(recursion: Recursion, predictor: Predictor) -> None:
-    """Move interpolated frames to the nearest posture in which everything holds, in place, where one is found.
-
-    Steps of the tracker find most; what they do not find is predicted.
-    """
+    """Move interpolated frames to the nearest posture in which everything holds, in place, where one is found."""
     run = predictor.run
     changed = np.flatnonzero((run.terms.q != recursion.q).any(axis=1)).tolist()
     for done, frame in enumerate(changed):
@@ -311,3 +284,86 @@ def hold_between(recursion: Recursion, predictor: Predictor) -> None:
             if not good:
                 continue
         recursion.q[frame] = nearest
+
+
+class Group(NamedTuple):
+    """Consecutive frames, the last one included, and the one of them that bisects what collides."""
+
+    first: int
+    last: int
+    middle: int
+
+
+def collision_groups(bad: Mask, low: int, high: int, share: float = 0.0, least: int = 1) -> list[Group]:
+    """Groups of the frames (n,) that collide strictly between two that stay; those that overlap or touch are one.
+
+    A run is widened to each side by a share of its number of frames, and to `least` frames where there is room.
+    """
+    first, last = low + 1, high - 1
+    found: list[tuple[int, int]] = []
+    for run in runs(bad[first : last + 1]):
+        begin, end = first + run.first, first + run.end - 1
+        begin, end = _widened(begin, end, round((end - begin + 1) * share), least, first, last)
+        while found and begin <= found[-1][1] + 1:
+            before = found.pop()
+            begin, end = min(before[0], begin), max(before[1], end)
+        found.append((begin, end))
+    marked = [begin + np.flatnonzero(bad[begin : end + 1]) for begin, end in found]
+    return [Group(*ends, int(frames[(len(frames) - 1) // 2])) for ends, frames in zip(found, marked, strict=True)]
+
+
+def _widened(begin: int, end: int, buffer: int, least: int, first: int, last: int) -> tuple[int, int]:
+    begin, end = max(first, begin - buffer), min(last, end + buffer)
+    lacking = least - (end - begin + 1)
+    if lacking > 0:
+        begin = max(first, begin - (lacking + 1) // 2)
+        end = min(last, max(end, begin + least - 1))
+        begin = max(first, min(begin, end - least + 1))
+    return begin, end
+
+
+def linear(model: pin.Model, a: int, b: int, qa: Array, qb: Array, frame: int) -> Array:
+    """Posture (nq,) of a frame on the geodesic from frame a to frame b > a (eq. 3.1 of the thesis)."""
+    return np.asarray(pin.interpolate(model, qa, qb, (frame - a) / (b - a)))
+
+
+def quadratic(model: pin.Model, a: int, m: int, b: int, qa: Array, qm: Array, qb: Array, frame: int) -> Array:
+    """Posture (nq,) of a frame on the parabola through frames a < m < b, of displacements from the middle posture."""
+    before, after = pin.difference(model, qm, qa), pin.difference(model, qm, qb)
+    at_a = (frame - m) * (frame - b) / ((a - m) * (a - b))
+    at_b = (frame - a) * (frame - m) / ((b - a) * (b - m))
+    return np.asarray(pin.integrate(model, qm, at_a * before + at_b * after))
+
+
+def fill(model: pin.Model, q: Array, a: int, m: int, b: int, kind: Kind) -> None:
+    """Interpolate the frames between a, m and b of q (n, nq) in place; a = m or m = b leaves out that side."""
+    ends = q[[a, m, b]].copy()
+    for frame in range(a + 1, b):
+        if frame == m:
+            continue
+        if kind == "quadratic" and a < m < b:
+            q[frame] = quadratic(model, a, m, b, ends[0], ends[1], ends[2], frame)
+        elif frame < m:
+            q[frame] = linear(model, a, m, ends[0], ends[1], frame)
+        else:
+            q[frame] = linear(model, m, b, ends[1], ends[2], frame)
+
+
+def key_frames(model: pin.Model, q: Array, moving: Mask, deviation: float) -> tuple[int, ...]:
+    """Frames of q (n, nq) between which linear interpolation misses no frame by more than a deviation, rad and m.
+
+    An interval is split at the frame that is missed most (Ramer 1972; Douglas and Peucker 1973), from the whole motion
+    on; `moving` (nv,) marks the degrees of freedom that count. The first and the last frame are among them.
+    """
+    found, waiting = {0, len(q) - 1}, [(0, len(q) - 1)]
+    while waiting:
+        a, b = waiting.pop()
+        missed = [
+            np.abs(pin.difference(model, linear(model, a, b, q[a], q[b], k), q[k])[moving]).max(initial=0.0)
+            for k in range(a + 1, b)
+        ]
+        if missed and max(missed) > deviation:
+            worst = a + 1 + int(np.argmax(missed))
+            found.add(worst)
+            waiting += [(a, worst), (worst, b)]
+    return tuple(sorted(found))

@@ -22,19 +22,10 @@ from wholebody.tasks.distance import DistanceMeasure, SquaredDistance
 
 
 def path_planes(figure: Figure, q: Array, frame: int, joints: Sequence[str], state: State) -> list[Plane]:
-    """Planes through the places of joints at a frame, normal to their paths there (eqs. 3.2 and 3.3 of the thesis).
+    """Planes through the places of joints at a frame of q (n, nq), normal to their paths there (eqs. 3.2 and 3.3).
 
     The normal is the direction from the place at this frame to the next one, at the last frame from the one before.
-
-    Args:
-        figure: the figure.
-        q: (n, nq) the present curves.
-        frame: which.
-        joints: names of the frames that move in their planes.
-        state: of the run; it is moved.
-
-    Returns:
-        One plane for each joint that moves there.
+    What does not move there has none. The state is moved.
     """
     if len(q) < 2:
         return []
@@ -65,12 +56,7 @@ class RootEffort(DistanceMeasure):
 
 
 class Prediction(NamedTuple):
-    """What posture prediction found for a frame.
-
-    Attributes:
-        q: (nq,) posture.
-        good: whether nothing overlaps in it, and everything holds that is held in the frame.
-    """
+    """A posture (nq,) that was predicted, and whether nothing overlaps in it and everything that is held holds."""
 
     q: Array
     good: bool
@@ -80,13 +66,7 @@ class Predictor:
     """Posture prediction in the frames of one clip."""
 
     def __init__(self, run: Run, method: Method, room: float) -> None:
-        """Take what stays the same from frame to frame.
-
-        Args:
-            run: of original postures from which the effort is counted, and what holds in each frame.
-            method: solves for postures.
-            room: least distance of what overlapped, metres.
-        """
+        """Take original postures, what solves for postures, and the least distance of what overlapped, metres."""
         self.run, self._method, self._room = run, method, room
         figure = run.scene.figure
         freezes = [term for term in run.terms.given if isinstance(term, Freeze)]
@@ -112,7 +92,7 @@ class Predictor:
             start: (nq,) where the search starts.
             planes: further constraints.
             effort_from: (nq,) posture from which the effort is counted instead.
-            most: iterations of the method after which its best posture so far is taken; None for as many as it likes.
+            most: iterations of the method after which its best posture so far is taken; None for any.
         """
         scene, terms = self.run.scene, self.run.terms
         asked = terms.asked(frame)
@@ -140,9 +120,8 @@ class Predictor:
     def _together(self, frame: int) -> Mask:
         """(pairs,) which pairs are of pieces that are held at each other in a frame, or both in the world.
 
-        No posture has more room between them than where they are held, so none is asked for: hands at one weapon, a
-        foot on the floor. Feet that stand side by side and turn about a toe have little more, and are asked for none
-        either. Otherwise what is held by its place alone may turn, and has its room.
+        No posture has more room between them, so none is asked for: hands at one weapon, a foot on the floor, feet side
+        by side. Otherwise what is held by its place alone may turn, and has its room.
         """
         number = np.arange(self.run.scene.model.njoints)
         stands = np.zeros(len(number), dtype=bool)

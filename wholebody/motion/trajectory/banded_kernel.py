@@ -39,15 +39,8 @@ def add_sums(
 ) -> None:  # fmt: skip
     """Add the sum over groups g of w_g v_g v_g', where v_g is the sum of the rows of the group times their factors.
 
-    Args:
-        band: as for `add_rows`.
-        first: as for `add_rows`.
-        begins: as for `add_rows`.
-        values: as for `add_rows`.
-        factors: (m,) of the rows.
-        members: rows of the groups, one group after the other.
-        groups: (g + 1,) where the members of each group begin.
-        weights: (g,) of the groups.
+    `factors` (m,) are of the rows; `members` are rows of one group after the other, and those of each group begin at
+    `groups` (g + 1,); `weights` (g,) are of the groups. Else as `add_rows`.
     """
     total = np.zeros(band.shape[0])
     for group in range(len(groups) - 1):

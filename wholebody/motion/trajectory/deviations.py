@@ -63,13 +63,7 @@ class Chart:
         return np.asarray(pin.difference(self.model, self.original[frame], q))
 
     def carried(self, frame: int, x: Array, rows: Array) -> Array:
-        """Derivatives (r, nv) with respect to x, of derivatives (r, nv) with respect to the posture's tangent.
-
-        Args:
-            frame: whose posture it is.
-            x: (nv,) its deviation.
-            rows: (r, nv).
-        """
+        """Derivatives (r, nv) with respect to the deviation x (nv,) of a frame, of rows (r, nv) in its tangent."""
         curved = self.curved
         if not len(curved) or not x[curved].any():
             return rows
@@ -77,12 +71,7 @@ class Chart:
         return self._times(rows, turned)
 
     def between(self, before: Array, after: Array, share: float) -> tuple[Array, Array, Array]:
-        """The posture between two postures (nq,), and its derivatives with respect to both.
-
-        Returns:
-            (nq,) the posture at this share of the way, and two arrays (nv, nv) from the tangents of both postures to
-            its own tangent. They are diagonal but for curved joints.
-        """
+        """The posture at a share of the way between two (nq,), and its derivatives (nv, nv) with respect to both."""
         model = self.model
         way = np.asarray(pin.difference(model, before, after))
         q = np.asarray(pin.integrate(model, before, share * way))

@@ -1,20 +1,15 @@
-"""A primal-dual interior-point method for programs with one block a frame and bands between.
+"""A primal-dual interior-point method (Mehrotra 1992) for programs with one block a frame and bands between.
 
     minimise    1/2 z' P z + c' z
     subject to  lower <= G z <= upper,   least <= z <= most
 
-With A z >= a for all bounds, slacks s = A z - a and multipliers y, each iteration solves Newton's equations of the
-conditions of optimality with s_i y_i = mu, first for mu = 0 and then for the mu that this predicts (Mehrotra 1992, "On
-the implementation of a primal-dual interior point method"). They come down to one matrix,
+With A z >= a for all bounds, slacks s = A z - a and multipliers y, Newton's equations come down to one matrix,
 
     K = P + A' diag(y / s) A .
 
 An unknown that nothing couples with others but rows, such as the slack of a missed contact, is eliminated: of its rows
-the sum of w a a' becomes sum w a a' - v v' / (p + sum w), with v = sum w a and its own diagonal p. What is left are the
-deviations. In the order of the frames K is a band as wide as the degrees of freedom of two frames, of three with loads.
-Its Cholesky factor takes n b^2 operations for n unknowns and a half width of b.
-
-It begins at a known point, with shortfalls in the slacks and half of a slack's price as the multiplier of its rows.
+the sum of w a a' becomes sum w a a' - v v' / (p + sum w), with v = sum w a and its own diagonal p. What is left is a
+band, in the order of the frames. docs/theory/trajectory.md has the reasons.
 """
 
 from __future__ import annotations
@@ -33,17 +28,9 @@ LEAST = 1e-3  # room at the beginning to a bound that is missed then, and to one
 
 
 class BandedQP(NamedTuple):
-    """A program; matrices are scipy.sparse.csc_array or csc_matrix.
+    """A program; P (n, n) is symmetric and positive definite, with both triangles; G (m, n); both are sparse columns.
 
-    Attributes:
-        P: (n, n) symmetric and positive definite, both triangles.
-        c: (n,).
-        G: (m, n).
-        lower: (m,).
-        upper: (m,).
-        least: (n,).
-        most: (n,).
-        start: (n,) where the iteration begins; None for the middle between bounds.
+    `start` (n,) is where the iteration begins; None for the middle between bounds.
     """
 
     P: Any
@@ -57,13 +44,7 @@ class BandedQP(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """Of a program.
-
-    Attributes:
-        z: (n,) the minimiser, within `least` and `most`; finite.
-        solved: whether the conditions of optimality hold.
-        iterations: of the method.
-    """
+    """The minimiser (n,) of a program, finite and within `least` and `most`; whether it is optimal; iterations."""
 
     z: Array
     solved: bool
@@ -143,11 +124,7 @@ def _without(fixed: Mask, program: BandedQP, accuracy: float, gap: float) -> Ans
 
 
 class _Bounds:
-    """All bounds as A z >= a: rows from below and above, and unknowns from below and above.
-
-    Attributes:
-        a: (k,).
-    """
+    """All bounds as A z >= a (k,): rows from below and above, and unknowns from below and above."""
 
     def __init__(self, program: BandedQP) -> None:
         lower, upper, least, most = program.lower, program.upper, program.least, program.most
@@ -192,12 +169,9 @@ class _Matrices:
     """The matrices of a program, split into banded unknowns and slacks.
 
     Attributes:
-        P: (n, n).
-        G: (m, n).
-        transposed: (n, m) of G.
+        P, G, transposed: (n, n), (m, n) and (n, m) of G.
         slack: indices of the slacks.
-        share: (m, slacks) columns of G of the slacks.
-        rows: (m, n - slacks) the other columns.
+        share, rows: (m, slacks) columns of G of the slacks, and the other columns.
         sums, columns: these two transposed.
     """
 
@@ -223,10 +197,7 @@ class _Matrices:
         self._K = np.empty_like(self._base)  # one for all iterations: fresh memory of this size costs time
 
     def factor(self, rows: Array, unknowns: Array) -> _Factor | None:
-        """Of K, with weights (m,) of the rows and (n,) of the unknowns; None where it is singular.
-
-        It takes the memory of the factor before.
-        """
+        """Of K, with weights (m,) of rows and (n,) of unknowns, in the last one's memory; None where singular."""
         own = self._own + unknowns[self.slack]
         shared = self._squares @ rows
         weights = rows.copy()
@@ -300,17 +271,7 @@ class _Factor(NamedTuple):
 
 
 class _Newton(NamedTuple):
-    """Newton's equations at one point.
-
-    Attributes:
-        matrices: of the program.
-        bounds: of the program.
-        factor: of K.
-        derivative: (n,) of the Lagrangian.
-        missed: (k,) A z - a - s.
-        s: (k,) slacks.
-        y: (k,) multipliers.
-    """
+    """Newton's equations at slacks s and multipliers y (k,): the Lagrangian's derivative (n,), and A z - a - s (k,)."""
 
     matrices: _Matrices
     bounds: _Bounds
@@ -331,10 +292,7 @@ class _Newton(NamedTuple):
 
 
 def _slacks(P: Any, G: Any, unbounded: Mask) -> Mask:
-    """(n,) unknowns that P does not couple with others, of each row the last of them: no row has two slacks.
-
-    Only those that are unbounded above (n,): a slack begins where its rows are met.
-    """
+    """(n,) unknowns, unbounded above, that P does not couple with others, of each row the last."""
     alone: Mask = (np.diff(P.indptr) == 1) & (P.diagonal() != 0.0) & (np.diff(G.indptr) > 0) & unbounded
     found = np.flatnonzero(alone)
     shares = sp.coo_array(G[:, found])

@@ -1,12 +1,9 @@
 """Loads of a trajectory: rows that keep torques within strength, and the zero moment point within the support.
 
-A clip may need more than the strength of a joint already, and may lean farther than its feet reach. So the bounds are:
-no joint more than its strength or than the largest torque that the original clip needs of it in this direction; and the
-zero moment point in no frame farther outside of an edge of its support than it is there in the original. A clip that
-may be slowed keeps to the strength of a joint if the original slowed as far as may be does.
-
-Differences of postures amplify noise, so recordings are filtered first (`wholebody.motion.clip_torques.smoothed`).
-Rows are those of the filtered original with the deviation on it, which is smooth itself.
+No joint needs more than its strength or than the largest torque that the original clip needs of it in this direction;
+the zero moment point is in no frame farther outside of an edge of its support than it is there in the original. A clip
+that may be slowed keeps to the strength of a joint if the original slowed as far as may be does. Rows are those of the
+filtered original (`wholebody.motion.clip_torques.smoothed`) with the deviation on it, which is smooth itself.
 """
 
 from __future__ import annotations
@@ -82,16 +79,7 @@ class ClipLoads:
         self, clip: Clip, dynamics: InverseDynamics, stands: Sequence[Stand], bounds: LoadBounds,
         changed: Array | None = None, defects: Defects | None = None,
     ) -> None:  # fmt: skip
-        """Look at a clip.
-
-        Args:
-            clip: the original postures.
-            dynamics: of the figure.
-            stands: where each frame stands.
-            bounds: of the loads.
-            changed: (n, nq) postures made of them, whose loads are looked at; None for the original ones.
-            defects: of the loads; None for none.
-        """
+        """Look at a clip, or at postures made of it (n, nq), with defects of their loads."""
         self._defects, self._changed = defects, changed
         self.figure, self.dt, self.bounds, self._original = clip.figure, clip.dt, bounds, clip.q
         self.base = on_filtered(clip.figure, clip.q, clip.q if changed is None else changed, clip.dt)
@@ -101,15 +89,7 @@ class ClipLoads:
     def original(
         cls, clip: Clip, feet: Mapping[str, Mask], strength: Strength, terms: FrameTerms, stretch: float = 1.0
     ) -> ClipLoads:
-        """Those of an original clip, whose own loads are among the bounds.
-
-        Args:
-            clip: the original.
-            feet: foot -> (n,) frames in which it stands.
-            strength: of the person.
-            terms: what is held.
-            stretch: by which factor the clip may be slowed.
-        """
+        """Those of an original clip on its feet (foot -> (n,)) that may be slowed; its own loads are bounds too."""
         dynamics = InverseDynamics(clip.figure, tuple(feet), 0.8)  # the friction of `wb.motion.torques`
         base = smoothed(clip, CUTOFF).q
         lower, upper = torque_limits(clip.figure, strength)
@@ -146,25 +126,14 @@ class ClipLoads:
         return torque, leaning + moved + bounds.outside[frame]
 
     def leaning(self, stand: Stand, loads: Loads, pressed: bool | None = None) -> Array:
-        """(e,) distances of the zero moment point from the edges of the support; none where it says little.
-
-        Args:
-            stand: where the frame stands.
-            loads: of the frame.
-            pressed: whether it says much; None to see that from the loads.
-        """
+        """(e,) distances of the zero moment point from the edges of the support; none where it is not `pressed` on."""
         pressed = loads.wrench[2] >= LIGHT * self.dynamics.weight if pressed is None else pressed
         if not len(stand.normals) or not pressed:
             return np.zeros(0)
         return stand.margins(zero_moment_point(loads.wrench, stand.height))
 
     def of(self, q: Array, times: Array | None = None) -> ClipLoads:
-        """The same for other postures (m, nq), with these bounds.
-
-        Args:
-            q: as many as before, or at other times of the clip.
-            times: (m,) these times, seconds; None for those of the frames.
-        """
+        """The same for as many other postures (n, nq), or for (m, nq) at other times (m,) of the clip, seconds."""
         if times is None:
             clip = Clip(self.figure, self._original, self.dt)
             return ClipLoads(clip, self.dynamics, self.stands, self.bounds, q, self._defects)
@@ -177,9 +146,8 @@ class ClipLoads:
     def corrected(self, q: Array) -> ClipLoads:
         """The same with rows whose loads at postures (n, nq) are those that `wb.motion.torques` measures.
 
-        Rows see a change of the recording as it is, at three frames, and the feet where they stood. The measurement
-        filters the sum, and looks at which feet stand then. The difference of both is added to the rows; it is nearly
-        the same for postures nearby.
+        Rows see a change of the recording as it is, and the feet where they stood. The measurement filters the sum, and
+        looks at which feet stand then. The difference of both is nearly the same for postures nearby.
         """
         own, clip = self.of(q), Clip(self.figure, q, self.dt)
         steady, marks = smoothed(clip, CUTOFF).q, standing_feet(clip, self.dynamics.feet)
@@ -211,10 +179,7 @@ class ClipLoads:
         return self.worst() > TOLERATED
 
     def timed(self, b: Array) -> TimedRows:
-        """Rows of the loads of these postures, when they are passed at rates whose squares are b (n,) or about that.
-
-        Torques and wrenches are linear in b and its derivative; the split over the soles is that at b.
-        """
+        """Rows of the loads of these postures, when they are passed at rates whose squares are b (n,) or about that."""
         changes = np.gradient(b, self.dt)
         parts = [self._timed(frame, float(b[frame]), float(changes[frame])) for frame in range(1, len(b) - 1)]
         parts = [part for part in parts if len(part.gap)]
@@ -268,11 +233,7 @@ class ClipLoads:
 
 
 class WindowLoads:
-    """Loads of the frames of a window, with their derivatives with respect to deviations.
-
-    Attributes:
-        frames: those of the window whose loads are known; all but the ends of the clip.
-    """
+    """Loads of the frames of a window but the ends of the clip, with derivatives with respect to deviations."""
 
     def __init__(self, loads: ClipLoads, first: int, count: int) -> None:
         """Take the frames from `first` on."""
@@ -296,14 +257,7 @@ class WindowLoads:
         return self._loads.gaps(number, found)
 
     def rows(self, frame: int, x: Array) -> tuple[Array, tuple[Array, ...]]:
-        """Gaps (r,) of what is near its bound, and derivatives (r, nv) for the frames before, at and after.
-
-        Those of frames beyond the window are left out.
-
-        Args:
-            frame: of the window.
-            x: (n, nv) deviations.
-        """
+        """Gaps (r,) near bounds at deviations (n, nv), and derivatives (r, nv) for the frames before, at and after."""
         loads, number = self._loads, self._first + frame
         stand = loads.stands[number]
         before, here, after = self.postures(frame, x)
@@ -344,12 +298,6 @@ def on_filtered(figure: Figure, original: Array, changed: Array, dt: float) -> A
 
     Differences of a recording amplify its noise, so it is filtered. Filtering what was changed would hide how fast it
     changes; so the change is taken as it is, on top of the filtered recording.
-
-    Args:
-        figure: of the postures.
-        original: (n, nq) of the recording.
-        changed: (n, nq) made of them.
-        dt: seconds from frame to frame.
     """
     model, steady = figure.model, smoothed(Clip(figure, original, dt), CUTOFF).q
     each = zip(steady, original, changed, strict=True)
@@ -357,15 +305,10 @@ def on_filtered(figure: Figure, original: Array, changed: Array, dt: float) -> A
 
 
 def standing_frames(places: Array, feet: Array) -> Indices:
-    """(m,) frames of a clip whose standing feet are those at places between its frames.
+    """(m,) frames of a clip whose standing feet are those at places (m,) between its frames; `feet` (n,) count them.
 
-    A foot stands from the first frame in which it stands to the last one. So it stands between two frames if it stands
-    in both: a foot that leaves the ground after a frame bears nothing a quarter of a frame later. So of the two frames
-    it is the one in which fewer feet stand, or else the nearer one.
-
-    Args:
-        places: (m,) in frames.
-        feet: (n,) how many feet stand in each frame.
+    A foot stands between two frames if it stands in both: one that leaves the ground after a frame bears nothing a
+    quarter of a frame later. So of two frames it is the one in which fewer feet stand, or else the nearer one.
     """
     near, below, above = (np.clip(to(places).astype(int), 0, len(feet) - 1) for to in (np.rint, np.floor, np.ceil))
     fewer = np.where(feet[below] < feet[above], below, above)
@@ -376,14 +319,7 @@ def standing_frames(places: Array, feet: Array) -> Indices:
 def soles_of(
     dynamics: InverseDynamics, q: Array, stands: Mapping[str, Mask], terms: FrameTerms
 ) -> tuple[list[Stand], list[Stand]]:
-    """Where each of postures (n, nq) stands, and where it stands while its feet are held; often the same objects.
-
-    Args:
-        dynamics: with the feet that stand.
-        q: the postures.
-        stands: foot -> (n,) frames in which it stands.
-        terms: what is held.
-    """
+    """Where each of postures (n, nq) stands, and where it stands while its feet are held; often the same objects."""
     own = [dynamics.stand(posture, [bool(marks[k]) for marks in stands.values()]) for k, posture in enumerate(q)]
     joints = dynamics.soles.joints
     return own, [stand.shifted([terms.shift(k, joint) for joint in joints]) for k, stand in enumerate(own)]

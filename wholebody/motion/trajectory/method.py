@@ -114,10 +114,7 @@ class Trajectory:
     def _freed(
         self, run: Run, reference: Array, loads: ClipLoads | None, rate: float, beyond: Mask | None = None
     ) -> tuple[Array, list[str]]:
-        """Postures (n, nq) that are free, as near as can be to reference postures (n, nq), and what is missed.
-
-        Frames (n,) that are beyond something else are changed too.
-        """
+        """Postures (n, nq) that are free, near reference postures (n, nq), and what is missed; `beyond` change too."""
         windows = ClipRun(run, reference, self.time, rate, loads)
         q: Array = np.array(reference)
         run.watch.tell(0.0, "looking for collisions")

@@ -93,15 +93,7 @@ class NodeEvaluator:
         self, workspace: Workspace, chart: Chart, terms: Sequence[Terms], clearance: float,
         loads: WindowLoads | None = None,
     ) -> None:  # fmt: skip
-        """Take what is needed.
-
-        Args:
-            workspace: of this run alone.
-            chart: the window's frames.
-            terms: for each frame, its resolved constraints.
-            clearance: metres.
-            loads: of the window.
-        """
+        """Take what is needed; `terms` are the resolved constraints of each frame."""
         self.workspace, self.chart, self.clearance, self._terms = workspace, chart, clearance, terms
         self.loads = loads
         self._known: dict[Node, tuple[Array, float, Rows]] = {}  # where each node was looked at last
@@ -112,13 +104,7 @@ class NodeEvaluator:
         return found if self.loads is None else sorted([*found, *map(Node.of_loads, self.loads.frames)])
 
     def at(self, node: Node, x: Array, within: float) -> Rows:
-        """The rows of a node.
-
-        Args:
-            node: where.
-            x: (n, nv) deviations of the window's frames.
-            within: metres beyond the clearance; pairs farther apart have no rows.
-        """
+        """The rows of a node at deviations x (n, nv), of pairs `within` metres beyond the clearance."""
         if node.loaded >= 0:
             assert self.loads is not None
             gap, parts = self.loads.rows(node.loaded, x)

@@ -42,15 +42,9 @@ class Limits(NamedTuple):
         cls, terms: FrameTerms, chart: Chart, first: int, seams: tuple[bool, bool], rate: float | None = None,
         begun: Array | None = None,
     ) -> Limits:  # fmt: skip
-        """Those of the frames of a clip; at a seam nothing moves.
+        """Those of a chart of a clip's frames from `first` on; at a seam nothing moves from what is begun with (n, nv).
 
-        Args:
-            terms: of the clip.
-            chart: of the frames from `first` on.
-            first: number of its first frame.
-            seams: whether the clip goes on before and after them.
-            rate: factor of the speed limits; None for no bounds on speed.
-            begun: (n, nv) deviations that frames at seams keep; None for none.
+        `seams` say whether the clip goes on before and after them, `rate` is the factor of speed limits, None for none.
         """
         count, nv = len(chart), chart.model.nv
         lower, upper = chart.bounds(terms.scene.figure.limits)
@@ -81,13 +75,7 @@ class Limits(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """A program, and where its unknowns are.
-
-    Attributes:
-        program: the program.
-        place: (n, a) index of the deviation of each frame and degree of freedom that counts.
-        dofs: (a,) these degrees of freedom.
-    """
+    """A program, the index in it of each frame's deviations (n, a), and their degrees of freedom (a,)."""
 
     program: BandedQP
     place: Indices
@@ -280,15 +268,10 @@ def _speed_part(step: Step, place: Indices, limits: Limits, size: int) -> tuple[
 
 
 def _brought_back(x: Array, past: Array, radius: float) -> Array:
-    """(a,) share of what changes pass their bounds by that a step within the trust region can take back.
+    """(a,) share of what changes (n - 1, a) pass their bounds by that a step within the trust region can take back.
 
     It can shift all later frames by what is passed in all, or take a share of every deviation away, for the original
     keeps to the bounds.
-
-    Args:
-        x: (n, a) deviations.
-        past: (n - 1, a) by how much their changes pass the bounds.
-        radius: of the trust region.
     """
     shifted = radius / np.maximum(np.abs(past).sum(axis=0), radius)
     shrunk = min(0.5, radius / max(float(np.abs(x).max(initial=0.0)), 1e-9))

@@ -1,12 +1,9 @@
 """Timing of a clip: the same postures one after the other, passed more slowly where something does not hold.
 
-Along a path q(s), with s the time of the clip as it is, the rate ds/dt and its square b(s) say how fast it is passed; b
-is 1 for the clip as it is. Then ``dq/dt = q'(s) sqrt(b)`` and ``d2q/dt2 = q''(s) b + q'(s) b'(s) / 2``. So bounds on
-speeds are bounds on b, and torques are linear in b and its derivative (Verscheure, Demeulenaere, Swevers, De Schutter
-and Diehl 2009, "Time-optimal path tracking for robots: a convex optimization approach"). They minimise the duration.
-Here the timing is to stay what it is where nothing is wrong, so the program minimises
+Along a path q(s) the square of the rate b(s) = (ds/dt)^2 is 1 for the clip as it is. Speeds bound b, and torques are
+linear in b and its derivative (Verscheure and others 2009). The timing is to stay where nothing is wrong:
 
-    1/2 sum_k ((1 - b_k)^2 + tau^4 ((b_(k+1) - 2 b_k + b_(k-1)) / h^2)^2) + weight * sum of what loads miss
+    minimise 1/2 sum_k ((1 - b_k)^2 + tau^4 ((b_(k+1) - 2 b_k + b_(k-1)) / h^2)^2) + weight * sum of what loads miss
 
 subject to ``1/stretch^2 <= b_k <= 1``, and b_k at most the square of the rate that speed limits leave.
 """
@@ -27,14 +24,7 @@ SPREAD = 0.2
 
 
 class TimedRows(NamedTuple):
-    """Loads that are linear in b and in its derivative: ``gap + speed b + change b' >= 0``.
-
-    Attributes:
-        frame: (r,) frame of each row.
-        gap: (r,) what does not depend on the timing.
-        speed: (r,) derivative with respect to b.
-        change: (r,) derivative with respect to b', seconds.
-    """
+    """Loads that are linear in b and its derivative, of frames (r,): ``gap + speed b + change b' >= 0``, all (r,)."""
 
     frame: Indices
     gap: Array
@@ -45,11 +35,8 @@ class TimedRows(NamedTuple):
 def slowed(most: Array, dt: float, stretch: float, loads: TimedRows | None = None) -> Array:
     """(n,) squares of the rate at which each frame is passed: 1 where the timing stays, else less.
 
-    Args:
-        most: (n,) bounds on it that speed limits give.
-        dt: seconds from frame to frame.
-        stretch: by which factor the clip may be slowed at most, anywhere; more than 1.
-        loads: further rows; what cannot be met is missed by as little as can be.
+    Speed limits bound it by `most` (n,), and `stretch` is by how much the clip may be slowed, more than 1. What cannot
+    be met of further rows is missed by as little as can be.
     """
     count = len(most)
     least = 1.0 / stretch**2
@@ -91,13 +78,7 @@ def _rate(count: int, dt: float) -> sp.csr_matrix:
 
 
 def speed_bounds(steps: Array, slowest: Array, fastest: Array) -> Array:
-    """(n,) largest squares of the rate with which every motion between frames keeps to its bounds.
-
-    Args:
-        steps: (n - 1, nv) motion from each frame to the next.
-        slowest: (n - 1, nv) or (nv,) its negative bounds, for the time of a frame.
-        fastest: the same, positive.
-    """
+    """(n,) largest squares of the rate with which every motion (n - 1, nv) keeps to negative and positive bounds."""
     bound = np.where(steps < 0.0, slowest, fastest)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(steps != 0.0, bound / steps, np.inf)
@@ -108,25 +89,16 @@ def speed_bounds(steps: Array, slowest: Array, fastest: Array) -> Array:
 
 
 class Timing(NamedTuple):
-    """A new timing.
-
-    Attributes:
-        times: (m,) seconds of the clip as it is, for each frame of the slowed clip, `dt` apart.
-        largest: factor by which the clip is slowed most, anywhere.
-    """
+    """Seconds of the clip as it is for each frame (m,) of the slowed one, and by what factor it is slowed most."""
 
     times: Array
     largest: float
 
 
 def timing(b: Array, dt: float) -> Timing | None:
-    """When each frame of the slowed clip is, in the time of the clip as it is; None where its timing stays.
+    """When each frame of the slowed clip is, by squares of the rate b (n,), linear in between; None where timing stays.
 
     The duration becomes a multiple of the time step; for that everything is slowed by less than one step in all.
-
-    Args:
-        b: (n,) squares of the rate at each frame; linear in between.
-        dt: seconds from frame to frame, of both.
     """
     if len(b) < 2 or (b >= 1.0 - 1e-3).all():  # it is slowed by next to nothing
         return None

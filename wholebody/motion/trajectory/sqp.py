@@ -1,13 +1,10 @@
 """Sequential quadratic programming over one window: a filter, a trust region, and only the joints that count.
 
-The objective is quadratic in the deviations, so all that a program gets wrong is the bending of contacts. A step is
-accepted if the pair of objective and shortfall is not worse in both than one that was there before (Fletcher and
-Leyffer 2002, "Nonlinear programming without a penalty function"). Steps along a bent surface are accepted so, which a
-merit function refuses.
+A step is accepted if the pair of objective and shortfall is not worse in both than one that was there before (Fletcher
+and Leyffer 2002, "Nonlinear programming without a penalty function"): so are steps along bent contacts.
 
 A degree of freedom joins the programs when it moves a row that is missed or active. The others cannot help: where no
-active row has an entry, the deviation that minimises the objective is zero. So this leaves out nothing, and most
-programs of a person have ten degrees of freedom a frame instead of 55.
+active row has an entry, the deviation that minimises the objective is zero.
 """
 
 from __future__ import annotations
@@ -164,14 +161,7 @@ class WindowProgram:
     """
 
     def __init__(self, evaluator: NodeEvaluator, objective: Objective, limits: Limits, iterations: int) -> None:
-        """Take what is needed.
-
-        Args:
-            evaluator: of the rows at nodes.
-            objective: of the window.
-            limits: of its deviations.
-            iterations: most steps of one run; a step takes one to three programs.
-        """
+        """Take what is needed; a run has at most so many steps, of one to three programs each."""
         self._evaluator, self._objective, self._limits = evaluator, objective, limits
         self._iterations = iterations
         self.nodes = evaluator.nodes()
@@ -299,10 +289,7 @@ class WindowProgram:
 
 
 def _stalled(missed: Sequence[float]) -> bool:
-    """Whether the last three steps left more than 80 % of the worst shortfall, and brought less than they asked for.
-
-    What was within a centimetre is on the right side, and has contacts that bend.
-    """
+    """Whether the last three steps left more than 80 % of the worst shortfall, and brought less than they asked for."""
     if len(missed) <= 3 or min(missed) <= 0.01:
         return False
     before = min(missed[:-3])

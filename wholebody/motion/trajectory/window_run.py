@@ -58,12 +58,7 @@ SETTINGS = WindowSettings()
 
 
 class WindowResult(NamedTuple):
-    """Postures of a window.
-
-    Attributes:
-        q: (n, nq) postures.
-        missed: what did not succeed; empty where all did.
-    """
+    """Postures (n, nq) of a window, and what did not succeed; empty where all did."""
 
     q: Array
     missed: str
@@ -124,8 +119,8 @@ class ClipRun:
     """Frees windows of one clip."""
 
     def __init__(
-        self, run: Run, reference: Array, time: float | None, rate: float = 1.0,
-        loads: ClipLoads | None = None,
+        self, run: Run, reference: Array, time: float | None, rate: float | None = 1.0,
+        loads: ClipLoads | None = None, near: float = NEARLY,
     ) -> None:  # fmt: skip
         """Take what is needed.
 
@@ -133,11 +128,12 @@ class ClipRun:
             run: of the clip.
             reference: (n, nq) postures that the deviations are from.
             time: seconds that a push spreads over; None for what the jerk of the answer asks for.
-            rate: factor of the speed limits, for a clip that will be slowed by as much.
+            rate: factor of the speed limits, for a clip that will be slowed by as much; None for no limits.
             loads: of the reference postures, if they are to keep to their bounds.
+            near: trust region of windows that are begun with given postures, radians and metres.
         """
         self._run, self._reference = run, reference
-        self._time, self._rate, self._loads = time, rate, loads
+        self._time, self._rate, self._loads, self._near = time, rate, loads, near
 
     def kept_back(
         self,
@@ -148,16 +144,7 @@ class ClipRun:
         cancel: Callable[[float], bool],
         margin: float,
     ) -> tuple[Window, WindowResult]:
-        """A window that was not freed once more, on one side of what it passes, for as many frames as that takes.
-
-        Args:
-            window: that was not freed.
-            freed: what was found for it.
-            q: (n, nq) postures of the clip, with these.
-            found: what is wrong with the reference.
-            cancel: as for `window`.
-            margin: seconds before and after.
-        """
+        """A window that was not freed once more, on one side of what it passes, for as many frames as that takes."""
         for begun in (self._reference, q):
             gaps = dipping(self._run.workspace, begun, range(window.first, window.end - 1))
             kept = kept_beside(self._run, Window(0, len(q)), begun, gaps)
@@ -185,10 +172,12 @@ class ClipRun:
         """
         own = self._of(window, found, cancel, begun)
         objective = self._objective(own, SETTINGS.first if self._time is None else self._time)
+        starts: Iterable[tuple[_Attempt, _Way]]
         if begun is None:
             starts = ((_Attempt(x), _Way(early=True)) for x in self._starts(own, found.depths))
         else:
-            starts = ((_Attempt(x), _Way(NEARLY, NEARLY)) for x in [own.deviations(begun[window.first : window.end])])
+            x = own.deviations(begun[window.first : window.end])
+            starts = [(_Attempt(x), _Way(self._near, self._near))]
         best: _Attempt | None = None
         ended_early: list[_Attempt] = []
         for start, way in chain(starts, ((start, _Way()) for start in ended_early)):
@@ -216,9 +205,8 @@ class ClipRun:
     def _of(self, window: Window, found: Faults, cancel: Callable[[float], bool], begun: Array | None) -> _Window:
         terms, around = self._run.terms, self._reference if begun is None else begun
         chart = Chart(self._run.workspace.model, np.array(self._reference[window.first : window.end]))
-        kept = (
-            None if begun is None else np.array([self._away(around, window.first), self._away(around, window.end - 1)])
-        )
+        ends = (window.first, window.end - 1)
+        kept = None if begun is None else np.array([self._away(begun, frame) for frame in ends])
         limits = Limits.of(terms, chart, window.first, self._seams(window), self._rate, kept)
         held = [terms.held(frame) for frame in range(window.first, window.end)]
         loads = None if self._loads is None else WindowLoads(self._loads, window.first, len(window))
@@ -320,10 +308,9 @@ class ClipRun:
         return _Attempt(x, found.worst, dipping, found.objective, between=program.between)
 
     def _dips(self, own: _Window, x: Array, dipped: set[int], met: bool) -> list[Node]:
-        """Places between frames with deviations x (n, nv) where motions dip, and beside them.
+        """Places between frames with deviations x (n, nv) where motions dip, and beside; everywhere in gaps `dipped`.
 
-        Gaps in `dipped`, which those that dip now join, have places everywhere. Where nothing is missed in frames
-        (`met`) what nearly dips is told too.
+        Those that dip now join these. Where nothing is missed in frames (`met`) what nearly dips is told too.
         """
         q, gaps = own.chart.postures(x), own.moved(x)
         swept = dips(self._run.workspace, q, gaps)
