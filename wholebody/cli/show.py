@@ -56,6 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.base.errors import InputError
     from wholebody.base.files import checked_target
     from wholebody.cli.picture import viewer_of
+    from wholebody.view.screenshot import Screenshots
     from wholebody.view.viewer import SAVED
 
     save: Path | None = arguments.save
@@ -63,18 +64,22 @@ def run(arguments: argparse.Namespace) -> int:
         checked_target(save, "--save", "a scene", SAVED)
     if save is not None and (arguments.port or arguments.host != LOCAL):
         raise InputError("--port and --host are for the live page; leave them out beside --save")
-    problem, q, view, title = _subject(arguments.what, person_options(arguments))
-    if arguments.posture is not None:
-        q = problem.scene.figure.posture(arguments.posture)
-    with viewer_of(problem, view, title, host=arguments.host, port=arguments.port) as viewer:
-        viewer.show(q, problem=problem, pieces=arguments.pieces)
-        if save is None:
-            print(f"showing {title} at {viewer.url}; Ctrl-C ends it", flush=True)
-            viewer.open()
-            viewer.wait(math.inf)
-            viewer.wait_until_closed()
-        else:
-            print(f"wrote {viewer.save(save)}")
+    with Screenshots() as screenshots:
+        if save is not None and save.suffix.lower() == ".png":
+            screenshots.start()  # it gets ready while the figure is loaded
+        problem, q, view, title = _subject(arguments.what, person_options(arguments))
+        if arguments.posture is not None:
+            q = problem.scene.figure.posture(arguments.posture)
+        served = {"host": arguments.host, "port": arguments.port, "screenshots": screenshots}
+        with viewer_of(problem, view, title, **served) as viewer:
+            viewer.show(q, problem=problem, pieces=arguments.pieces)
+            if save is None:
+                print(f"showing {title} at {viewer.url}; Ctrl-C ends it", flush=True)
+                viewer.open()
+                viewer.wait(math.inf)
+                viewer.wait_until_closed()
+            else:
+                print(f"wrote {viewer.save(save)}")
     return 0
 
 

@@ -84,7 +84,7 @@ _NO_AXIS = np.zeros(3)
 _CENTER = np.zeros((1, 3))
 _ALONG = np.array([0.0, 0.0, 1.0])
 _CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
-_SIDES = np.concatenate([np.eye(3), -np.eye(3)])
+_SIDES = np.hstack([np.concatenate([np.eye(3), -np.eye(3)]), np.zeros((6, 1))])
 
 
 def swept_points(geometry: Any) -> SweptPoints:
@@ -100,9 +100,9 @@ def swept_points(geometry: Any) -> SweptPoints:
         return SweptPoints(points, radius, caps, half + radius, _ALONG, 2.0 * radius, box)
     if isinstance(geometry, coal.Box):
         box = np.array(geometry.halfSide)
-        faces = np.empty((6, 4))
-        faces[:, :3], faces[:3, 3], faces[3:, 3] = _SIDES, box, box
-        return SweptPoints(_CORNERS * box, 0.0, faces, math.hypot(*box), _NO_AXIS, 2.0 * min(box.tolist()), box)
+        faces, lengths = _SIDES.copy(), box.tolist()
+        faces[:3, 3] = faces[3:, 3] = box
+        return SweptPoints(_CORNERS * box, 0.0, faces, math.hypot(*lengths), _NO_AXIS, 2.0 * min(lengths), box)
     if isinstance(geometry, coal.Ellipsoid):
         radii = np.array(geometry.radii)
         return SweptPoints(_NONE, 0.0, _NO_FACES, float(radii.max()), _NO_AXIS, 2.0 * float(radii.min()), radii)

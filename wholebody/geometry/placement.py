@@ -43,7 +43,7 @@ def placement(at: PlacementLike, what: str = "placement") -> pin.SE3:
         return _rigid(np.asarray(at.rotation), np.asarray(at.translation), what)
     values = array(at, what, "(x, y, z), (x, y, z, qx, qy, qz, qw), a 4x4 matrix or a pin.SE3")
     if values.shape == (3,):
-        if not max(map(abs, values.tolist())) <= FARTHEST or np.isnan(values).any():
+        if not all(abs(one) <= FARTHEST for one in values.tolist()):
             _check_values(values, what)
         return pin.SE3(_UPRIGHT, values)
     if values.shape == (7,):

@@ -191,7 +191,7 @@ class SceneContents(checks.FixedAttributes):
             checks.known(
                 other, {*self.figure.segments, *carried}, "segment or carried thing", f"attach {name!r}: rests_on"
             )
-        return self._put(name, shape, at, color, to, rests)
+        return self._put(name, shape, at, color, segment=to, rests_on=rests)
 
     def move(self, name: str, *, at: Any, over: float | None = None) -> Self:
         """Move a thing to a new placement in the world, or in its segment's frame; as for `add`.
@@ -227,23 +227,14 @@ class SceneContents(checks.FixedAttributes):
             self._changed()
         return self
 
-    def _put(
-        self,
-        name: str,
-        shape: Shape,
-        at: Any,
-        color: Any,
-        to: str | None = None,
-        rests_on: tuple[str, ...] = (),
-        body: Body | None = None,
-        material: Material = DEFAULT,
-    ) -> Self:
+    def _put(self, name: str, shape: Shape, at: Any, color: Any, **more: Any) -> Self:
+        """Add a thing with `more` fields of a `SceneObject`."""
         checks.instance(shape, Shape, repr(name), SHAPES)
         place = to_placement(at, f"{name!r}: at")
         _warn_of_units(name, place, shape)
         painted = None if color is None else checks.color(color, f"{name!r}: color")
         with self._lock:
-            thing = SceneObject(name, shape, place, to, painted, rests_on, body=body, material=material)
+            thing = SceneObject(name, shape, place, color=painted, **more)
             self._objects[self._free_name(name)] = thing
             self._changed()
         return self
