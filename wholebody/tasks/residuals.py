@@ -42,6 +42,10 @@ def fill_point_rows(rows: Array, point: Array) -> None:
     rows[2, 4] = -x
 
 
+_angular = np.repeat((False, True), 3)
+_angular.flags.writeable = False
+
+
 class PlacementResidual(NamedTuple):
     """Difference between the placement of one frame relative to another and its target, in the axes of the other frame.
 
@@ -71,7 +75,7 @@ class PlacementResidual(NamedTuple):
     @property
     def angular(self) -> Mask:
         """(m,) whether each row is in radians."""
-        return np.array([False] * 3 * self.position + [True] * 3 * self.orientation)
+        return _angular[3 * (not self.position) : 3 + 3 * self.orientation]
 
     def value(self, state: State) -> Array:
         """(m,) the difference."""

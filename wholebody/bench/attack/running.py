@@ -51,7 +51,8 @@ def attack(
         # Half an hour for a first case: it compiles everything, on a machine that has other things to do.
         return None if case is None else Job(case, _attacked, (case, deadline), 1800.0)
 
-    for outcome in run_jobs(next_job, [Child(ONE_THREAD) for _ in range(jobs)]):
+    children = [Child(ONE_THREAD) for _ in range(jobs)]
+    for outcome in run_jobs(next_job, children):
         case = outcome.job.name
         error = outcome.error
         if error is None:
@@ -64,6 +65,8 @@ def attack(
             yield case, Verdict("wrong", said, deadline)
         else:
             yield case, Verdict("wrong", f"the process died: {error.how}")
+    for child in children:
+        child.close()
 
 
 def _attacked(case: Case, deadline: float) -> Verdict:
