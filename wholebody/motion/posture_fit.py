@@ -51,13 +51,7 @@ class Fitter:
     """
 
     def __init__(self, figure: Figure, points: list[str], turns: list[str]) -> None:
-        """Choose the frames.
-
-        Args:
-            figure: the figure.
-            points: frames whose origins are the points.
-            turns: frames that have goals of orientation.
-        """
+        """Choose the frames whose origins are the points, and those that have goals of orientation."""
         self.figure, self.model = figure, figure.model
         self._state = State(figure.model)
         self._point_joints, self._point_parts = self._carried(points)
@@ -119,13 +113,7 @@ class Fitter:
         return np.asarray(np.einsum("ckj,ck->cj", self._base_turns, found))
 
     def cost(self, q: Array, goals: Goals, cones: float = 0.0) -> float:
-        """Half the sum of the squared weighted errors.
-
-        Args:
-            q: (nq,).
-            goals: what is to be reached.
-            cones: weight of the angles by which limbs are outside of their reach cones, metres per radian.
-        """
+        """Half the sum of the squared weighted errors; `cones` weighs angles outside of reach cones, m/rad."""
         self._state.update(q)
         errors, posture = self._errors(q, goals)
         cost = 0.5 * float(errors @ errors + posture @ posture)
@@ -250,16 +238,7 @@ class Fitter:
 def smooth(
     fitter: Fitter, q: Array, goals: Callable[[int], Goals], dt: float, iterations: int, told: Callable[[], None]
 ) -> Array:
-    """The postures (n, nq) of least sum of costs and squared accelerations, by descent from q.
-
-    Args:
-        fitter: of the figure.
-        q: (n, nq) where the descent begins, within the limits.
-        goals: of each frame.
-        dt: seconds from frame to frame.
-        iterations: at most.
-        told: called after each iteration.
-    """
+    """The postures (n, nq) of least sum of costs and squared accelerations, by descent from q within the limits."""
     if len(q) < 3:
         return q
     # m²/rad²: where errors are left, their curvature is about the error times a limb's length, which Gauss-Newton omits

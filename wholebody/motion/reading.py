@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+from collections.abc import Mapping
 from pathlib import Path
 
 from wholebody.base.checks import choice
@@ -11,8 +12,10 @@ from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, InputError, one_line
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
-from wholebody.motion.files import amass, archive, bvh, read_frames
+from wholebody.motion.files import amass, archive, bvh, columns, read_frames
+from wholebody.motion.files.base import Frames
 from wholebody.motion.retargeting import retarget
+from wholebody.motion.roles import column_names
 from wholebody.motion.skeleton import UNITS, UP, SkeletonMotion
 from wholebody.tracking.tracks import check_figure
 
@@ -45,13 +48,19 @@ def read_skeleton(path: str | os.PathLike[str], *, unit: str | None = None, up: 
     return motion
 
 
-def read_clip(path: str | os.PathLike[str], figure: Figure) -> Clip:
+def read_clip(
+    path: str | os.PathLike[str],
+    figure: Figure,
+    names: str | os.PathLike[str] | Mapping[str, Mapping[str, str]] | None = None,
+) -> Clip:
     """Read a clip of a figure; the ending of the file's name says the format.
 
     Args:
         path: a clip of this figure that `Clip.write` wrote (.npz, .bvh), a table (.csv), a joint profile (.txt), or the
             motion of another skeleton (.bvh, AMASS .npz), which is retargeted.
         figure: the figure of the postures.
+        names: as for `wb.retarget`; of a table, by `columns`, the column of a joint of another name:
+            ``{"columns": {"left_knee": "LKnee", "time": "t"}}``.
 
     Raises:
         FileFormatError: the file cannot be read, is cut off, has wrong counts or values that are no finite numbers, or
@@ -62,13 +71,16 @@ def read_clip(path: str | os.PathLike[str], figure: Figure) -> Clip:
     path = checked_path(path, "path")
     check_figure(figure, "read_clip")
     motion = _skeleton(path, None, None)
-    frames = read_frames(path, figure) if motion is None else bvh.own(motion, figure)
+    if path.suffix.lower() == ".csv" and names is not None:
+        frames: Frames | None = columns.read(path, figure, column_names(names, figure))
+    else:
+        frames = read_frames(path, figure) if motion is None else bvh.own(motion, figure)
     if motion is not None and frames is None:
         _say(motion, path)
     try:
         if frames is None:
             assert motion is not None
-            return retarget(motion, figure)
+            return retarget(motion, figure, names)
         return Clip(figure, frames.q, frames.dt, frames.name)
     except InputError as error:
         raise FileFormatError(f"{one_line(path.name)}: {error}") from None

@@ -69,14 +69,8 @@ def held(
 ) -> dict[str, Array]:
     """The goals of points with feet that stand at one place each, at the height at which the figure's stand.
 
-    Before and after it stands, a foot goes over from its own way to that place and back.
-
-    Args:
-        points: role to (n, 3), metres.
-        steps: when the feet stand.
-        places: role to (3,) place in the figure's neutral posture, which stands.
-        lowest: height of the figure's lowest point in it.
-        dt: seconds from frame to frame.
+    Before and after it stands, a foot goes over from its own way to that place and back. Places (3,) and the lowest
+    height are those of the figure's neutral posture, which stands.
     """
     found = dict(points)
     for part in ("toe", "ankle"):
@@ -218,14 +212,7 @@ def rest_axes(motion: SkeletonMotion, roles: Roles) -> Array | None:
 
 
 def targets(motion: SkeletonMotion, figure: Figure, roles: Roles, steps: Footfalls) -> Targets:
-    """Goals of all frames.
-
-    Args:
-        motion: the skeleton.
-        figure: the figure.
-        roles: what they have in common.
-        steps: when its feet stand; where they do, the figure's feet are on the plane z = 0.
-    """
+    """Goals of all frames; where the skeleton's feet stand, the figure's are on the plane z = 0."""
     places, turned, lowest = standing_places(figure, roles)
     own = _Body(places)
     joint = {role: motion.names.index(name) for role, name in roles.joints.items()}

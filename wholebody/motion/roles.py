@@ -150,6 +150,17 @@ def _frames(figure: Figure) -> dict[str, str]:
     return found
 
 
+def column_names(names: object, figure: Figure) -> dict[str, str]:
+    """Joint of a figure, or "time", to its column in a table, of the table `columns` of names; see `matched`."""
+    known = ("time", *figure.joints)
+    for joint, column in (found := dict(_given(names).get("columns", {}))).items():
+        if joint not in known:
+            raise UnknownNameError("joint", str(joint), known, "names of columns")
+        if not isinstance(column, str):
+            raise InputError(f"names of columns: {joint} is {shown(column)}; give the name of a column")
+    return found
+
+
 def _given(names: object) -> dict[str, Mapping[str, str]]:
     if names is None:
         return {}
@@ -157,8 +168,8 @@ def _given(names: object) -> dict[str, Mapping[str, str]]:
         path = checked_path(names, "names")
         names = parsed_toml(read_text(path, "names of bones"), path.name)
     for key, table in names.items():
-        if key not in ("skeleton", "figure"):
-            raise UnknownNameError("table", str(key), ("skeleton", "figure"), "names of bones")
+        if key not in ("skeleton", "figure", "columns"):
+            raise UnknownNameError("table", str(key), ("skeleton", "figure", "columns"), "names of bones")
         if not isinstance(table, Mapping):
             raise InputError(
                 f'names of bones: {key} is {shown(table)}; give names by role, such as left_knee = "LeftLeg"'

@@ -121,20 +121,9 @@ class SkeletonMotion:
         name: str = "motion",
         notes: tuple[str, ...] = (),
     ) -> SkeletonMotion:
-        """The motion of a skeleton from the rotation of each joint in its parent's axes.
+        """The motion from the rotation (n, j, 3, 3) of each joint in its parent's axes, and the root's place (n, 3).
 
-        Args:
-            names: (j,) of the joints.
-            parents: (j,) indices.
-            offsets: (j, 3), metres.
-            local: (n, j, 3, 3) rotation of each joint in its parent's axes.
-            root: (n, 3) place of the root in the world.
-            dt: seconds from frame to frame.
-            name: in messages.
-            notes: sentences on what was assumed.
-
-        Raises:
-            InputError: as for a new motion.
+        The other arguments are the attributes.
         """
         text(name, "the name of a motion")
         local = checked_array(local, f"{name}: local", "rotations, shape (n, j, 3, 3)")
@@ -194,9 +183,5 @@ UP = {
 
 
 def checked_motion(value: object, what: str) -> SkeletonMotion:
-    """A moving skeleton.
-
-    Raises:
-        InputError: it is something else.
-    """
+    """A moving skeleton; anything else is refused."""
     return instance(value, SkeletonMotion, what, "read one with wb.motion.read_skeleton('walk.bvh')")

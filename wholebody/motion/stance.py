@@ -185,13 +185,7 @@ class _Foot:
 
 
 def shifts(figure: Figure, q: Array, stands: Sequence[Sequence[str]]) -> tuple[tuple[Array, ...], ...]:
-    """For each frame, the shift (3,) of each of the frames of the figure that stand there, metres.
-
-    Args:
-        figure: with feet.
-        q: (n, nq) postures.
-        stands: for each of them, names of the frames that stand.
-    """
+    """For each posture (n, nq), the shift (3,) of each of the frames that stand there, by name, metres."""
     feet = _feet(figure, stands)
     places = {}
     for first, second in combinations(feet, 2):
@@ -324,15 +318,7 @@ def standing_points(figure: Figure, q: Array, dt: float) -> dict[str, NDArray[np
 
 
 def slid(path: Array, stands: NDArray[np.bool_]) -> tuple[float, int]:
-    """How far a point moves in the horizontal plane while it stands, from where it stood first.
-
-    Args:
-        path: (n, 3) position in each frame, metres.
-        stands: (n,) when it stands.
-
-    Returns:
-        The longest distance, metres, and its frame; 0 and 0 where it never stands.
-    """
+    """How far a point (n, 3) moves in the horizontal plane while it stands, metres, and the frame; 0 and 0 for none."""
     far, at = 0.0, 0
     for first, after in runs(stands):
         away = np.linalg.norm(path[first:after, :2] - path[first, :2], axis=1)

@@ -16,9 +16,8 @@ from wholebody.methods.base import Method
 from wholebody.methods.inputs import check_problem
 from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
-from wholebody.studies.records import ENDED, REFUSED, Records, SolveRecord
+from wholebody.studies.records import ENDED, REFUSED, Records, RecordStore, SolveRecord
 from wholebody.studies.sending import Kept, Sender, Sent
-from wholebody.studies.store import RecordStore
 from wholebody.tasks.answers import is_own
 from wholebody.version import __version__
 

@@ -46,22 +46,14 @@ class PlacementResidual(NamedTuple):
     """Difference between the placement of one frame relative to another and its target, in the axes of the other frame.
 
     Rows: position (3, metres) if `position`, then rotation vector (3, radians) if `orientation`.
-
-    Attributes:
-        place: the frame that moves.
-        base: the reference frame; the world by default.
-        target: (3,) target position of the frame's origin in the base.
-        undo: inverse of the target's rotation, as a placement without translation.
-        position: whether the residual has the position.
-        orientation: whether it has the rotation.
     """
 
-    place: Place
-    base: Place
-    target: Array
-    undo: Any
-    position: bool
-    orientation: bool
+    place: Place  # the frame that moves
+    base: Place  # the reference frame; the world by default
+    target: Array  # (3,) target position of the frame's origin in the base
+    undo: Any  # inverse of the target's rotation, as a placement without translation
+    position: bool  # whether the residual has the position
+    orientation: bool  # whether it has the rotation
 
     @classmethod
     def build(

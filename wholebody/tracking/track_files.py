@@ -6,8 +6,9 @@ import csv
 import io
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -62,16 +63,36 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
     """
     path = checked_path(path, "path")
     check_figure(figure, "read_track")
+    values, dt = read_values(path, figure)
+    track = Track.of(figure, values, dt, path.name)
+    track.check(figure)
+    return track
+
+
+def read_values(path: Path, figure: Figure, columns: Mapping[str, str] = MappingProxyType({})) -> tuple[Array, float]:
+    """The seven values of a free root and one of each joint (n, 7 + joints) of a track, and its time step.
+
+    `columns` names the column of a joint, or of "time", where it has another name; see `read_track`.
+    """
+    resting = figure.joint_values(figure.neutral)
+    if len(resting) < len(figure.joints):
+        joint = next(joint for joint in figure.joints if joint not in resting)
+        raise InputError(
+            f"{path.name}: joint {joint!r} of {figure.name} has several values, and a column one; give .npz"
+        )
     text = read_text(path, "track", LARGEST)
     lines = _lines(path, text)
     number, first = next(lines, (1, []))
     wanted = [TIME, *(ROOT_COLUMNS if figure.root == "free" else ()), *figure.joints]
+    own = {column: joint for joint, column in columns.items()}
+    units = [name.strip().lower().endswith(DEGREES) for name in first]
+    first = [own.get(name.strip(), name) for name in first]
     if first and all(map(is_number, first)):
         first, lines = _without_names(path, first, wanted, [(number, first), *lines])
     names = _columns(f"{path.name}, line {number}", first, wanted)
     table, places, decimals = _numbers(path, number, lines, names)
-    in_degrees = [name.strip().lower().endswith(DEGREES) for name in first]
-    table[:, in_degrees] = np.radians(table[:, in_degrees])
+    if len(units) == len(names):  # of a file with names
+        table[:, units] = np.radians(table[:, units])
     dt = _time_step(path, table[:, names.index(TIME)], places, decimals)
     broken = np.argwhere(~(np.abs(table) <= LARGEST_VALUE))
     if len(broken):
@@ -84,13 +105,12 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
     if missing:
         more = f" and {len(missing) - 4} more" if len(missing) > 4 else ""
         warn(f"{path.name}: no column for {', '.join(missing[:4])}{more}; they stay as in the neutral posture")
-    q = np.tile(figure.neutral, (len(table), 1))
+    root = figure.neutral[: len(wanted) - 1 - len(figure.joints)]
+    values = np.tile([*root, *resting.values()], (len(table), 1))
     for column, name in enumerate(wanted[1:]):
         if name in names:
-            q[:, column] = table[:, names.index(name)]
-    track = Track.of(figure, q, dt, path.name)
-    track.check(figure)
-    return track
+            values[:, column] = table[:, names.index(name)]
+    return values, dt
 
 
 def _without_names(

@@ -17,11 +17,9 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.interpolate import CubicSpline
 
 import wholebody as wb
 from wholebody.figures.figure import Figure
-from wholebody.motion.files import joint_profile
 from wholebody.tracking.tracks import MOST_FRAMES
 
 CLOSE = {".npz": 1e-14, ".csv": 1e-14, ".txt": 1e-6, ".bvh": 1e-4}
@@ -117,21 +115,6 @@ def test_a_joint_profile_of_other_hands_is_read(human: Figure, tmp_path: Path) -
     assert len(clip) == 2
     assert clip.dt == 0.033333
     assert clip.q[0, 7:] == pytest.approx(0.01 * np.arange(6, 55), abs=1e-9)
-
-
-def test_splines_are_sampled(human: Figure) -> None:
-    times = np.array([0.5, 1.0, 1.7])
-    curves = np.random.default_rng(3).uniform(-0.4, 0.4, (3, 55))
-    frames = joint_profile.sampled(times, curves, human, 0.1)
-    assert len(frames.q) == 13
-    assert frames.q[5, 7:] == pytest.approx(curves[1, 6:], abs=1e-12)
-    wanted = CubicSpline(times, curves[:, 6:], bc_type="clamped")(0.5 + 0.1 * np.arange(13))
-    assert frames.q[:, 7:] == pytest.approx(wanted, abs=1e-12)
-    for wrong in ([0.5, 0.5, 1.0], [0.5, np.nan, 1.0]):
-        with pytest.raises(wb.InputError, match="times are"):
-            joint_profile.sampled(np.array(wrong), curves, human, 0.1)
-    with pytest.raises(wb.InputError, match="curves have shape"):
-        joint_profile.sampled(times, curves[:, :5], human, 0.1)
 
 
 PROFILE = ["# comment", "0.1", "2", "\t".join(["0"] * 55), "\t".join(["0"] * 55)]
@@ -525,3 +508,34 @@ def test_an_archive_of_too_many_frames_is_refused_by_its_header(tmp_path: Path, 
         archive.writestr("q.npy", header.getvalue() + b"too few numbers")
     with pytest.raises(wb.FileFormatError, match=rf"q has {frames} frames; give 1 to {MOST_FRAMES}"):
         wb.read_clip(tmp_path / "long.npz", figure)
+
+
+WHEEL = """<robot name="wheel"><link name="base"/><link name="a"/><link name="b"/><link name="c"/>
+<joint name="wheel" type="continuous"><parent link="base"/><child link="a"/><axis xyz="0 1 0"/></joint>
+<joint name="knee" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 1 0"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+<joint name="finger" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 1 0"/>
+<limit lower="-2" upper="2" effort="1" velocity="1"/>{}</joint></robot>"""
+
+
+@pytest.mark.parametrize("root", ["free", "fixed"])
+@pytest.mark.parametrize("mimic", ["", '<mimic joint="knee" multiplier="2" offset="0.1"/>'])
+def test_tables_have_the_angles_of_joints_that_turn_without_end(root: str, mimic: str, tmp_path: Path) -> None:
+    (tmp_path / "wheel.urdf").write_text(WHEEL.format(mimic))
+    figure = wb.load(tmp_path / "wheel.urdf", root=root)
+    angles = np.linspace(0.0, 9.0, 7)  # more than a turn
+    q = [figure.with_joints(figure.neutral, {"wheel": angle, "knee": 0.1 * angle}) for angle in angles]
+    clip = wb.Clip(figure, np.array(q), 0.1)
+    path = clip.write(tmp_path / "a.csv")
+    lines = path.read_text().splitlines()
+    turned = [float(line.split(",")[lines[0].split(",").index("wheel")]) for line in lines[1:]]
+    assert turned == pytest.approx(angles)
+    assert furthest(wb.read_clip(path, figure), clip) < 1e-12
+    path.write_text(path.read_text().replace("wheel", "Rad 1 [deg]", 1).replace("time", "t"))
+    names = {"columns": {"wheel": "Rad 1 [deg]", "time": "t"}}
+    with pytest.raises(wb.WholebodyError, match="no column is called 't'"):
+        wb.read_clip(path, figure)
+    read = wb.read_clip(path, figure, names)
+    assert figure.joint_values(read.q[1])["wheel"] == pytest.approx(np.radians(angles[1]))
+    with pytest.raises(wb.WholebodyError, match="no joint is called 'whel'; did you mean wheel"):
+        wb.read_clip(path, figure, {"columns": {"whel": "Rad 1"}})

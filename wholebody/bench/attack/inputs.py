@@ -15,8 +15,7 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.bench.attack.case import CORPUS, Verdict, chosen
 from wholebody.figures.packaged_urdf import task_paths, urdf_path
-from wholebody.taskfile import read_task
-from wholebody.taskfile.result import read
+from wholebody.taskfile import read_result, read_task
 from wholebody.tracking.track_files import read_track
 
 _VALUE = rb'"[^"\n]*"|\[[^\[\]\n]*\]|-?\d+\.?\d*'
@@ -170,7 +169,7 @@ def _reader(rng: np.random.Generator) -> Reader:
         files = _stored({"track.csv": "track.csv"} | ROBOT)
         return Reader(lambda path: read_track(path, wb.load(path.with_name("robot.urdf"))), files)
     if kind == "result":
-        return Reader(read, _stored({"result.json": "result.json"} | task))
+        return Reader(read_result, _stored({"result.json": "result.json"} | task))
     packaged = rng.random() < 0.15
     if kind == "robot":
         return Reader(wb.load, {"hand.urdf": urdf_path("hand").read_bytes()} if packaged else _stored(ROBOT))

@@ -30,32 +30,20 @@ READERS: dict[str, Callable[[Path, Figure], Frames]] = {
 
 
 def write_motion(motion: Motion, path: str | os.PathLike[str]) -> Path:
-    """Write a clip in the format that the ending of the file's name says.
-
-    Raises:
-        InputError: as for `Clip.write`.
-    """
+    """Write a clip in the format that the ending of the file's name says; see `Clip.write`."""
     path = checked_path(path, "path")
     return WRITERS[_ending(path, WRITERS, "written")](motion, path)
 
 
 def check_ending(path: str | os.PathLike[str]) -> Path:
-    """The path of a file to write, checked before long work.
-
-    Raises:
-        FileFormatError: the ending of its name is no format that can be written.
-    """
+    """The path of a file to write, checked before long work."""
     path = checked_path(path, "path")
     _ending(path, WRITERS, "written")
     return path
 
 
 def read_frames(path: str | os.PathLike[str], figure: Figure) -> Frames:
-    """Read postures of a figure from a file in the format that the ending of its name says.
-
-    Raises:
-        FileFormatError: as for `wb.read_clip`.
-    """
+    """Read postures of a figure from a file in the format that the ending of its name says; see `wb.read_clip`."""
     path = checked_path(path, "path")
     return READERS[_ending(path, READERS, "read", (".bvh",))](path, figure)
 

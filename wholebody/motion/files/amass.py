@@ -32,11 +32,7 @@ def is_amass(arrays: dict[str, np.ndarray]) -> bool:
 
 
 def read_motion(path: Path) -> SkeletonMotion:
-    """Read the body of an AMASS archive.
-
-    Raises:
-        FileFormatError: an array is missing, has another shape, or has values that are not finite.
-    """
+    """Read the body of an AMASS archive."""
     name = one_line(path.name)
     poses, places, frequency = _arrays(name, read_arrays(path))
     frames = len(poses)

@@ -24,11 +24,7 @@ VERSION = 1  # of the layout of the arrays
 
 
 def write(motion: Motion, path: Path) -> Path:
-    """Write a clip as npz: `wholebody_clip` (version), `q`, `dt`, `name`, `joints`, `figure`.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
+    """Write a clip as npz: `wholebody_clip` (version), `q`, `dt`, `name`, `joints`, `figure`."""
     data = io.BytesIO()
     np.savez_compressed(
         data,
@@ -43,12 +39,7 @@ def write(motion: Motion, path: Path) -> Path:
 
 
 def read(path: Path, figure: Figure) -> Frames:
-    """Read a clip that `write` wrote.
-
-    Raises:
-        FileFormatError: it is no such archive, it is damaged, or its joints are in another order than the figure's.
-        UnknownNameError: it has a joint that the figure does not have.
-    """
+    """Read a clip that `write` wrote of a figure of the same joints."""
     arrays = read_arrays(path)
     if "wholebody_clip" not in arrays:
         raise FileFormatError(f"{path.name}: is no clip of wholebody; its arrays are {_listed(arrays)}")
@@ -61,7 +52,7 @@ def read(path: Path, figure: Figure) -> Frames:
     q, dt, joints = arrays["q"], arrays["dt"], [str(joint) for joint in np.atleast_1d(arrays["joints"])]
     if q.dtype.kind not in "fiu" or q.ndim != 2 or dt.dtype.kind not in "fiu" or dt.shape != ():
         raise FileFormatError(f"{path.name}: q of shape {q.shape} and dt of shape {dt.shape} are no clip")
-    check_joints(path, joints, figure)
+    _check_joints(path, joints, figure)
     if q.shape[1] != figure.model.nq:
         raise FileFormatError(
             f"{path.name}: {q.shape[1]} values a frame, and {figure.name} has {figure.model.nq}; load the figure that "
@@ -72,13 +63,8 @@ def read(path: Path, figure: Figure) -> Frames:
     return Frames(q.astype(np.float64, copy=False), float(dt), name)
 
 
-def check_joints(path: Path, joints: list[str], figure: Figure) -> None:
-    """Check that the joints of a file are those of a figure, in the same order.
-
-    Raises:
-        UnknownNameError: a joint that the figure does not have.
-        FileFormatError: joints are missing or in another order.
-    """
+def _check_joints(path: Path, joints: list[str], figure: Figure) -> None:
+    """Check that the joints of a file are those of a figure, in the same order."""
     for joint in joints:
         if joint not in figure.joints:
             raise UnknownNameError("joint", joint, figure.joints, path.name)
@@ -89,12 +75,7 @@ def check_joints(path: Path, joints: list[str], figure: Figure) -> None:
 
 
 def read_arrays(path: Path) -> dict[str, NDArray[np.generic]]:
-    """All arrays of an npz file, without those of Python objects.
-
-    Raises:
-        FileFormatError: it is no npz file, it is damaged, or an array is too large, which its header says before it
-            is read.
-    """
+    """All arrays of an npz file, without those of Python objects; the header of one that is too large says so."""
     data = read_bytes(path, "clip")
     arrays: dict[str, NDArray[np.generic]] = {}
     try:
@@ -121,12 +102,7 @@ def read_arrays(path: Path) -> dict[str, NDArray[np.generic]]:
 
 
 def _holds_objects(file: IO[bytes], what: str) -> bool:
-    """Whether an array holds Python objects, which are never unpacked; its header says that, and its size.
-
-    Raises:
-        FileFormatError: more frames than a clip has, or more numbers than can be read as such.
-        ValueError: it is no header.
-    """
+    """Whether an array holds Python objects, which are never unpacked; its header says that, and its size."""
     version = np.lib.format.read_magic(file)  # type: ignore[no-untyped-call]
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     header = read(file)  # type: ignore[no-untyped-call]

@@ -4,35 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.base.checks import TIME_STEP, TIME_STEP_ASKED
 from wholebody.base.errors import FileFormatError, one_line
-from wholebody.figures.figure import Figure
 from wholebody.tracking.tracks import LARGEST, MOST_FRAMES
 
-
-class Motion(Protocol):
-    """What is written: a clip."""
-
-    @property
-    def figure(self) -> Figure:
-        """The figure of the postures."""
-
-    @property
-    def q(self) -> Array:
-        """(n, nq) one posture for each frame."""
-
-    @property
-    def dt(self) -> float:
-        """Seconds from frame to frame."""
-
-    @property
-    def name(self) -> str:
-        """Name of the clip."""
+Motion: TypeAlias = Any
+"""What is written, a `Clip`: `figure`, `q` (n, nq), `dt` and `name`; the module of clips imports this one."""
 
 
 class Frames(NamedTuple):
@@ -53,11 +35,7 @@ LARGEST_FILE = 500_000_000  # bytes of a text file of motion: an hour of 75 join
 
 
 def number(word: str, where: str) -> float:
-    """A finite number.
-
-    Raises:
-        FileFormatError: the word is none.
-    """
+    """A finite number of a word; one that is none is refused with its place."""
     try:
         value = float(word)
     except ValueError:
@@ -68,11 +46,7 @@ def number(word: str, where: str) -> float:
 
 
 def seconds(word: str, where: str) -> float:
-    """A time step.
-
-    Raises:
-        FileFormatError: the word is none.
-    """
+    """A time step; a word that is none is refused with its place."""
     dt = number(word, where)
     if not TIME_STEP[0] <= dt <= TIME_STEP[1]:
         raise FileFormatError(f"{where}: the time step is {dt:g} s; {TIME_STEP_ASKED}")
@@ -80,11 +54,7 @@ def seconds(word: str, where: str) -> float:
 
 
 def frame_count(word: str, where: str) -> int:
-    """A number of frames.
-
-    Raises:
-        FileFormatError: the word is none, or there are too many.
-    """
+    """A number of frames, 1 to `MOST_FRAMES`; a word that is none is refused with its place."""
     if not re.fullmatch(r"\d{1,9}", word):
         raise FileFormatError(f"{where}: {one_line(word, 20)!r} is no number of frames")
     if not 1 <= int(word) <= MOST_FRAMES:
@@ -93,16 +63,7 @@ def frame_count(word: str, where: str) -> int:
 
 
 def table(name: str, rows: Sequence[tuple[int, Sequence[str]]], columns: int) -> Array:
-    """The numbers of rows, (n, columns).
-
-    Args:
-        name: of the file.
-        rows: number of the line, and its words.
-        columns: how many words a row has.
-
-    Raises:
-        FileFormatError: a row has more or less words, or a word is no finite number.
-    """
+    """The numbers of rows (n, columns), each with the number of its line; a wrong one is refused with this line."""
     found = np.empty((len(rows), columns))
     for k, (line, words) in enumerate(rows):
         if len(words) != columns:

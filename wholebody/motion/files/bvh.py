@@ -24,16 +24,7 @@ from wholebody.motion.structure import recognised_unit
 
 
 def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> SkeletonMotion:
-    """Read a moving skeleton.
-
-    Args:
-        path: the file.
-        unit: "metres", "centimetres", ... of `UNITS`; recognised by the size of the skeleton if left out.
-        up: "y" or "z"; recognised by the rest posture if left out.
-
-    Raises:
-        FileFormatError: the file cannot be read; the line is named.
-    """
+    """Read a moving skeleton; see `wholebody.motion.reading.read_skeleton`."""
     found = parsed(read_foreign_text(path, "motion", LARGEST_FILE), path.name)
     mark, _, rest = found.joints[0].name.partition(":")
     ours = mark == MARK and bool(rest)
@@ -74,23 +65,25 @@ def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> S
         motion = SkeletonMotion.moved(
             names, parents, scale * offsets @ turn.T, local, places, found.dt, title_of(path), tuple(notes)
         )
-        return replace(motion, positions=_lengthened(motion, found, kept, first, scale * turn))
+        return _lengthened(motion, found, kept, first, scale * turn)
     except InputError as error:
         raise FileFormatError(f"{path.name}: {error}") from None
 
 
-def _lengthened(motion: SkeletonMotion, found: BvhText, kept: list[int], first: int, scale: Array) -> Array:
-    """Places (n, j, 3) of the joints where the lengths of bones change."""
-    positions, columns = np.array(motion.positions), _columns(found)
+def _lengthened(motion: SkeletonMotion, found: BvhText, kept: list[int], first: int, scale: Array) -> SkeletonMotion:
+    """The motion with the places of the joints where the lengths of bones change."""
+    moving = [
+        any(values.any() for (_, kind), values in columns.items() if kind == "position") for columns in _columns(found)
+    ]
+    if not any(moving[source] for source in kept[1:]):
+        return motion
+    positions = np.array(motion.positions)
     for joint, source in enumerate(kept[1:], 1):
         parent = motion.parents[joint]
-        step: Array = motion.offsets[joint]
-        given = [values for (_, kind), values in columns[source].items() if kind == "position"]
-        if any(values.any() for values in given):
-            step = _positions(found, source)[first:] @ scale.T
+        step: Array = _positions(found, source)[first:] @ scale.T if moving[source] else motion.offsets[joint]
         turned = np.einsum("nij,nj->ni", motion.rotations[:, parent], np.broadcast_to(step, (len(motion), 3)))
         positions[:, joint] = positions[:, parent] + turned
-    return positions
+    return replace(motion, positions=positions)
 
 
 def _positions(found: BvhText, joint: int) -> Array:
@@ -142,10 +135,7 @@ def _begins_with_rest(angles: Array) -> bool:
     """Whether the first frame is a rest posture, and the second is not.
 
     No joint but the root turns in it; or few do, and a jump leads to the second frame: in CMU's converted files some
-    joints of the rest posture turn by whole degrees.
-
-    Args:
-        angles: (frames, joints, 3) of all joints but the root, radians.
+    joints of the rest posture turn by whole degrees. Angles (frames, joints, 3), radians, are without the root's.
     """
     if len(angles) < 2:
         return False
@@ -230,11 +220,7 @@ MARK = "centimetres"  # before the name of a root, as a name space: an own file 
 
 
 def write(motion: Motion, path: Path) -> Path:
-    """Write a clip as BVH: y up, z forward, centimetres, one joint for all of the figure's joints at one place.
-
-    Raises:
-        InputError: a joint of the figure slides, or the file cannot be written.
-    """
+    """Write a clip as BVH: y up, z forward, centimetres, one joint for all of the figure's joints at one place."""
     nodes = nodes_of(motion.figure)
     local, root = rotations(motion.figure, nodes, motion.q)
     back, scale = UP["y"].T, 1.0 / UNITS["centimetres"]  # six digits of which are 1e-8 m

@@ -50,15 +50,7 @@ class BvhText:
 
 
 def parsed(text: str, name: str) -> BvhText:
-    """Joints and numbers of a BVH text.
-
-    Args:
-        text: of the file.
-        name: of the file, for messages.
-
-    Raises:
-        FileFormatError: with the line, what is wrong.
-    """
+    """Joints and numbers of the text of a file of a name; what is wrong is told with its line."""
     lines = [(number, line.strip()) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
     place = _Hierarchy(name, lines).read()
     frames, rest = _counted(name, lines, place.at, r"frames\s*:\s*(\S+)", "Frames:")

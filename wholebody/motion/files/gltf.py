@@ -47,12 +47,7 @@ def write(motion: Motion, path: Path) -> Path:
 
 
 def joint_tree(model: Any, placements: Sequence[pin.SE3]) -> tuple[Any, list[str]]:
-    """A trimesh.Scene with one node a joint, y up, and the names of the nodes.
-
-    Args:
-        model: Pinocchio's model.
-        placements: of each joint in its parent.
-    """
+    """A trimesh.Scene with one node a joint, placed in its parent, y up, and the names of the nodes."""
     import trimesh
 
     names = [f"joint {name}" for name in model.names]
@@ -135,15 +130,7 @@ def _keys(figure: Figure, q: Array) -> tuple[Array, Array]:
 
 
 def add_piece(tree: Any, joints: Sequence[str], piece: Any, mesh: Any, color: Sequence[int]) -> None:
-    """Add a piece to a `joint_tree`, below the node of its joint.
-
-    Args:
-        tree: the trimesh.Scene.
-        joints: names of its nodes.
-        piece: of Pinocchio's geometry model.
-        mesh: a trimesh of it.
-        color: red, green, blue, alpha, each from 0 to 255.
-    """
+    """Add the mesh of a piece to a `joint_tree`, below the node of its joint; colours from 0 to 255."""
     from trimesh.visual import TextureVisuals
     from trimesh.visual.material import PBRMaterial
 

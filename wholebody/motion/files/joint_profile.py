@@ -19,17 +19,13 @@ from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
 from wholebody.motion.files.base import LARGEST_FILE, Frames, Motion, frame_count, seconds, table
 from wholebody.motion.files.nodes import angles_about
-from wholebody.tracking.tracks import MOST_FRAMES, ROOT_SIZE
+from wholebody.tracking.tracks import ROOT_SIZE
 
 GLOBAL = 6  # values of the pelvis: place and rotation
 
 
 def write(motion: Motion, path: Path) -> Path:
-    """Write a clip as a joint profile.
-
-    Raises:
-        InputError: the figure has no free root, a joint of several degrees of freedom, or the file cannot be written.
-    """
+    """Write a clip as a joint profile; its figure has a free root and joints of one degree of freedom."""
     _check_figure(motion.figure)
     angles = np.unwrap(angles_about(Rotation.from_quat(motion.q[:, 3:ROOT_SIZE]), np.eye(3)), axis=0)
     rows = np.hstack([motion.q[:, :3], angles, motion.q[:, ROOT_SIZE:]])
@@ -50,13 +46,7 @@ def write(motion: Motion, path: Path) -> Path:
 
 
 def read(path: Path, figure: Figure) -> Frames:
-    """Read a joint profile.
-
-    Raises:
-        FileFormatError: the file cannot be read, has no positive time step, another number of rows than it says, or
-            another number of values than the figure has; the line is named.
-        InputError: the figure has no free root, or a joint of several degrees of freedom.
-    """
+    """Read a joint profile; what is wrong is told with its line."""
     _check_figure(figure)
     name = one_line(path.name)
     lines = enumerate(read_text(path, "joint profile", LARGEST_FILE).splitlines(), 1)
@@ -73,41 +63,6 @@ def read(path: Path, figure: Figure) -> Frames:
         raise FileFormatError(f"{name}, line {line}: {len(frames)} rows and not {count}; the file is cut off or wrong")
     values = table(name, frames, GLOBAL + figure.model.nq - ROOT_SIZE)
     return Frames(_postures(values), dt, title_of(path))
-
-
-def sampled(times: Array, curves: Array, figure: Figure, dt: float, name: str = "splines") -> Frames:
-    """Frames of joint curves that are given by points: cubic splines through them, with rest at both ends.
-
-    Args:
-        times: (k,) seconds, ascending; the first and the last one are the start and the end.
-        curves: (k, 6 + joints) values G1 ... G6, Q1 ... at these times.
-        figure: the figure.
-        dt: seconds from frame to frame.
-        name: of the clip.
-
-    Raises:
-        InputError: times do not ascend, or shapes do not fit.
-    """
-    from scipy.interpolate import CubicSpline
-
-    from wholebody.base.checks import array, time_step
-
-    _check_figure(figure)
-    times, curves = (
-        array(times, "times", "seconds, shape (k,)"),
-        array(curves, "curves", "values, shape (k, 6 + joints)"),
-    )
-    dt = time_step(dt, "dt")
-    wide = GLOBAL + figure.model.nq - ROOT_SIZE
-    if times.ndim != 1 or len(times) < 2 or not (np.diff(times) > 0.0).all() or not np.isfinite(times).all():
-        raise InputError("times are at least two, ascending and finite, seconds")
-    if curves.shape != (len(times), wide) or not np.isfinite(curves).all():
-        raise InputError(f"curves have shape {curves.shape}; give finite values of shape ({len(times)}, {wide})")
-    count = int(np.floor((times[-1] - times[0]) / dt * (1.0 + 1e-12) + 1e-9)) + 1
-    if count > MOST_FRAMES:
-        raise InputError(f"dt of {dt:g} s makes {count} frames; give a longer one")
-    spline = CubicSpline(times, curves, bc_type="clamped")
-    return Frames(_postures(spline(times[0] + dt * np.arange(count))), dt, name)
 
 
 def _postures(values: Array) -> Array:

@@ -22,11 +22,8 @@ def angles_about(turned: Rotation, axes: Array) -> Array:
     """Angles (n, 3) of rotations about axes (3, 3), rows, each turned by the ones before; radians.
 
     In gimbal lock only the sum or the difference of the first and the third angle is known. The third one is then that
-    of the nearest frame without, so that no angle jumps for a frame; zero where all frames are locked.
-
-    Args:
-        turned: n rotations, frame by frame.
-        axes: unit vectors; the second is orthogonal to both others.
+    of the nearest frame without, so that no angle jumps for a frame; zero where all frames are locked. The second axis
+    is orthogonal to both others.
     """
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Gimbal lock", UserWarning)
@@ -76,11 +73,7 @@ class Node:
 
 
 def nodes_of(figure: Figure) -> list[Node]:
-    """The nodes of a figure, parents before children.
-
-    Raises:
-        InputError: a joint slides, or follows another one.
-    """
+    """The nodes of a figure, parents before children; a figure whose joints slide has none."""
     model = figure.model
     data = model.createData()
     columns = pin.computeJointJacobians(model, data, pin.neutral(model)).reshape(6, -1)
