@@ -114,7 +114,7 @@ def test_faulty_files_are_read_or_refused_in_one_sentence(
         "task": wb.read_task,
         "track": lambda path: tracking.read_track(path, hand),
         "path": tracking.read_path,
-        "result": result.read,
+        "result": result.read_result,
     }
     known = cache(lambda spec, **options: wb.load(spec, **options))
     monkeypatch.setattr(task_module, "load", known)  # the same people again and again

@@ -269,7 +269,23 @@ def robots(arguments: argparse.Namespace) -> None:
     publish_page("robots.md", page(found, facts, reaches), arguments)
 
 
-COMMANDS = (newton, qp, human, regress, loads, clip_constants, detail, ablation, robots)
+@measuring(
+    "pen",
+    "things that move by themselves for minutes",
+    "Let dominoes, stacks and balls move in a pen, where a ball is kicked every ten seconds.",
+    option("--minutes", type=float, default=10.0, metavar="N", help="simulated (default: 10)"),
+)
+def pen(arguments: argparse.Namespace) -> None:
+    """Measure; --quick takes three seconds."""
+    from tests.audits.pen import long_run
+
+    minutes = 0.05 if arguments.quick else number(arguments.minutes, "--minutes", 0.01, 1000.0, "minutes")
+    facts, row = machine(), long_run(minutes)
+    text = report("Dominoes, stacks and balls in a pen; a ball is kicked every ten seconds.", {"": [row]}, facts)
+    publish("pen", text, arguments, facts=facts, tables={"pen": [row]})
+
+
+COMMANDS = (newton, qp, human, regress, loads, clip_constants, detail, ablation, robots, pen)
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -88,13 +88,13 @@ def test_no_process_is_left_when_a_run_is_ended(how: signal.Signals, jobs: int, 
     wait_until(lambda: not any(Path(f"/proc/{worker}/stat").exists() for worker in workers))
 
 
-def begun_by(_: int) -> str:
-    return Path(f"/proc/{os.getppid()}/status").read_text()
+def status(_: int) -> str:
+    return Path("/proc/self/status").read_text()
 
 
 def test_processes_leave_ctrl_c_to_the_one_who_began_them() -> None:
     """A terminal sends it to all of them; one that has hardly begun would print a traceback."""
-    for outcome in run_batch((Job(k, begun_by, (k,), 60.0) for k in range(3)), 2):
+    for outcome in run_batch((Job(k, status, (k,), 60.0) for k in range(3)), 2):
         (ignored,) = (line.split()[1] for line in str(outcome.answer).splitlines() if line.startswith("SigIgn"))
         assert int(ignored, 16) & 1 << (signal.SIGINT - 1)
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

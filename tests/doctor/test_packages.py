@@ -5,9 +5,18 @@ import re
 import sys
 from pathlib import Path
 
-import pytest
-
-from wholebody.doctor.packages import EXTRAS, MODULES, Conflict, Distribution, conflicts, installed, shadow
+from wholebody.doctor.packages import (
+    EXTRAS,
+    MODULES,
+    Conflict,
+    Distribution,
+    conflicts,
+    installed,
+    loader_folders,
+    python_fault,
+    shadow,
+    shadowing_folders,
+)
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -67,10 +76,32 @@ def test_the_examined_packages_are_those_of_the_project() -> None:
     assert all(name in names(of_users[extra]) for name, extra in EXTRAS.items())
 
 
-@pytest.mark.parametrize("name", MODULES)
-def test_what_is_needed_is_installed_here(name: str) -> None:
-    found = installed([name, "no-such-distribution"])
-    assert name in found
+def test_what_is_needed_is_installed_here() -> None:
+    found = installed([*MODULES, "no-such-distribution"])
     assert "no-such-distribution" not in found
-    assert found[name].version[0].isdigit()
-    assert any(os.path.isfile(file) for file in found[name].files)
+    for name in MODULES:
+        assert found[name].version[0].isdigit()
+        assert any(os.path.isfile(file) for file in found[name].files)
+
+
+def test_pythons_without_packages_are_a_fault() -> None:
+    assert [python_fault(version) for version in ((3, 10), (3, 11), (3, 12), (3, 13))] == [None] * 4
+    for version in ((2, 7), (3, 9), (3, 14)):
+        assert f"{version[0]}.{version[1]}" in (python_fault(version) or "")
+
+
+def test_a_workspace_on_pythonpath_that_brings_its_own_pinocchio_is_named(tmp_path: Path) -> None:
+    ros, plain = tmp_path / "ros", tmp_path / "plain"
+    (ros / "pinocchio").mkdir(parents=True)
+    (ros / "numpy.py").touch()
+    plain.mkdir()
+    path = os.pathsep.join([str(plain), "", str(tmp_path / "absent"), str(ros)])
+    assert shadowing_folders({"PYTHONPATH": path}, ["pinocchio", "numpy", "coal"]) == {str(ros): ["numpy", "pinocchio"]}
+    assert shadowing_folders({}, ["pinocchio"]) == {}
+
+
+def test_libraries_that_replace_the_wheels_own_are_named(tmp_path: Path) -> None:
+    (tmp_path / "libpinocchio_default.so.3").touch()
+    (tmp_path / "libsomething.so").touch()
+    assert loader_folders({"LD_LIBRARY_PATH": str(tmp_path)}) == {str(tmp_path): ["libpinocchio"]}
+    assert loader_folders({"LD_LIBRARY_PATH": ""}) == {}

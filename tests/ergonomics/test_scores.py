@@ -149,6 +149,28 @@ def test_angles_are_those_of_the_joints_that_are_turned(person: wb.Figure) -> No
     assert np.degrees(bowed.trunk_twist) == pytest.approx(20.0, abs=1e-6)
 
 
+def test_a_raised_arm_scores_as_raised_whichever_way_it_went(person: wb.Figure) -> None:
+    """The angle between upper arm and trunk is taken from the joints' centres, at random postures of the shoulder."""
+    rng, raised = np.random.default_rng(9), 0
+    shoulder = [f"right_shoulder_{turn}" for turn in ("flexion", "abduction", "rotation")]
+    places = {name: person.model.joints[person.joint_id(name)].idx_q for name in shoulder}
+    low, high = person.model.lowerPositionLimit, person.model.upperPositionLimit
+    limits = {name: (low[k], high[k]) for name, k in places.items()}
+    for _ in range(300):
+        q = person.with_joints(person.posture("standing"), {name: rng.uniform(*limits[name]) for name in shoulder})
+        arm = person.placement(q, "right_elbow").translation - person.placement(q, "right_shoulder").translation
+        along = person.placement(q, "thorax").rotation[:, 2] @ arm / np.linalg.norm(arm)
+        if along > np.cos(radians(60.0)):  # 120 degrees from hanging
+            raised += 1
+            assert wb.ergonomics.rula(person, q).right.upper_arm >= 4
+            assert wb.ergonomics.reba(person, q).right.upper_arm >= 4
+    assert raised > 30
+    over = bent(person, right_shoulder_abduction=165, right_shoulder_flexion=3)
+    assert wb.ergonomics.rula(person, over).right.upper_arm >= 4
+    sideways = bent(person, right_shoulder_abduction=90)  # the worksheet: no flexion, and abducted
+    assert wb.ergonomics.rula(person, sideways).right.upper_arm == 2
+
+
 def test_angles_do_not_depend_on_where_a_person_stands_and_looks(person: wb.Figure) -> None:
     q = bent(person, left_shoulder_flexion=50, spine1_flexion=20, neck1_rotation=15)
     moved = q.copy()

@@ -12,8 +12,7 @@ import pytest
 import wholebody as wb
 from tests.task_text import box, figure, hold, point
 from wholebody.cli.main import main
-from wholebody.studies.study_file import read_study
-from wholebody.studies.task_files import TaskFile
+from wholebody.studies.study_files import TaskFile, read_study
 
 TASK = (
     figure("human")

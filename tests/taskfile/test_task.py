@@ -10,8 +10,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.figures.state import State
-from wholebody.taskfile.schema import TABLES
-from wholebody.taskfile.terms import CONSTRAINTS, GOALS, MEASURES
+from wholebody.taskfile.schema import CONSTRAINTS, GOALS, MEASURES, TABLES
 
 TURNED = [0.0, 0.0, 0.7071067811865476, 0.7071067811865476]
 

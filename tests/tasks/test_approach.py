@@ -8,7 +8,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.figures.state import State
-from wholebody.tasks.approach import approached, has_face
+from wholebody.tasks.contact_parts import approached, has_face
 
 BOARD, IN_FRONT = 0.30, 0.01  # m
 

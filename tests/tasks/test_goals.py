@@ -72,11 +72,10 @@ def test_angular_says_which_rows_are_radians(humanoid: Any) -> None:
     state = State(humanoid.model).update(q)
     for term, letters in expected.items():
         resolved = term.resolve(humanoid, q)
-        assert "".join("r" if angular else "." for angular in resolved.angular) == letters
         value = resolved.error(state) if isinstance(resolved, tasks.Goal) else resolved.value(state)
         assert value.shape == (len(letters),)
-        if isinstance(resolved, tasks.Constraint):
-            assert resolved.lower.shape == resolved.upper.shape == value.shape
+        angular = np.broadcast_to(resolved.angular, value.shape)
+        assert "".join("r" if angle else "." for angle in angular) == letters
 
 
 @pytest.mark.parametrize("angle", [np.pi - 1e-3, np.pi - 1e-6, np.pi - 1e-9, np.pi, np.pi + 1e-9])
@@ -202,10 +201,10 @@ def test_plane_measures_the_distance_along_its_normal(humanoid: Any) -> None:
     here = state.frame(humanoid.model.getFrameId("larm_elbow_joint")).translation.copy()
     through = tasks.Plane("larm_elbow_joint", (0.0, 0.0, 5.0)).resolve(humanoid, q)
     np.testing.assert_allclose(through.value(state), [0.0], atol=1e-15)
-    np.testing.assert_array_equal([through.lower, through.upper], [[0.0], [0.0]])
+    np.testing.assert_array_equal([through.lower, through.upper], [0.0, 0.0])
     above = tasks.Plane("larm_elbow_joint", (0, 3, 4), point=here - (0.0, 0.6, 0.8), side="above").resolve(humanoid, q)
     np.testing.assert_allclose(above.value(state), [1.0])
-    np.testing.assert_array_equal([above.lower, above.upper], [[0.0], [np.inf]])
+    np.testing.assert_array_equal([above.lower, above.upper], [0.0, np.inf])
 
 
 def test_terms_do_not_change_when_resolved(humanoid: Any, random_posture: Any) -> None:

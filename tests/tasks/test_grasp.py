@@ -67,6 +67,19 @@ def test_thumb_and_fingers_oppose(figure: wb.Figure, kind: Any, shape: Any) -> N
     assert _apart(_normal(scene, solution.q, "right_thumb_distal"), mean) > 135.0 - 0.1
 
 
+@pytest.mark.parametrize("radius", [0.033, 0.04], ids=["can", "mug"])
+def test_an_edged_thing_is_pinched_from_two_sides(figure: wb.Figure, radius: float) -> None:
+    """From a start from which the finger that lies on a flat end of the cylinder used to leave it."""
+    scene = wb.Scene(figure).add(wb.Cylinder(radius, 0.1), name="thing", at=(0.42, -0.28, 1.15))
+    relaxed = wb.figures.finger_angles("relaxed", "right")
+    start = figure.with_joints(figure.posture("standing"), {"right_elbow_flexion": np.radians(45.0), **relaxed})
+    problem = wb.Problem(scene, start=start, goals=[wb.Grasp("right", "thing", "pinch")], constraints=FEET)
+    solution = wb.solve(problem)
+    assert solution.status == "solved", solution.message
+    ends = [_normal(scene, solution.q, f"right_{finger}_distal") for finger in ("thumb", "index")]
+    assert _apart(*ends) > 135.0 - 6.0  # a cylinder is a prism whose sides are 5.6 degrees apart
+
+
 def _outer(finger: str) -> tuple[str, ...]:
     inner = "proximal" if finger == "thumb" else "middle"
     return f"right_{finger}_{inner}", f"right_{finger}_distal"
@@ -74,8 +87,8 @@ def _outer(finger: str) -> tuple[str, ...]:
 
 @pytest.mark.parametrize(
     "shape",
-    [wb.Sphere(0.015), wb.Sphere(0.035), wb.Sphere(0.04), wb.Capsule(0.0125, 0.3), wb.Capsule(0.025, 0.3)],
-    ids=["ball 30 mm", "ball 70 mm", "ball 80 mm", "rod 25 mm", "rod 50 mm"],
+    [wb.Sphere(0.015), wb.Sphere(0.04), wb.Capsule(0.025, 0.3)],
+    ids=["ball 30 mm", "ball 80 mm", "rod 50 mm"],
 )
 def test_in_a_power_grip_the_thumb_opposes_the_fingers(figure: wb.Figure, shape: Any) -> None:
     scene = wb.Scene(figure).add(shape, name="thing", at=AT)
@@ -107,7 +120,7 @@ def test_fingers_on_one_side_do_not_oppose(figure: wb.Figure) -> None:
         state = scene.state(q)
         near = pin.integrate(figure.model, q, np.eye(figure.model.nv)[2] * -(down - 0.01))
         value = grasp.value(state.update(near))
-        assert (value[-1] > 0.05) == (opposed < np.pi)
+        assert (value[-1] > 1e-3) == (opposed < np.pi)
 
 
 @pytest.mark.parametrize(

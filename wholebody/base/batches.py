@@ -1,20 +1,24 @@
-"""Many jobs beside each other, on this machine or on a dask cluster, through joblib; each in a child process.
+"""Many jobs beside each other, in child processes of this machine or, through joblib, on a dask cluster.
 
-A job that crashes ends only its own process. `runner.run_jobs` is for jobs that follow from the outcomes of others, or
-whose processes are forked; it stays on this machine.
+A job that crashes ends only its own process. Processes of this machine are kept from call to call.
 """
 
 from __future__ import annotations
 
 import multiprocessing
-import signal
+import os
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
-from typing import Any
+from multiprocessing.connection import wait
+from typing import Any, TypeVar
 
 from wholebody.base.errors import MissingPackageError, WholebodyError
-from wholebody.base.runner import ONE_THREAD, Child, EndedError, Job, Outcome, end_with
+from wholebody.base.records import with_values
+from wholebody.base.runner import ONE_THREAD, Child, EndedError, Job, Outcome, end_with, interrupt_ignored, run_jobs
+
+T = TypeVar("T")
 
 _local = threading.local()
 
@@ -25,7 +29,8 @@ _Sent = tuple[int, Callable[..., Any], tuple[Any, ...], float]
 def run_batch(work: Iterable[Job], jobs: int = 1, cluster: str | None = None) -> Iterator[Outcome]:
     """Do jobs beside each other, and give their outcomes as they end. A job is asked for when it can begin.
 
-    The libraries of a process compute on one core. Closing the iterator, as an exception does, ends all processes.
+    The libraries of a process compute on one core. Closing the iterator, as an exception does, ends the processes that
+    are busy; idle ones serve the next call.
 
     Args:
         work: asked for one by one. A deadline of 0 seconds is none; functions need not be importable.
@@ -36,15 +41,103 @@ def run_batch(work: Iterable[Job], jobs: int = 1, cluster: str | None = None) ->
         MissingPackageError: dask is not installed.
         WholebodyError: the cluster does not answer.
     """
+    asked = iter(work)
+    if cluster is None:
+        with _children(jobs) as found:
+            for child in found:
+                if child.job is not None:  # it still gets ready for other work
+                    child.close()
+                child.close_if_full()
+            yield from run_jobs(lambda: next(asked, None), found)
+        return
     begun: dict[int, Job] = {}
 
     def sent() -> Iterator[_Sent]:
-        for number, job in enumerate(work):
+        for number, job in enumerate(asked):
             begun[number] = job
             yield number, job.function, job.arguments, job.seconds
 
     for number, answer, ended in spread(_in_own_child, sent(), jobs, cluster):
         yield Outcome(begun.pop(number), (), answer, None if ended is None else EndedError(*ended))
+
+
+def shared(
+    items: Sequence[T], jobs: int, here: Callable[[T], Any], there: Callable[[list[T], bool], Job]
+) -> Iterator[tuple[T, Any, EndedError | None]]:
+    """Do work in this process, and beside it in `jobs - 1` others as soon as they are ready.
+
+    Others get ready by doing the first of the work too. Where all is done before, they go on for the next call.
+
+    Args:
+        items: the work.
+        jobs: processes, this one included.
+        here: does one item; its answer.
+        there: the job that does several, whose answer is a list of theirs. If that is None, the job is asked for again
+            with True, and has all that the process may lack.
+
+    Returns:
+        Each item with its answer, or with the error of its process, as they are done.
+    """
+    left, alone = deque(items), deque[T]()  # items whose process ended are done again, one by one
+    with _children(min(jobs, len(items)) - 1) as others:
+        for child in others:
+            child.close_if_full()
+            if child.process is None:
+                child.begin(with_values(there([left[0]], True), name=_ready))
+        while left or alone or any(map(_works, others)):
+            for child in others:
+                if child.job is None and (alone or left):
+                    count = max(1, min(16, len(left) // (4 * jobs)))
+                    chunk = [alone.popleft()] if alone else [left.popleft() for _ in range(count)]
+                    child.begin(there(chunk, False))
+            if left:
+                item = left.popleft()
+                yield item, here(item), None
+            busy = {child.connection: child for child in others if child.job is not None}
+            for connection in wait(busy, 0.0 if left or not any(map(_works, others)) else None):
+                child = busy[connection]  # type: ignore[index]
+                outcome = child.listen()
+                if outcome is None or outcome.job.name is _ready:
+                    continue
+                chunk = outcome.job.name
+                if outcome.error is not None and len(chunk) > 1:
+                    alone.extend(chunk)
+                elif outcome.error is not None:
+                    yield chunk[0], None, outcome.error
+                elif outcome.answer is None:
+                    child.begin(there(chunk, True))
+                else:
+                    yield from ((item, answer, None) for item, answer in zip(chunk, outcome.answer, strict=True))
+
+
+_ready = object()
+"""Name of a job by which a process gets ready."""
+
+_idle: dict[int, list[Child]] = {}
+"""Processes that are kept for the next call, by the id of the process that began them: a fork has its own."""
+
+
+def _works(child: Child) -> bool:
+    """Whether a process does a job that is waited for."""
+    return child.job is not None and child.job.name is not _ready
+
+
+@contextmanager
+def _children(count: int) -> Iterator[list[Child]]:
+    """Processes, kept ones first; those that are busy with work at the end are ended."""
+    idle, found = _idle.setdefault(os.getpid(), []), list[Child]()
+    for _ in range(count):
+        try:
+            found.append(idle.pop())
+        except IndexError:
+            found.append(Child(ONE_THREAD))
+    try:
+        yield found
+    finally:
+        for child in found:
+            if _works(child):
+                child.close()
+        idle.extend(found)
 
 
 def spread(
@@ -64,7 +157,7 @@ def spread(
             parallel = joblib.Parallel(
                 n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch=jobs + 1
             )  # fmt: skip
-            with _interrupt_ignored():
+            with interrupt_ignored():
                 answers = parallel(joblib.delayed(function)(argument) for argument in arguments)
             try:
                 yield from answers
@@ -72,19 +165,6 @@ def spread(
                 answers.close()
     finally:
         close_own_child()  # which does the jobs where there is one at a time
-
-
-@contextmanager
-def _interrupt_ignored() -> Iterator[None]:
-    """Ignore Ctrl-C meanwhile: processes that begin now ignore it for good, and print no traceback; we end them."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, signal.SIG_DFL if handler is None else handler)
 
 
 def own_child() -> Child:

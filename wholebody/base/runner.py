@@ -19,6 +19,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from os import _exit
@@ -122,6 +123,11 @@ class Child:
         return None if self._process is None else self._process.pid
 
     @property
+    def job(self) -> Job | None:
+        """The job that it does; None if it is idle."""
+        return self._job
+
+    @property
     def connection(self) -> Connection:
         """The connection that becomes readable when a job sent something; see `multiprocessing.connection.wait`."""
         assert self._connection is not None
@@ -155,13 +161,15 @@ class Child:
         try:
             last, value = self.connection.recv()
         except (EOFError, ConnectionResetError):
-            return Outcome(self._job, tuple(self._notes), None, self._ended())
+            job, error = self._job, self._ended()
+            return Outcome(job, tuple(self._notes), None, error)
         if not last:
             self._notes.append(value)
             return None
+        job, self._job = self._job, None
         if self._forked:
             self.close()
-        return Outcome(self._job, tuple(self._notes), value, None)
+        return Outcome(job, tuple(self._notes), value, None)
 
     def close_if_full(self) -> None:
         """End an idle process that holds more memory than `FULL`; the next job starts another."""
@@ -176,7 +184,7 @@ class Child:
         for stream in (self._connection, self._output):
             if stream is not None:
                 stream.close()
-        self._process = self._output = self._connection = None
+        self._process = self._output = self._connection = self._job = None
 
     def _fork(self, job: Job) -> None:
         """Fork a process for the job."""
@@ -199,13 +207,16 @@ class Child:
 
 
 def start_process(environment: Mapping[str, str]) -> Started:
-    """Start an interpreter that reads jobs, with these variables and no others."""
+    """Start an interpreter that reads jobs, with these variables and no others.
+
+    It ignores Ctrl-C from its beginning, and prints no traceback: who began it ends it.
+    """
     import wholebody
 
     ours, theirs = socket.socketpair()
     root, path = str(Path(wholebody.__file__).parents[1]), [str(folder) for folder in sys.path]
     output = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the process)
-    with theirs:
+    with theirs, interrupt_ignored():
         process = subprocess.Popen(
             [sys.executable, "-c", _START.format(root=root, path=path, descriptor=theirs.fileno(), parent=os.getpid())],
             stdin=subprocess.DEVNULL,
@@ -217,8 +228,21 @@ def start_process(environment: Mapping[str, str]) -> Started:
     return Started(process, Connection(ours.detach()), output)
 
 
+@contextmanager
+def interrupt_ignored() -> Iterator[None]:
+    """Ignore Ctrl-C meanwhile: processes that begin now ignore it for good. Only the main thread hears Ctrl-C."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_DFL if handler is None else handler)
+
+
 def run_jobs(next_job: Callable[[], Job | None], children: Sequence[Child]) -> Iterator[Outcome]:
-    """Run jobs in parallel, each in one of the children, and yield their outcomes as they end; then close these.
+    """Run jobs in parallel, each in one of the children, and yield outcomes as they end. An early end closes busy ones.
 
     `next_job` is called for a job whenever a process is free; it returns None if there is none (now, or any more).
     """
@@ -238,7 +262,7 @@ def run_jobs(next_job: Callable[[], Job | None], children: Sequence[Child]) -> I
                     free.append(child)
                     yield outcome
     finally:
-        for child in children:
+        for child in busy:
             child.close()
 
 

@@ -34,10 +34,6 @@ class Interval(NamedTuple):
         """The figure and its ends in another unit."""
         return Interval(factor * self.value, factor * self.low, factor * self.high, self.cases)
 
-    def apart_from(self, value: float) -> bool:
-        """Whether the interval excludes a value."""
-        return self.low > value or self.high < value
-
 
 NOTHING = Interval(nan, -inf, inf, 0)
 

@@ -48,7 +48,8 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.assessment.posture import assess
     from wholebody.taskfile import result
 
-    task, q = result.read(arguments.result)
+    found = result.read_result(arguments.result)
+    task, q = found.task, found.q
     judged = assess(task.problem, q)
     described: dict[str, Any] = {"assessment": judged.summary()}
     scores = None

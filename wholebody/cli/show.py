@@ -99,8 +99,8 @@ def _subject(what: str, options: Mapping[str, Any]) -> tuple[Problem, NDArray[np
     if options and path.suffix.lower() in (".json", ".toml"):
         raise InputError(f"{path} says which person it shows; leave out --{next(iter(options))}")
     if path.suffix.lower() == ".json":
-        task, q = result.read(path)
-        return task.problem, q, task.view, task.title
+        found = result.read_result(path)
+        return found.task.problem, found.q, found.task.view, found.task.title
     if path.suffix.lower() == ".toml":
         task = read_task(path)
         return task.problem, task.problem.start, task.view, task.title

@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.cli.picture import make_folder
     from wholebody.cli.tables import table
     from wholebody.studies.study import study
-    from wholebody.studies.study_file import read_study
+    from wholebody.studies.study_files import read_study
 
     asked = read_study(arguments.study)
     out = arguments.out or Path("out") / arguments.study.stem

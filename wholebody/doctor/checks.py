@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from typing import NamedTuple
 
 from wholebody.base.runner import Child, EndedError
@@ -17,22 +18,10 @@ TIMEOUT = 300.0
 
 
 class Outcome(NamedTuple):
-    """The outcome of a check.
+    """The outcome of a check."""
 
-    Attributes:
-        works: whether the check succeeded.
-        detail: the finding, or the reason of the failure, in a few words.
-    """
-
-    works: bool
-    detail: str
-
-
-def import_module(name: str) -> str:
-    """Import a module; return its file."""
-    from importlib import import_module as load
-
-    return str(load(name).__file__)
+    works: bool  # whether the check succeeded
+    detail: str  # the finding, or the reason of the failure, in a few words
 
 
 def solve_program(name: str) -> str:
@@ -91,7 +80,7 @@ def list_methods(_: str) -> str:
 
 
 CHECKS: dict[str, Callable[[str], str]] = {
-    "import": import_module,
+    "import": lambda name: str(import_module(name).__file__),
     "program": solve_program,
     "pose": pose_person,
     "methods": list_methods,
@@ -100,16 +89,7 @@ CHECKS: dict[str, Callable[[str], str]] = {
 
 
 def run(kind: str, names: Sequence[str], timeout: float = TIMEOUT) -> dict[str, Outcome]:
-    """Try names one after the other.
-
-    Args:
-        kind: a key of `CHECKS`.
-        names: names to try.
-        timeout: time limit of a check, seconds.
-
-    Returns:
-        An outcome for every name.
-    """
+    """Try names one after the other."""
     child, outcomes = Child(), dict[str, Outcome]()
     try:
         for name in names:
@@ -117,10 +97,8 @@ def run(kind: str, names: Sequence[str], timeout: float = TIMEOUT) -> dict[str, 
                 outcomes[name] = Outcome(*child.call(attempt, kind, name, seconds=timeout))
             except EndedError as error:
                 said = f": {error.said}" if error.said else ""
-                end = (
-                    f"no answer within {timeout:.0f} s" if error.overtime else f"ended the process ({error.how}){said}"
-                )
-                outcomes[name] = Outcome(False, end)
+                late = f"no answer within {timeout:.0f} s"
+                outcomes[name] = Outcome(False, late if error.overtime else f"ended the process ({error.how}){said}")
     finally:
         child.close()
     return outcomes

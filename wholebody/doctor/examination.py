@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from wholebody.doctor import checks, environment, packages
+from wholebody.doctor import checks, packages
 from wholebody.doctor.packages import EXTRAS, MODULES, Distribution
 from wholebody.methods import EXTRAS as OF_METHODS
 
@@ -28,38 +28,23 @@ AGAIN = "pip install --force-reinstall wholebody"
 
 @dataclass(frozen=True)
 class Entry:
-    """One examined part.
+    """One examined part."""
 
-    Attributes:
-        kind: "package", "QP solver", "method", "tool" or "cache".
-        name: its name.
-        state: "works", "absent" or "broken".
-        detail: version, time, place or reason.
-        needed: whether wholebody requires it.
-        repair: the command or action that repairs it; empty if none is needed.
-    """
-
-    kind: str
-    name: str
-    state: State
-    detail: str
-    needed: bool = True
-    repair: str = ""
+    kind: str  # "package", "QP solver", "method", "tool" or "cache"
+    name: str  # its name
+    state: State  # "works", "absent" or "broken"
+    detail: str  # version, time, place or reason
+    needed: bool = True  # whether wholebody requires it
+    repair: str = ""  # the command or action that repairs it; empty if none is needed
 
 
 @dataclass(frozen=True)
 class Report:
-    """The result of the examination.
+    """The result of the examination."""
 
-    Attributes:
-        python: version and path of the interpreter.
-        entries: all examined parts.
-        faults: the faults with their repairs: (sentence, repair).
-    """
-
-    python: str
-    entries: tuple[Entry, ...]
-    faults: tuple[tuple[str, str], ...] = field(default=())
+    python: str  # version and path of the interpreter
+    entries: tuple[Entry, ...]  # all examined parts
+    faults: tuple[tuple[str, str], ...] = field(default=())  # the faults with their repairs: (sentence, repair)
 
     @property
     def healthy(self) -> bool:
@@ -68,14 +53,10 @@ class Report:
 
 
 def examine(environ: Mapping[str, str] = os.environ) -> Report:
-    """Examine everything; this takes about ten seconds, because methods and solvers are really used.
-
-    Args:
-        environ: the environment variables to examine.
-    """
+    """Examine everything; this takes about ten seconds, because methods and solvers are really used."""
     have = packages.installed(["wholebody", *MODULES, *EXTRAS])
     entries = [*_packages(have), *_solvers(have), *_methods(), *_tools(), _cache()]
-    faults = [*_python(), *_conflicts(have), *_paths(environ)]
+    faults = [*_faults(have, environ)]
     faults += [
         (f"the {entry.kind} {entry.name} is {entry.state}: {entry.detail}", entry.repair)
         for entry in entries
@@ -154,20 +135,14 @@ def _cache() -> Entry:
     return Entry("cache", "convex pieces", "absent", detail, False, f"let {VARIABLE} name a folder that can be written")
 
 
-def _python() -> Iterator[tuple[str, str]]:
-    fault = environment.python_fault()
-    if fault:
+def _faults(have: Mapping[str, Distribution], environ: Mapping[str, str]) -> Iterator[tuple[str, str]]:
+    """Faults of the interpreter, of packages that exclude each other, and of search paths."""
+    if fault := packages.python_fault():
         yield fault, "make an environment with one of them: python3.12 -m venv .venv"
-
-
-def _conflicts(have: Mapping[str, Distribution]) -> Iterator[tuple[str, str]]:
     for conflict in packages.conflicts(have):
         yield str(conflict), conflict.repair
-
-
-def _paths(environ: Mapping[str, str]) -> Iterator[tuple[str, str]]:
-    for folder, hidden in environment.shadowing_folders(environ, MODULES.values()).items():
+    for folder, hidden in packages.shadowing_folders(environ, MODULES.values()).items():
         yield f"PYTHONPATH names {folder}, whose {', '.join(hidden)} hide the installed ones", "unset PYTHONPATH"
-    for folder, hidden in environment.loader_folders(environ).items():
+    for folder, hidden in packages.loader_folders(environ).items():
         sentence = f"LD_LIBRARY_PATH names {folder}, whose {', '.join(hidden)} replace the installed ones"
         yield sentence, "unset LD_LIBRARY_PATH"

@@ -1,11 +1,13 @@
-"""Installed packages, conflicts between them, and packages that are hidden by others of the same name."""
+"""Installed packages, conflicts between them, Python's version, and search paths that hide packages and libraries."""
 
 from __future__ import annotations
 
 import os
 import re
+import sys
 from collections.abc import Iterable, Mapping
 from importlib import metadata
+from pathlib import Path
 from typing import NamedTuple
 
 MODULES = {
@@ -51,35 +53,27 @@ EXTRAS = {
 }
 """Optional packages: distribution -> the extra that installs it."""
 
+OLDEST, NEWEST = (3, 10), (3, 13)
+LIBRARIES = ("libpinocchio", "libcoal", "libhpp-fcl", "libeigenpy", "libboost_python", "liburdfdom", "libassimp")
+"""Shared libraries of which other versions break those of the wheels."""
+
 _EXACT = re.compile(r"^\s*(?P<name>[\w.-]+)\s*==\s*(?P<version>[\w.+!-]+)\s*$")
 
 
 class Distribution(NamedTuple):
-    """An installed distribution.
+    """An installed distribution."""
 
-    Attributes:
-        version: its version.
-        requires: its requirements, as its metadata states them.
-        files: absolute paths of its files; empty if its metadata does not list them.
-    """
-
-    version: str
-    requires: tuple[str, ...] = ()
-    files: frozenset[str] = frozenset()
+    version: str  # its version
+    requires: tuple[str, ...] = ()  # its requirements, as its metadata states them
+    files: frozenset[str] = frozenset()  # absolute paths of its files; empty if its metadata does not list them
 
 
 class Conflict(NamedTuple):
-    """Two incompatible packages.
+    """Two incompatible packages."""
 
-    Attributes:
-        who: the one with the requirement.
-        needs: its requirement, such as ``pin==3.8.0``.
-        found: the installed version; None if there is none.
-    """
-
-    who: str
-    needs: str
-    found: str | None
+    who: str  # the one with the requirement
+    needs: str  # its requirement, such as ``pin==3.8.0``
+    found: str | None  # the installed version; None if there is none
 
     @property
     def repair(self) -> str:
@@ -126,9 +120,6 @@ def conflicts(have: Mapping[str, Distribution]) -> list[Conflict]:
     """Exact versions that an installed package requires and that are not installed.
 
     Those are the binary interfaces of Pinocchio, coal and placo, which are built against each other.
-
-    Args:
-        have: the result of `installed`.
     """
     found = []
     for who, distribution in sorted(have.items()):
@@ -140,12 +131,38 @@ def conflicts(have: Mapping[str, Distribution]) -> list[Conflict]:
 
 
 def shadow(distribution: Distribution, file: str) -> str | None:
-    """Folder from which another package of the same name was imported, or None if the right one was imported.
-
-    Args:
-        distribution: the installed distribution.
-        file: the file of the imported module.
-    """
+    """Folder from which another package of the same name was imported, or None if the right one was imported."""
     if not distribution.files or os.path.realpath(file) in distribution.files:
         return None
     return os.path.dirname(os.path.dirname(file))
+
+
+def python_fault(version: tuple[int, int] = sys.version_info[:2]) -> str | None:
+    """Say what is wrong with the interpreter's version, if anything."""
+    if OLDEST <= version <= NEWEST:
+        return None
+    return f"Python {version[0]}.{version[1]} is not one of 3.10 to 3.13, for which all packages exist"
+
+
+def shadowing_folders(environ: Mapping[str, str], modules: Iterable[str]) -> dict[str, list[str]]:
+    """Folders of PYTHONPATH, as after sourcing a workspace of ROS, with modules of these names: folder -> modules."""
+    found: dict[str, list[str]] = {}
+    for folder in _folders(environ, "PYTHONPATH"):
+        hidden = sorted({name for name in modules if (folder / name).is_dir() or (folder / f"{name}.py").is_file()})
+        if hidden:
+            found[str(folder)] = hidden
+    return found
+
+
+def loader_folders(environ: Mapping[str, str]) -> dict[str, list[str]]:
+    """Folders of LD_LIBRARY_PATH with libraries that would replace the wheels' own: folder -> libraries."""
+    found: dict[str, list[str]] = {}
+    for folder in _folders(environ, "LD_LIBRARY_PATH"):
+        hidden = [name for name in LIBRARIES if any(folder.glob(f"{name}*.so*"))]
+        if hidden:
+            found[str(folder)] = hidden
+    return found
+
+
+def _folders(environ: Mapping[str, str], variable: str) -> list[Path]:
+    return [Path(entry) for entry in environ.get(variable, "").split(os.pathsep) if entry and os.path.isdir(entry)]

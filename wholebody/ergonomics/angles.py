@@ -7,7 +7,6 @@ Directions of segments are compared, as the joint coordinate systems of the Inte
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -18,88 +17,37 @@ from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 
 SIDES = ("left", "right")
-SEGMENTS = ("pelvis", "thorax", "neck", "head")
-SIDE_SEGMENTS = ("upper_arm", "forearm", "hand")
-SIDE_FRAMES = ("shoulder", "elbow", "wrist", "palm", "hip", "knee", "ankle")
-
-
-class Scored(Protocol):
-    """Scores of one side."""
-
-    @property
-    def score(self) -> int:
-        """What they come to."""
-
-    @property
-    def action(self) -> str:
-        """What the paper says of it."""
-
-
-Parts = TypeVar("Parts", bound=Scored)
-
-
-@dataclass(frozen=True)
-class BothSides(Generic[Parts]):
-    """Scores of both sides, of which the worse one counts.
-
-    Attributes:
-        left, right: the parts of each side.
-    """
-
-    left: Parts
-    right: Parts
-
-    @property
-    def worse(self) -> str:
-        """The side with the greater score; "right" where they are equal."""
-        return "left" if self.left.score > self.right.score else "right"
-
-    @property
-    def score(self) -> int:
-        """The greater score of both sides."""
-        return max(self.left.score, self.right.score)
-
-    @property
-    def action(self) -> str:
-        """What the paper says of the greater score."""
-        return (self.left if self.worse == "left" else self.right).action
+NAMES = {"pelvis", "thorax", "neck", "head"}.union(
+    f"{side}_{part}"
+    for side in SIDES
+    for part in ("upper_arm", "forearm", "hand", "shoulder", "elbow", "wrist", "palm", "hip", "knee", "ankle")
+)
+"""Segments and frames of a person."""
 
 
 @dataclass(frozen=True)
 class SideAngles:
-    """Angles of one side of the body, radians.
+    """Angles of one side of the body, radians."""
 
-    Attributes:
-        shoulder_flexion: of the upper arm against the trunk in the sagittal plane; forward is positive, 0 hangs.
-        shoulder_abduction: of the upper arm out of the sagittal plane; outward is positive.
-        shoulder_rise: height of the shoulder's centre above that of the upright body, in the thorax's axes, metres.
-        elbow_flexion: between upper arm and forearm; 0 is straight.
-        forearm_outward: of the forearm out of the sagittal plane; outward is positive.
-        across: whether the wrist is beyond the middle plane of the trunk.
-        wrist_flexion: of the hand against the forearm; towards the palm is positive.
-        wrist_deviation: likewise, towards the thumb.
-        forearm_twist: of the forearm about its axis against the upper arm; 0 as if to shake hands, inward is positive.
-        knee_flexion: between thigh and shank; 0 is straight.
-        arm_raised: whether elbow or wrist is at the height of the shoulder or above.
-        thigh_slope: of the thigh against the vertical; half a right angle and more is horizontal rather than upright.
-        foot_height: of the ankle above the lower ankle, metres.
-        knee_height: of the knee above the lower ankle, metres.
-    """
-
+    # of the upper arm against the trunk in the sagittal plane: 0 hangs or points straight out sideways, forward is
+    # positive, -90 degrees points backward, and whatever points higher is more than 90 degrees, up to 270
     shoulder_flexion: float
-    shoulder_abduction: float
+    shoulder_abduction: float  # of the upper arm out of the sagittal plane; outward is positive
+    # height of the shoulder's centre above that of the upright body, in the thorax's axes, metres
     shoulder_rise: float
-    elbow_flexion: float
-    forearm_outward: float
-    across: bool
-    wrist_flexion: float
-    wrist_deviation: float
+    elbow_flexion: float  # between upper arm and forearm; 0 is straight
+    forearm_outward: float  # of the forearm out of the sagittal plane; outward is positive
+    across: bool  # whether the wrist is beyond the middle plane of the trunk
+    wrist_flexion: float  # of the hand against the forearm; towards the palm is positive
+    wrist_deviation: float  # likewise, towards the thumb
+    # of the forearm about its axis against the upper arm; 0 as if to shake hands, inward is positive
     forearm_twist: float
-    knee_flexion: float
-    arm_raised: bool
+    knee_flexion: float  # between thigh and shank; 0 is straight
+    arm_raised: bool  # whether elbow or wrist is at the height of the shoulder or above
+    # of the thigh against the vertical; half a right angle and more is horizontal rather than upright
     thigh_slope: float
-    foot_height: float
-    knee_height: float
+    foot_height: float  # of the ankle above the lower ankle, metres
+    knee_height: float  # of the knee above the lower ankle, metres
 
 
 @dataclass(frozen=True)
@@ -130,11 +78,7 @@ class BodyAngles:
     center_ahead: float
 
     def side(self, name: str) -> SideAngles:
-        """The angles of "left" or "right".
-
-        Raises:
-            InputError: another name.
-        """
+        """The angles of "left" or "right"."""
         return self.left if checks.choice(name, SIDES, "side") == "left" else self.right
 
 
@@ -149,8 +93,9 @@ def body_angles(figure: Figure, q: Array) -> BodyAngles:
         InputError: a figure without these names, or q has the wrong shape or is not finite.
     """
     check_person(figure, "body_angles: figure")
-    figure.warn_of_angles(checks.posture(q, figure.model.nq, "body_angles: q"), "body_angles: q")
-    now = _Body(figure, checks.posture(q, figure.model.nq, "body_angles: q"))
+    q = checks.posture(q, figure.model.nq, "body_angles: q")
+    figure.warn_of_angles(q, "body_angles: q")
+    now = _Body(figure, q)
     upright = _Body(figure, pin.neutral(figure.model))
     line, line_upright = now.trunk(), upright.trunk()
     feet = [now.at[f"{side}_ankle"] for side in SIDES]
@@ -171,14 +116,9 @@ def body_angles(figure: Figure, q: Array) -> BodyAngles:
 
 
 def check_person(figure: object, what: str) -> Figure:
-    """A figure with the names of a person.
-
-    Raises:
-        InputError: it is none.
-    """
+    """A figure with the names of a person."""
     person = checks.instance(figure, Figure, what, "load one with wb.load('human')")
-    wanted = {*SEGMENTS, *(f"{side}_{name}" for side in SIDES for name in (*SIDE_SEGMENTS, *SIDE_FRAMES))}
-    lacking = sorted(wanted - {*person.segments, *person.frames})
+    lacking = sorted(NAMES - {*person.segments, *person.frames})
     if lacking:
         raise InputError(f"{what}: {person.name} has no {checks.some(lacking)}; load a person with wb.load('human')")
     return person
@@ -190,16 +130,14 @@ class _Body:
     def __init__(self, figure: Figure, q: Array) -> None:
         model, data = figure.model, figure.model.createData()
         pin.framesForwardKinematics(model, data, q)
-        names = {*SEGMENTS, *(f"{side}_{name}" for side in SIDES for name in (*SIDE_SEGMENTS, *SIDE_FRAMES))}
-        placed = {name: data.oMf[figure.frame_id(name)] for name in names}
+        placed = {name: data.oMf[figure.frame_id(name)] for name in NAMES}
         self.at = {name: np.array(place.translation) for name, place in placed.items()}
         self.axes = {name: np.array(place.rotation) for name, place in placed.items()}
         self.center = np.array(pin.centerOfMass(model, data, q))
 
     def turn(self, base: str, name: str) -> Array:
         """Rotation (3, 3) of a segment in the axes of another."""
-        result: Array = self.axes[base].T @ self.axes[name]
-        return result
+        return np.asarray(self.axes[base].T @ self.axes[name])
 
     def trunk(self) -> Array:
         """The line from the middle of the hips to the neck (3,): forward, left and up, by the heading of the pelvis."""
@@ -229,10 +167,10 @@ def _side(now: _Body, upright: _Body, side: str, lowest: float) -> SideAngles:
     rise = [body.axes["thorax"].T @ (body.at[f"{side}_shoulder"] - body.at["thorax"]) for body in (now, upright)]
     hand = -now.turn(f"{side}_forearm", f"{side}_hand")[:, 2]  # the long axis of a hanging hand points down
     thigh, shank = _unit(knee - hip), _unit(ankle - knee)
-    # length of an upper arm's direction in the sagittal plane below which it points sideways and has no flexion
-    # there
+    flexion = float(np.arctan2(upper[0], -upper[2]))
+    sideways = np.hypot(upper[0], upper[2]) <= 0.2  # length in the sagittal plane below which an arm has no flexion
     return SideAngles(
-        shoulder_flexion=float(np.arctan2(upper[0], -upper[2])) if np.hypot(upper[0], upper[2]) > 0.2 else 0.0,
+        shoulder_flexion=0.0 if sideways else flexion + (2.0 * np.pi if flexion < -0.5 * np.pi else 0.0),
         shoulder_abduction=float(np.arcsin(np.clip(out * upper[1], -1.0, 1.0))),
         shoulder_rise=float(rise[0][2] - rise[1][2]),
         elbow_flexion=_between(upper, lower),
@@ -250,8 +188,7 @@ def _side(now: _Body, upright: _Body, side: str, lowest: float) -> SideAngles:
 
 
 def _unit(vector: Array) -> Array:
-    result: Array = vector / np.linalg.norm(vector)
-    return result
+    return np.asarray(vector / np.linalg.norm(vector))
 
 
 def _between(one: Array, other: Array) -> float:

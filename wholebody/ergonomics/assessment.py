@@ -12,8 +12,7 @@ from wholebody.ergonomics.owas_score import Owas, owas_code
 from wholebody.ergonomics.posture_torques import StaticTorques, static_torques
 from wholebody.ergonomics.reba_score import Reba, reba_parts
 from wholebody.ergonomics.rula_score import Rula, rula_parts
-from wholebody.ergonomics.seat import seen
-from wholebody.ergonomics.work import Work
+from wholebody.ergonomics.work import Work, seen
 from wholebody.figures.figure import Figure
 from wholebody.motion.strength import Strength
 from wholebody.scene.scene import Scene
@@ -28,12 +27,8 @@ COLORS: tuple[Color, ...] = (
 )
 """Green to red, of scores from the least to the greatest."""
 
-PARTS = {
-    "upper_arm": ("upper_arm", "clavicle"),
-    "lower_arm": ("forearm",),
-    "wrist": ("hand",),
-}
-"""Parts of a side in RULA -> the segments that are coloured by them."""
+PARTS = {"upper_arm": "upper_arm", "clavicle": "upper_arm", "forearm": "lower_arm", "hand": "wrist"}
+"""Segments of a side -> the parts in RULA that colour them; legs for all others."""
 
 MOST = {"upper_arm": 6, "lower_arm": 3, "wrist": 4, "neck": 6, "trunk": 6, "legs": 2}
 
@@ -94,17 +89,12 @@ class Ergonomics:
         }
 
     def colors(self, figure: Figure) -> dict[str, Color]:
-        """Segment -> colour by its part's score in RULA: green is the least, red the greatest.
-
-        Raises:
-            InputError: the figure is no person.
-        """
+        """Segments of a person -> colour by the part's score in RULA: green is the least, red the greatest."""
         found: dict[str, Color] = {}
         for name in check_person(figure, "colors: figure").segments:
             side, _, part = name.partition("_")
             if side in SIDES:
-                mine = self.rula.left if side == "left" else self.rula.right
-                known = next((key for key, names in PARTS.items() if part in names), "legs")
+                mine, known = getattr(self.rula, side), PARTS.get(part, "legs")
             else:
                 mine, known = self.rula.right, "neck" if name in ("neck", "head") else "trunk"
             level = (getattr(mine, known) - 1) / (MOST[known] - 1)
@@ -141,11 +131,6 @@ def ergonomics_of(
 def _plain(values: dict[str, Any]) -> dict[str, Any]:
     """Angles in degrees; lengths, shares and flags as they are."""
     kept = ("shoulder_rise", "foot_height", "knee_height", "left_share", "center_ahead")
-    return {
-        name: _plain(value)
-        if isinstance(value, dict)
-        else value
-        if name in kept or isinstance(value, bool)
-        else degrees(value)
-        for name, value in values.items()
-    }
+    nested = {name: _plain(value) for name, value in values.items() if isinstance(value, dict)}
+    turned = {name: degrees(value) for name, value in values.items() if isinstance(value, float) and name not in kept}
+    return {**values, **nested, **turned}

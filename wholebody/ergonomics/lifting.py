@@ -17,7 +17,7 @@ import numpy as np
 from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.fields import Checked, Range
-from wholebody.ergonomics.angles import check_person
+from wholebody.ergonomics.angles import SIDES, check_person
 from wholebody.ergonomics.published import published
 from wholebody.figures.figure import Figure
 
@@ -40,9 +40,6 @@ class Lift(Checked):
         duration: of the lifting, hours, up to 8.
         coupling: "good", "fair" or "poor".
         load: kg; None for a lift of which only the limit is asked.
-
-    Raises:
-        InputError: a value of the wrong kind or out of range.
     """
 
     horizontal: Annotated[float, Range(0.0, 3.0, "m")]
@@ -67,13 +64,11 @@ class Lift(Checked):
         h, v, d, a = 100.0 * self.horizontal, 100.0 * self.vertical, 100.0 * self.travel, degrees(self.asymmetry)
         high = int(v >= 75.0)  # cm: height of the hands from which the second columns of the tables count
         column = next(row[1 + high] for row in published("niosh")["multipliers"] if self.duration <= row[0])
-        # cm: least travel
-        # degrees: most turned
         return {
             "HM": 25.0 / max(h, CLOSEST) if h <= FARTHEST else 0.0,
             "VM": 1.0 - 0.003 * abs(v - 75.0) if v <= HIGHEST else 0.0,
-            "DM": 0.82 + 4.5 / max(d, 25.0) if d <= HIGHEST else 0.0,
-            "AM": 1.0 - 0.0032 * a if a <= 135.0 else 0.0,
+            "DM": 0.82 + 4.5 / max(d, 25.0) if d <= HIGHEST else 0.0,  # cm: least travel
+            "AM": 1.0 - 0.0032 * a if a <= 135.0 else 0.0,  # degrees: most turned
             "FM": _frequency(self.frequency, column),
             "CM": published("niosh")["coupling"][self.coupling][high],
         }
@@ -129,11 +124,11 @@ def lift_between(
 
 def _hands(figure: Figure, q: Array) -> tuple[float, float, float]:
     """Horizontal distance, height and asymmetry of the hands."""
-    names = [f"{side}_{part}" for side in ("left", "right") for part in ("palm", "ankle")]
-    places = {name: figure.placement(q, name) for name in names}
-    hands = 0.5 * (places["left_palm"].translation + places["right_palm"].translation)
-    ankles = 0.5 * (places["left_ankle"].translation + places["right_ankle"].translation)
-    forward = sum(figure.placement(q, f"{side}_foot").rotation[:2, 0] for side in ("left", "right"))
+    palms, ankle, feet = (
+        [figure.placement(q, f"{side}_{part}") for side in SIDES] for part in ("palm", "ankle", "foot")
+    )
+    hands, ankles = (0.5 * (left.translation + right.translation) for left, right in (palms, ankle))
+    forward = sum(foot.rotation[:2, 0] for foot in feet)
     away = (hands - ankles)[:2]
     turned = abs(np.arctan2(forward[0] * away[1] - forward[1] * away[0], forward @ away))
     return float(np.linalg.norm(away)), float(hands[2]), float(turned)
@@ -145,6 +140,4 @@ def _frequency(asked: float, column: list[float]) -> float:
     if asked > frequencies[-1]:
         return 0.0
     upper = next(k for k, frequency in enumerate(frequencies) if asked <= frequency)
-    if column[upper] == 0.0:
-        return 0.0
-    return float(np.interp(asked, frequencies, column))
+    return float(np.interp(asked, frequencies, column)) if column[upper] > 0.0 else 0.0

@@ -15,8 +15,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.fields import Checked, Range
 from wholebody.ergonomics.angles import BodyAngles
 from wholebody.ergonomics.published import published
-from wholebody.ergonomics.seat import seen
-from wholebody.ergonomics.work import KNEELING, Work, both_feet
+from wholebody.ergonomics.work import KNEELING, Work, both_feet, seen
 from wholebody.figures.figure import Figure
 from wholebody.scene.scene import Scene
 
@@ -27,14 +26,7 @@ BENT_KNEE = radians(30.0)
 
 @dataclass(frozen=True)
 class Owas(Checked):
-    """An OWAS code.
-
-    Attributes:
-        back: 1 to 4.
-        arms: 1 to 3.
-        legs: 1 to 7.
-        load: 1 to 3.
-    """
+    """The digits of an OWAS code; an InputError if one is out of its range."""
 
     back: Annotated[int, Range(1, 4, whole=True)]
     arms: Annotated[int, Range(1, 3, whole=True)]
@@ -64,16 +56,7 @@ class Owas(Checked):
 
 
 def owas(figure: Figure | Scene, q: Array, work: Work | None = None) -> Owas:
-    """OWAS of a person's posture.
-
-    Args:
-        figure: a person, see `body_angles`; or a scene, whose things then tell whether the person sits.
-        q: (nq,) posture.
-        work: the load, and whether the person walks; none if left out.
-
-    Raises:
-        InputError: no person, no posture, or no work.
-    """
+    """OWAS of a person's posture; arguments and errors as for `rula`. Of `work` counts whether the person walks too."""
     person = seen(figure, q, work, "owas")
     return owas_code(person.angles, person.work)
 

@@ -40,11 +40,7 @@ class StaticTorques:
         return max(self.share.items(), key=lambda item: item[1], default=("", 0.0))
 
     def of_side(self, side: str) -> tuple[str, float]:
-        """The same of one side's arm and leg.
-
-        Raises:
-            InputError: neither "left" nor "right".
-        """
+        """The same of the arm and the leg of "left" or "right"."""
         checks.choice(side, SIDES, "side")
         mine = {name: share for name, share in self.share.items() if name.startswith(f"{side}_")}
         return max(mine.items(), key=lambda item: item[1], default=("", 0.0))

@@ -1,4 +1,4 @@
-"""The published tables of the observation methods and of the lifting equation, `tables.json`.
+"""Scores of both sides, and the published tables of observation methods and the lifting equation, `tables.json`.
 
 RULA: tables A (upper arm 1 to 6, lower arm 1 to 3, wrist 1 to 4, wrist twist 1 or 2), B (neck 1 to 6, trunk 1 to 6,
 legs 1 or 2) and C (score C 1 to 8 and more, score D 1 to 7 and more), and the greatest score of each action level.
@@ -12,6 +12,7 @@ below 75 cm, and at 75 cm or above; coupling multipliers of table 7, below 75 cm
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -27,3 +28,26 @@ def published(method: str) -> dict[str, Any]:
 def action(method: str, score: int) -> str:
     """What the paper of "rula" or "reba" says of a score."""
     return str(next(words for greatest, words in published(method)["actions"] if score <= greatest))
+
+
+@dataclass(frozen=True)
+class BothSides:
+    """Scores of both sides, of which the worse one counts."""
+
+    left: Any  # the parts of each side
+    right: Any
+
+    @property
+    def worse(self) -> str:
+        """The side with the greater score; "right" where they are equal."""
+        return "left" if self.left.score > self.right.score else "right"
+
+    @property
+    def score(self) -> int:
+        """The greater score of both sides."""
+        return int(max(self.left.score, self.right.score))
+
+    @property
+    def action(self) -> str:
+        """What the paper says of the greater score."""
+        return str(getattr(self, self.worse).action)

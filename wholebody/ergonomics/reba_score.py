@@ -8,39 +8,24 @@ from typing import Annotated
 
 from wholebody.base.arrays import Array
 from wholebody.base.fields import Checked, Range
-from wholebody.ergonomics.angles import SIDES, BodyAngles, BothSides
-from wholebody.ergonomics.published import action, published
+from wholebody.ergonomics.angles import SIDES, BodyAngles
+from wholebody.ergonomics.published import BothSides, action, published
 from wholebody.ergonomics.rula_score import (
-    ABDUCTED,
     DEVIATED,
     END_OF_TWIST,
     NEUTRAL,
-    RAISED,
     lower_arm,
-    position,
+    raised,
     turned,
 )
-from wholebody.ergonomics.seat import seen
-from wholebody.ergonomics.work import COUPLINGS, Work, both_feet
+from wholebody.ergonomics.work import COUPLINGS, Work, both_feet, seen
 from wholebody.figures.figure import Figure
 from wholebody.scene.scene import Scene
 
 
 @dataclass(frozen=True)
 class RebaParts(Checked):
-    """Scores of the parts of the body, which the tables combine.
-
-    Attributes:
-        neck: 1 to 3.
-        trunk: 1 to 5.
-        legs: 1 to 4.
-        upper_arm: 1 to 6.
-        lower_arm: 1 or 2.
-        wrist: 1 to 3.
-        load: 0 to 3.
-        coupling: 0 to 3.
-        activity: 0 to 3.
-    """
+    """Scores of the parts of the body, which the tables combine; an InputError if one is out of its range."""
 
     neck: Annotated[int, Range(1, 3, whole=True)]
     trunk: Annotated[int, Range(1, 5, whole=True)]
@@ -73,21 +58,15 @@ class RebaParts(Checked):
         return action("reba", self.score)
 
 
-class Reba(BothSides[RebaParts]):
+class Reba(BothSides):
     """REBA of both sides: the parts with the arm and the leg of each side."""
+
+    left: RebaParts
+    right: RebaParts
 
 
 def reba(figure: Figure | Scene, q: Array, work: Work | None = None) -> Reba:
-    """REBA of a person's posture.
-
-    Args:
-        figure: a person, see `body_angles`; or a scene, whose things then tell whether the person sits.
-        q: (nq,) posture.
-        work: load, grip and repetition; none if left out.
-
-    Raises:
-        InputError: no person, no posture, or no work.
-    """
+    """REBA of a person's posture; arguments and errors as for `rula`. Of `work` the grip counts too."""
     person = seen(figure, q, work, "reba")
     return Reba(*(reba_parts(person.angles, side, person.work) for side in SIDES))
 
@@ -95,24 +74,19 @@ def reba(figure: Figure | Scene, q: Array, work: Work | None = None) -> Reba:
 def reba_parts(angles: BodyAngles, side: str, work: Work) -> RebaParts:
     """Scores of the parts of one side."""
     arm = angles.side(side)
-    upper = position(arm) + int(arm.shoulder_rise > RAISED) + int(abs(arm.shoulder_abduction) > ABDUCTED)
+    head = 1 if -NEUTRAL <= angles.neck_flexion <= radians(20.0) else 2
     twisted = abs(arm.wrist_deviation) > DEVIATED or abs(arm.forearm_twist) > END_OF_TWIST
     return RebaParts(
-        neck=_neck(angles),
+        neck=head + min(turned(angles.neck_twist, angles.neck_lateral), 1),
         trunk=_trunk(angles),
         legs=_legs(angles, side, work),
-        upper_arm=max(upper - int(work.arms_supported), 1),
+        upper_arm=max(raised(arm) - int(work.arms_supported), 1),
         lower_arm=lower_arm(arm),
         wrist=(1 if abs(arm.wrist_flexion) <= radians(15.0) else 2) + int(twisted),
         load=(0 if work.load < 5.0 else 1 if work.load <= 10.0 else 2) + int(work.shock),
         coupling=COUPLINGS.index(work.coupling),
         activity=int(work.static) + int(work.repeated) + int(work.unstable),
     )
-
-
-def _neck(angles: BodyAngles) -> int:
-    score = 1 if -NEUTRAL <= angles.neck_flexion <= radians(20.0) else 2
-    return score + min(turned(angles.neck_twist, angles.neck_lateral), 1)
 
 
 def _trunk(angles: BodyAngles) -> int:

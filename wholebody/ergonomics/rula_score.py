@@ -13,15 +13,13 @@ from typing import Annotated
 
 from wholebody.base.arrays import Array
 from wholebody.base.fields import Checked, Range
-from wholebody.ergonomics.angles import SIDES, BodyAngles, BothSides, SideAngles
-from wholebody.ergonomics.published import action, published
-from wholebody.ergonomics.seat import seen
-from wholebody.ergonomics.work import Work, both_feet
+from wholebody.ergonomics.angles import SIDES, BodyAngles, SideAngles
+from wholebody.ergonomics.published import BothSides, action, published
+from wholebody.ergonomics.work import Work, both_feet, seen
 from wholebody.figures.figure import Figure
 from wholebody.scene.scene import Scene
 
-NEUTRAL = radians(5.0)
-"""Up to which a wrist is neutral, a trunk upright, and a head not in extension."""
+NEUTRAL = radians(5.0)  # Up to which a wrist is neutral, a trunk upright, and a head not in extension
 ABDUCTED = radians(20.0)
 RAISED = 0.03  # m: of a shoulder
 DEVIATED = radians(10.0)  # of a wrist from its middle line
@@ -30,19 +28,7 @@ END_OF_TWIST = radians(45.0)  # half of the forearm's usual range to either side
 
 @dataclass(frozen=True)
 class RulaParts(Checked):
-    """Scores of the parts of the body, which the tables combine.
-
-    Attributes:
-        upper_arm: 1 to 6.
-        lower_arm: 1 to 3.
-        wrist: 1 to 4.
-        wrist_twist: 1 or 2.
-        neck: 1 to 6.
-        trunk: 1 to 6.
-        legs: 1 or 2.
-        muscle: 0 or 1, of static or repeated use.
-        force: 0 to 3.
-    """
+    """Scores of the parts of the body, which the tables combine; an InputError if one is out of its range."""
 
     upper_arm: Annotated[int, Range(1, 6, whole=True)]
     lower_arm: Annotated[int, Range(1, 3, whole=True)]
@@ -51,7 +37,7 @@ class RulaParts(Checked):
     neck: Annotated[int, Range(1, 6, whole=True)]
     trunk: Annotated[int, Range(1, 6, whole=True)]
     legs: Annotated[int, Range(1, 2, whole=True)]
-    muscle: Annotated[int, Range(0, 1, whole=True)] = 0
+    muscle: Annotated[int, Range(0, 1, whole=True)] = 0  # static or repeated use
     force: Annotated[int, Range(0, 3, whole=True)] = 0
 
     @property
@@ -77,8 +63,11 @@ class RulaParts(Checked):
         return action("rula", self.score)
 
 
-class Rula(BothSides[RulaParts]):
+class Rula(BothSides):
     """RULA of both sides."""
+
+    left: RulaParts
+    right: RulaParts
 
 
 def rula(figure: Figure | Scene, q: Array, work: Work | None = None) -> Rula:
@@ -99,28 +88,28 @@ def rula(figure: Figure | Scene, q: Array, work: Work | None = None) -> Rula:
 def rula_parts(angles: BodyAngles, side: str, work: Work) -> RulaParts:
     """Scores of the parts of one side."""
     arm = angles.side(side)
-    # of a forearm out of the sagittal plane: "out to the side of the body"
+    bent = abs(arm.wrist_flexion)
+    wrist = 1 if bent <= NEUTRAL else 2 if bent <= radians(15.0) else 3
+    balanced = work.sits(angles) or both_feet(angles)
+    outward = arm.forearm_outward > radians(30.0)  # "out to the side of the body"
     return RulaParts(
-        upper_arm=_upper_arm(arm, work),
-        lower_arm=lower_arm(arm) + int(arm.across or arm.forearm_outward > radians(30.0)),
-        wrist=_wrist(arm),
+        upper_arm=max(raised(arm) - int(work.arms_supported), 1),
+        lower_arm=lower_arm(arm) + int(arm.across or outward),
+        wrist=wrist + int(abs(arm.wrist_deviation) > DEVIATED),
         wrist_twist=1 + int(abs(arm.forearm_twist) > END_OF_TWIST),
         neck=_neck(angles),
         trunk=_trunk(angles, work),
-        legs=_legs(angles, work),
+        legs=1 if work.legs_supported and balanced else 2,
         muscle=int(work.static or work.repeated),
         force=_force(work),
     )
 
 
-def position(arm: SideAngles) -> int:
-    """Score of the upper arm's flexion, 1 to 4; of RULA and REBA."""
-    flexion = arm.shoulder_flexion
-    if flexion > radians(90.0):
-        return 4
-    if flexion > radians(45.0):
-        return 3
-    return 2 if abs(flexion) > radians(20.0) else 1
+def raised(arm: SideAngles) -> int:
+    """Score of an upper arm that nothing supports, 1 to 6: its flexion, a raised shoulder, abduction; also of REBA."""
+    bent = arm.shoulder_flexion
+    score = 4 if bent > radians(90.0) else 3 if bent > radians(45.0) else 2 if abs(bent) > radians(20.0) else 1
+    return score + int(arm.shoulder_rise > RAISED) + int(abs(arm.shoulder_abduction) > ABDUCTED)
 
 
 def lower_arm(arm: SideAngles) -> int:
@@ -133,17 +122,6 @@ def turned(*angles: float) -> int:
     # from which a trunk or neck counts as twisted or bent sideways: EN 1005-4 (2005) calls up to 10
     # degrees "not clearly visible"
     return sum(abs(angle) > radians(10.0) for angle in angles)
-
-
-def _upper_arm(arm: SideAngles, work: Work) -> int:
-    score = position(arm) + int(arm.shoulder_rise > RAISED) + int(abs(arm.shoulder_abduction) > ABDUCTED)
-    return max(score - int(work.arms_supported), 1)
-
-
-def _wrist(arm: SideAngles) -> int:
-    bent = abs(arm.wrist_flexion)
-    score = 1 if bent <= NEUTRAL else 2 if bent <= radians(15.0) else 3
-    return score + int(abs(arm.wrist_deviation) > DEVIATED)
 
 
 def _neck(angles: BodyAngles) -> int:
@@ -160,11 +138,6 @@ def _trunk(angles: BodyAngles, work: Work) -> int:
     rests = bool(work.back_supported) and work.sits(angles) and opened >= radians(90.0)
     score = 1 if rests else 1 if bent <= NEUTRAL else 2 if bent <= radians(20.0) else 3 if bent <= radians(60.0) else 4
     return score + turned(angles.trunk_twist, angles.trunk_lateral)
-
-
-def _legs(angles: BodyAngles, work: Work) -> int:
-    balanced = work.sits(angles) or both_feet(angles)
-    return 1 if work.legs_supported and balanced else 2
 
 
 def _force(work: Work) -> int:

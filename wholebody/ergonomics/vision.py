@@ -17,10 +17,7 @@ from wholebody.base.fields import Checked, Range
 from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
 
-EYES = "gaze"
-"""Frame between the eyes; its x axis points ahead."""
-
-
+EYES = "gaze"  # frame between the eyes; its x axis points ahead
 RAY = 1e-3  # m: radius of a line of sight
 NEAR = 0.02  # m: at both ends of a line of sight that is not looked at: the thing that is seen hides nothing
 BLURRED = 0.05  # m: nearer points are not seen
@@ -35,9 +32,6 @@ class FieldOfView(Checked):
         up: above the normal line of sight, radians.
         down: below it, radians.
         declination: of the normal line of sight below the head's own axis ahead, radians.
-
-    Raises:
-        InputError: a value out of range.
     """
 
     horizontal: Annotated[float, Range(1e-3, pi, "rad")] = radians(35.0)

@@ -1,14 +1,21 @@
-"""What a posture does not tell: load, repetition, grip, support."""
+"""What a posture does not tell: load, repetition, grip, support; and whether somebody sits.
+
+Who sits is told by `Work`, by what is below pelvis and thighs in a scene, or by the posture.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Annotated, Literal, get_args
+from dataclasses import dataclass, replace
+from math import radians
+from typing import Annotated, Literal, NamedTuple, get_args
 
 from wholebody.base import checks
+from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range
-from wholebody.ergonomics.angles import BodyAngles
+from wholebody.ergonomics.angles import BodyAngles, body_angles
+from wholebody.figures.figure import Figure
+from wholebody.scene.scene import Scene
 
 Coupling = Literal["good", "fair", "poor", "unacceptable"]
 COUPLINGS: tuple[Coupling, ...] = get_args(Coupling)
@@ -36,9 +43,6 @@ class Work(Checked):
         walking: whether the person walks (OWAS).
         seated: None to tell it from the posture: both thighs lie, both knees are bent, no knee is on the ground, and
             the centre of mass is behind the feet.
-
-    Raises:
-        InputError: a value of the wrong kind or out of range.
     """
 
     load: Annotated[float, LOAD] = 0.0
@@ -60,16 +64,11 @@ class Work(Checked):
             raise InputError("Work: a person who walks is not seated; leave one of them out")
 
     def sits(self, angles: BodyAngles) -> bool:
-        """Whether the person is seated.
-
-        Raises:
-            InputError: no angles of a body.
-        """
+        """Whether the person is seated."""
         checks.instance(angles, BodyAngles, "sits: angles", "give those of wb.ergonomics.body_angles(figure, q)")
         if self.seated is not None:
             return self.seated
-        # rad: of both thighs, from which a body with bent knees counts as seated
-        # rad: 30 degrees
+        # rad: slopes of both thighs, and of the knees 30 degrees, from which a body counts as seated
         lies = all(
             side.thigh_slope > 0.7854 and side.knee_flexion > 0.5236 and side.knee_height > KNEELING
             for side in (angles.left, angles.right)
@@ -80,17 +79,57 @@ class Work(Checked):
         return lies and behind and max(angles.left.thigh_slope, angles.right.thigh_slope) < 2.0
 
 
-def check_work(work: object, what: str) -> Work:
-    """A `Work`, or the default of None.
-
-    Raises:
-        InputError: something else.
-    """
-    return Work() if work is None else checks.instance(work, Work, what, "give wb.ergonomics.Work(load=5.0)")
-
-
 def both_feet(angles: BodyAngles) -> bool:
     """Whether both feet bear weight."""
     # m: height of an ankle above the other up to which both feet stand
     level = max(angles.left.foot_height, angles.right.foot_height) <= 0.08
     return level and BOTH_FEET <= angles.left_share <= 1.0 - BOTH_FEET
+
+
+class Seen(NamedTuple):
+    """What the scores are made of."""
+
+    figure: Figure  # the person
+    angles: BodyAngles  # of the body
+    work: Work  # with `seated` and `back_supported` told
+    seat: str  # words for how they were told
+
+
+def seen(body: Figure | Scene, q: Array, work: Work | None, what: str) -> Seen:
+    """A person's angles, and whether the person sits."""
+    figure = body.figure if isinstance(body, Scene) else body
+    asked = Work() if work is None else checks.instance(
+        work, Work, f"{what}: work", "give wb.ergonomics.Work(load=5.0)"
+    )  # fmt: skip
+    angles = body_angles(figure, q)
+    seat, rest = _bearers(body, q, angles) if isinstance(body, Scene) and not asked.walking else (None, None)
+    if asked.seated is not None:
+        told, sits = "as Work says", asked.seated
+    elif seat is not None:
+        told, sits = f"as {seat} is below pelvis or thighs", True
+    else:
+        told, sits = "by the posture", asked.sits(angles) and not asked.walking
+    words = f"{'sits' if sits else 'does not sit'}, {told}"
+    if sits and asked.back_supported is None and rest is not None:
+        words += f"; the back is at {rest}"
+    back = rest is not None if asked.back_supported is None else asked.back_supported
+    return Seen(figure, angles, replace(asked, seated=sits, back_supported=back), words)
+
+
+def _bearers(scene: Scene, q: Array, angles: BodyAngles) -> tuple[str | None, str | None]:
+    """Names of the things nearest below pelvis or thighs and at the trunk; no seat for who lies."""
+    # of the trunk against the vertical: who is beyond lies
+    lies = max(abs(angles.trunk_flexion), abs(angles.trunk_lateral)) > radians(70.0)
+    # m: up to which a body rests on a thing, as the viewer colours contacts
+    found, seat, rest = scene.contacts(q, within=0.005), None, None
+    for (one, other), normal in zip(found.pair, found.normal, strict=True):
+        owners = scene.piece_owner[one], scene.piece_owner[other]
+        for thing, segment, up in ((*owners, normal[2]), (*owners[::-1], -normal[2])):
+            if thing not in scene.objects or scene.objects[thing].segment is not None:
+                continue  # what is carried bears nobody
+            # upward part of a contact's unit normal, from which the thing is rather below than beside
+            if segment in ("pelvis", "left_thigh", "right_thigh") and up > 0.5 and not lies:
+                seat = seat or thing
+            if segment in ("thorax", "upper_lumbar", "lower_lumbar"):
+                rest = rest or thing
+    return seat, rest

@@ -278,7 +278,8 @@ class Figure(checks.FixedAttributes):
     def clamp(self, q: Array) -> Array:
         """Return a copy of q (nq,) with every limited joint moved to its nearest allowed value."""
         q = self._checked(q).copy()
-        q[self.limits.idx_q] = np.clip(q[self.limits.idx_q], self.limits.lower, self.limits.upper)
+        idx_q, _, lower, upper = self.limits
+        q[idx_q] = np.minimum(np.maximum(q[idx_q], lower), upper)
         return q
 
     def grounded(self, q: Array, scene: Any) -> Array:

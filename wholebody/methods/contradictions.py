@@ -27,8 +27,7 @@ from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import Status
 from wholebody.tasks.base import Bound
-from wholebody.tasks.frame import Frame, Orientation
-from wholebody.tasks.hold import Hold
+from wholebody.tasks.frame import Frame, Hold, Orientation
 from wholebody.tasks.inputs import Place, find_place
 from wholebody.tasks.point import Point
 from wholebody.tasks.range_of_motion import CoupledRow, RangeOfMotion, ReachCones, TwistRow

@@ -78,7 +78,8 @@ def _repair(run: Run, window: Window, found: Faults, q: Array) -> bool:
     frames = slice(window.first, window.end)
     windows = ClipRun(run, q, SETTINGS.spread, None, near=SETTINGS.radius)
     freed = windows.window(window, found, lambda _: run.ended, q).q
-    better = run.faults(freed, window.first).number < run.faults(q[frames], window.first).number
+    before = int(found.wrong[frames].sum()) + sum(window.first <= gap < window.end - 1 for gap in found.gaps)
+    better = run.faults(freed, window.first).number < before
     if better:
         q[frames] = freed
     return better

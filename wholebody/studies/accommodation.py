@@ -18,7 +18,7 @@ from wholebody.methods.base import Method
 from wholebody.studies.many import SolveProgress
 from wholebody.studies.records import Records
 from wholebody.studies.study import TaskFunction, Variant, study
-from wholebody.studies.task_files import TaskFile
+from wholebody.studies.study_files import TaskFile
 from wholebody.tasks import inputs
 
 SEXES = {"male": "M", "female": "F"}
@@ -50,8 +50,7 @@ class Accommodation:
     def __repr__(self) -> str:
         parts = [("reach", self.reaches), ("fit", self.fits), *([("see", self.sees)] if self.sees is not None else [])]
         words = ", ".join(f"{np.mean(values):.0%} {name}" for name, values in parts)
-        why = self.records.from_neighbours_in_words() + self.records.first_without_answer()
-        return f"Accommodation of {len(self.records)} people: {self.share:.0%}\n  {words}{why}"
+        return f"Accommodation of {len(self.records)} people: {self.share:.0%}\n  {words}{self.records.remarks()}"
 
 
 def people(count: int = 9, sexes: Sequence[str] = ("male", "female")) -> dict[str, dict[str, Any]]:
@@ -127,12 +126,11 @@ def accommodation(
     if point is not None:
         make = TaskFile(checks.path(task, "task")) if isinstance(task, (str, os.PathLike)) else task
         variants = [Variant(make, person, None, None) for person in population.values()]
-        seen = tuple(_seen(variant, one.q, point) for variant, one in zip(variants, records, strict=True))
+        seen = tuple(  # a problem that failed is not made again
+            one.q is not None and sight(variant().scene, one.q, point).seen
+            for variant, one in zip(variants, records, strict=True)
+        )
     return Accommodation(records, reaches, fits, seen)
-
-
-def _seen(variant: Variant, q: Any, point: Any) -> bool:
-    return q is not None and sight(variant().scene, q, point).seen  # a problem that failed is not made again
 
 
 def _statures(sex: str) -> tuple[float, float]:

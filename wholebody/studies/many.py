@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, is_dataclass, replace
-from typing import Any, NamedTuple
+from functools import partial
+from typing import Any, NamedTuple, TypeVar
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array
-from wholebody.base.batches import run_batch
+from wholebody.base.batches import run_batch, shared
 from wholebody.base.errors import InputError, WholebodyError, one_line
-from wholebody.base.runner import Job, Outcome
+from wholebody.base.runner import EndedError, Job
 from wholebody.methods.base import Method
 from wholebody.methods.inputs import check_problem
 from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
-from wholebody.studies.records import ENDED, REFUSED, Records, SolveRecord
-from wholebody.studies.sending import Kept, Sender, Sent
-from wholebody.studies.store import RecordStore
+from wholebody.studies.records import ENDED, REFUSED, Records, RecordStore, SolveRecord
+from wholebody.studies.sending import Sender, Sent
 from wholebody.tasks.answers import is_own
 from wholebody.version import __version__
 
@@ -29,6 +30,11 @@ RUN = 16  # problems that warm-start one from the other: longer = fewer cold sta
 NEIGHBOURS = 4  # answers of others that are tried for one problem: more find more, and cost where there is no answer
 
 Make = Callable[[], Problem]
+
+T = TypeVar("T")
+
+_Start = tuple[Make, Any]
+"""A problem, and the posture (nq,) from which it is solved."""
 
 
 class SolveProgress(NamedTuple):
@@ -102,13 +108,13 @@ def solve_many(
     folder: str | os.PathLike[str] | None = None,
     progress: Callable[[SolveProgress], Any] | None = None,
 ) -> Records:
-    """Solve many problems, several at a time, in child processes that keep the scenes which they have seen.
+    """Solve many problems, several at a time, in processes that keep the scenes which they have seen.
 
     The answers are the same whatever `jobs` is. A problem that fails, or whose process ends, has a record that says so
-    and ends no other. One at a time, without a deadline and with the package's own terms alone, problems are solved in
-    this process. A problem that is not solved from its own start is tried from the answers of up to four solved
-    ones beside it in the order given, of figures with as many coordinates; `SolveRecord.neighbour` names the one that
-    led to its answer.
+    and ends no other. Without a deadline and with the package's own terms alone, problems are solved in this process,
+    and beside it in others once these are ready, which are kept for the next call. A problem that is not solved from
+    its own start is tried from the answers of up to four solved ones beside it in the order given, of figures with as
+    many coordinates; `SolveRecord.neighbour` names the one that led to its answer.
 
     Args:
         problems: the problems; a mapping gives them names, otherwise they are numbered from "0".
@@ -200,25 +206,25 @@ def _from_neighbours(
     tried: dict[int, dict[int, int]] = {k: {} for k, one in done.items() if one.q is not None and not one.solved}
     while True:
         work = {k: near for k in tried if not done[k].solved and (near := _nearest(k, order, done, tried[k]))}
-        sender, found = Sender(), {}
-        jobs = (
-            Job(k, _solve_from, (sender.sent(order[k].make), running.method, done[j].q), running.seconds or 0.0)
-            for k, (j, _) in work.items()
-        )
-        here = _is_here([order[k] for k in work], running)
-        outcomes = _done_here(jobs) if here else run_batch(jobs, running.jobs, running.cluster)
-        try:
-            for outcome in outcomes:
-                if outcome.error is None and outcome.answer is not None:
-                    found[outcome.job.name] = outcome.answer
-        finally:
-            outcomes.close()  # type: ignore[attr-defined]
+        given = {k: (order[k].make, done[j].q) for k, (j, _) in work.items()}
+        ways = partial(_started, given, running), partial(_starting, given, running, Sender())
+        with closing(_done([*work], [order[k] for k in work], running, ways)) as outcomes:
+            found = {k: answer for k, answer, error in outcomes if error is None and answer is not None}
         for k, (j, distance) in work.items():
             tried[k][j] = distance
             if k in found and keep(k, replace(order[k].record, **found[k], neighbour=order[j].record.name)):
                 return
         if not work:
             return
+
+
+def _started(given: Mapping[int, _Start], running: Running, k: int) -> dict[str, Any] | None:
+    return _solve_from([given[k]], running.method)[0]
+
+
+def _starting(given: Mapping[int, _Start], running: Running, sender: Sender, cases: list[int], full: bool) -> Job:
+    sent = sender.sent([given[k] for k in cases], full)
+    return Job(cases, _sent_to, (_solve_from, sent, running.method), running.seconds or 0.0)
 
 
 def _nearest(
@@ -244,51 +250,68 @@ def _run(
 ) -> bool:  # fmt: skip
     """Do runs; whether the caller ended them. Runs of several cases whose process ended are left in `alone`."""
     sender = Sender()
-    here = _is_here([order[k] for run in work for k in run], running)
 
-    def jobs() -> Iterator[Job]:
-        for run in work:
-            makes = [order[k].make for k in run]
-            sent = Kept(makes) if here else sender.sent(makes)
-            yield Job(run, _solve_run, (sent, running.method), (running.seconds or 0.0) * len(run))
+    def here(run: range) -> Any:
+        return _solve_runs([[order[k].make for k in run]], running.method)[0]
 
-    outcomes = _done_here(jobs()) if here else run_batch(jobs(), running.jobs, running.cluster)
-    try:
-        for outcome in outcomes:
-            run = outcome.job.name
-            if outcome.error is not None and len(run) > 1:
+    def there(runs: list[range], full: bool) -> Job:
+        given = sender.sent([[order[k].make for k in run] for run in runs], full)
+        return Job(runs, _sent_to, (_solve_runs, given, running.method), (running.seconds or 0.0) * len(runs[0]))
+
+    with closing(_done(work, [order[k] for run in work for k in run], running, (here, there))) as outcomes:
+        for run, answers, error in outcomes:
+            if error is not None and len(run) > 1:
                 alone.extend(range(k, k + 1) for k in run)
                 continue
-            if outcome.error is not None:
-                answers = [{"outcome": ENDED, "message": str(outcome.error)}]
-            else:
-                answers = outcome.answer
-            for k, answer in zip(run, answers, strict=True):
+            found = [{"outcome": ENDED, "message": str(error)}] if error is not None else answers
+            for k, answer in zip(run, found, strict=True):
                 if keep(k, replace(order[k].record, **answer)):
                     return True
-    finally:
-        outcomes.close()  # type: ignore[attr-defined]
     return False
 
 
-def _is_here(cases: Sequence[Case], running: Running) -> bool:
-    """Whether cases are solved in this process: one at a time, and nobody else's code can end it or go on for ever."""
-    alone = running.seconds is None and running.cluster is None and running.jobs == 1
-    return alone and all(isinstance(case.make, _Given) and not case.make.is_own for case in cases)
+def _done(
+    work: Sequence[T], cases: Iterable[Case], running: Running,
+    ways: tuple[Callable[[T], Any], Callable[[list[T], bool], Job]],
+) -> Generator[tuple[T, Any, EndedError | None], None, None]:  # fmt: skip
+    """Do work, in this process too where nobody else's code in its cases can end it or go on for ever.
+
+    Args:
+        work: its parts.
+        cases: of all of it.
+        running: how.
+        ways: how a part is done here, and the job that does parts elsewhere; see `shared`.
+    """
+    here, there = ways
+    quick = running.seconds is None and running.cluster is None
+    if quick and all(isinstance(case.make, _Given) and not case.make.is_own for case in cases):
+        yield from shared(work, running.jobs, here, there)
+        return
+    outcomes = run_batch((there([part], True) for part in work), running.jobs, running.cluster)
+    with closing(outcomes):  # type: ignore[type-var]
+        for job, _, answer, error in outcomes:
+            yield job.name[0], None if answer is None else answer[0], error
 
 
-def _done_here(jobs: Iterator[Job]) -> Iterator[Outcome]:
-    for job in jobs:
-        yield Outcome(job, (), job.function(*job.arguments), None)
+def _sent_to(function: Callable[[Any, Method], Any], given: Sent, method: Method) -> Any:
+    """What a function answers to a value that was sent; None where this process has not seen a scene of it."""
+    try:
+        value = given.read()
+    except KeyError:
+        return None
+    return function(value, method)
 
 
-def _solve_run(makers: Sent | Kept, method: Method) -> list[dict[str, Any]]:
-    """Solve the problems of a run, in a process of its own: what their records say."""
-    answers, q = [], None
-    for make in makers.read():
-        record = _solved(make, method, q)
-        q = record.q if record.solved else None
-        answers.append({name: getattr(record, name) for name in _ANSWERED})
+def _solve_runs(runs: Sequence[Sequence[Make]], method: Method) -> list[list[dict[str, Any]]]:
+    """Solve the problems of runs: what their records say."""
+    answers: list[list[dict[str, Any]]] = []
+    for run in runs:
+        q = None
+        answers.append([])
+        for make in run:
+            record = _solved(make, method, q)
+            q = record.q if record.solved else None
+            answers[-1].append({name: getattr(record, name) for name in _ANSWERED})
     return answers
 
 
@@ -313,11 +336,14 @@ def _solved(make: Make, method: Method, q: Array | None) -> SolveRecord:
         return replace(empty, outcome=REFUSED, message=one_line(f"{type(error).__name__}: {error}"))
 
 
-def _solve_from(make: Sent, method: Method, q: Array) -> dict[str, Any] | None:
-    """Solve a problem from another's answer (nq,), in a process of its own: what its record says; None if unsolved."""
-    problem = check_problem(make.read()(), "the task's answer")
-    record = SolveRecord("").of(_alone(method).solve(problem.with_start(q)))
-    return {name: getattr(record, name) for name in _ANSWERED} if record.solved else None
+def _solve_from(given: Sequence[_Start], method: Method) -> list[dict[str, Any] | None]:
+    """Solve problems from others' answers (nq,): what their records say; None for one that is not solved."""
+    answers: list[dict[str, Any] | None] = []
+    for make, q in given:
+        problem = check_problem(make(), "the task's answer")
+        record = SolveRecord("").of(_alone(method).solve(problem.with_start(q)))
+        answers.append({name: getattr(record, name) for name in _ANSWERED} if record.solved else None)
+    return answers
 
 
 def _alone(method: Any) -> Any:

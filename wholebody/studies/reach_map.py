@@ -16,12 +16,22 @@ from wholebody.base.runner import packed
 from wholebody.geometry.placement import FARTHEST
 from wholebody.methods.base import Method
 from wholebody.methods.inputs import check_problem
+from wholebody.methods.qp.method import QP
 from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
 from wholebody.studies.many import MOST_JOBS
-from wholebody.studies.reach_bounds import SLACK, distance_beyond, reach_balls
 from wholebody.studies.reach_result import BEYOND, EXCLUDED, INSIDE, MISSED, NOT_TRIED, REACHED, ReachMap
-from wholebody.studies.reach_search import SURE, Asked, Brick, Try, covered, search_brick
+from wholebody.studies.reach_search import (
+    SLACK,
+    SURE,
+    Asked,
+    Brick,
+    Try,
+    covered,
+    distance_beyond,
+    reach_balls,
+    search_brick,
+)
 from wholebody.tasks import inputs
 
 MOST_PLACES = 1_000_000
@@ -89,7 +99,11 @@ def reach_map(
     inputs.find_place(problem.scene, frame, what)
     point = inputs.point(offset, f"{what}: offset")
     grid = _grid(low, high, step)
-    whole, quick = _methods(method)
+    if method is None:
+        whole: Method = QP(measures=False)
+        quick: Method = QP(measures=False, restarts=0, budget=0, iterations=30)  # from a neighbour's posture
+    else:
+        whole = quick = as_method(method)
     jobs = checks.whole(jobs, f"{what}: jobs", 1, MOST_JOBS)
     if cluster is not None:
         checks.text(cluster, f"{what}: cluster")
@@ -216,48 +230,40 @@ class _Search:
             free = members[self._open()[members]]
             if len(free):
                 apart = np.linalg.norm(self._grid.places[free] - self._grid.places[members].mean(axis=0), axis=1)
-                bricks.append(self._brick([int(free[np.argmin(apart)])], [], whole=True))
+                bricks.append(self._brick([int(free[np.argmin(apart)])], []))
         return bricks
 
     def _following(self) -> Iterator[Brick]:
         """Bricks with places that are open, or to be tried once more."""
-        open_, reached = self._open(), self._verdict == REACHED
-        known = np.flatnonzero(reached)
+        open_, known = self._open(), np.flatnonzero(self._verdict == REACHED)
         for members in self._bricks:
-            free = members[open_[members]].tolist()
-            again = [pair for k in members[self._verdict[members] == MISSED].tolist() for pair in self._again(k, known)]
+            free, again = members[open_[members]].tolist(), []
+            for place in members[self._verdict[members] == MISSED].tolist():
+                begin, apart = self._nearest(self._grid.places[place], known)
+                # the reached place is nearer than what the missed one was missed by
+                if apart < SURE * self._left[place] and (place, begin) not in self._tried:
+                    again.append((place, begin))
             if free or again:
-                yield self._brick(free, again)
+                yield self._brick(free, again, known)
 
-    def _again(self, place: int, known: Indices) -> list[tuple[int, int]]:
-        """The reached place from which a missed one is tried once more: it is nearer than what was missed by."""
+    def _nearest(self, place: Array, known: Indices) -> tuple[int, float]:
+        """Number of the reached place that is nearest to a place (3,), and its distance; inf without any."""
         if not len(known):
-            return []
-        apart = np.linalg.norm(self._grid.places[known] - self._grid.places[place], axis=1)
-        nearest = int(np.argmin(apart))
-        begin = int(known[nearest])
-        if apart[nearest] >= SURE * self._left[place] or (place, begin) in self._tried:
-            return []
-        return [(place, begin)]
+            return -1, np.inf
+        apart = np.linalg.norm(self._grid.places[known] - place, axis=1)
+        return int(known[np.argmin(apart)]), float(apart.min())
 
-    def _brick(self, free: list[int], again: list[tuple[int, int]], whole: bool = False) -> Brick:
+    def _brick(self, free: list[int], again: list[tuple[int, int]], known: Indices | None = None) -> Brick:
+        """Places to search, from all that is reached; without `known` by whole solves."""
         near = {k: self._grid.neighbours(k) for k in [*free, *(place for place, _ in again)]}
         wanted = {*near, *(other for others in near.values() for other in others), *(begin for _, begin in again)}
         reached = {k: self._q[k] for k in sorted(wanted) if self._verdict[k] == REACHED}
-        if free and not whole and not reached:
-            reached = self._nearest(free)
+        if free and known is not None and not reached and len(known):
+            begin = self._nearest(self._grid.places[free].mean(axis=0), known)[0]
+            reached = {begin: self._q[begin]}
         places = {k: self._grid.places[k] for k in wanted | reached.keys()}
         tried = {pair for pair in self._tried if pair[0] in near}
-        return Brick(places, near, free, again, reached, whole, tried)
-
-    def _nearest(self, free: list[int]) -> dict[int, Array]:
-        """The reached place that is nearest to a brick without any, and its posture."""
-        known = np.flatnonzero(self._verdict == REACHED)
-        if not len(known):
-            return {}
-        middle = self._grid.places[free].mean(axis=0)
-        begin = int(known[np.argmin(np.linalg.norm(self._grid.places[known] - middle, axis=1))])
-        return {begin: self._q[begin]}
+        return Brick(places, near, free, again, reached, known is None, tried)
 
 
 def _numbered(sent: tuple[int, Any]) -> tuple[int, list[tuple[Try, int]]]:
@@ -304,13 +310,3 @@ def _grid(low: Any, high: Any, step: Any) -> _Grid:
     index = np.stack(np.meshgrid(*(np.arange(int(n)) for n in counts), indexing="ij"), axis=-1).reshape(-1, 3)
     number = {(i, j, k): place for place, (i, j, k) in enumerate(index.tolist())}
     return _Grid((x, y, z), places, index, number)
-
-
-def _methods(given: str | Method | None) -> tuple[Method, Method]:
-    """The method of whole solves, and of those that begin at a neighbour."""
-    if given is not None:
-        method = as_method(given)
-        return method, method
-    from wholebody.methods.qp.method import QP
-
-    return QP(measures=False), QP(measures=False, restarts=0, budget=0, iterations=30)

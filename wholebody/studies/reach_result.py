@@ -14,8 +14,7 @@ from wholebody.base.files import checked_target, write
 from wholebody.problem import Problem
 
 NOT_TRIED, REACHED, MISSED, EXCLUDED, BEYOND, INSIDE = range(6)
-VERDICTS = ("not tried", "reached", "missed", "excluded", "beyond", "inside")
-"""Words of the codes of a verdict."""
+VERDICTS = ("not tried", "reached", "missed", "excluded", "beyond", "inside")  # Words of the codes of a verdict
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -35,6 +34,9 @@ class ReachMap:
         q: (nx, ny, nz, nq) the posture of a reached place, the nearest of a missed one, the start elsewhere.
         solves: how many solves it took.
         from_neighbours: how many reached places were missed at first, and then reached from a neighbour's.
+
+    Raises:
+        InputError: of its files: another ending, or it cannot be written.
     """
 
     problem: Problem = field(repr=False)
@@ -88,11 +90,7 @@ class ReachMap:
         return f"{head}\n  {counts}{again}\n  {span}"
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write all arrays into an npz file; returns the path.
-
-        Raises:
-            InputError: the name has another ending, or the file cannot be written.
-        """
+        """Write all arrays into an npz file; returns the path."""
         file = checked_target(path, "save: path", "a reach map", (".npz",))
         stream = io.BytesIO()
         np.savez_compressed(
@@ -102,11 +100,7 @@ class ReachMap:
         return write(file, stream.getvalue())
 
     def to_vtk(self, path: str | os.PathLike[str]) -> Path:
-        """Write verdict, left and measure as a legacy VTK file of structured points; returns the path.
-
-        Raises:
-            InputError: the name has another ending, or the file cannot be written.
-        """
+        """Write verdict, left and measure as a legacy VTK file of structured points; returns the path."""
         file = checked_target(path, "to_vtk: path", "a grid", (".vtk",))
         shape, origin = self.verdict.shape, (self.x[0], self.y[0], self.z[0])
         spacing = [float(axis[1] - axis[0]) if len(axis) > 1 else 1.0 for axis in (self.x, self.y, self.z)]
@@ -127,21 +121,13 @@ class ReachMap:
         return write(file, "\n".join(lines) + "\n")
 
     def picture(self, path: str | os.PathLike[str]) -> Path:
-        """Draw heat maps of all heights into a PNG file; returns the path.
-
-        Raises:
-            InputError: the name has another ending, or the file cannot be written.
-        """
-        from wholebody.studies.reach_pictures import draw_slices
+        """Draw heat maps of all heights into a PNG file; returns the path."""
+        from wholebody.studies.pictures import draw_slices
 
         return draw_slices(self, checked_target(path, "picture: path", "a picture", (".png",)))
 
     def html(self, path: str | os.PathLike[str]) -> Path:
-        """Write a page with a slider over the heights, for any browser, without a network; returns the path.
-
-        Raises:
-            InputError: the name has another ending, or the file cannot be written.
-        """
-        from wholebody.studies.reach_pictures import write_page
+        """Write a page with a slider over the heights, for any browser, without a network; returns the path."""
+        from wholebody.studies.pictures import write_page
 
         return write_page(self, checked_target(path, "html: path", "a page", (".htm", ".html")))

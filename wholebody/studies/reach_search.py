@@ -1,17 +1,18 @@
-"""The search of one brick of a reach map: each place from the posture of a neighbour that is reached."""
+"""The search of one brick of a reach map, each place from a neighbour that is reached; places provably out of reach."""
 
 from __future__ import annotations
 
 import pickle
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from wholebody.base.arrays import Array, Mask
+from wholebody.figures.state import State
 from wholebody.methods.base import Method
 from wholebody.methods.contradictions import contradictions
+from wholebody.methods.simplification.reach import Balls, Reach, held_balls
 from wholebody.problem import Problem
 from wholebody.tasks import Point
 
@@ -19,44 +20,27 @@ SURE = 0.95  # share of the distance to a missed place within which no place is 
 
 
 class Try(NamedTuple):
-    """A place that was searched.
+    """A place that was searched."""
 
-    Attributes:
-        place: its number.
-        reached: whether a posture was found.
-        inside: whether the place contradicts the constraints, so that it was not searched.
-        left: distance to the nearest posture that was found, metres.
-        sure: whether the search says that there is nothing nearer, so that places within that distance are left out.
-        measure: weighted sum of the measures at the posture.
-        q: (nq,) the posture.
-    """
-
-    place: int
-    reached: bool
-    inside: bool
-    left: float
+    place: int  # its number
+    reached: bool  # whether a posture was found
+    inside: bool  # whether the place contradicts the constraints, so that it was not searched
+    left: float  # distance to the nearest posture that was found, metres
+    # whether the search says that there is nothing nearer, so that places within that distance are left out
     sure: bool
-    measure: float
-    q: Array
+    measure: float  # weighted sum of the measures at the posture
+    q: Array  # (nq,) the posture
 
 
 @dataclass(frozen=True)
 class Asked:
-    """The problem of every place.
+    """The problem of every place."""
 
-    Attributes:
-        problem: its goals are met at every place too.
-        frame: the frame that reaches.
-        offset: (3,) the point of the frame, in its axes.
-        whole: method of whole solves.
-        quick: method of those that begin at a neighbour.
-    """
-
-    problem: Problem
-    frame: str
-    offset: Array
-    whole: Method
-    quick: Method
+    problem: Problem  # its goals are met at every place too
+    frame: str  # the frame that reaches
+    offset: Array  # (3,) the point of the frame, in its axes
+    whole: Method  # method of whole solves
+    quick: Method  # method of those that begin at a neighbour
 
     def at(self, place: Array, start: Array) -> Problem:
         """The problem of a place (3,), from a start (nq,)."""
@@ -64,35 +48,20 @@ class Asked:
         made.goals = (*self.problem.goals, Point(self.frame, place, offset=self.offset).resolve(made.scene, made.start))
         return made
 
-    @cached_property
-    def alone(self) -> bool:
-        """Whether the place is the only goal, so that its residual is its distance from the reach."""
-        return not self.problem.goals
-
 
 @dataclass
 class Brick:
-    """Places that are searched together, in one process.
+    """Places that are searched together, in one process."""
 
-    Attributes:
-        places: number -> (3,) metres.
-        neighbours: number -> numbers of the neighbours of a place, those of other bricks included.
-        open: places that are searched.
-        again: (place, neighbour) to be tried once more from there.
-        reached: number -> posture (nq,) of what is reached already, here and around.
-        whole: whether places are solved by whole solves from the problem's start.
-        tried: (place, neighbour) of tries of earlier rounds.
-        tries: the answer.
-    """
-
-    places: dict[int, Array]
+    places: dict[int, Array]  # number -> (3,) metres
+    # number -> numbers of the neighbours of a place, those of other bricks included
     neighbours: dict[int, tuple[int, ...]]
-    open: list[int]
-    again: list[tuple[int, int]]
-    reached: dict[int, Array]
-    whole: bool = False
-    tried: set[tuple[int, int]] = field(default_factory=set)
-    tries: list[tuple[Try, int]] = field(default_factory=list)
+    open: list[int]  # places that are searched
+    again: list[tuple[int, int]]  # (place, neighbour) to be tried once more from there
+    reached: dict[int, Array]  # number -> posture (nq,) of what is reached already, here and around
+    whole: bool = False  # whether places are solved by whole solves from the problem's start
+    tried: set[tuple[int, int]] = field(default_factory=set)  # (place, neighbour) of tries of earlier rounds
+    tries: list[tuple[Try, int]] = field(default_factory=list)  # the answer
 
     def search(self, asked: Asked) -> list[tuple[Try, int]]:
         """Search the places: each try, with the neighbour that it began from, -1 for none."""
@@ -139,17 +108,20 @@ class Brick:
         self.tried.add((place, begin))
         start = self.reached.get(begin, asked.problem.start)
         problem = asked.at(self.places[place], start)
-        found = self._contradiction(problem, place) or _solved(asked, problem, place, self.whole or begin < 0)
+        with problem.borrow() as workspace:
+            inside = bool(contradictions(problem, workspace))
+        if inside:
+            found = Try(place, False, True, 0.0, False, 0.0, problem.start)
+        else:
+            solution = (asked.whole if self.whole or begin < 0 else asked.quick).solve(problem)
+            judged, q = solution.assessment, np.asarray(solution.q)
+            # only where the place is the only goal its residual is its distance from the reach
+            sure = not asked.problem.goals and solution.status == "unreachable"
+            found = Try(place, solution.solved, False, judged.goal_errors[-1], sure, judged.measure, q)
         self.tries.append((found, begin))
         if found.reached:
             self.reached[place] = found.q
         return found
-
-    def _contradiction(self, problem: Problem, place: int) -> Try | None:
-        with problem.borrow() as workspace:
-            if contradictions(problem, workspace):
-                return Try(place, False, True, 0.0, False, 0.0, problem.start)
-        return None
 
     def _once_more(self) -> None:
         """Ask for another try of places that were not reached and of which many neighbours are."""
@@ -163,13 +135,6 @@ class Brick:
             # reached neighbours from which a place that was not reached is tried once more
             if len(near) >= 3 and fresh and tries < 4 and (place, fresh[0]) not in self.again:
                 self.again.append((place, fresh[0]))
-
-
-def _solved(asked: Asked, problem: Problem, place: int, whole: bool) -> Try:
-    solution = (asked.whole if whole else asked.quick).solve(problem)
-    judged = solution.assessment
-    sure = asked.alone and solution.status in ("unreachable",)
-    return Try(place, solution.solved, False, judged.goal_errors[-1], sure, judged.measure, np.asarray(solution.q))
 
 
 _known: dict[str, Asked] = {}
@@ -190,3 +155,34 @@ def covered(places: Array, center: Array, radius: Array) -> Mask:
     for middle, size in zip(center, radius, strict=True):
         inside |= np.linalg.norm(places - middle, axis=1) < SURE * size
     return inside
+
+
+SLACK = 1e-6  # m: for rounding: a place that is out of reach by no more may be reached
+
+
+def reach_balls(problem: Problem, frame: str, offset: Array) -> tuple[Array, Array]:
+    """Centres (k, 3) and radii (k,) of balls that hold a point of a frame in every posture within limits and holds."""
+    figure, model = problem.scene.figure, problem.scene.model
+    held = model.frames[figure.frame_id(frame)]
+    point = (held.placement.act(offset))[None]
+    joint = np.array([held.parentJoint], dtype=np.intp)
+    state = State(model).update(problem.start)
+    stuck = np.zeros(model.nv, dtype=bool)
+    for bound in problem.bounds:
+        low, high = bound.bounds(state, None)
+        stuck |= (low == 0.0) & (high == 0.0)
+    resting = Balls(point, np.zeros(1), np.zeros(1, dtype=np.intp))
+    reach = Reach(model, problem.start, resting, joint, np.flatnonzero(stuck).tolist())
+    found = [reach.seen_from(0), *held_balls(figure, reach, problem.constraints)]
+    center = np.concatenate([balls.center for balls in found])
+    radius = np.concatenate([balls.radius for balls in found])
+    bounded = np.isfinite(radius)
+    return center[bounded], radius[bounded]
+
+
+def distance_beyond(places: Array, center: Array, radius: Array) -> Array:
+    """By how much (n,) places are at least out of reach, metres."""
+    least = np.zeros(len(places))
+    for middle, size in zip(center, radius, strict=True):
+        least = np.maximum(least, np.linalg.norm(places - middle, axis=1) - size)
+    return least

@@ -1,4 +1,4 @@
-"""What a run of many solves found: one record a case, and the table of all."""
+"""What a run of many solves found: one record a case, the table of all, and the records on disk."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ import csv
 import io
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+import sqlite3
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from contextlib import closing
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -15,12 +18,12 @@ import numpy as np
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array
-from wholebody.base.errors import MissingPackageError
-from wholebody.base.files import checked_target, write
+from wholebody.base.errors import FileFormatError, InputError, MissingPackageError
+from wholebody.base.files import checked_target, make_folder, write
 from wholebody.solution import Solution
 
 REFUSED, ENDED, CANCELLED = "refused", "ended", "cancelled"
-COLUMN = "target"  # the factor that has columns in a chart; the others have rows
+JUDGED = ("goal_error", "goal_angle", "penetration", "limit_violation", "constraint_violation", "measure")
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,13 +77,8 @@ class SolveRecord:
             message=solution.message,
             seconds=solution.seconds,
             iterations=solution.iterations,
-            goal_error=judged.goal_error,
-            goal_angle=judged.goal_angle,
-            penetration=judged.penetration,
-            limit_violation=judged.limit_violation,
-            constraint_violation=judged.constraint_violation,
-            measure=judged.measure,
             q=np.array(solution.q, dtype=float),
+            **{name: getattr(judged, name) for name in JUDGED},
         )
 
     def row(self) -> dict[str, Any]:
@@ -96,25 +94,21 @@ class SolveRecord:
 
     @classmethod
     def from_json(cls, text: str) -> SolveRecord:
-        """Read what `as_json` wrote.
-
-        Raises:
-            ValueError, TypeError: it is something else.
-        """
+        """Read what `as_json` wrote."""
         plain = json.loads(text)
         q = plain.pop("q")
         return cls(q=None if q is None else np.array(q, dtype=float), **plain)
 
 
 class Records(Sequence[SolveRecord]):
-    """The records of many solves, in the order in which they were asked."""
+    """The records of many solves, in the order in which they were asked.
+
+    Raises:
+        InputError: no list of records; of its files: another ending, or it cannot be written.
+    """
 
     def __init__(self, records: Sequence[SolveRecord]) -> None:
-        """Keep the records.
-
-        Raises:
-            InputError: records is no list, or an entry is no `SolveRecord`.
-        """
+        """Keep the records."""
         listed = checks.listed(records, "Records: records", "those of wb.solve_many")
         for one in listed:
             checks.instance(one, SolveRecord, "Records: a record", "give those of wb.solve_many")
@@ -126,9 +120,6 @@ class Records(Sequence[SolveRecord]):
     def __len__(self) -> int:
         return len(self._records)
 
-    def __iter__(self) -> Iterator[SolveRecord]:
-        return iter(self._records)
-
     def __repr__(self) -> str:
         counts = ", ".join(f"{number} {outcome}" for outcome, number in self.counts().items()) or "none"
         seconds = sum(one.seconds for one in self._records)
@@ -137,20 +128,16 @@ class Records(Sequence[SolveRecord]):
         missed = f"{worst.name} by {1e3 * worst.goal_error:.3g} mm" if worst else "none"
         return (
             f"{len(self)} solves: {counts}\n  {seconds:.3g} s of solving\n"
-            f"  goal missed most: {missed}{self.from_neighbours_in_words()}{self.first_without_answer()}"
+            f"  goal missed most: {missed}{self.remarks()}"
         )  # fmt: skip
 
-    def first_without_answer(self) -> str:
-        """Lines about the first that was refused and the first whose process ended, and why; "" for none."""
-        lines = ""
+    def remarks(self) -> str:
+        """Lines about those solved from a neighbour's answer, and the first that was refused or whose process ended."""
+        lines = f"\n  {self.from_neighbours} solved from the answer of a neighbour" if self.from_neighbours else ""
         for outcome in (REFUSED, ENDED):
             first = next((one for one in self._records if one.outcome == outcome), None)
             lines += "" if first is None else f"\n  first {outcome}: {first.name}, {first.message}"
         return lines
-
-    def from_neighbours_in_words(self) -> str:
-        """A line about how many are solved from the answers of neighbours; "" for none."""
-        return f"\n  {self.from_neighbours} solved from the answer of a neighbour" if self.from_neighbours else ""
 
     @property
     def from_neighbours(self) -> int:
@@ -159,10 +146,7 @@ class Records(Sequence[SolveRecord]):
 
     def counts(self) -> dict[str, int]:
         """How many records have each outcome."""
-        found: dict[str, int] = {}
-        for one in self._records:
-            found[one.outcome] = found.get(one.outcome, 0) + 1
-        return found
+        return dict(Counter(one.outcome for one in self._records))
 
     @property
     def solved(self) -> float:
@@ -190,24 +174,14 @@ class Records(Sequence[SolveRecord]):
 
         Raises:
             InputError: there are no records, more than 100 rows or columns, two records of one name and factors, or an
-                outcome that no solve has; the name has another ending, or the file cannot be written.
+                outcome that no solve has.
         """
-        from wholebody.studies.outcome_chart import Cell, draw_outcomes
+        from wholebody.studies.pictures import draw_outcomes
 
-        file, cells = checked_target(path, "chart: path", "a chart", (".png",)), []
-        for one in self._records:
-            others = [value for factor, value in (one.factors or {}).items() if factor != COLUMN]
-            row = ", ".join(others) if one.factors else one.name
-            left = 0.0 if one.solved else one.goal_error
-            cells.append(Cell(row, (one.factors or {}).get(COLUMN, ""), one.outcome, left))
-        return draw_outcomes(cells, file)
+        return draw_outcomes(self._records, checked_target(path, "chart: path", "a chart", (".png",)))
 
     def to_csv(self, path: str | os.PathLike[str]) -> Path:
-        """Write the rows as CSV; returns the path.
-
-        Raises:
-            InputError: the name has another ending, or the file cannot be written.
-        """
+        """Write the rows as CSV; returns the path."""
         file = checked_target(path, "to_csv: path", "a table", (".csv",))
         rows = self.rows()
         sheet = io.StringIO()
@@ -217,12 +191,7 @@ class Records(Sequence[SolveRecord]):
         return write(file, sheet.getvalue())
 
     def to_parquet(self, path: str | os.PathLike[str]) -> Path:
-        """Write the rows as Parquet; returns the path.
-
-        Raises:
-            MissingPackageError: pyarrow is not installed.
-            InputError: the name has another ending, or the file cannot be written.
-        """
+        """Write the rows as Parquet; returns the path; a MissingPackageError without pyarrow."""
         file = checked_target(path, "to_parquet: path", "a table", (".parquet", ".pq"))
         try:
             import pyarrow
@@ -234,3 +203,43 @@ class Records(Sequence[SolveRecord]):
         sink = pyarrow.BufferOutputStream()
         pyarrow.parquet.write_table(pyarrow.Table.from_pylist(self.rows()), sink)
         return write(file, sink.getvalue().to_pybytes())
+
+
+NAME = "records.sqlite"
+
+
+class RecordStore:
+    """Records by the fingerprint of what was asked; a record is there whole or not at all."""
+
+    def __init__(self, folder: Path) -> None:
+        """Open the folder, or make it."""
+        make_folder(folder)
+        self.path = folder / NAME
+        try:
+            with closing(self._connection()) as connection, connection:
+                connection.execute("CREATE TABLE IF NOT EXISTS records (asked TEXT PRIMARY KEY, record TEXT NOT NULL)")
+        except sqlite3.OperationalError as error:
+            raise InputError(f"{self.path} cannot be written ({error}); give another folder") from None
+        except sqlite3.DatabaseError:
+            raise self._foreign() from None
+
+    def read(self) -> dict[str, SolveRecord]:
+        """All records by fingerprint, without those whose process ended, which are done again."""
+        try:
+            with closing(self._connection()) as connection:
+                rows = connection.execute("SELECT asked, record FROM records").fetchall()
+            found = {str(asked): SolveRecord.from_json(record) for asked, record in rows}
+        except (sqlite3.DatabaseError, ValueError, TypeError, KeyError, AttributeError):
+            raise self._foreign() from None
+        return {asked: record for asked, record in found.items() if record.outcome not in (ENDED, CANCELLED)}
+
+    def add(self, asked: str, record: SolveRecord) -> None:
+        """Keep a record."""
+        with closing(self._connection()) as connection, connection:
+            connection.execute("INSERT OR REPLACE INTO records VALUES (?, ?)", (asked, record.as_json()))
+
+    def _connection(self) -> sqlite3.Connection:
+        return sqlite3.connect(self.path, timeout=60.0)  # s: that another process may hold the file
+
+    def _foreign(self) -> FileFormatError:
+        return FileFormatError(f"{self.path}: holds no records of wb.solve_many; give another folder")

@@ -12,16 +12,6 @@ from wholebody.base.runner import packed
 from wholebody.scene.scene import Scene
 
 
-class Kept(NamedTuple):
-    """What stays in this process."""
-
-    value: Any
-
-    def read(self) -> Any:
-        """The value."""
-        return self.value
-
-
 class Sent(NamedTuple):
     """What is sent to another process.
 
@@ -34,7 +24,11 @@ class Sent(NamedTuple):
     scenes: dict[str, bytes]
 
     def read(self) -> Any:
-        """The value, with the scenes that this process has seen already, or has them now."""
+        """The value, with the scenes that this process has seen already, or has them now.
+
+        Raises:
+            KeyError: it has not seen one that was not sent.
+        """
         return _Reader(self).load()
 
 
@@ -45,8 +39,8 @@ class Sender:
         """Begin with none."""
         self._scenes: dict[tuple[int, int, int], tuple[str, bytes, Scene]] = {}
 
-    def sent(self, value: Any) -> Sent:
-        """A value, ready to be sent."""
+    def sent(self, value: Any, full: bool = True) -> Sent:
+        """A value, ready to be sent; in full, or without the scenes to a process that has seen them."""
         into, scenes = io.BytesIO(), {}
 
         def leave_out(given: object) -> str | None:
@@ -57,7 +51,8 @@ class Sender:
                 made = packed(given)
                 self._scenes[key] = hashlib.sha256(made).hexdigest(), made, given
             digest, made, _ = self._scenes[key]
-            scenes[digest] = made
+            if full:
+                scenes[digest] = made
             return digest
 
         import cloudpickle

@@ -8,10 +8,11 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
+from math import prod
 from typing import Any
 
 from wholebody.base import checks
-from wholebody.base.errors import InputError, WholebodyError
+from wholebody.base.errors import InputError
 from wholebody.base.files import read_bytes
 from wholebody.base.runner import packed
 from wholebody.figures import Figure, load
@@ -19,9 +20,8 @@ from wholebody.figures.anthropometry import design_cases
 from wholebody.methods.base import Method
 from wholebody.problem import Problem
 from wholebody.studies.many import RUN, Case, Running, SolveProgress, fingerprint, run_cases, runs_of
-from wholebody.studies.records import Records, SolveRecord
-from wholebody.studies.store import RecordStore
-from wholebody.studies.task_files import TaskFile
+from wholebody.studies.records import Records, RecordStore, SolveRecord
+from wholebody.studies.study_files import TaskFile
 
 MOST_CASES = 1_000_000
 
@@ -95,22 +95,19 @@ def study(
     factors = [_named(values, f"{what}: {name}") for name, values in given.items()]
     if not any(factors):
         raise InputError("study: nothing varies; give people, targets or layouts")
-    if len(factors[0] or [1]) * len(factors[1] or [1]) * len(factors[2] or [1]) > MOST_CASES:
+    if prod(len(values) or 1 for values in factors) > MOST_CASES:
         raise InputError(f"study: more than {MOST_CASES} cases; give fewer people, targets or layouts")
-    persons = {name: _person(person) for name, person in factors[0].items()}
-    for number, values in enumerate((persons, factors[1], factors[2])):
-        for value in values.values():
-            if file is not None:
-                file.check(*(value if k == number else None for k in range(3)))
+    factors[0] = {name: _person(person) for name, person in factors[0].items()}
+    if file is not None:
+        file.check(*(values.values() for values in factors))
     store = None if folder is None else RecordStore(checks.path(folder, f"{what}: folder"))
     runs = []
-    pairs = product(enumerate(_or_none(persons)), enumerate(_or_none(factors[2])))
-    for (i, (who, person)), (j, (where, layout)) in pairs:
+    persons, aims, places = (list(enumerate(values.items() or [("", None)])) for values in factors)
+    for (i, (who, person)), (j, (where, layout)) in product(persons, places):
         cases = []
-        for k, (aim, target) in enumerate(_or_none(factors[1])):
-            named = {
-                key: name for key, name in zip(("person", "target", "layout"), (who, aim, where), strict=True) if name
-            }
+        for k, (aim, target) in aims:
+            named = {"person": who, "target": aim, "layout": where}
+            named = {factor: name for factor, name in named.items() if name}
             variant = Variant(make, person, target, layout)
             asked = fingerprint(mark, person, target, layout, running.method, warm_start) if store else ""
             record = SolveRecord(", ".join(named.values()), factors=named)
@@ -168,11 +165,7 @@ def _fixed(person: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:
 
 
 def _person(given: Any) -> Any:
-    """A figure as it is, or options of `load`.
-
-    Raises:
-        InputError, UnknownNameError: no such person.
-    """
+    """A figure as it is, or options of `load`."""
     if isinstance(given, Figure):
         return given
     if isinstance(given, str):
@@ -182,13 +175,10 @@ def _person(given: Any) -> Any:
     if isinstance(given, Mapping):
         try:
             loaded(_fixed(given))  # wrong options are refused before anything is computed
-        except WholebodyError:
-            raise
-        except TypeError:
-            raise InputError(
-                f"study: a person is {checks.shown(given)}; give options such as {{'sex': 'female'}}"
-            ) from None
-        return dict(given)
+
+            return dict(given)
+        except TypeError:  # of options that no dictionary of arguments has
+            pass
     raise InputError(f"study: a person is {checks.shown(given)}; give 'F5', {{'sex': 'female'}} or a figure")
 
 
@@ -220,10 +210,6 @@ def _words(value: Any) -> str:
 
 def _word(value: Any) -> str:
     return value if isinstance(value, str) else f"{value:g}" if isinstance(value, float) else checks.shown(value)
-
-
-def _or_none(values: dict[str, Any]) -> list[tuple[str, Any]]:
-    return list(values.items()) or [("", None)]
 
 
 def _source(task: Any) -> Any:

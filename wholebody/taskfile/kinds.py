@@ -1,4 +1,4 @@
-"""Kinds of values in a task file: the accepted values, their description, and the message about a wrong one."""
+"""Tables of a task file and kinds of values: what is accepted, its description, and the message about a wrong one."""
 
 from __future__ import annotations
 
@@ -31,18 +31,10 @@ class Kind(ABC):
 
     @abstractmethod
     def read(self, value: Any, where: Where) -> Any:
-        """Return the value in the form that Python code takes.
-
-        Raises:
-            FileFormatError: the value is of another kind or out of range.
-        """
+        """Return the value in the form that Python code takes."""
 
     def names(self, value: Any, figure: Figure, where: Where) -> None:  # noqa: B027 - most kinds name nothing
-        """Check names against the figure.
-
-        Raises:
-            UnknownNameError: the figure does not know one of them.
-        """
+        """Check names against the figure."""
 
 
 @dataclass(frozen=True)
@@ -89,14 +81,10 @@ class Numbers(Kind):
         return tuple(each.read(entry, where.at(f"[{i}]")) for i, entry in enumerate(value))
 
 
-@dataclass(frozen=True)
 class Placement(Kind):
     """Position, or position and orientation."""
 
-    @property
-    def words(self) -> str:
-        """The three ways of writing it."""
-        return "[x, y, z], [x, y, z, qx, qy, qz, qw] or a 4x4 matrix, m"
+    words = "[x, y, z], [x, y, z, qx, qy, qz, qw] or a 4x4 matrix, m"
 
     def read(self, value: Any, where: Where) -> Any:
         """Return the placement, as `wholebody.geometry.placement` takes it."""
@@ -110,14 +98,10 @@ class Placement(Kind):
         raise where.fault(f"{shown(value)} is no place; write {self.words}")
 
 
-@dataclass(frozen=True)
 class Color(Kind):
     """Numbers, a name or a hexadecimal code."""
 
-    @property
-    def words(self) -> str:
-        """The three ways of writing it."""
-        return 'red, green, blue and, if given, alpha, each from 0 to 1; a name such as "steelblue"; or "#rrggbb"'
+    words = 'red, green, blue and, if given, alpha, each from 0 to 1; a name such as "steelblue"; or "#rrggbb"'
 
     def read(self, value: Any, where: Where) -> tuple[float, float, float, float]:
         """Return red, green, blue and alpha."""
@@ -161,14 +145,10 @@ class Choice(Kind):
         return str(value)
 
 
-@dataclass(frozen=True)
 class Flag(Kind):
     """True or false."""
 
-    @property
-    def words(self) -> str:
-        """Return "true or false"."""
-        return "true or false"
+    words = "true or false"
 
     def read(self, value: Any, where: Where) -> bool:
         """Return the flag."""
@@ -225,19 +205,13 @@ class Several(Kind):
 
 @dataclass(frozen=True)
 class ByName(Kind):
-    """Values by name, which whoever uses them looks up.
+    """Values by name, which whoever uses them looks up."""
 
-    Attributes:
-        kind: of the values.
-        what: the names, such as "dimensions".
-        example: a name and a value as they are written.
-        unit: of the values.
-    """
-
-    kind: Kind
-    what: str
-    example: str
-    unit: str
+    kind: Kind  # of the values
+    what: str  # the names, such as "dimensions"
+    example: str  # a name and a value as they are written
+    unit: str  # of the values
+    names_of: Kind | None = None  # of the names, where the figure knows them
 
     @property
     def words(self) -> str:
@@ -250,32 +224,20 @@ class ByName(Kind):
             raise where.fault(f"{shown(value)} is not a table of {self.what}; write {{ {self.example} }}")
         return {name: self.kind.read(entry, where.at(name)) for name, entry in value.items()}
 
-
-class Joints(ByName):
-    """Values of joints by name."""
-
-    def __init__(self) -> None:
-        """Radians, and metres of sliding joints."""
-        number = Number(Range(-2.0 * math.pi, 2.0 * math.pi, "rad"))
-        super().__init__(number, "joints", "left_elbow_flexion = 0.5", "rad (m for sliding joints)")
-
     def names(self, value: Any, figure: Figure, where: Where) -> None:
-        """Look the joints up."""
-        for name in value:
-            JOINT.names(name, figure, where.at(name))
+        """Look the names up."""
+        if self.names_of is not None:
+            for name in value:
+                self.names_of.names(name, figure, where.at(name))
 
 
-@dataclass(frozen=True)
 class ThingJoints(Kind):
     """Joints that hold a thing to others or to the world."""
 
-    @property
-    def words(self) -> str:
-        """Return how it is written."""
-        return (
-            'list of {type = "hinge" or "ball", at = [x, y, z], axis = [x, y, z], to = "thing"}; at is a point in the '
-            "thing's axes, m; axis is that of a hinge, z if left out; without to the world holds it"
-        )
+    words = (
+        'list of {type = "hinge" or "ball", at = [x, y, z], axis = [x, y, z], to = "thing"}; at is a point in the '
+        "thing's axes, m; axis is that of a hinge, z if left out; without to the world holds it"
+    )
 
     def read(self, value: Any, where: Where) -> tuple[BallJoint, ...]:
         """Return the joints."""
@@ -309,8 +271,6 @@ class ThingJoints(Kind):
 
 JOINTS: dict[str, type[BallJoint]] = {"hinge": Hinge, "ball": BallJoint}
 
-_ROOT: dict[str, tuple[str, ...]] = {"free": ("root",), "fixed": ()}
-
 POSITION = Numbers(Vector(3, Range(-FARTHEST, FARTHEST, "m")), "[x, y, z]")
 DIRECTION = Numbers(Vector(3, Range(-1e6, 1e6)), "[x, y, z], any length")
 PLACEMENT = Placement()
@@ -323,6 +283,10 @@ FRAME = Name("frame", lambda figure: {*figure.frames, *figure.segments, *figure.
 SEGMENT = Name("segment", lambda figure: figure.segments)
 POSTURE = Name("posture", lambda figure: figure.postures)
 PROPORTIONS = ByName(Number(DIMENSION), "dimensions", "sitting_height = 0.93", "m")
+JOINT_VALUES = ByName(
+    Number(Range(-2.0 * math.pi, 2.0 * math.pi, "rad")), "joints", "left_elbow_flexion = 0.5",
+    "rad (m for sliding joints)", JOINT,
+)  # fmt: skip
 CONE = Name("reach cone", lambda figure: figure.cones)
 RANGE = Name("range of motion", lambda figure: figure.ranges)
 
@@ -346,3 +310,31 @@ def kind_of(record: type, field: str) -> Kind:
     if isinstance(check, Vector):
         return Numbers(check)
     return Choice(tuple(check.options)) if isinstance(check, fields.Choice) else _OF_CHECKS[check]
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key of a table."""
+
+    name: str  # its name in the file; also the name of the argument
+    kind: Kind  # the accepted values
+    required: bool = False  # whether the table must have it
+
+
+@dataclass(frozen=True)
+class Form:
+    """One type of a table, such as a goal of type "point"."""
+
+    keys: tuple[Key, ...] = ()  # its own keys, in addition to those of the table
+    make: Callable[..., Any] | None = None  # makes the object from the keys; None if the caller makes it
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of the file."""
+
+    keys: tuple[Key, ...] = ()  # keys of every type
+    many: bool = False  # whether the file can have several, written in double brackets
+    chooser: str = ""  # key that names the type; empty if there are no types
+    implied: tuple[tuple[str, str], ...] = ()  # keys that only one type has and that imply it: (key, type)
+    forms: dict[str, Form] | None = None  # types by name

@@ -11,43 +11,27 @@ from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError, UnknownNameError, one_line
 from wholebody.base.files import is_file, parsed_toml, read_text
 from wholebody.figures.figure import Figure
+from wholebody.taskfile.kinds import Form, Key, Table
 from wholebody.taskfile.schema import TABLES, TOP
-from wholebody.taskfile.tables import Form, Key, Table
 from wholebody.taskfile.where import Where
 
 
 class Entry(NamedTuple):
-    """One table of the file, checked.
+    """One table of the file, checked."""
 
-    Attributes:
-        where: its place.
-        form: its type; None if the table has no types.
-        name: name of the type.
-        keys: the keys that it can have.
-        values: the values of the keys that it has.
-    """
-
-    where: Where
-    form: Form | None
-    name: str
-    keys: Mapping[str, Key]
-    values: dict[str, Any]
+    where: Where  # its place
+    form: Form | None  # its type; None if the table has no types
+    name: str  # name of the type
+    keys: Mapping[str, Key]  # the keys that it can have
+    values: dict[str, Any]  # the values of the keys that it has
 
     def check_names(self, figure: Figure) -> None:
-        """Check names against the figure.
-
-        Raises:
-            UnknownNameError: with the nearest names, file and key.
-        """
+        """Check names against the figure."""
         for name, value in self.values.items():
             self.keys[name].kind.names(value, figure, self.where.at(name))
 
     def make(self) -> Any:
-        """Make the object of this type.
-
-        Raises:
-            FileFormatError: the values contradict each other.
-        """
+        """Make the object of this type."""
         assert self.form is not None
         assert self.form.make is not None
         try:
@@ -69,50 +53,29 @@ class Contents(NamedTuple):
 
 
 def read_contents(path: Path) -> Contents:
-    """Read a task file and check every table, key and value.
-
-    Raises:
-        FileFormatError: with file, line, key and correction.
-        UnknownNameError: a table, key or type that does not exist, with the nearest ones.
-    """
-    text, data = read_toml(path, "task file")
-    where = Where(path, text)
-    plain = {name: value for name, value in data.items() if name not in TABLES}
-    for name in plain:
-        if name not in {key.name for key in TOP}:
-            raise UnknownNameError("key or table", name, [*(key.name for key in TOP), *TABLES], str(where))
-    top = Entry(where, None, "", {key.name: key for key in TOP}, _values(plain, TOP, where))
-    tables = {name: _entries(name, data[name], TABLES[name], where) for name in TABLES if name in data}
-    if "figure" not in tables:
-        raise where.fault('there is no [figure] table; add [figure] with name = "human"')
-    return Contents(top, tables)
+    """Read a task file and check every table, key and value."""
+    contents = contents_of(path, "task file", TOP, TABLES)
+    if "figure" not in contents.tables:
+        raise contents.top.where.fault('there is no [figure] table; add [figure] with name = "human"')
+    return contents
 
 
-def read_toml(path: Path, kind: str) -> tuple[str, dict[str, Any]]:
-    """The text of a TOML file and what it says.
-
-    Args:
-        path: the file.
-        kind: what it is, for the message: "task file".
-
-    Raises:
-        FileFormatError: it cannot be read or is no TOML.
-        UnknownNameError: there is no such file.
-    """
-    text = _text(path, kind)
-    return text, parsed_toml(text, path.name)
-
-
-def _text(path: Path, kind: str) -> str:
+def contents_of(path: Path, kind: str, keys: tuple[Key, ...], known: Mapping[str, Table]) -> Contents:
+    """Read a TOML file of a kind, such as "task file", with these keys at its top and these tables."""
     try:
-        return read_text(path, kind).replace("\r\n", "\n")
+        text = read_text(path, kind).replace("\r\n", "\n")
     except FileFormatError:
-        if is_file(path):
-            raise
-        if os.path.lexists(path):
+        if is_file(path) or os.path.lexists(path):
             raise
         there = sorted(file.name for file in path.parent.glob("*.toml")) if os.path.isdir(path.parent) else []
         raise UnknownNameError(kind, path.name, there, one_line(str(path.parent))) from None
+    data, where, names = parsed_toml(text, path.name), Where(path, text), {key.name: key for key in keys}
+    plain = {name: value for name, value in data.items() if name not in known}
+    for name in plain:
+        if name not in names:
+            raise UnknownNameError("key or table", name, [*names, *known], str(where))
+    top = Entry(where, None, "", names, _values(plain, keys, where))
+    return Contents(top, {name: _entries(name, data[name], known[name], where) for name in known if name in data})
 
 
 def _entries(name: str, data: Any, table: Table, where: Where) -> list[Entry]:

@@ -18,24 +18,17 @@ from wholebody.base.files import checked_target, read_text, write
 from wholebody.base.records import as_dict
 from wholebody.figures.state import State
 from wholebody.geometry.placement import FARTHEST
-from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.taskfile.task import Task, read_task
 from wholebody.version import __version__
 
 
 class GoalLeft(NamedTuple):
-    """Remaining error of one goal.
+    """Remaining error of one goal."""
 
-    Attributes:
-        name: its type and its frame.
-        distance: metres; None for a goal without a position.
-        angle: radians; None for a goal without a direction.
-    """
-
-    name: str
-    distance: float | None
-    angle: float | None
+    name: str  # its type and its frame
+    distance: float | None  # metres; None for a goal without a position
+    angle: float | None  # radians; None for a goal without a direction
 
 
 def goals_left(task: Task, q: Array) -> list[GoalLeft]:
@@ -51,13 +44,7 @@ def goals_left(task: Task, q: Array) -> list[GoalLeft]:
 
 
 def describe(task: Task, solution: Solution, folder: Path) -> dict[str, Any]:
-    """Return the content of result.json.
-
-    Args:
-        task: the task.
-        solution: its solution.
-        folder: the folder of the file; the path of the task file is relative to it.
-    """
+    """Return the content of result.json."""
     figure, q = task.problem.scene.figure, solution.q
     state = State(figure.model).update(q)
     return {
@@ -113,13 +100,28 @@ def read_result(path: str | os.PathLike[str]) -> Result:
         InputError: the path is none.
         WholebodyError: its task cannot be read.
     """
-    file = checked_path(path, "read_result: path")
-    data, task, q = _read(file)
+    file, again = checked_path(path, "read_result: path"), "give a result.json that `wholebody pose` wrote"
+    text = read_text(file, "result")
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise FileFormatError(f"{file}: is no JSON ({one_line(str(error))}); {again}") from None
+    if not isinstance(data, dict) or not isinstance(data.get("task"), str) or not isinstance(data.get("q"), list):
+        raise FileFormatError(f"{file}: has no task and q; {again}")
+    task = read_task(file.parent / data["task"])
+    figure, numbers = task.problem.scene.figure, data["q"]
+    good = [isinstance(entry, (int, float)) and abs(entry) <= FARTHEST for entry in numbers]
+    if len(good) != figure.model.nq or not all(good):
+        raise FileFormatError(
+            f"{file}, key q: is not {figure.model.nq} finite numbers, as the figure of its task needs; "
+            "pose the task again"
+        )
+    q = np.array(numbers, dtype=float)
     texts = {name: data.get(name) for name in ("status", "message", "method")}
     wrong = next((name for name, value in texts.items() if not isinstance(value, str)), None)
     if wrong is not None:
-        raise FileFormatError(f"{file}, key {wrong}: is no text; give a result.json that `wholebody pose` wrote")
-    return Result(task, q, **texts, joints=task.problem.scene.figure.joint_values(q))  # type: ignore[arg-type]
+        raise FileFormatError(f"{file}, key {wrong}: is no text; {again}")
+    return Result(task, q, **texts, joints=figure.joint_values(q))  # type: ignore[arg-type]
 
 
 def write_result(task: Task, solution: Solution, path: str | os.PathLike[str]) -> Path:
@@ -134,39 +136,6 @@ def write_result(task: Task, solution: Solution, path: str | os.PathLike[str]) -
     instance(solution, Solution, "write_result: solution", "give one of wb.solve")
     posture(solution.q, task.problem.scene.model.nq, "write_result: the solution's posture")
     return write(file, as_json(describe(task, solution, file.parent)))
-
-
-def read(path: Path) -> tuple[Task, Array]:
-    """Read a result: its task, and its posture (nq,).
-
-    Raises:
-        FileFormatError: it is not a result, or does not fit the present task.
-        WholebodyError: its task cannot be read.
-    """
-    return _read(path)[1:]
-
-
-def _read(path: Path) -> tuple[dict[str, Any], Task, Array]:
-    text = read_text(path, "result")
-    try:
-        data = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        why = one_line(str(error))
-        raise FileFormatError(f"{path}: is no JSON ({why}); give a result.json that `wholebody pose` wrote") from None
-    if not isinstance(data, dict) or not isinstance(data.get("task"), str) or not isinstance(data.get("q"), list):
-        raise FileFormatError(f"{path}: has no task and q; give a result.json that `wholebody pose` wrote")
-    task = read_task(path.parent / data["task"])
-    return data, task, _posture(path, data["q"], task.problem)
-
-
-def _posture(path: Path, entries: list[Any], problem: Problem) -> Array:
-    numbers = [entry for entry in entries if isinstance(entry, (int, float)) and abs(entry) <= FARTHEST]
-    wanted = problem.scene.model.nq
-    if len(entries) != wanted or len(numbers) != wanted:
-        raise FileFormatError(
-            f"{path}, key q: is not {wanted} finite numbers, as the figure of its task needs; pose the task again"
-        )
-    return np.array(numbers, dtype=float)
 
 
 def _finite(value: Any) -> Any:

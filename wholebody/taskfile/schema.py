@@ -1,88 +1,198 @@
-"""All tables and keys of a task file. The reader and the documentation both use them."""
+"""All tables and keys of a task file, which reader and writer use; docs/taskfile.md says what they mean."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import MISSING, fields, replace
+from typing import Any
+
+from wholebody import methods, tasks
+from wholebody.base.fields import Range, Vector
+from wholebody.figures.anthropometry import AGE, MASS, PERCENTILE, STATURE
+from wholebody.figures.link_pieces import CONCAVITY
+from wholebody.geometry import shapes
+from wholebody.geometry.pieces import SMALLEST
+from wholebody.methods.inputs import BUDGET, CCD_TOLERANCE, DAMPING, ITERATIONS, RESTARTS, SEED, TIME_LIMIT, TOLERANCE
 from wholebody.problem import CLEARANCE
 from wholebody.scene.matter.body import Body
 from wholebody.taskfile import kinds
-from wholebody.taskfile.kinds import FRAME, PLACEMENT, POSITION, Number, kind_of
-from wholebody.taskfile.tables import Key, Table
-from wholebody.taskfile.terms import CONSTRAINTS, GOALS, MEASURES, METHODS
-from wholebody.taskfile.things import FIGURES, SHAPES
-
-_THING = (
-    Key("at", PLACEMENT, "its placement; the origin if left out"),
-    Key("color", kinds.Color(), "of the thing; chosen by the viewer if left out"),
+from wholebody.taskfile.kinds import (
+    DIRECTION,
+    FRAME,
+    GROUP,
+    PLACEMENT,
+    POSITION,
+    SEGMENT,
+    Choice,
+    Flag,
+    Form,
+    Key,
+    Kind,
+    Number,
+    Numbers,
+    Several,
+    Table,
+    Text,
+    kind_of,
 )
 
-_BODY = (
-    Key("density", kind_of(Body, "density"), "of a thing that moves by itself, in `wholebody world`"),
-    Key("mass", kind_of(Body, "mass"), "in place of a density"),
-    Key("material", kinds.Choice(("wood", "human", "metal")), "for impacts and friction; wood if left out"),
-    Key("velocity", kind_of(Body, "velocity"), "of a thing that moves by itself; 0 if left out"),
-    Key("angular_velocity", kind_of(Body, "angular_velocity"), "of it, along the world's axes; 0 if left out"),
-    Key("joints", kinds.ThingJoints(), "that hold a thing that moves by itself; free if left out"),
-)
+_SIZE = Range(SMALLEST, POSITION.vector.each.high, "m")  # of a thing in reach; a larger one is in other units
+_LENGTH, _LENGTHS = Number(_SIZE), Numbers(Vector(3, _SIZE))
 
-TOP = (
-    Key("title", kinds.Text(), "one line of description"),
-    Key("clearance", Number(CLEARANCE), "least distance between any two pieces; 0 if left out"),
-    Key(
-        "touching",
-        kinds.Several(kinds.Several(kinds.Text(), 2), example='[["right_hand", "table"]]'),
-        "pairs of segments or objects whose clearance is 0",
+
+def _keys(**given: Kind) -> tuple[Key, ...]:
+    """Keys that may be left out."""
+    return tuple(Key(name, kind) for name, kind in given.items())
+
+
+def _needed(**given: Kind) -> tuple[Key, ...]:
+    return tuple(Key(name, kind, True) for name, kind in given.items())
+
+
+_PERSON = _keys(
+    sex=Choice(("male", "female")), stature=Number(STATURE), mass=Number(MASS), percentile=Number(PERCENTILE)
+)
+_OWN = _keys(proportions=kinds.PROPORTIONS, age=Number(AGE))
+_DETAIL = _keys(detail=Choice(("spheres", "capsules", "hulls")))
+
+FIGURES = {
+    "human": Form((*_PERSON, *_OWN, *_DETAIL, *_keys(hands=Choice(("rigid", "fingers"))))),
+    "avatar": Form((*_PERSON, *_OWN, *_DETAIL)),
+    "hand": Form((*_keys(side=Choice(("left", "right"))), *_PERSON)),
+    "urdf": Form(
+        (
+            *_needed(path=Text()),
+            *_keys(root=Choice(("fixed", "free")), package_dirs=Several(Text()), concavity=Number(CONCAVITY)),
+        )
     ),
-    Key("range_of_motion", kinds.Flag(), "whether a person keeps ranges of motion, cones and rhythm; true if left out"),
-    Key("balance", kinds.Flag(), "whether the centre of mass stays above the feet; if left out, where a person stands"),
+}
+
+SHAPES = {
+    "box": Form(_needed(size=_LENGTHS), shapes.Box),
+    "sphere": Form(_needed(radius=_LENGTH), shapes.Sphere),
+    "capsule": Form(_needed(radius=_LENGTH, length=_LENGTH), shapes.Capsule),
+    "cylinder": Form(_needed(radius=_LENGTH, length=_LENGTH), shapes.Cylinder),
+    "torus": Form(_needed(radius=_LENGTH, tube=_LENGTH), shapes.Torus),
+    "ellipsoid": Form(_needed(semi_axes=_LENGTHS), shapes.Ellipsoid),
+    "halfspace": Form(_keys(normal=DIRECTION, offset=Number(POSITION.vector.each)), shapes.HalfSpace),
+    "hull": Form(_needed(points=Several(POSITION, 4)), shapes.Hull),
+    "mesh": Form(
+        (
+            *_needed(path=Text()),
+            *(Key(name, kind_of(shapes.Mesh, name)) for name in ("scale", "up", "max_vertices", "threshold")),
+        )
+    ),
+}
+
+
+def _form(made: type, names: str, /, **given: Kind) -> Form:
+    """A form whose keys are fields of the class that it makes; those without a default are required.
+
+    Their kinds are what the fields accept, where none is given.
+    """
+    needed = {field.name for field in fields(made) if field.default is field.default_factory is MISSING}
+    keys = (Key(name, given.get(name) or kind_of(made, name), name in needed) for name in names.split())
+    return Form(tuple(keys), made)
+
+
+CONTACTS = {
+    "touch": _form(tasks.Touch, "part thing weight"),
+    "lean": _form(tasks.Lean, "on part side weight", part=SEGMENT),
+    "sit": _form(tasks.Sit, "on back pelvis trunk weight", pelvis=SEGMENT, trunk=SEGMENT),
+    "grasp": _form(tasks.Grasp, "hand thing kind side opposed along approach weight", hand=Choice(("left", "right"))),
+}
+"""Contacts; each is a goal and a constraint, by the table in which it stands."""
+
+GOALS = {
+    "point": _form(tasks.Point, "frame target offset weight", frame=FRAME),
+    "frame": _form(tasks.Frame, "frame target weight", frame=FRAME),
+    "orientation": _form(tasks.Orientation, "frame target weight", frame=FRAME),
+    "axis": _form(tasks.Axis, "frame axis direction toward weight", frame=FRAME),
+    "center_of_mass": _form(tasks.CenterOfMass, "target axes weight"),
+    "relative": _form(tasks.Relative, "frame to placement orientation weight", frame=FRAME, to=FRAME),
+    "posture": _form(tasks.Posture, "target joints weight", target=kinds.POSTURE, joints=Several(GROUP)),
+    **CONTACTS,
+}
+
+CONSTRAINTS = {
+    "hold": _form(tasks.Hold, "frame at orientation relative_to", frame=FRAME, relative_to=FRAME),
+    "plane": _form(tasks.Plane, "frame normal point side", frame=FRAME),
+    "balance": _form(tasks.Balance, "feet margin", feet=Several(SEGMENT)),
+    "freeze": Form(_needed(joints=Several(GROUP)), lambda joints: tasks.Freeze(*joints)),
+    "reach_cones": _form(tasks.ReachCones, "names", names=Several(kinds.CONE)),
+    "range_of_motion": _form(tasks.RangeOfMotion, "names", names=Several(kinds.RANGE)),
+    "stand": _form(tasks.Stand, "on feet balance margin", feet=Several(SEGMENT)),
+    **{name: replace(form, keys=form.keys[:-1]) for name, form in CONTACTS.items()},  # a constraint has no weight
+}
+
+MEASURES = {
+    "effort": _form(tasks.Effort, "weight"),
+    "rotation_effort": _form(tasks.RotationEffort, "weight"),
+    "discomfort": _form(tasks.Discomfort, "weight"),
+    "displacement": _form(tasks.Displacement, "weight"),
+    "rhythm": _form(tasks.Rhythm, "weight"),
+    "potential_energy": _form(tasks.PotentialEnergy, "weight"),
+}
+
+
+def _later(name: str) -> Callable[..., Any]:
+    """A method by its name in `wb.methods`, imported only when it is made."""
+    return lambda **settings: getattr(methods, name)(**settings)
+
+
+_TOLERANCE, _ITERATIONS, _TIME_LIMIT = Number(TOLERANCE), Number(ITERATIONS), Number(TIME_LIMIT)
+_LIMITS = _keys(tolerance=_TOLERANCE, iterations=_ITERATIONS, time_limit=_TIME_LIMIT)
+
+METHODS = {
+    "qp": Form(
+        _keys(
+            solver=Text(), hot_start=Flag(), tolerance=_TOLERANCE, iterations=_ITERATIONS, budget=Number(BUDGET),
+            restarts=Number(RESTARTS), restarts_for_measure=Number(RESTARTS), seed=Number(SEED), measures=Flag(),
+            time_limit=_TIME_LIMIT,
+        ),
+        _later("QP"),
+    ),
+    "ccd": Form(
+        _keys(
+            tolerance=Number(CCD_TOLERANCE), iterations=_ITERATIONS, restarts=Number(RESTARTS), seed=Number(SEED),
+            time_limit=_TIME_LIMIT,
+        ),
+        _later("CCD"),
+    ),
+    "newton": Form((*_LIMITS, *_keys(algebra=Text(), inequalities=Choice(("slack", "barrier")))), _later("Newton")),
+    "placo": Form(_LIMITS, _later("Placo")),
+    "dls": Form((*_LIMITS, *_keys(damping=Number(DAMPING))), _later("DampedLeastSquares")),
+}  # fmt: skip
+
+
+_THING = _keys(at=PLACEMENT, color=kinds.Color())
+_BODY = _keys(
+    density=kind_of(Body, "density"),
+    mass=kind_of(Body, "mass"),
+    material=Choice(("wood", "human", "metal")),
+    velocity=kind_of(Body, "velocity"),
+    angular_velocity=kind_of(Body, "angular_velocity"),
+    joints=kinds.ThingJoints(),
+)
+
+TOP = _keys(
+    title=Text(),
+    clearance=Number(CLEARANCE),
+    touching=Several(Several(Text(), 2), example='[["right_hand", "table"]]'),
+    range_of_motion=Flag(),
+    balance=Flag(),
 )
 
 TABLES = {
-    "figure": Table(
-        "The figure that is posed.",
-        (Key("joints", kinds.Several(kinds.GROUP), "joints and groups that may move; all if left out"),),
-        chooser="name",
-        implied=(("path", "urdf"),),
-        forms=FIGURES,
-    ),
-    "start": Table(
-        "The start posture; the figure's first posture if left out.",
-        (
-            Key("posture", kinds.POSTURE, "one of the figure's postures"),
-            Key("joints", kinds.Joints(), "values of joints that differ from that posture"),
-            Key("root", PLACEMENT, "placement of a free root; as in the posture if left out"),
-        ),
-    ),
-    "object": Table(
-        "A thing around the figure.",
-        (Key("name", kinds.Text(), "of the thing", True), *_THING, *_BODY),
-        True,
-        "shape",
-        forms=SHAPES,
-    ),
+    "figure": Table(_keys(joints=Several(GROUP)), chooser="name", implied=(("path", "urdf"),), forms=FIGURES),
+    "start": Table(_keys(posture=kinds.POSTURE, joints=kinds.JOINT_VALUES, root=PLACEMENT)),
+    "object": Table((*_needed(name=Text()), *_THING, *_BODY), True, "shape", forms=SHAPES),
     "attach": Table(
-        "A thing that the figure carries.",
-        (
-            Key("name", kinds.Text(), "of the thing", True),
-            Key("to", FRAME, "the frame that carries it", True),
-            Key("rests_on", kinds.Several(kinds.Text()), "more segments and carried things that it may touch"),
-            *_THING,
-        ),
-        True,
-        "shape",
-        forms=SHAPES,
+        (*_needed(name=Text(), to=FRAME), *_keys(rests_on=Several(Text())), *_THING), True, "shape", forms=SHAPES
     ),
-    "goal": Table("A goal, which is met if possible.", (), True, "type", forms=GOALS),
-    "constraint": Table(
-        "A constraint, in addition to joint limits and non-penetration.", (), True, "type", forms=CONSTRAINTS
-    ),
-    "measure": Table("A measure to minimise; effort if the file has none.", (), True, "type", forms=MEASURES),
-    "view": Table(
-        "The camera of the picture; chosen automatically if left out.",
-        (
-            Key("eye", POSITION, "position of the camera; with target"),
-            Key("target", POSITION, "the point in the middle of the picture; with eye"),
-            Key("see_through", kinds.Several(kinds.Text()), "things to draw transparent"),
-        ),
-    ),
-    "method": Table("The method that finds the posture.", (), chooser="name", forms=METHODS),
+    "goal": Table((), True, "type", forms=GOALS),
+    "constraint": Table((), True, "type", forms=CONSTRAINTS),
+    "measure": Table((), True, "type", forms=MEASURES),
+    "view": Table(_keys(eye=POSITION, target=POSITION, see_through=Several(Text()))),
+    "method": Table((), chooser="name", forms=METHODS),
 }

@@ -6,14 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.checks import path as checked_path
-from wholebody.base.errors import InputError, UnknownNameError, WholebodyError
+from wholebody.base.errors import UnknownNameError
 from wholebody.base.files import is_file, is_folder, title_of
 from wholebody.base.records import with_values
 from wholebody.figures import Figure, load
@@ -27,22 +27,16 @@ from wholebody.scene.scene import Scene
 from wholebody.taskfile.reading import Contents, Entry, read_contents
 from wholebody.taskfile.where import Where
 
-_T = TypeVar("_T")
 _OF_BODIES = ("density", "mass", "material", "velocity", "angular_velocity", "joints")
 
 
 class View(NamedTuple):
-    """The camera of a picture of the task.
+    """The camera of a picture of the task."""
 
-    Attributes:
-        eye: position of the camera, metres; None for an automatic one.
-        target: the point in the middle of the picture, metres; given with the eye.
-        see_through: names of things drawn transparent.
-    """
-
-    eye: tuple[float, float, float] | None = None
+    eye: tuple[float, float, float] | None = None  # position of the camera, metres; None for an automatic one
+    # the point in the middle of the picture, metres; given with the eye
     target: tuple[float, float, float] | None = None
-    see_through: tuple[str, ...] = ()
+    see_through: tuple[str, ...] = ()  # names of things drawn transparent
 
 
 @dataclass(frozen=True)
@@ -83,15 +77,7 @@ def read_task(path: str | PathLike[str]) -> Task:
 
 
 def task_from(contents: Contents, file: Path) -> Task:
-    """The task that the contents of a file state.
-
-    Args:
-        contents: of the file, or changed since.
-        file: which paths are relative to.
-
-    Raises:
-        FileFormatError, UnknownNameError, InputError: as for `read_task`.
-    """
+    """The task that the contents of a file state."""
     figure = _figure(contents)
     for entries in contents.tables.values():
         for entry in entries:
@@ -99,26 +85,17 @@ def task_from(contents: Contents, file: Path) -> Task:
                 entry.check_names(figure)
     start = _start(contents, figure)
     scene = _scene(contents, figure)
-    terms = {name: _terms(contents, name, scene, start) for name in ("goal", "constraint", "measure")}
-    top = contents.top
-    problem = _said(
-        top.where,
-        lambda: Problem(
-            scene,
-            start,
-            goals=terms["goal"],
-            constraints=terms["constraint"],
-            measures=terms["measure"] or None,
-            clearance=top.values.get("clearance", 0.0),
-            touching=top.values.get("touching", ()),
-            range_of_motion=top.values.get("range_of_motion", True),
-            balance=top.values.get("balance"),
-        ),
-    )
+
+    options = {name: value for name, value in contents.top.values.items() if name != "title"}
+    for name in ("goal", "constraint", "measure"):
+        if terms := _terms(contents, name, scene, start):
+            options[f"{name}s"] = terms
+    with contents.top.where.named():
+        problem = Problem(scene, start, **options)
     method = contents.one("method")
     return Task(
         path=file,
-        title=top.values.get("title", title_of(file)),
+        title=contents.top.values.get("title", title_of(file)),
         problem=problem,
         method=method.make() if method else method_named("qp"),
         goal_names=tuple(_goal_name(entry) for entry in contents.tables.get("goal", ())),
@@ -136,11 +113,13 @@ def _figure(contents: Contents) -> Figure:
         spec = _file(options.pop("path"), entry.where.at("path"))
         if "package_dirs" in options:
             options["package_dirs"] = [entry.where.file.parent / folder for folder in options["package_dirs"]]
-    figure: Figure = _said(entry.where, lambda: load(spec, **options))
+    with entry.where.named():
+        figure: Figure = load(spec, **options)
     if joints is None:
         return figure
     entry.check_names(figure)
-    return _said(entry.where.at("joints"), lambda: figure.reduced(joints))
+    with entry.where.at("joints").named():
+        return figure.reduced(joints)
 
 
 def _start(contents: Contents, figure: Figure) -> NDArray[np.float64]:
@@ -149,7 +128,8 @@ def _start(contents: Contents, figure: Figure) -> NDArray[np.float64]:
         return figure.posture(figure.postures[0])
     q = figure.posture(entry.values.get("posture", figure.postures[0]))
     joints = entry.values.get("joints", {})
-    q = _said(entry.where.at("joints"), lambda: figure.with_joints(q, joints))
+    with entry.where.at("joints").named():
+        q = figure.with_joints(q, joints)
     if not figure.within_limits(q):
         clamped = figure.joint_values(figure.clamp(q))
         far = max(joints, key=lambda name: abs(joints[name] - clamped[name]))
@@ -159,8 +139,8 @@ def _start(contents: Contents, figure: Figure) -> NDArray[np.float64]:
     if "root" in entry.values:
         if figure.root != "free":
             raise entry.where.at("root").fault("the figure's root is fixed; leave the key out, or load a free root")
-        place = _said(entry.where.at("root"), lambda: placement(entry.values["root"], "root"))
-        q[:7] = pin.SE3ToXYZQUAT(place)
+        with entry.where.at("root").named():
+            q[:7] = pin.SE3ToXYZQUAT(placement(entry.values["root"], "root"))
     return q
 
 
@@ -169,21 +149,13 @@ def _scene(contents: Contents, figure: Figure) -> Scene:
     for entry in [*contents.tables.get("object", ()), *contents.tables.get("attach", ())]:
         options = dict(entry.values)
         thing = {name: options.pop(name) for name in ("name", "at", "color", "to", "rests_on") if name in options}
-        thing |= _said(entry.where, lambda options=options: _body(options))  # type: ignore[misc]
+        moves: dict[str, Any] = {name: options.pop(name) for name in _OF_BODIES if name in options}
+        with entry.where.named():
+            thing |= {"body": Body(**moves)} if moves.keys() - {"material"} else moves
         shape = _shape(entry, options)
         add: Callable[..., Scene] = scene.attach if "to" in thing else scene.add
-        _said(entry.where, lambda add=add, shape=shape, thing=thing: add(shape, **thing))  # type: ignore[misc]
-    _check_joints(contents, scene)
-    return scene
-
-
-def _check_joints(contents: Contents, scene: Scene) -> None:
-    """Look up what holds things.
-
-    Raises:
-        UnknownNameError: there is no such thing.
-        FileFormatError: a thing is to hold itself.
-    """
+        with entry.where.named():
+            add(shape, **thing)
     things = [name for name, thing in scene.objects.items() if thing.segment is None]
     for entry in contents.tables.get("object", ()):
         for number, joint in enumerate(entry.values.get("joints", ())):
@@ -192,18 +164,7 @@ def _check_joints(contents: Contents, scene: Scene) -> None:
                 raise UnknownNameError("thing", joint.to, things, str(where))
             if joint.to == entry.values["name"]:
                 raise where.fault("the thing cannot hold itself; name another thing, or leave to out for the world")
-
-
-def _body(options: dict[str, Any]) -> dict[str, Any]:
-    """Take what makes a thing move by itself from the options: its body, or its material alone.
-
-    Raises:
-        InputError: both a density and a mass.
-    """
-    given: dict[str, Any] = {name: options.pop(name) for name in _OF_BODIES if name in options}
-    if not given.keys() - {"material"}:
-        return given
-    return {"body": Body(**given)}
+    return scene
 
 
 def _shape(entry: Entry, options: dict[str, Any]) -> Shape:
@@ -212,7 +173,8 @@ def _shape(entry: Entry, options: dict[str, Any]) -> Shape:
         shape: Shape = with_values(entry, values=options).make()
         return shape
     file = _file(options.pop("path"), entry.where.at("path"))
-    return _said(entry.where.at("path"), lambda: Mesh(file, **options))
+    with entry.where.at("path").named():
+        return Mesh(file, **options)
 
 
 def _terms(contents: Contents, name: str, scene: Scene, start: NDArray[np.float64]) -> list[Any]:
@@ -220,7 +182,8 @@ def _terms(contents: Contents, name: str, scene: Scene, start: NDArray[np.float6
     terms = []
     for entry in contents.tables.get(name, ()):
         term = entry.make()
-        _said(entry.where, lambda term=term: term.resolve(scene, start))  # type: ignore[misc]
+        with entry.where.named():
+            term.resolve(scene, start)
         terms.append(term)
     return terms
 
@@ -251,15 +214,3 @@ def _goal_name(entry: Entry) -> str:
     named = ("frame", "part", "on", "hand", *(("target",) if entry.name == "posture" else ()))
     moved = next((entry.values[key] for key in named if key in entry.values), "")
     return f"{entry.name} {moved}".strip()
-
-
-def _said(where: Where, call: Callable[[], _T]) -> _T:
-    """Call, and add the place in the file to an error."""
-    try:
-        return call()
-    except UnknownNameError as error:
-        raise UnknownNameError(error.kind, error.name, error.known, str(where)) from None
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
-    except WholebodyError as error:
-        raise type(error)(f"{where}: {error}") from None

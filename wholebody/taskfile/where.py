@@ -3,31 +3,25 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from wholebody.base.errors import FileFormatError, one_line
+from wholebody.base.errors import FileFormatError, InputError, UnknownNameError, WholebodyError, one_line
 
 _HEADER = re.compile(r"^\s*\[\[?\s*([\w.-]+)\s*\]\]?")
 
 
 @dataclass(frozen=True)
 class Where:
-    """A table of a task file, or a key in it.
+    """A table of a task file, or a key in it."""
 
-    Attributes:
-        file: the task file.
-        text: its text, used to find lines.
-        table: name of the table; empty at the top of the file.
-        number: number of the table among those of its name, from 1; 0 if there can be only one.
-        key: key in the table; empty for the table as a whole.
-    """
-
-    file: Path
-    text: str = ""
-    table: str = ""
-    number: int = 0
-    key: str = ""
+    file: Path  # the task file
+    text: str = ""  # its text, used to find lines
+    table: str = ""  # name of the table; empty at the top of the file
+    number: int = 0  # number of the table among those of its name, from 1; 0 if there can be only one
+    key: str = ""  # key in the table; empty for the table as a whole
 
     def at(self, key: str) -> Where:
         """The place of a key in this table, or of an entry (such as "[0]") in this key."""
@@ -41,6 +35,18 @@ class Where:
     def fault(self, sentence: str) -> FileFormatError:
         """Make an error that names this place."""
         return FileFormatError(f"{self}: {sentence}")
+
+    @contextmanager
+    def named(self) -> Iterator[None]:
+        """Inside it an error names this place."""
+        try:
+            yield
+        except UnknownNameError as error:
+            raise UnknownNameError(error.kind, error.name, error.known, str(self)) from None
+        except InputError as error:
+            raise InputError(f"{self}: {error}") from None
+        except WholebodyError as error:
+            raise type(error)(f"{self}: {error}") from None
 
     def __str__(self) -> str:
         """Return file, line if known, table and key."""

@@ -23,8 +23,8 @@ from wholebody.scene.geometry_model import SceneObject
 from wholebody.scene.matter.body import BallJoint
 from wholebody.scene.scene import Scene
 from wholebody.taskfile.kinds import JOINTS
-from wholebody.taskfile.terms import CONSTRAINTS, GOALS, MEASURES
-from wholebody.taskfile.things import SHAPES
+from wholebody.taskfile.schema import CONSTRAINTS, FIGURES, GOALS, MEASURES, SHAPES
+from wholebody.tasks.frame import PlacementTerm
 
 
 def write_task(problem: Problem | Scene, path: str | PathLike[str], *, title: str | None = None) -> Path:
@@ -86,10 +86,7 @@ def _figure(figure: Figure, target: Path) -> dict[str, Any]:
     named = {"name": spec} if spec in ("human", "avatar", "hand") else {"path": _beside(spec, target)}
     if options.get("package_dirs"):
         options = {**options, "package_dirs": [_beside(str(folder), target) for folder in options["package_dirs"]]}
-    known = {
-        "sex", "stature", "mass", "percentile", "proportions", "age", "detail", "hands", "side", "root", "package_dirs",
-        "concavity",
-    }  # fmt: skip
+    known = {key.name for form in FIGURES.values() for key in form.keys}
     for option in options:
         if option not in known or (option == "concavity" and isinstance(options[option], dict)):
             raise InputError(f"write_task: the figure was loaded with {option}, which a task file cannot say")
@@ -173,14 +170,9 @@ def _term(term: Any, forms: dict[str, Any], what: str, number: int) -> dict[str,
         value = getattr(term, key.name, None)
         if value is not None:
             found[key.name] = _plain(value)
-    if isinstance(term, tasks.Hold):
-        found["at"] = _seven(term.kept_at)
-    elif isinstance(term, tasks.Relative):
-        found["placement"] = _seven(term.residual.placement)
-    elif isinstance(term, tasks.Frame):
-        found["target"] = _seven(term.residual.placement)
-    elif isinstance(term, tasks.Orientation):
-        found["target"] = _seven(term.residual.placement)[3:]
+    if isinstance(term, PlacementTerm):
+        written = next(name for name in ("at", "placement", "target") if hasattr(term, name))
+        found[written] = _seven(term.residual.placement)[0 if term.residual.position else 3 :]
     elif isinstance(term, tasks.Plane):
         found["point"] = _plain(term.resolved_normal * term.height)
     elif isinstance(term, tasks.Posture) and not isinstance(term.target, str):

@@ -4,14 +4,11 @@ from wholebody.tasks.axis import Axis
 from wholebody.tasks.balance import Balance
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
 from wholebody.tasks.bounds import Freeze, StepLimit
-from wholebody.tasks.center_of_mass import CenterOfMass
 from wholebody.tasks.discomfort import Discomfort
 from wholebody.tasks.distance import Displacement, Effort, RotationEffort
-from wholebody.tasks.frame import Frame, Orientation, Relative
+from wholebody.tasks.frame import Frame, Hold, Orientation, Relative
 from wholebody.tasks.grasp import Grasp
-from wholebody.tasks.hold import Hold
-from wholebody.tasks.plane import Plane
-from wholebody.tasks.point import Point
+from wholebody.tasks.point import CenterOfMass, Plane, Point
 from wholebody.tasks.posture import Posture
 from wholebody.tasks.potential_energy import PotentialEnergy
 from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones

@@ -46,12 +46,7 @@ def _is_ours(kind: type) -> bool:
 
 
 def check_answers(kind: type, table: Mapping[str, Check]) -> None:
-    """Have the answers of a class of terms checked.
-
-    Args:
-        kind: the class; methods and properties that this package wrote, or that are checked already, stay as they are.
-        table: method or property to the check of its answer.
-    """
+    """Have the answers of a class of terms checked."""
     for name, check in table.items():
         owner = next((base for base in kind.__mro__ if name in vars(base)), None)
         if owner is None or _is_ours(owner):
@@ -90,12 +85,7 @@ class Checked:
 
 
 def values(term: object, what: str, given: Any, _: object = ()) -> Array:
-    """Values (m,) of a goal or constraint; a single number is one row.
-
-    Raises:
-        TermError: no real numbers, or more than one row.
-        UndefinedTermError: a number that is not finite.
-    """
+    """Values (m,) of a goal or constraint; a single number is one row."""
     found = given if type(given) is np.ndarray and given.dtype is _DOUBLE else _numbers(term, what, given, "shape (m,)")
     if found.ndim > 1:
         raise _wrong(term, f"its {what} has shape {found.shape}; return one row of numbers, shape (m,)")
@@ -103,12 +93,7 @@ def values(term: object, what: str, given: Any, _: object = ()) -> Array:
 
 
 def rows(term: object, what: str, given: Any, arguments: tuple[Any, ...] = ()) -> Wrench | Array:
-    """A Jacobian: a `Wrench`, or rows (m, nv); a single row may be (nv,).
-
-    Raises:
-        TermError: neither, another number of columns, or a joint that there is not.
-        UndefinedTermError: a number that is not finite.
-    """
+    """A Jacobian: a `Wrench`, or rows (m, nv); a single row may be (nv,)."""
     model = _model(arguments)
     if isinstance(given, Wrench):
         found = _numbers(term, what, given.rows, "wrenches, shape (m, 6)")
@@ -128,12 +113,7 @@ def rows(term: object, what: str, given: Any, arguments: tuple[Any, ...] = ()) -
 
 
 def one(term: object, what: str, given: Any, _: object = ()) -> float:
-    """A single number.
-
-    Raises:
-        TermError: none.
-        UndefinedTermError: it is not finite.
-    """
+    """A single number."""
     if type(given) is float and isfinite(given):
         return given
     found = _numbers(term, what, given, "one number")
@@ -143,12 +123,7 @@ def one(term: object, what: str, given: Any, _: object = ()) -> float:
 
 
 def freedoms(term: object, what: str, given: Any, arguments: tuple[Any, ...] = ()) -> Array:
-    """A number for each degree of freedom, (nv,).
-
-    Raises:
-        TermError: another shape.
-        UndefinedTermError: a number that is not finite.
-    """
+    """A number for each degree of freedom, (nv,)."""
     found, model = _numbers(term, what, given, "shape (nv,)"), _model(arguments)
     if found.ndim != 1 or (model is not None and len(found) != model.nv):
         wanted = "(nv,)" if model is None else (model.nv,)
@@ -157,12 +132,7 @@ def freedoms(term: object, what: str, given: Any, arguments: tuple[Any, ...] = (
 
 
 def diagonal(term: object, what: str, given: Any, arguments: tuple[Any, ...] = ()) -> Array:
-    """A number of zero or more for each degree of freedom, (nv,).
-
-    Raises:
-        TermError: another shape, or a negative number.
-        UndefinedTermError: a number that is not finite.
-    """
+    """A number of zero or more for each degree of freedom, (nv,)."""
     found = freedoms(term, what, given, arguments)
     if (found < 0.0).any():
         raise _wrong(term, f"it has a negative {what}; give a diagonal that is zero or more")
@@ -170,12 +140,7 @@ def diagonal(term: object, what: str, given: Any, arguments: tuple[Any, ...] = (
 
 
 def squares(term: object, what: str, given: Any, arguments: tuple[Any, ...] = ()) -> tuple[Array, Array] | None:
-    """Residuals (k,) and their derivatives (k, nv), or None.
-
-    Raises:
-        TermError: neither, or not as many of both.
-        UndefinedTermError: a number that is not finite.
-    """
+    """Residuals (k,) and their derivatives (k, nv), or None."""
     if given is None:
         return None
     if not isinstance(given, (tuple, list)) or len(given) != 2:
@@ -187,12 +152,7 @@ def squares(term: object, what: str, given: Any, arguments: tuple[Any, ...] = ()
 
 
 def sides(term: object, what: str, given: Any, arguments: tuple[Any, ...] = ()) -> tuple[Array, Array]:
-    """Lower and upper bounds, each (nv,); infinite for no bound.
-
-    Raises:
-        TermError: no two such rows.
-        UndefinedTermError: a bound is not a number.
-    """
+    """Lower and upper bounds, each (nv,); infinite for no bound."""
     if not isinstance(given, (tuple, list, np.ndarray)) or len(given) != 2:
         raise _wrong(term, f"its {what} are {checks.shown(given)}; give lower and upper ones, each (nv,)")
     low, high = (_known(term, what, _numbers(term, what, side, "two rows, each (nv,)")) for side in given)
@@ -204,12 +164,7 @@ def sides(term: object, what: str, given: Any, arguments: tuple[Any, ...] = ()) 
 
 
 def limit(term: object, what: str, given: Any, _: object = ()) -> Array:
-    """Least or greatest values of a constraint, (m,) or one for all; infinite for no bound.
-
-    Raises:
-        TermError: no numbers.
-        UndefinedTermError: one is not a number.
-    """
+    """Least or greatest values of a constraint, (m,) or one for all; infinite for no bound."""
     found = _known(term, what, _numbers(term, what, given, "shape (m,), or one number for all rows"))
     if found.ndim > 1:
         raise _wrong(term, f"its {what} has shape {found.shape}; give shape (m,), or one number for all rows")
@@ -217,11 +172,7 @@ def limit(term: object, what: str, given: Any, _: object = ()) -> Array:
 
 
 def mask(term: object, what: str, given: Any, _: object = ()) -> Mask:
-    """Which rows are angles, (m,) or one for all.
-
-    Raises:
-        TermError: something other than true and false.
-    """
+    """Which rows are angles, (m,) or one for all."""
     try:
         found = np.asarray(given)
     except ValueError:
@@ -232,12 +183,7 @@ def mask(term: object, what: str, given: Any, _: object = ()) -> Mask:
 
 
 def weight(term: object, what: str, given: Any, _: object = ()) -> float:
-    """A positive weight.
-
-    Raises:
-        TermError: it is no number, or not positive.
-        UndefinedTermError: it is not finite.
-    """
+    """A positive weight."""
     found = one(term, what, given)
     if not found > 0.0:
         raise _wrong(term, f"its {what} is {found:g}; give a positive number")

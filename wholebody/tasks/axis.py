@@ -31,11 +31,9 @@ The exact derivative is infinite at the opposite direction. The cap keeps the ro
 The gradient of the squared error stays exact, because it has no component across the error.
 """
 
-NO_ANGLE = 1e-12
-"""Sine below which the error has no direction of its own, so the first of the two is taken."""
+NO_ANGLE = 1e-12  # Sine below which the error has no direction of its own, so the first of the two is taken
 
-TOUCHING = 1e-6
-"""Distance [m] below which a point has no direction from the frame; the goal then counts as met."""
+TOUCHING = 1e-6  # Distance [m] below which a point has no direction from the frame; the goal then counts as met
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,15 +46,10 @@ class Axis(Goal):
     Attributes:
         frame: name of the frame, segment or joint.
         axis: (3,) the axis in the frame, such as (1, 0, 0); any length.
-        direction: (3,) its target direction in the world; any length.
+        direction: (3,) its target direction in the world; any length. One of direction and toward is given.
         toward: (3,) the point in the world to which it should point from the frame's origin [m].
         weight: factor on the squared error [1/rad^2].
-        place: the frame and the joint that carries it, once resolved.
         basis: (3, 3) rows in the frame: two directions perpendicular to the axis, and the axis, each of length 1.
-        resolved_target: (3,) `direction` as a unit vector, or `toward` [m].
-
-    Raises:
-        InputError: neither or both of `direction` and `toward` are given, or a vector has no direction.
     """
 
     frame: str
@@ -66,8 +59,8 @@ class Axis(Goal):
     toward: inputs.Position | None = None
     weight: inputs.Weight = 1.0
     basis: Array = field(init=False, repr=False)
-    resolved_target: Array = field(init=False, repr=False)
-    place: inputs.Place = field(init=False, repr=False)
+    resolved_target: Array = field(init=False, repr=False)  # (3,) `direction` as a unit vector, or `toward` [m]
+    place: inputs.Place = field(init=False, repr=False)  # the frame and the joint that carries it
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -83,8 +76,8 @@ class Axis(Goal):
 
     @property
     def angular(self) -> Mask:
-        """(2,) both rows are in radians."""
-        return np.ones(2, dtype=bool)
+        """Both rows are in radians."""
+        return np.ones((), dtype=bool)
 
     def error(self, state: State) -> Array:
         """(2,) the angle along the two directions perpendicular to the axis [rad]."""

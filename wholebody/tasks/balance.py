@@ -10,7 +10,7 @@ from typing import Annotated, Any, TypeAlias
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Names, Range
 from wholebody.figures.state import State
@@ -22,18 +22,13 @@ STANDING_HEIGHT = 0.01
 """Height [m] above a foot's lowest point up to which its corners stand on the ground; soles are rounded by as much."""
 
 
-NEAREST = 1e-5
-"""Distance [m] below which two points count as one corner."""
+NEAREST = 1e-5  # Distance [m] below which two points count as one corner
 
 
 def standing_points(scene: Surroundings, q: Array, feet: Sequence[str]) -> Array:
     """Points (n, 3) on which the feet stand at the posture q: the lowest corners of their pieces.
 
     Child segments of a foot, such as toes, belong to it.
-
-    Raises:
-        UnknownNameError: the figure has no such foot.
-        InputError: a foot has no pieces.
     """
     state = State(scene.model).update(q)
     points = []
@@ -50,21 +45,12 @@ def standing_points(scene: Surroundings, q: Array, feet: Sequence[str]) -> Array
 
 
 def low_points(geometry: Any, placement: pin.SE3) -> Array:
-    """Candidates (n, 3) for the lowest points of a piece: all corners, or the lowest points of its balls.
-
-    Args:
-        geometry: a coal shape.
-        placement: of its origin in the world.
-    """
+    """Candidates (n, 3) for the lowest points of a piece: all corners, or the lowest points of its balls."""
     return outermost(geometry, placement, np.array((0.0, 0.0, -1.0)))
 
 
 def convex_polygon(points: Array) -> Array:
-    """Corners (k, 2) of the convex hull of points (n, 2), anticlockwise.
-
-    Raises:
-        InputError: the points lie on a line.
-    """
+    """Corners (k, 2) of the convex hull of points (n, 2), anticlockwise."""
     flat = np.round(points[:, :2], 6)
     corners = flat[hull_corners(flat)].reshape(-1, 2)
     if len(corners) < 3 or least_width(corners) < 1e-4:  # Width [m] below which a polygon counts as a line.
@@ -146,27 +132,16 @@ class Balance(Constraint):
     Attributes:
         feet: names of the segments that carry the figure, including their child segments, such as toes.
         margin: least distance from the edges [m].
-        normals: (m, 2) unit normals of the edges of the support polygon, inward; once resolved.
-        offsets: (m,) of the edges: inside, normals @ x >= offsets [m]; once resolved.
-
-    Raises:
-        InputError: no feet are named, or the margin is negative.
     """
 
     feet: Feet = ("left_foot", "right_foot")
     _: KW_ONLY
     margin: Margin = 0.0
-    normals: Array = field(init=False, repr=False)
-    offsets: Array = field(init=False, repr=False)
+    normals: Array = field(init=False, repr=False)  # (m, 2) unit normals of the edges of the support polygon, inward
+    offsets: Array = field(init=False, repr=False)  # (m,) of the edges: inside, normals @ x >= offsets [m]
 
     def resolve(self, scene: Surroundings, start: Array) -> Balance:
-        """Compute the support polygon at the start.
-
-        Raises:
-            UnknownNameError: the figure has no such foot.
-            InputError: the feet have no pieces, stand on a line, or the polygon is smaller than the margin; or no
-                moving part has mass.
-        """
+        """Compute the support polygon at the start."""
         inputs.check_mass(scene, "Balance")
         corners = convex_polygon(standing_points(scene, start, self.feet)[:, :2])
         if len(shrunk(corners, self.margin)) == 0:
@@ -178,18 +153,8 @@ class Balance(Constraint):
 
     @property
     def lower(self) -> Array:
-        """(m,) the margin."""
-        return np.full(len(self.offsets), self.margin)
-
-    @property
-    def upper(self) -> Array:
-        """(m,) inf."""
-        return np.full(len(self.offsets), np.inf)
-
-    @property
-    def angular(self) -> Mask:
-        """(m,) no row is in radians."""
-        return np.zeros(len(self.offsets), dtype=bool)
+        """The margin."""
+        return np.array(self.margin)
 
     def value(self, state: State) -> Array:
         """(m,) distance inside each edge [m]."""

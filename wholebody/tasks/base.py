@@ -58,25 +58,22 @@ def filled(term: _T, **values: object) -> _T:
 
 
 class SupportingPlanes(NamedTuple):
-    """Inequalities ``value <= 0`` about a posture.
+    """Inequalities ``value <= 0`` about a posture."""
 
-    Attributes:
-        value: (k,) [m].
-        jacobian: (k, nv) their derivative.
-        key: (k,) numbers that name a plane from one posture to the next, each less than `MOST_PLANES`.
-        bend: (b, nv) rows b with the second derivatives of the term's rows as sums of b' b, where they are positive.
-        bend_row: (b,) the row of the term that a bend is of.
-    """
-
-    value: Array
-    jacobian: Array
-    key: Indices
+    value: Array  # (k,) [m]
+    jacobian: Array  # (k, nv) their derivative
+    key: Indices  # (k,) numbers that name a plane from one posture to the next, each less than `MOST_PLANES`
+    # (b, nv) rows b with the second derivatives of the term's rows as sums of b' b, where they are positive
     bend: Array
-    bend_row: Indices
+    bend_row: Indices  # (b,) the row of the term that a bend is of
 
 
 class Term(Checked):
-    """Base of goals, constraints, bounds and measures; `Checked` says how the fields of one are checked."""
+    """Base of goals, constraints, bounds and measures.
+
+    Raises:
+        InputError: a value of the wrong kind or out of range; it names the term, the argument and what it takes.
+    """
 
     _answered: ClassVar[Mapping[str, answers.Check]] = {}
 

@@ -33,11 +33,7 @@ class Freeze(Bound):
     _upper: Array
 
     def __init__(self, *joints: str) -> None:
-        """Name the frozen joints.
-
-        Raises:
-            InputError: nothing is named, or a name is not a string.
-        """
+        """Name the frozen joints."""
         if not joints or not all(isinstance(name, str) for name in joints):
             raise InputError(f"Freeze takes names, not {shown(joints)}; write Freeze('left_leg', 'right_leg', 'root')")
         self.joints = joints
@@ -69,9 +65,6 @@ class StepLimit(Bound):
         joints: other limits for joints and groups, by name; a later name overrides an earlier one.
         root_velocity: limit of the root's translation, along each of its own axes [m/s].
         root_turn: limit of the root's rotation, about each of its own axes [rad/s].
-
-    Raises:
-        InputError: a velocity is not a positive number.
     """
 
     velocity: Speed = np.inf
@@ -91,12 +84,7 @@ class StepLimit(Bound):
         object.__setattr__(self, "joints", speeds)
 
     def resolve(self, scene: Surroundings, start: Array) -> StepLimit:
-        """Find the joints.
-
-        Raises:
-            UnknownNameError: the figure has no such joint or group.
-            InputError: a velocity of the root is given and the figure is fixed to the world.
-        """
+        """Find the joints."""
         velocity = np.full(scene.model.nv, self.velocity)
         if scene.figure.root == "free":
             root = inputs.find_dofs(scene, ("root",), "StepLimit")

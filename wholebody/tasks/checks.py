@@ -28,18 +28,7 @@ def named(where: str, term: object) -> Iterator[None]:
 
 
 def check_rows(where: str, term: Any, evaluate: Callable[[State], Array], state: State) -> None:
-    """Check the values and Jacobian of a goal or constraint, its weight or bounds, and which rows are angles.
-
-    Args:
-        where: its place, such as "goals[1]".
-        term: the term.
-        evaluate: its `error` or `value`.
-        state: the state at which it is evaluated.
-
-    Raises:
-        TermError: numbers of the wrong kind, or shapes that do not fit.
-        UndefinedTermError: a value that is not finite.
-    """
+    """Check the values and Jacobian of a goal or constraint, its weight or bounds, and which rows are angles."""
     with named(where, term):
         values, _ = values_and_rows(term, evaluate, state)
         if isinstance(term, Goal):
@@ -58,17 +47,7 @@ def check_rows(where: str, term: Any, evaluate: Callable[[State], Array], state:
 
 
 def values_and_rows(term: Any, evaluate: Callable[[State], Array], state: State) -> tuple[Array, Array]:
-    """Values (m,) of a goal or constraint at a state, and their derivatives (m, nv).
-
-    Args:
-        term: the term.
-        evaluate: its `error` or `value`.
-        state: where.
-
-    Raises:
-        TermError: numbers of the wrong kind, or not as many values as rows.
-        UndefinedTermError: a number that is not finite.
-    """
+    """Values (m,) of a goal or constraint at a state, and their derivatives (m, nv)."""
     values = answers.values(term, evaluate.__name__, evaluate(state))
     jacobian = answers.rows(term, "jacobian", term.jacobian(state), (state,))
     count = len(jacobian.rows if isinstance(jacobian, Wrench) else jacobian)
@@ -80,13 +59,7 @@ def values_and_rows(term: Any, evaluate: Callable[[State], Array], state: State)
 
 
 def undefined(terms: Iterable[Term], state: State, dt: float | None = None) -> UndefinedTermError | None:
-    """Why a state cannot be used: the first term of one's own that is not finite there; None where all are.
-
-    Args:
-        terms: resolved goals, constraints, bounds and measures.
-        state: where.
-        dt: seconds of a step, for bounds.
-    """
+    """Why a state cannot be used: the first term of one's own that is not finite there; None where all are."""
     try:
         for term in filter(answers.is_own, terms):
             for what, arguments in _ASKED:
@@ -104,12 +77,7 @@ def defined(term: Term, states: Iterable[State]) -> Iterator[State]:
 
 
 def check_measure(where: str, measure: Measure, state: State) -> None:
-    """Check the value, gradient, curvature and squares of a measure at a state.
-
-    Raises:
-        TermError: numbers of the wrong kind, shapes that do not fit, or a negative curvature.
-        UndefinedTermError: a value that is not finite.
-    """
+    """Check the value, gradient, curvature and squares of a measure at a state."""
     with named(where, measure):
         answers.weight(measure, "weight", measure.weight)
         answers.one(measure, "value", measure.value(state))

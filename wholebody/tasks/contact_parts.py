@@ -7,8 +7,10 @@ constraint: the list of a problem in which it stands decides whether it is met i
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple, Protocol, runtime_checkable
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, Protocol, TypeVar
 
+import coal
 import numpy as np
 import pinocchio as pin
 
@@ -16,10 +18,12 @@ from wholebody.base.arrays import Array, Mask
 from wholebody.base.records import with_values
 from wholebody.figures.state import State
 from wholebody.tasks.axis import equidistant_error, equidistant_jacobian
-from wholebody.tasks.base import Constraint, Goal, SupportingPlanes
+from wholebody.tasks.base import Constraint, Goal, SupportingPlanes, filled
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.kinks import MOST_FACES, bends, crossed_edges, faces_met
 from wholebody.tasks.surfaces import Face, Nearest, Surface, foot, nearest
+
+_T = TypeVar("_T")
 
 FOOT_STEP = 1e-4  # m: of the difference that tells how the nearest point moves; coal has it to 1e-9
 ROUND_DEPTH = 8e-6  # m: by which a round end may be inside: four fifths of the usual tolerance
@@ -37,14 +41,6 @@ class Part(Protocol):
         """Values (m,) and their derivative (m, nv)."""
 
 
-@runtime_checkable
-class Bounded(Part, Protocol):
-    """A part whose rows have kinks."""
-
-    def planes(self, state: State) -> SupportingPlanes:
-        """What says where the kinks are; keys are less than `MOST_PLANES` of a part."""
-
-
 class RoundEnd(NamedTuple):
     """A point on the round surface of its own piece, which touches there only where the two normals are opposed.
 
@@ -52,16 +48,11 @@ class RoundEnd(NamedTuple):
     p = P(c). The distances of point and piece say so to second order alone, by r (1 - cos t) for an angle t: their
     derivatives are the same there. The two rows t_k . (p - P(c)) do not vanish. They may be as large as leaves the
     point at most `ROUND_DEPTH` off where the piece touches; within that, the distance is that of the piece.
-
-    Attributes:
-        middle: c as a surface.
-        radius: of the piece [m].
-        across: (2, 3) t_k, two directions in the axes of the joint, along the surface at the point.
     """
 
-    middle: Surface
-    radius: float
-    across: Array
+    middle: Surface  # c as a surface
+    radius: float  # of the piece [m]
+    across: Array  # (2, 3) t_k, two directions in the axes of the joint, along the surface at the point
 
     @property
     def room(self) -> float:
@@ -69,13 +60,7 @@ class RoundEnd(NamedTuple):
         return float(np.sqrt(2.0 * self.radius * ROUND_DEPTH))
 
     def nearest(self, near: Nearest, other: Surface, state: State) -> Nearest:
-        """The nearest points of the piece and the other surface where the point is about there, else of the point.
-
-        Args:
-            near: of the point.
-            other: surface.
-            state: at the posture.
-        """
+        """The nearest points of the piece and the other surface where the point is about there, else of the point."""
         of_middle = nearest(self.middle, other, state)
         distance = max(of_middle.distance - self.radius, near.distance - ROUND_DEPTH)
         return with_values(of_middle if distance > near.distance - ROUND_DEPTH else near, distance=distance)
@@ -94,27 +79,17 @@ class RoundEnd(NamedTuple):
         arm = tip - there
         wrench = through(tip, across) - through(center, moves / FOOT_STEP)
         wrench[:, 3:] += np.cross(across, arm)
-        return across @ arm, _between(state, wrench, near.against, near.joint)
+        return across @ arm, between(state, wrench, near.against, near.joint)
 
 
 class Gap(NamedTuple):
-    """The signed distance of two surfaces: one row, zero where they touch [m].
+    """The signed distance of two surfaces: one row, zero where they touch [m]."""
 
-    Attributes:
-        first, second: the surfaces.
-        face: the face of the second that the first is to lie on; None where any side will do.
-        end: of a first surface that is a point on its own round piece.
-    """
-
-    first: Surface
+    first: Surface  # the surfaces
     second: Surface
-    face: Face | None = None
-    end: RoundEnd | None = None
-
-    @property
-    def in_radians(self) -> tuple[bool, ...]:
-        """It is not."""
-        return (False,)
+    face: Face | None = None  # the face of the second that the first is to lie on; None where any side will do
+    end: RoundEnd | None = None  # of a first surface that is a point on its own round piece
+    in_radians: tuple[bool, ...] = (False,)
 
     def rows(self, state: State) -> tuple[Array, Array]:
         """The distance, and a force along the normal."""
@@ -122,7 +97,7 @@ class Gap(NamedTuple):
         if self.end is not None:
             near = self.end.nearest(near, self.second, state)
         wrench = through(near.point, near.normal[None])
-        return np.array([near.distance]), _between(state, wrench, near.joint, near.against)
+        return np.array([near.distance]), between(state, wrench, near.joint, near.against)
 
     def planes(self, state: State) -> SupportingPlanes:
         """Of faces and edges that what touches is not beyond, and of the angle between the normals at a round end."""
@@ -142,9 +117,9 @@ class Gap(NamedTuple):
         key = np.array([plane.key for plane in found], dtype=np.intp)
         if self.end is None:
             turned = through(near.point, bends(self.first, self.second, near, state))
-            bend = _between(state, turned, near.joint, near.against)
+            bend = between(state, turned, near.joint, near.against)
             return SupportingPlanes(value, rows, key, bend, np.zeros(len(bend), dtype=np.intp))
-        bend = _between(state, self.end.bends(self.second, state), near.joint, near.against)
+        bend = between(state, self.end.bends(self.second, state), near.joint, near.against)
         upright, turns = self.end.rows(self.first, self.second, near, state)
         sides = 2.0 * np.pi * np.arange(8) / 8  # of the octagon within the circle of the room
         ways, room = np.column_stack([np.cos(sides), np.sin(sides)]), self.end.room * np.cos(np.pi / 8)
@@ -158,23 +133,13 @@ class Gap(NamedTuple):
 
 
 class Near(NamedTuple):
-    """Two surfaces not farther apart than a distance: one row, zero within it, and what is beyond it [m].
+    """Two surfaces not farther apart than a distance: one row, zero within it, and what is beyond it [m]."""
 
-    Attributes:
-        first, second: the surfaces.
-        most: the distance [m].
-        face: as for a `Gap`.
-    """
-
-    first: Surface
+    first: Surface  # the surfaces
     second: Surface
-    most: float
-    face: Face | None = None
-
-    @property
-    def in_radians(self) -> tuple[bool, ...]:
-        """It is not."""
-        return (False,)
+    most: float  # the distance [m]
+    face: Face | None = None  # as for a `Gap`
+    in_radians: tuple[bool, ...] = (False,)
 
     def rows(self, state: State) -> tuple[Array, Array]:
         """What is beyond, and a force along the normal."""
@@ -192,25 +157,14 @@ class Facing(NamedTuple):
     """An axis of a frame along a direction that goes with a face: two rows, the angle between them [rad].
 
     The same azimuthal equidistant rows as those of `Axis`, see there.
-
-    Attributes:
-        place: the frame and its joint.
-        basis: (3, 3) rows in the frame: two directions across the axis, and the axis.
-        face: the face.
-        direction: (3,) in the face's own axes, unit.
-        either: whether the opposite direction will do as well: the nearer one counts.
     """
 
-    place: Place
-    basis: Array
-    face: Face
-    direction: Array
-    either: bool = False
-
-    @property
-    def in_radians(self) -> tuple[bool, ...]:
-        """Both rows."""
-        return True, True
+    place: Place  # the frame and its joint
+    basis: Array  # (3, 3) rows in the frame: two directions across the axis, and the axis
+    face: Face  # the face
+    direction: Array  # (3,) in the face's own axes, unit
+    either: bool = False  # whether the opposite direction will do as well: the nearer one counts
+    in_radians: tuple[bool, ...] = (True, True)
 
     def rows(self, state: State) -> tuple[Array, Array]:
         """The angle along the two directions, and moments."""
@@ -221,7 +175,7 @@ class Facing(NamedTuple):
         components = (axes @ direction).tolist()
         wrench = np.zeros((2, 6))
         wrench[:, 3:] = (equidistant_jacobian(*components) @ axes) @ pin.skew(direction)
-        return equidistant_error(*components), _between(state, wrench, self.place.joint, self.face.joint)
+        return equidistant_error(*components), between(state, wrench, self.place.joint, self.face.joint)
 
 
 class Level(NamedTuple):
@@ -230,32 +184,22 @@ class Level(NamedTuple):
     place: Place
     axis: Array
     face: Face
-
-    @property
-    def in_radians(self) -> tuple[bool, ...]:
-        """The row."""
-        return (True,)
+    in_radians: tuple[bool, ...] = (True,)
 
     def rows(self, state: State) -> tuple[Array, Array]:
         """The sine, and a moment."""
         normal = self.face.at(state)[1][2]
         axis = state.frame(self.place.frame).rotation @ self.axis
         wrench = np.array([[0.0, 0.0, 0.0, *(pin.skew(axis) @ normal)]])
-        return np.array([axis @ normal]), _between(state, wrench, self.place.joint, self.face.joint)
+        return np.array([axis @ normal]), between(state, wrench, self.place.joint, self.face.joint)
 
 
 class Over(NamedTuple):
-    """The origin of a frame within a box that stands on a face: rows are zero within, and its distances outside [m].
+    """The origin of a frame within a box that stands on a face: rows are zero within, and its distances outside [m]."""
 
-    Attributes:
-        place: the frame and its joint.
-        face: the face.
-        low, high: (k,) ends along the face's first k axes: across it and, with three, along its normal.
-    """
-
-    place: Place
-    face: Face
-    low: Array
+    place: Place  # the frame and its joint
+    face: Face  # the face
+    low: Array  # (k,) ends along the face's first k axes: across it and, with three, along its normal
     high: Array
 
     @property
@@ -279,7 +223,7 @@ class Over(NamedTuple):
         center, axes = self.face.at(state)
         axes = axes[: len(self.low)]
         point = state.frame(self.place.frame).translation
-        return axes @ (point - center), _between(state, through(point, axes), self.place.joint, self.face.joint)
+        return axes @ (point - center), between(state, through(point, axes), self.place.joint, self.face.joint)
 
 
 def through(point: Array, forces: Array) -> Array:
@@ -287,31 +231,23 @@ def through(point: Array, forces: Array) -> Array:
     return np.hstack([forces, forces @ pin.skew(point).T])
 
 
-def _between(state: State, wrench: Array, joint: int, against: int) -> Array:
+def between(state: State, wrench: Array, joint: int, against: int) -> Array:
+    """Rows (m, nv) of wrenches (m, 6) on one joint against another."""
     count = len(wrench)
     return state.rows(wrench, np.full(count, joint, dtype=np.intp), np.full(count, against, dtype=np.intp))
 
 
-class ContactTerm(Goal, Constraint):
-    """A term made of parts; all of its rows are zero where the contact is made."""
+@dataclass(frozen=True, eq=False)
+class TermOfParts(Constraint):
+    """A constraint made of parts, whose rows are one after the other."""
 
-    parts: Sequence[Part]
-    touches: tuple[tuple[str, str], ...]
+    parts: Sequence[Part] = field(init=False, repr=False)  # once resolved
+    touches: tuple[tuple[str, str], ...] = field(init=False, repr=False, default=())
 
     @property
     def touching(self) -> tuple[tuple[str, str], ...]:
         """Owners that are to touch: their clearance is zero."""
         return self.touches
-
-    @property
-    def lower(self) -> Array:
-        """Zero, for every row."""
-        return np.zeros(())
-
-    @property
-    def upper(self) -> Array:
-        """Zero, for every row."""
-        return np.zeros(())
 
     @property
     def angular(self) -> Mask:
@@ -321,10 +257,6 @@ class ContactTerm(Goal, Constraint):
     def value(self, state: State) -> Array:
         """(m,) residual of the contact [m, rad]."""
         return np.concatenate([part.rows(state)[0] for part in self.parts])
-
-    def error(self, state: State) -> Array:
-        """(m,) the same: a goal is met where it is zero."""
-        return self.value(state)
 
     def jacobian(self, state: State) -> Array:
         """(m, nv) the derivative."""
@@ -337,7 +269,27 @@ class ContactTerm(Goal, Constraint):
 
     def supporting_planes(self, state: State) -> SupportingPlanes:
         """Planes of the faces about every gap: past an edge there is no surface left to slide on."""
-        return planes_of(self.parts, state)
+        found, row = [no_planes(state.model.nv)], 0
+        for number, part in enumerate(self.parts):
+            if hasattr(part, "planes"):  # what says where its rows have kinks; keys are less than 3 `MOST_FACES`
+                planes: SupportingPlanes = part.planes(state)
+                key, bend_row = planes.key + 3 * MOST_FACES * number, planes.bend_row + row
+                found.append(with_values(planes, key=key, bend_row=bend_row))
+            row += len(part.in_radians)
+        return SupportingPlanes(*(np.concatenate(each) for each in zip(*found, strict=True)))
+
+
+class ContactTerm(TermOfParts, Goal):
+    """A term all of whose rows are zero where the contact is made."""
+
+    @property
+    def upper(self) -> Array:
+        """Zero, as `lower`."""
+        return np.zeros(())
+
+    def error(self, state: State) -> Array:
+        """(m,) the value: a goal is met where it is zero."""
+        return self.value(state)
 
 
 def one_sided(value: Array, jacobian: Array) -> SupportingPlanes:
@@ -353,20 +305,33 @@ def no_planes(nv: int) -> SupportingPlanes:
     return SupportingPlanes(none, rows, index, rows, index)
 
 
-def planes_of(parts: Sequence[Part], state: State) -> SupportingPlanes:
-    """The supporting planes of all parts that have some."""
-    found = [no_planes(state.model.nv)]
-    row = 0
-    for number, part in enumerate(parts):
-        if isinstance(part, Bounded):
-            planes = part.planes(state)
-            # planes: more than one part ever has
-            found.append(with_values(planes, key=planes.key + 3 * MOST_FACES * number, bend_row=planes.bend_row + row))
-        row += len(part.in_radians)
-    return SupportingPlanes(*(np.concatenate(each) for each in zip(*found, strict=True)))
-
-
 def owner_pairs(first: Iterable[str], second: Iterable[str]) -> tuple[tuple[str, str], ...]:
     """Every pair of an owner of the first surface with one of the second."""
     others = tuple(second)
     return tuple((a, b) for a in first for b in others)
+
+
+def has_face(term: Any) -> bool:
+    """Whether a resolved term brings a surface to a face of a thing."""
+    return any(isinstance(part, (Gap, Near)) and part.face is not None for part in getattr(term, "parts", ()))
+
+
+def approached(term: _T, distance: float) -> _T:
+    """A resolved term whose surfaces are to be in front of the planes of their faces by a distance [m].
+
+    The signed distance of two surfaces does not tell on which side of a thing a surface is: a foot under a pedal is
+    pushed down out of it, never up through it. Towards the plane of its face the distance leads to the open side.
+    """
+    if not has_face(term):
+        return term
+    return filled(term, parts=tuple(_approached(part, distance) for part in getattr(term, "parts", ())))
+
+
+def _approached(part: Any, distance: float) -> Any:
+    """A part whose second surface is the half-space behind its face, moved outwards; it goes where the thing goes."""
+    if not isinstance(part, (Gap, Near)) or part.face is None:
+        return part
+    whole, normal = part.face.surface, part.face.axes[2]
+    space = coal.Halfspace(normal, float(normal @ part.face.center) + distance)
+    plane = with_values(whole, pieces=whole.pieces[:1], joints=whole.joints[:1])
+    return with_values(part, second=plane.with_shapes((space,)))

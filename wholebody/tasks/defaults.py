@@ -14,7 +14,7 @@ from wholebody.tasks.balance import Balance, convex_polygon, least_width, standi
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings
 from wholebody.tasks.bounds import Freeze
 from wholebody.tasks.distance import Effort
-from wholebody.tasks.hold import Hold
+from wholebody.tasks.frame import Hold
 from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
 from wholebody.tasks.rhythm import Rhythm, girdles_of
 from wholebody.tasks.sit import Sit
@@ -36,13 +36,7 @@ _effort = Effort()
 
 
 def default_measures(scene: Surroundings, start: Array, *, ranges: bool) -> tuple[Measure, ...]:
-    """`Effort`, and for a person `Rhythm` beside it, resolved.
-
-    Args:
-        scene: with the figure.
-        start: (nq,) the start.
-        ranges: whether a person moves as people do; without it `Effort` is alone.
-    """
+    """`Effort`, and for a person `Rhythm` beside it, resolved."""
     person = ranges and bool(scene.figure.ranges) and bool(girdles_of(scene.figure))
     effort = _effort.resolve(scene, start)
     return (effort, Rhythm().resolve(scene, start)) if person else (effort,)
@@ -55,20 +49,6 @@ def default_constraints(
 
     A person who stands at the start on a line, such as the tips of two toes, keeps no balance that is measured by an
     area. The default is left out there, unless it is required.
-
-    Args:
-        scene: with the figure; only one with ranges of motion, a person, has defaults.
-        start: (nq,) the start.
-        known: classes of the constraints that were stated.
-        ranges: whether ranges of motion and reach cones are kept.
-        balance: whether balance is kept.
-        required: whether it must be kept.
-
-    Returns:
-        The resolved constraints, and which default is left out and why, in words; "" where none is.
-
-    Raises:
-        InputError: balance is required, and the feet do not stand on an area.
     """
     figure = scene.figure
     found: list[Constraint] = []
@@ -93,15 +73,7 @@ def default_constraints(
 def stands(
     scene: Surroundings, state: State, stated: Sequence[Constraint], bounds: Sequence[Bound], goals: Sequence[Goal]
 ) -> bool:
-    """Whether a person stands: both feet are held where they are at the start, and nothing else carries it.
-
-    Args:
-        scene: with the figure.
-        state: at the start.
-        stated: resolved constraints.
-        bounds: resolved bounds.
-        goals: resolved goals.
-    """
+    """Whether a person stands: both feet are held where they are at the start, and nothing else carries it."""
     figure = scene.figure
     if figure.root != "free" or not figure.ranges or not set(FEET) <= set(figure.segments):
         return False

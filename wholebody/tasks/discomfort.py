@@ -14,31 +14,21 @@ from wholebody.tasks import inputs
 from wholebody.tasks.base import Measure, Surroundings, filled
 from wholebody.tasks.distance import LEAST_CURVATURE
 
-STEEPNESS = 2.5
-"""Half the 5.0 in eq. 3.14: the penalty at the ratio r from a limit is cos(2.5 r)^200."""
+STEEPNESS = 2.5  # Half the 5.0 in eq. 3.14: the penalty at the ratio r from a limit is cos(2.5 r)^200
 
 POWER = 200
 """Twice the exponent in eq. 3.14: the penalty is 1 at the limit, 0.2 at 5 % of the range from it and 0.002 at 10 %."""
 
 
 class LimitedJoints(NamedTuple):
-    """The n joints that have two limits.
+    """The n joints that have two limits."""
 
-    Attributes:
-        idx_q: (n,) indices in the posture.
-        idx_v: (n,) indices in the tangent vector.
-        neutral: (n,) values in the neutral posture.
-        weights: (n,) g over the squared range.
-        limits: (2, n) upper, then lower limits.
-        phase: (2, n) derivative of the phase 2.5 r by the joint's value: r falls towards the upper limit.
-    """
-
-    idx_q: NDArray[np.intp]
-    idx_v: NDArray[np.intp]
-    neutral: Array
-    weights: Array
-    limits: Array
-    phase: Array
+    idx_q: NDArray[np.intp]  # (n,) indices in the posture
+    idx_v: NDArray[np.intp]  # (n,) indices in the tangent vector
+    neutral: Array  # (n,) values in the neutral posture
+    weights: Array  # (n,) g over the squared range
+    limits: Array  # (2, n) upper, then lower limits
+    phase: Array  # (2, n) derivative of the phase 2.5 r by the joint's value: r falls towards the upper limit
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,11 +46,10 @@ class Discomfort(Measure):
 
     Attributes:
         weight: factor on the measure.
-        limited: the joints that have two limits, once resolved.
     """
 
     weight: inputs.Weight = 1.0
-    limited: LimitedJoints = field(init=False, repr=False)
+    limited: LimitedJoints = field(init=False, repr=False)  # the joints that have two limits
 
     def resolve(self, scene: Surroundings, start: Array) -> Discomfort:
         """Read the limits, the neutral posture and the weights of the figure."""

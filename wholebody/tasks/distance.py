@@ -19,17 +19,11 @@ LEAST_CURVATURE = 1e-6
 
 
 class SquaredDistance(NamedTuple):
-    """``sum_i w_i d_i^2`` with d the tangent vector (nv,) from a reference posture.
+    """``sum_i w_i d_i^2`` with d the tangent vector (nv,) from a reference posture."""
 
-    Attributes:
-        reference: (nq,) posture that has distance zero.
-        weights: (nv,) not negative.
-        curvature: (nv,) positive diagonal of the second derivative.
-    """
-
-    reference: Array
-    weights: Array
-    curvature: Array
+    reference: Array  # (nq,) posture that has distance zero
+    weights: Array  # (nv,) not negative
+    curvature: Array  # (nv,) positive diagonal of the second derivative
 
     @classmethod
     def build(cls, reference: Array, weights: Array) -> SquaredDistance:
@@ -63,13 +57,9 @@ class SquaredDistance(NamedTuple):
 
 
 class DistanceMeasure(Measure):
-    """A measure that is a weighted squared distance from a posture.
+    """A measure that is a weighted squared distance from a posture."""
 
-    Attributes:
-        distance: the posture, and the weight of every degree of freedom; once resolved.
-    """
-
-    distance: SquaredDistance
+    distance: SquaredDistance  # the posture, and the weight of every degree of freedom; once resolved
 
     def value(self, state: State) -> float:
         """The distance [rad^2]."""
@@ -97,11 +87,10 @@ class Effort(DistanceMeasure):
 
     Attributes:
         weight: factor on the measure [1/rad^2].
-        distance: the start, and the weight of every degree of freedom; once resolved.
     """
 
     weight: inputs.Weight = 1.0
-    distance: SquaredDistance = field(init=False, repr=False)
+    distance: SquaredDistance = field(init=False, repr=False)  # the start, and the weight of every degree of freedom
 
     def resolve(self, scene: Surroundings, start: Array) -> Effort:
         """Store the start."""
@@ -117,7 +106,6 @@ class Displacement(DistanceMeasure):
 
     Attributes:
         weight: factor on the measure [1/rad^2].
-        distance: the neutral posture, and the weight of every degree of freedom; once resolved.
     """
 
     weight: inputs.Weight = 1.0
@@ -183,12 +171,11 @@ class RotationEffort(Measure):
 
     Attributes:
         weight: factor on the measure [1/rad^2].
-        balls: the ball joints, once resolved.
         others: the start, and the weights of all other degrees of freedom; once resolved.
     """
 
     weight: inputs.Weight = 1.0
-    balls: tuple[BallJoint, ...] = field(init=False, repr=False)
+    balls: tuple[BallJoint, ...] = field(init=False, repr=False)  # the ball joints
     others: SquaredDistance = field(init=False, repr=False)
 
     def resolve(self, scene: Surroundings, start: Array) -> RotationEffort:
@@ -234,13 +221,7 @@ class RotationEffort(Measure):
 
 
 def ball_joints(model: Any, start: Array, weights: Array) -> tuple[BallJoint, ...]:
-    """The ball joints of a model: three hinges in a row with one centre and axes at right angles.
-
-    Args:
-        model: Pinocchio's model.
-        start: (nq,) posture from which rotations count.
-        weights: (nv,) of the degrees of freedom.
-    """
+    """The ball joints of a model: three hinges in a row with one centre and axes at right angles."""
     state = State(model).update(pin.neutral(model))
     jacobian = pin.computeJointJacobians(model, state.data, state.q)
     found: list[BallJoint] = []

@@ -1,40 +1,41 @@
-"""Goals: a frame at a placement, at an orientation, or at a placement relative to another frame."""
+"""A frame at a placement, at an orientation, or at a placement relative to another frame: goals, and a constraint."""
 
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Annotated, Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array, Mask
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Goal, Surroundings, filled
+from wholebody.tasks.base import Constraint, Goal, Surroundings, Term, filled
 from wholebody.tasks.residuals import PlacementResidual, placement_between
 
 
-class PlacementGoal(Goal):
-    """A goal whose error is a difference of placements: in position [m], then in orientation [rad], of those asked for.
+class PlacementTerm(Term):
+    """A term whose rows are those of a residual: in position [m], then in orientation [rad], of those asked for."""
 
-    Attributes:
-        residual: computes the error, with frames, joints and target; once resolved.
-    """
-
-    residual: PlacementResidual
+    residual: PlacementResidual  # with frames, joints and target; once resolved
 
     @property
     def angular(self) -> Mask:
         """(m,) which rows are in radians: three of six, or of three all or none."""
         return self.residual.angular
 
-    def error(self, state: State) -> Array:
-        """(m,) difference in position [m] and orientation [rad]."""
-        return self.residual.value(state)
-
     def jacobian(self, state: State) -> Wrench:
         """(m, 6) rows on the frame's joint, or between the joints of the two frames."""
         return self.residual.wrench(state)
+
+
+class PlacementGoal(PlacementTerm, Goal):
+    """A goal to place a frame."""
+
+    def error(self, state: State) -> Array:
+        """(m,) difference in position [m] and orientation [rad]."""
+        return self.residual.value(state)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,18 +51,13 @@ class Frame(PlacementGoal):
         target: its target: (x, y, z) with the axes of the world, (x, y, z, qx, qy, qz, qw), a matrix (4, 4) or a
             pin.SE3; metres.
         weight: factor on the squared error [1/m^2 and 1/rad^2: a metre counts as much as a radian].
-        resolved_target: `target` as a pin.SE3.
-        residual: computes the error, with frame, joint and target; once resolved.
-
-    Raises:
-        InputError: the target is none of these, or not in metres.
     """
 
     frame: str
     target: inputs.Target
     _: KW_ONLY
     weight: inputs.Weight = 1.0
-    resolved_target: Any = field(init=False, repr=False)
+    resolved_target: Any = field(init=False, repr=False)  # `target` as a pin.SE3
     residual: PlacementResidual = field(init=False, repr=False)
 
     def resolve(self, scene: Surroundings, start: Array) -> Frame:
@@ -80,18 +76,13 @@ class Orientation(PlacementGoal):
         frame: name of the frame, segment or joint.
         target: quaternion (x, y, z, w) or rotation matrix (3, 3) of the frame in the world.
         weight: factor on the squared error [1/rad^2].
-        resolved_target: `target` as a pin.SE3 without translation.
-        residual: computes the error, with frame, joint and target; once resolved.
-
-    Raises:
-        InputError: the target is not a rotation.
     """
 
     frame: str
     target: Annotated[ArrayLike, inputs.target_rotation]
     _: KW_ONLY
     weight: inputs.Weight = 1.0
-    resolved_target: Any = field(init=False, repr=False)
+    resolved_target: Any = field(init=False, repr=False)  # `target` as a pin.SE3 without translation
     residual: PlacementResidual = field(init=False, repr=False)
 
     def resolve(self, scene: Surroundings, start: Array) -> Orientation:
@@ -115,10 +106,6 @@ class Relative(PlacementGoal):
             metres. None for the relative placement at the start.
         orientation: False leaves the frame free to turn about its origin.
         weight: factor on the squared error [1/m^2 and 1/rad^2].
-        residual: computes the error, with frames, joints and target; once resolved.
-
-    Raises:
-        InputError: the placement is none of these, or not in metres.
     """
 
     frame: str
@@ -137,3 +124,47 @@ class Relative(PlacementGoal):
         given = self.placement is not None
         target = self.resolved_placement if given else placement_between(scene, start, self.frame, self.to)
         return filled(self, residual=PlacementResidual.build(place, target, base, orientation=self.orientation))
+
+
+@dataclass(frozen=True, eq=False)
+class Hold(PlacementTerm, Constraint):
+    """Keep a frame at a placement, in the world or relative to another frame of the figure.
+
+    Relative to another frame it closes a loop: two hands that carry one box, or the second hand on a two-handed tool.
+
+    Attributes:
+        frame: name of the frame, segment or joint.
+        at: its placement: (x, y, z) with the axes of the world or of `relative_to`, (x, y, z, qx, qy, qz, qw), a matrix
+            (4, 4) or a pin.SE3; metres. None for its placement at the start.
+        orientation: False holds only the frame's origin and leaves the frame free to turn.
+        relative_to: name of the frame that `at` is relative to; None for the world.
+    """
+
+    frame: str
+    at: inputs.Target | None = None
+    _: KW_ONLY
+    orientation: bool = True
+    relative_to: str | None = None
+    resolved_at: Any = field(init=False, repr=False, default=None)
+    residual: PlacementResidual = field(init=False, repr=False)
+
+    def resolve(self, scene: Surroundings, start: Array) -> Hold:
+        """Find the frames, and their placements at the start."""
+        place = inputs.find_place(scene, self.frame, "Hold")
+        base = inputs.find_base(scene, self.relative_to, self.frame, "Hold")
+        at = placement_between(scene, start, self.frame, self.relative_to) if self.at is None else self.resolved_at
+        return filled(self, residual=PlacementResidual.build(place, at, base, orientation=self.orientation))
+
+    @property
+    def kept_at(self) -> Any:
+        """The placement at which the frame is held, in the world or in the other frame, once resolved."""
+        return self.residual.placement
+
+    @property
+    def upper(self) -> Array:
+        """Zero, as `lower`."""
+        return np.zeros(())
+
+    def value(self, state: State) -> Array:
+        """(m,) difference in position [m] and orientation [rad]."""
+        return self.residual.value(state)

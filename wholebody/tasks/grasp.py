@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass
 from math import pi
 from typing import Annotated, Literal
 
@@ -17,10 +16,9 @@ from wholebody.base.records import with_values
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
-from wholebody.tasks.bars import Crossing, Looking, bar_of, rim_of
 from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Over, Part, owner_pairs
-from wholebody.tasks.opposition import Opposing, rounded
+from wholebody.tasks.grips import Crossing, Looking, Opposing, bar_of, rim_of, rounded
 from wholebody.tasks.surfaces import Surface, carried_by, face, joined, segments_beyond, surface
 from wholebody.tasks.touch import check_apart
 
@@ -51,7 +49,7 @@ class Grasp(ContactTerm):
       needs fingers.
 
     Two sides oppose where the normals of their contacts are antiparallel, within `opposed`; of several fingers the
-    mean of the normals counts. Edges of boxes count as rounded.
+    mean of the normals counts. Edges of boxes and hulls count as rounded.
 
     Use it as a goal or as a constraint. The clearance between hand and thing is zero.
 
@@ -67,11 +65,6 @@ class Grasp(ContactTerm):
         approach: "overhand", the palm looks down, "underhand", it looks up, or "side", it looks to the side, within 45
             degrees each; any if left out.
         weight: factor on the squared error, as a goal [1/m^2 and 1/rad^2].
-        parts: the rows, once resolved.
-
-    Raises:
-        InputError: the hand is neither, the kind or the approach is another word, the side has no direction, or an
-            angle or a place is out of range.
     """
 
     hand: inputs.Name
@@ -83,8 +76,6 @@ class Grasp(ContactTerm):
     along: Annotated[float, Range(-1.0, 1.0)] | None = None
     approach: Literal["overhand", "underhand", "side"] | None = None
     weight: inputs.Weight = 1.0
-    parts: Sequence[Part] = field(init=False, repr=False)
-    touches: tuple[tuple[str, str], ...] = field(init=False, repr=False, default=())
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -104,12 +95,7 @@ class Grasp(ContactTerm):
         return self.hand.split("_")[0]
 
     def resolve(self, scene: Surroundings, start: Array) -> Grasp:
-        """Find the hand, and the face, bar or sides that it takes.
-
-        Raises:
-            UnknownNameError: the figure has no such palm or fingertip, or there is no such thing.
-            InputError: the thing is a frame, is carried by the same hand, or needs fingers that are missing.
-        """
+        """Find the hand, and the face, bar or sides that it takes."""
         where = f"Grasp({shown(self.hand)}, {shown(self.thing)})"
         place = inputs.find_place(scene, self.frame, where)
         hand, thing = carried_by(scene, self.hand, place.joint), surface(scene, self.thing, where)
@@ -135,11 +121,7 @@ class Grasp(ContactTerm):
     def _palm(
         self, scene: Surroundings, place: inputs.Place, hand: Surface, thing: Surface, state: State, where: str
     ) -> list[Part]:
-        if self.side is not None:
-            outwards = np.asarray(self.side)
-        else:
-            sideways = np.array((0.0, 1.0 if self._side == "left" else -1.0, 0.0))
-            outwards = _heading(scene, state) @ sideways
+        outwards = self._outwards(scene, state) if self.side is None else np.asarray(self.side)
         taken = face(scene, self.thing, outwards, state, where)
         facing = Facing(place, across(np.array((0.0, 0.0, 1.0))), taken, np.array((0.0, 0.0, -1.0)))
         return [Gap(hand, thing, taken), facing, Over(place, taken, -MIDDLE * taken.half, MIDDLE * taken.half)]
@@ -147,8 +129,7 @@ class Grasp(ContactTerm):
     def _power(
         self, scene: Surroundings, place: inputs.Place, hand: Surface, thing: Surface, state: State, where: str
     ) -> list[Part]:
-        sideways = np.array((0.0, 1.0 if self._side == "left" else -1.0, 0.0))
-        rim = rim_of(thing, _heading(scene, state) @ sideways, state)
+        rim = rim_of(thing, self._outwards(scene, state), state)
         if rim is not None and self.along is not None:
             raise InputError(f"{where}: along is for bars, and {shown(self.thing)} is a ring; leave it out")
         bar = bar_of(thing, state, where) if rim is None else rim
@@ -167,10 +148,9 @@ class Grasp(ContactTerm):
             outwards = with_values(rim, axes=rim.axes[[1, 0, 2]])
             parts.append(Over(place, outwards, np.zeros(1), np.full(1, np.inf)))
         parts += [Gap(finger, thing) for finger in fingers.values()]
-        others = tuple(finger for name, finger in fingers.items() if name != "thumb")
-        thumbs = tuple(finger for name, finger in fingers.items() if name == "thumb")
-        if others:
-            first = thumbs[0] if thumbs and thickness >= THIN else hand
+        thumb = fingers.pop("thumb", hand)
+        if others := tuple(fingers.values()):
+            first = thumb if thickness >= THIN else hand
             parts.append(Opposing(first, others, thing, rounded(thing), float(self.opposed), CLOSED))
         return parts
 
@@ -201,16 +181,8 @@ class Grasp(ContactTerm):
         thumb, *others = (surface(scene, end, where) for end in ends)
         parts: list[Part] = [Gap(finger, thing) for finger in (thumb, *others)]
         # m: distance of the farthest of fingertips from which they begin to oppose the thumb
-        parts.append(
-            Opposing(
-                thumb,
-                tuple(others),
-                thing,
-                rounded(thing),
-                float(self.opposed),
-                CLOSED if self.kind == "pinch" else 0.1,
-            )
-        )
+        far = CLOSED if self.kind == "pinch" else 0.1
+        parts.append(Opposing(thumb, tuple(others), thing, rounded(thing), float(self.opposed), far, lever=0.02))
         bar = bar_of(thing, state, where) if np.isfinite(thing.reach).all() else None
         # ratio of its longest to its next half size from which a thing that is taken by fingertips has ends
         if bar is not None and (self.along is not None or bar.half[2] > 2.0 * bar.half[1]):
@@ -220,6 +192,14 @@ class Grasp(ContactTerm):
             parts.append(Over(tip, lengthwise, np.array([low]), np.array([high])))
         return parts
 
+    def _outwards(self, scene: Surroundings, state: State) -> Array:
+        """Direction (3,) in the world to the hand's side, by the heading of the figure's root at the start."""
+        left = 1.0 if self._side == "left" else -1.0
+        ahead = state.data.oMi[1].rotation[:2, 0] if scene.figure.root == "free" else np.zeros(2)
+        length = float(np.hypot(*ahead))
+        x, y = ahead / length if length >= 1e-6 else (1.0, 0.0)
+        return np.array((-left * y, left * x, 0.0))
+
     def _room(self, half: float) -> tuple[float, float]:
         """Where the hand may be along a bar, from its middle [m]."""
         if self.along is None:
@@ -228,25 +208,10 @@ class Grasp(ContactTerm):
 
     def _outer_parts(self, scene: Surroundings) -> dict[str, Surface]:
         """Of each finger of the hand, its two outer parts; none of a hand that is one segment."""
-        known = set(scene.figure.segments)
         found = {}
         for finger in FINGERS:
             kinds = ("proximal" if finger == "thumb" else "middle", "distal")
-            parts = [f"{self._side}_{finger}_{kind}" for kind in kinds]
-            owned = [part for part in parts if part in known]
-            if owned:
+            parts = {f"{self._side}_{finger}_{kind}" for kind in kinds}
+            if owned := parts.intersection(scene.figure.segments):
                 found[finger] = joined(scene, f"{self._side}_{finger}", owned)
         return found
-
-
-def _heading(scene: Surroundings, state: State) -> Array:
-    """Rotation (3, 3) about z of the figure's root at the start; none for a fixed root."""
-    figure = scene.figure
-    if figure.root != "free":
-        return np.eye(3)
-    ahead = state.data.oMi[1].rotation[:, 0]
-    length = float(np.hypot(*ahead[:2]))
-    if length < 1e-6:
-        return np.eye(3)
-    c, s = ahead[0] / length, ahead[1] / length
-    return np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))

@@ -17,8 +17,7 @@ from wholebody.figures.state import State
 from wholebody.geometry.placement import PlacementLike, placement, unit_vector
 from wholebody.tasks.base import Surroundings
 
-FARTHEST = 100.0
-"""Distance [m] beyond which a position is refused as a wrong unit: 100 mm are a tenth of a metre."""
+FARTHEST = 100.0  # Distance [m] beyond which a position is refused as a wrong unit: 100 mm are a tenth of a metre
 
 WEIGHT = Range(1e-12, 1e12, wanted="a positive number such as 1, or leave it out")
 """Weights of terms: beyond this range the squares of weights make other terms vanish in rounding."""
@@ -31,22 +30,11 @@ class Place(NamedTuple):
     joint: int
 
 
-WORLD = Place(0, 0)
-"""The world: Pinocchio's frame and joint 0."""
+WORLD = Place(0, 0)  # The world: Pinocchio's frame and joint 0
 
 
 def find_place(scene: Surroundings, name: str, where: str) -> Place:
-    """Look up a frame, or the joint of that name.
-
-    Args:
-        scene: the scene with the figure.
-        name: a frame, a segment, or a joint.
-        where: the calling term, for the message.
-
-    Raises:
-        UnknownNameError: the name is unknown.
-        InputError: the name is not a string.
-    """
+    """Look up a frame, or the joint of that name."""
     if not isinstance(name, str):
         raise InputError(f"{where} takes the name of a frame, not {shown(name)}")
     try:
@@ -57,12 +45,7 @@ def find_place(scene: Surroundings, name: str, where: str) -> Place:
 
 
 def find_base(scene: Surroundings, name: str | None, moved: str, where: str) -> Place:
-    """Look up the reference frame of another frame; None is the world.
-
-    Raises:
-        UnknownNameError: the figure has no such frame.
-        InputError: one joint carries both, so they cannot move relative to each other.
-    """
+    """Look up the reference frame of another frame; None is the world."""
     if name is None:
         return WORLD
     base = find_place(scene, name, where)
@@ -72,12 +55,7 @@ def find_base(scene: Surroundings, name: str | None, moved: str, where: str) -> 
 
 
 def find_dofs(scene: Surroundings, names: Sequence[str], where: str) -> Indices:
-    """Tangent indices (k,) of joints and groups.
-
-    Raises:
-        UnknownNameError: the figure has no such joint or group.
-        InputError: not a list of names.
-    """
+    """Tangent indices (k,) of joints and groups."""
     try:
         return np.asarray(scene.figure.dofs(names), dtype=np.intp)
     except UnknownNameError as error:
@@ -93,55 +71,35 @@ def angular_dofs(model: Any) -> Mask:
 
 
 def point(value: object, where: str) -> Array:
-    """Position (3,), metres.
-
-    Raises:
-        InputError: not three finite numbers, or so far away that it cannot be in metres.
-    """
+    """Position (3,), metres."""
     place = numbers(value, (3,), where)
     check_reachable(place, where)
     return place
 
 
 def check_reachable(place: Array, where: str) -> None:
-    """Refuse a position that cannot be in metres.
-
-    Raises:
-        InputError: it is farther than `FARTHEST` from the origin.
-    """
+    """Refuse a position that cannot be in metres."""
     distance = math.hypot(*place)
     if distance > FARTHEST:
         raise InputError(f"{where} is {distance:.4g} m away; lengths are in metres, so divide millimetres by 1000")
 
 
 def direction(value: object, where: str) -> Array:
-    """Unit vector (3,) along the given one.
-
-    Raises:
-        InputError: not three finite numbers, or all of them zero.
-    """
+    """Unit vector (3,) along the given one."""
     unit = np.array(unit_vector(value, where))
     unit.flags.writeable = False
     return unit
 
 
 def target_placement(at: PlacementLike, where: str) -> Any:
-    """Placement (pin.SE3) from any of the forms of `wholebody.geometry.placement.placement`.
-
-    Raises:
-        InputError: it has none of these forms, or is too far away to be in metres.
-    """
+    """Placement (pin.SE3) from any of the forms of `wholebody.geometry.placement.placement`."""
     result = placement(at, where)
     check_reachable(result.translation, where)
     return result
 
 
 def target_rotation(value: ArrayLike, where: str) -> Any:
-    """Rotation, as a pin.SE3 without translation, from a quaternion (x, y, z, w) or a matrix (3, 3).
-
-    Raises:
-        InputError: it is neither, or not a rotation.
-    """
+    """Rotation, as a pin.SE3 without translation, from a quaternion (x, y, z, w) or a matrix (3, 3)."""
     given = array(value, where, "a quaternion (x, y, z, w) or a matrix (3, 3)")
     if given.shape == (4,):
         return target_placement((0.0, 0.0, 0.0, *numbers(given, (4,), where).tolist()), where)
@@ -153,11 +111,7 @@ def target_rotation(value: ArrayLike, where: str) -> Any:
 
 
 def name(value: object, what: str) -> str:
-    """The name of a segment, a piece or a thing.
-
-    Raises:
-        InputError: it is no text, or empty.
-    """
+    """The name of a segment, a piece or a thing."""
     if not isinstance(value, str) or not value:
         raise InputError(f"{what} is {shown(value)}; give the name of a segment or a thing")
     return value
@@ -171,10 +125,6 @@ Name: TypeAlias = Annotated[str, name]
 
 
 def check_mass(scene: Surroundings, where: str) -> None:
-    """Check that a moving part of the figure has mass; otherwise its centre of mass is undefined.
-
-    Raises:
-        InputError: none has.
-    """
+    """Check that a moving part of the figure has mass; otherwise its centre of mass is undefined."""
     if not any(inertia.mass > 0.0 for inertia in list(scene.model.inertias)[1:]):
         raise InputError(f"{where}: nothing of {scene.figure.name} that moves has mass; leave it out")

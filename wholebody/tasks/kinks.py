@@ -20,19 +20,12 @@ NO_EDGES: Array = np.zeros((0, 2, 3))
 
 
 class FacePlane(NamedTuple):
-    """The plane of a face of one piece, and the point of another piece that is farthest behind it.
+    """The plane of a face of one piece, and the point of another piece that is farthest behind it."""
 
-    Attributes:
-        value: how far in front of the plane that point is [m]; not positive where the pieces touch.
-        normal: (3,) outward.
-        point: (3,) [m].
-        key: number of the face.
-    """
-
-    value: float
-    normal: Array
-    point: Array
-    key: int
+    value: float  # how far in front of the plane that point is [m]; not positive where the pieces touch
+    normal: Array  # (3,) outward
+    point: Array  # (3,) [m]
+    key: int  # number of the face
 
 
 def faces_met(
@@ -42,13 +35,6 @@ def faces_met(
 
     Faces beyond which another piece of the second surface goes on where it is touched are no end of it, and are left
     out.
-
-    Args:
-        first: the surface that meets them.
-        second: the one that has them.
-        pieces: the nearest ones.
-        state: at the posture.
-        edges: (k, 2, 3) see `crossed_edges`: their normals count as those of faces, where neither piece has a face.
     """
     i, j = pieces
     swept = second.swept[j]

@@ -29,19 +29,14 @@ class Posture(Goal):
         target: name of one of the figure's postures, or a posture (nq,).
         joints: names of the joints and groups that the goal moves; None for all, including the root.
         weight: factor on the squared error [1/rad^2 and 1/m^2].
-        resolved_target: (nq,) the posture, once resolved.
-        dofs: (m,) indices of these joints in the tangent vector, once resolved.
-
-    Raises:
-        InputError: the posture has the wrong shape, is not finite, or has a quaternion that is not of unit length.
     """
 
     target: str | ArrayLike
     _: KW_ONLY
     joints: Sequence[str] | None = None
     weight: inputs.Weight = 1.0
-    resolved_target: Array = field(init=False, repr=False)
-    dofs: Array = field(init=False, repr=False)
+    resolved_target: Array = field(init=False, repr=False)  # (nq,) the posture
+    dofs: Array = field(init=False, repr=False)  # (m,) indices of these joints in the tangent vector
     _angular: Mask = field(init=False, repr=False)
     _constant: Array | None = field(init=False, repr=False, default=None)
 

@@ -36,11 +36,10 @@ class PotentialEnergy(Measure):
 
     Attributes:
         weight: factor on the measure [1/J^2].
-        masses: of the segments, once resolved.
     """
 
     weight: inputs.Weight = 1.0
-    masses: Masses = field(init=False, repr=False)
+    masses: Masses = field(init=False, repr=False)  # of the segments
 
     def resolve(self, scene: Surroundings, start: Array) -> PotentialEnergy:
         """Compute the weights of the segments, and their heights in the neutral posture."""

@@ -21,19 +21,12 @@ from wholebody.tasks.base import Constraint, Surroundings, filled
 
 
 class Limb(NamedTuple):
-    """One reach cone on a figure.
+    """One reach cone on a figure."""
 
-    Attributes:
-        cone: the spherical polygon.
-        reference: the frame to which the cone is fixed.
-        limb: the frame that turns within the cone.
-        axis: (3,) the limb's direction in its frame, a unit vector.
-    """
-
-    cone: Any
-    reference: inputs.Place
-    limb: inputs.Place
-    axis: Array
+    cone: Any  # the spherical polygon
+    reference: inputs.Place  # the frame to which the cone is fixed
+    limb: inputs.Place  # the frame that turns within the cone
+    axis: Array  # (3,) the limb's direction in its frame, a unit vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,24 +39,15 @@ class ReachCones(Constraint):
 
     Attributes:
         names: names of the figure's cones; None for all of them.
-        limbs: each cone with its frames and joints, once resolved.
-
-    Raises:
-        InputError: names is no list.
     """
 
     names: Annotated[Sequence[str], Names("['left_shoulder']", least=0)] | None = None
-    limbs: tuple[Limb, ...] = field(init=False, repr=False)
+    limbs: tuple[Limb, ...] = field(init=False, repr=False)  # each cone with its frames and joints
     _joints: NDArray[np.intp] = field(init=False, repr=False)
     _against: NDArray[np.intp] = field(init=False, repr=False)
 
     def resolve(self, scene: Surroundings, start: Array) -> ReachCones:
-        """Find the cones and their frames.
-
-        Raises:
-            UnknownNameError: a name is unknown.
-            InputError: the figure has no cones.
-        """
+        """Find the cones and their frames."""
         cones = scene.figure.cones
         if not cones:
             raise InputError("ReachCones: this figure has no reach cones; leave the constraint out")
@@ -81,19 +65,9 @@ class ReachCones(Constraint):
         )
 
     @property
-    def lower(self) -> Array:
-        """(m,) zeros."""
-        return np.zeros(len(self.limbs))
-
-    @property
-    def upper(self) -> Array:
-        """(m,) inf."""
-        return np.full(len(self.limbs), np.inf)
-
-    @property
     def angular(self) -> Mask:
-        """(m,) all rows are in radians."""
-        return np.ones(len(self.limbs), dtype=bool)
+        """All rows are in radians."""
+        return np.ones((), dtype=bool)
 
     def value(self, state: State) -> Array:
         """(m,) signed angle to the edge of each cone, positive inside [rad]."""
@@ -149,19 +123,12 @@ class CoupledRow(NamedTuple):
 
 
 class EllipticRow(NamedTuple):
-    """``(1 - sum_k (a_k / l_k)^2) size / 2``, about the distance from the ellipsoid near it; see `EllipticRange`.
+    """``(1 - sum_k (a_k / l_k)^2) size / 2``, about the distance from the ellipsoid near it; see `EllipticRange`."""
 
-    Attributes:
-        axes: the coordinates that each angle a is the sum of.
-        offset: (k,) radians added to each.
-        limits: (2, k) lower and upper limits l.
-        size: radians.
-    """
-
-    axes: tuple[tuple[Coordinate, ...], ...]
-    offset: Array
-    limits: Array
-    size: float
+    axes: tuple[tuple[Coordinate, ...], ...]  # the coordinates that each angle a is the sum of
+    offset: Array  # (k,) radians added to each
+    limits: Array  # (2, k) lower and upper limits l
+    size: float  # radians
 
     def value(self, state: State) -> float:
         """Radians, positive inside."""
@@ -192,17 +159,11 @@ class EllipticRow(NamedTuple):
 
 
 class TwistRow(NamedTuple):
-    """``bound + slope . z - sign twist``; see `TwistRange`.
+    """``bound + slope . z - sign twist``; see `TwistRange`."""
 
-    Attributes:
-        reference: the frame that carries the range.
-        limb: the frame that turns.
-        part: center, sign, bound and slope.
-    """
-
-    reference: inputs.Place
-    limb: inputs.Place
-    part: TwistRange
+    reference: inputs.Place  # the frame that carries the range
+    limb: inputs.Place  # the frame that turns
+    part: TwistRange  # center, sign, bound and slope
 
     def value(self, state: State) -> float:
         """Radians, positive inside."""
@@ -245,24 +206,14 @@ class RangeOfMotion(Constraint):
 
     Attributes:
         names: names of the figure's ranges; None for all of them.
-        rows: each range with its frames and joints, once resolved.
-        row_names: its name, once resolved.
-
-    Raises:
-        InputError: names is no list.
     """
 
     names: Annotated[Sequence[str], Names("['neck']", least=0)] | None = None
-    rows: tuple[Row, ...] = field(init=False, repr=False)
-    row_names: tuple[str, ...] = field(init=False, repr=False)
+    rows: tuple[Row, ...] = field(init=False, repr=False)  # each range with its frames and joints
+    row_names: tuple[str, ...] = field(init=False, repr=False)  # its name
 
     def resolve(self, scene: Surroundings, start: Array) -> RangeOfMotion:
-        """Find the ranges, their frames and joints.
-
-        Raises:
-            UnknownNameError: a name is unknown.
-            InputError: the figure has no ranges.
-        """
+        """Find the ranges, their frames and joints."""
         ranges = scene.figure.ranges
         if not ranges:
             raise InputError("RangeOfMotion: this figure has no ranges of motion; leave the constraint out")
@@ -271,19 +222,9 @@ class RangeOfMotion(Constraint):
         return filled(self, rows=tuple(rows), row_names=names)
 
     @property
-    def lower(self) -> Array:
-        """(m,) zeros."""
-        return np.zeros(len(self.rows))
-
-    @property
-    def upper(self) -> Array:
-        """(m,) inf."""
-        return np.full(len(self.rows), np.inf)
-
-    @property
     def angular(self) -> Mask:
-        """(m,) all rows are in radians."""
-        return np.ones(len(self.rows), dtype=bool)
+        """All rows are in radians."""
+        return np.ones((), dtype=bool)
 
     def value(self, state: State) -> Array:
         """(m,) angle to the end of each range, positive inside [rad]."""

@@ -42,26 +42,22 @@ def fill_point_rows(rows: Array, point: Array) -> None:
     rows[2, 4] = -x
 
 
+_angular = np.repeat((False, True), 3)
+_angular.flags.writeable = False
+
+
 class PlacementResidual(NamedTuple):
     """Difference between the placement of one frame relative to another and its target, in the axes of the other frame.
 
     Rows: position (3, metres) if `position`, then rotation vector (3, radians) if `orientation`.
-
-    Attributes:
-        place: the frame that moves.
-        base: the reference frame; the world by default.
-        target: (3,) target position of the frame's origin in the base.
-        undo: inverse of the target's rotation, as a placement without translation.
-        position: whether the residual has the position.
-        orientation: whether it has the rotation.
     """
 
-    place: Place
-    base: Place
-    target: Array
-    undo: Any
-    position: bool
-    orientation: bool
+    place: Place  # the frame that moves
+    base: Place  # the reference frame; the world by default
+    target: Array  # (3,) target position of the frame's origin in the base
+    undo: Any  # inverse of the target's rotation, as a placement without translation
+    position: bool  # whether the residual has the position
+    orientation: bool  # whether it has the rotation
 
     @classmethod
     def build(
@@ -79,7 +75,7 @@ class PlacementResidual(NamedTuple):
     @property
     def angular(self) -> Mask:
         """(m,) whether each row is in radians."""
-        return np.array([False] * 3 * self.position + [True] * 3 * self.orientation)
+        return _angular[3 * (not self.position) : 3 + 3 * self.orientation]
 
     def value(self, state: State) -> Array:
         """(m,) the difference."""

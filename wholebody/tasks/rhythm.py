@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -36,41 +37,30 @@ is 16, 32, 58 and 75. He squats more than most: people who lift as they like nei
 (Davis et al. 2002, Occupational Ergonomics 3(2)), so the share, and the weight, are an ESTIMATE beside his."""
 
 
+Three: TypeAlias = tuple[int, int, int]
+
+
 class Elevation(NamedTuple):
     """A joint that follows the elevation e of a limb: its usual angle is ``most (1 - cos e) + rest``.
 
     With an onset o it follows the flexion f alone: ``most (f + sqrt(f^2 + o^2) - o) / 2 + rest``, which is about
     ``most f`` where f is much more than o, and does not change where the limb is bent back.
-
-    Attributes:
-        idx_q: the joint, flexion and abduction of the limb: places in the posture.
-        idx_v: the same in the tangent.
-        weight: of the square, 1/rad^2.
-        most: the share where the limb is level, radians; with an onset, radians for each of the flexion.
-        rest: what the joint has beyond its share at the start, radians.
-        onset: flexion about which the share begins, radians; zero for a share of the elevation.
     """
 
-    idx_q: tuple[int, int, int]
-    idx_v: tuple[int, int, int]
-    weight: float
-    most: float
-    rest: float = 0.0
-    onset: float = 0.0
+    idx_q: Three  # the joint, flexion and abduction of the limb: places in the posture
+    idx_v: Three  # the same in the tangent
+    weight: float  # of the square, 1/rad^2
+    most: float  # the share where the limb is level, radians; with an onset, radians for each of the flexion
+    rest: float = 0.0  # what the joint has beyond its share at the start, radians
+    onset: float = 0.0  # flexion about which the share begins, radians; zero for a share of the elevation
 
 
 class Lumbar(NamedTuple):
-    """The lumbar joints and the free root.
+    """The lumbar joints and the free root."""
 
-    Attributes:
-        idx_q: their flexion: places in the posture.
-        idx_v: the same in the tangent.
-        rest: what they have beyond their share at the start, radians.
-    """
-
-    idx_q: tuple[int, int, int]
-    idx_v: tuple[int, int, int]
-    rest: float
+    idx_q: Three  # their flexion: places in the posture
+    idx_v: Three  # the same in the tangent
+    rest: float  # what they have beyond their share at the start, radians
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,35 +79,28 @@ class Rhythm(Measure):
 
     Attributes:
         weight: factor on the measure.
-        girdles: clavicles with their arms, once resolved.
         knees: knees with their hips, once resolved; they count where there is a lumbar spine.
-        lumbar: the lumbar spine, once resolved; None without a free root.
     """
 
     weight: inputs.Weight = 1.0
-    girdles: tuple[Elevation, ...] = field(init=False, repr=False)
+    girdles: tuple[Elevation, ...] = field(init=False, repr=False)  # clavicles with their arms
     knees: tuple[Elevation, ...] = field(init=False, repr=False)
-    lumbar: Lumbar | None = field(init=False, repr=False)
+    lumbar: Lumbar | None = field(init=False, repr=False)  # the lumbar spine; None without a free root
 
     def resolve(self, scene: Surroundings, start: Array) -> Rhythm:
-        """Find the joints, and what the lumbar spine has at the start.
-
-        Raises:
-            InputError: the figure has neither a clavicle with its arm nor a lumbar spine on a free root.
-        """
+        """Find the joints, and what the lumbar spine has at the start."""
         figure = scene.figure
         girdles, lumbar = girdles_of(figure), _lumbar(figure, start)
         if not girdles and lumbar is None:
             raise InputError("Rhythm: this figure has no clavicles and no lumbar spine; leave the measure out")
-        return filled(self, girdles=girdles, knees=() if lumbar is None else _knees(figure, start), lumbar=lumbar)
+        names = ("knee_flexion", "hip_flexion", "hip_abduction")
+        knees = _elevations(figure, names, KNEE_WEIGHT, KNEE_SHARE, KNEE_ONSET) if lumbar is not None else ()
+        knees = tuple(with_values(knee, rest=_beyond(start, knee)[0]) for knee in knees)
+        return filled(self, girdles=girdles, knees=knees, lumbar=lumbar)
 
     def value(self, state: State) -> float:
         """The measure."""
-        q = state.q
-        total = sum(part.weight * _beyond(q, part)[0] ** 2 for part in (*self.girdles, *self.knees))
-        if self.lumbar is not None:
-            total += LUMBAR_WEIGHT * _bent(q, self.lumbar)[0] ** 2
-        return float(total)
+        return float(sum(weight * excess**2 for weight, excess, _, _ in self.parts(state.q)))
 
     def gradient(self, state: State) -> Array:
         """(nv,) derivative [1/rad]."""
@@ -164,31 +147,29 @@ def girdles_of(figure: Figure) -> tuple[Elevation, ...]:
     return _elevations(figure, parts, CLAVICLE_WEIGHT, math.radians(13.0), 0.0)
 
 
-def _knees(figure: Figure, start: Array) -> tuple[Elevation, ...]:
-    parts = ("knee_flexion", "hip_flexion", "hip_abduction")
-    found = _elevations(figure, parts, KNEE_WEIGHT, KNEE_SHARE, KNEE_ONSET)
-    return tuple(with_values(knee, rest=_beyond(start, knee)[0]) for knee in found)
-
-
 def _elevations(
     figure: Figure, parts: tuple[str, str, str], weight: float, most: float, onset: float
 ) -> tuple[Elevation, ...]:
-    found = []
-    for side in ("left", "right"):
-        names = [f"{side}_{part}" for part in parts]
-        if all(name in figure.joints for name in names):
-            a, b, c = (figure.model.joints[figure.joint_id(name)] for name in names)
-            idx_q, idx_v = (a.idx_q, b.idx_q, c.idx_q), (a.idx_v, b.idx_v, c.idx_v)
-            found.append(Elevation(idx_q, idx_v, weight, most, onset=onset))
+    sides = ([f"{side}_{part}" for part in parts] for side in ("left", "right"))
+    found = [Elevation(*_places(figure, names), weight, most, onset=onset) for names in sides if _has(figure, names)]
     return tuple(found)
+
+
+def _has(figure: Figure, names: Sequence[str]) -> bool:
+    return set(names) <= set(figure.joints)
+
+
+def _places(figure: Figure, names: Sequence[str]) -> tuple[Three, Three]:
+    """Places of three joints in the posture, and in the tangent."""
+    a, b, c = (figure.model.joints[figure.joint_id(name)] for name in names)
+    return (a.idx_q, b.idx_q, c.idx_q), (a.idx_v, b.idx_v, c.idx_v)
 
 
 def _lumbar(figure: Figure, start: Array) -> Lumbar | None:
     names = [f"spine{level}_flexion" for level in (1, 2, 3)]
-    if figure.root != "free" or not all(name in figure.joints for name in names):
+    if figure.root != "free" or not _has(figure, names):
         return None
-    a, b, c = (figure.model.joints[figure.joint_id(name)] for name in names)
-    part = Lumbar((a.idx_q, b.idx_q, c.idx_q), (a.idx_v, b.idx_v, c.idx_v), 0.0)
+    part = Lumbar(*_places(figure, names), 0.0)
     return with_values(part, rest=_bent(start, part)[0])
 
 

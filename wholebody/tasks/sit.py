@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass
 
+import coal
 import numpy as np
 
 from wholebody.base.arrays import Array
@@ -13,6 +13,7 @@ from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
+from wholebody.tasks.balance import low_points
 from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Level, Near, Over, Part, owner_pairs
 from wholebody.tasks.surfaces import Surface, face, joined, surface
@@ -35,10 +36,6 @@ class Sit(ContactTerm):
         pelvis: the segment that sits.
         trunk: the last of the segments above the pelvis that may touch the back.
         weight: factor on the squared error, as a goal [1/m^2 and 1/rad^2].
-        parts: the rows, once resolved.
-
-    Raises:
-        InputError: a name is not a string, or the weight is not positive.
     """
 
     on: inputs.Name
@@ -47,8 +44,6 @@ class Sit(ContactTerm):
     pelvis: inputs.Name = "pelvis"
     trunk: inputs.Name = "thorax"
     weight: inputs.Weight = 1.0
-    parts: Sequence[Part] = field(init=False, repr=False)
-    touches: tuple[tuple[str, str], ...] = field(init=False, repr=False, default=())
 
     @property
     def frame(self) -> str:
@@ -56,12 +51,7 @@ class Sit(ContactTerm):
         return self.pelvis
 
     def resolve(self, scene: Surroundings, start: Array) -> Sit:
-        """Find the surfaces and the seat's face.
-
-        Raises:
-            UnknownNameError: there is nothing of that name.
-            InputError: the seat or the back is a frame, or the pelvis has no pieces.
-        """
+        """Find the surfaces and the seat's face."""
         where = f"Sit({shown(self.on)})"
         place, trunk = inputs.find_place(scene, self.pelvis, where), inputs.find_place(scene, self.trunk, where)
         state = State(scene.model).update(start)
@@ -74,7 +64,7 @@ class Sit(ContactTerm):
         # m: how much higher than on the deepest point of the pelvis and thighs the pelvis may sit
         deep = _depth(scene, self.pelvis, place) + 0.01
         over = Over(place, seat, np.append(-edge, -np.inf), np.append(edge, deep))
-        left = _rest(scene, place).T @ np.array((0.0, 1.0, 0.0))
+        left = upright(scene).frame(place.frame).rotation.T @ np.array((0.0, 1.0, 0.0))
         parts: list[Part] = [Gap(bottom, thing, seat), over]
         touches = owner_pairs(bottom.owners, thing.owners)
         if self.back is None:
@@ -93,10 +83,9 @@ class Sit(ContactTerm):
         return filled(self, parts=tuple(parts), touches=touches)
 
 
-def _rest(scene: Surroundings, place: inputs.Place) -> Array:
-    """Rotation (3, 3) of a frame in the figure's first posture, in which the figure looks along x."""
-    figure = scene.figure
-    return np.asarray(State(scene.model).update(figure.posture(figure.postures[0])).frame(place.frame).rotation)
+def upright(scene: Surroundings) -> State:
+    """The state of the figure's first posture, in which it looks along x."""
+    return State(scene.model).update(scene.figure.posture(scene.figure.postures[0]))
 
 
 def _trunk(scene: Surroundings, pelvis: inputs.Place, trunk: inputs.Place) -> list[str]:
@@ -129,10 +118,7 @@ def _thighs(scene: Surroundings, pelvis: inputs.Place, trunk: inputs.Place) -> l
 
 def _depth(scene: Surroundings, name: str, place: inputs.Place) -> float:
     """How far the pelvis reaches below its origin when it is upright, metres."""
-    from wholebody.tasks.balance import low_points
-
-    figure = scene.figure
-    state = State(scene.model).update(figure.posture(figure.postures[0]))
+    state = upright(scene)
     shape = joined(scene, name, [name])
     lows = [low_points(piece, shape.placed(k, state))[:, 2].min() for k, piece in enumerate(shape.shapes)]
     return float(state.frame(place.frame).translation[2] - min(lows))
@@ -140,8 +126,6 @@ def _depth(scene: Surroundings, name: str, place: inputs.Place) -> float:
 
 def _middle(thing: Surface, state: State, other: Array, where: str) -> Array:
     """Mean (3,) of the origins of a thing's pieces; for a half-space the nearest point of its plane."""
-    import coal
-
     shape = thing.shapes[0]
     if isinstance(shape, coal.Halfspace):
         place = thing.placed(0, state)
@@ -151,11 +135,7 @@ def _middle(thing: Surface, state: State, other: Array, where: str) -> Array:
 
 
 def _level(direction: Array, where: str) -> Array:
-    """The horizontal part of a direction, as a unit vector.
-
-    Raises:
-        InputError: it is vertical.
-    """
+    """The horizontal part of a direction, as a unit vector."""
     flat = np.array((direction[0], direction[1], 0.0))
     length = float(np.linalg.norm(flat))
     if length < 1e-6:

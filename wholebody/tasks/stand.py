@@ -2,29 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices
 from wholebody.base.checks import shown
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.balance import STANDING_HEIGHT, Feet, Margin, hull_corners, low_points
-from wholebody.tasks.base import Constraint, SupportingPlanes, Surroundings, filled
-from wholebody.tasks.contact_parts import Facing, Gap, Over, Part, owner_pairs, planes_of
-from wholebody.tasks.sit import UP
+from wholebody.tasks.base import Surroundings, filled
+from wholebody.tasks.contact_parts import Facing, Gap, Over, Part, TermOfParts, owner_pairs
+from wholebody.tasks.sit import UP, upright
 from wholebody.tasks.surfaces import face, segments_beyond, surface
 
 FAR_INSIDE = 1.0  # m: value of a row whose corner is no corner of the polygon
 
 
 @dataclass(frozen=True, eq=False)
-class Stand(Constraint):
+class Stand(TermOfParts):
     """Stand with flat soles on a thing; the feet may slide, and the centre of mass stays over them.
 
     Each sole touches the thing, lies flat on its upper face and has its middle over it. The support polygon is that of
@@ -35,11 +34,8 @@ class Stand(Constraint):
         feet: segments whose soles stand.
         balance: whether the centre of mass stays over the soles; False for who also sits, leans or holds on.
         margin: distance of the centre of mass from the edges of the polygon [m].
-        parts: equality rows: of each foot the distance, two angles, and two rows over the face; once resolved.
-        polygon: inequality rows of the balance; None without it.
-
-    Raises:
-        InputError: no feet are named, a name is not a string, or the margin is negative.
+        parts: of each foot the distance, two angles, and two rows over the face, which are zero; then, with balance,
+            the distances of the centre of mass inside the edges [m]; once resolved.
     """
 
     on: inputs.Name
@@ -47,24 +43,16 @@ class Stand(Constraint):
     feet: Feet = ("left_foot", "right_foot")
     balance: bool = True
     margin: Margin = 0.0
-    parts: Sequence[Part] = field(init=False, repr=False)
-    polygon: SolePolygon | None = field(init=False, repr=False)
-    touches: tuple[tuple[str, str], ...] = field(init=False, repr=False, default=())
 
     def resolve(self, scene: Surroundings, start: Array) -> Stand:
-        """Find the soles and the face that they stand on.
-
-        Raises:
-            UnknownNameError: there is no such thing or foot.
-            InputError: a foot has no pieces, the thing is a frame, or nothing of the figure has mass.
-        """
+        """Find the soles and the face that they stand on."""
         where = f"Stand({shown(self.on)})"
         state = State(scene.model).update(start)
         ground, thing = face(scene, self.on, UP, state, where), surface(scene, self.on, where)
         parts: list[Part] = []
         touches: tuple[tuple[str, str], ...] = ()
         corners, joints = [], []
-        rest = State(scene.model).update(scene.figure.posture(scene.figure.postures[0]))
+        rest = upright(scene)
         for foot in self.feet:
             place, sole = inputs.find_place(scene, foot, where), surface(scene, foot, where)
             if not sole.owners or place.joint == 0:
@@ -82,60 +70,26 @@ class Stand(Constraint):
             inside = rest.data.oMi[place.joint].inverse()
             corners += [np.asarray(inside.act(point)) for point in lows]
             joints += [place.joint] * len(lows)
-        polygon = None
         if self.balance:
             inputs.check_mass(scene, where)
             polygon = SolePolygon(np.array(corners), np.array(joints, dtype=np.intp))
             if not (polygon.rows(state)[0] < FAR_INSIDE).any():
                 raise InputError(f"{where}: the soles are a line, not an area; name more feet, or leave balance out")
-        return filled(self, parts=tuple(parts), polygon=polygon, touches=touches)
-
-    @property
-    def touching(self) -> tuple[tuple[str, str], ...]:
-        """Owners that are to touch: their clearance is zero."""
-        return self.touches
-
-    def _counts(self) -> tuple[int, int]:
-        equal = sum(len(part.in_radians) for part in self.parts)
-        return equal, 0 if self.polygon is None else len(self.polygon.joints)
+            parts.append(polygon)
+        return filled(self, parts=tuple(parts), touches=touches)
 
     @property
     def lower(self) -> Array:
         """(m,) zeros, and the margin for the rows of the balance."""
-        equal, unequal = self._counts()
-        return np.concatenate([np.zeros(equal), np.full(unequal, self.margin)])
+        return np.where(self._balanced(), self.margin, 0.0)
 
     @property
     def upper(self) -> Array:
         """(m,) zeros, and inf for the rows of the balance."""
-        equal, unequal = self._counts()
-        return np.concatenate([np.zeros(equal), np.full(unequal, np.inf)])
+        return np.where(self._balanced(), np.inf, 0.0)
 
-    @property
-    def angular(self) -> Mask:
-        """(m,) which rows are in radians."""
-        flags = [turned for part in self.parts for turned in part.in_radians]
-        return np.array(flags + [False] * self._counts()[1], dtype=bool)
-
-    def value(self, state: State) -> Array:
-        """(m,) residuals of the contacts [m, rad], then distances of the centre of mass inside the edges [m]."""
-        rows = [part.rows(state)[0] for part in self.parts]
-        return np.concatenate(rows if self.polygon is None else [*rows, self.polygon.rows(state)[0]])
-
-    def jacobian(self, state: State) -> Array:
-        """(m, nv)."""
-        rows = [part.rows(state)[1] for part in self.parts]
-        return np.vstack(rows if self.polygon is None else [*rows, self.polygon.rows(state)[1]])
-
-    def value_and_jacobian(self, state: State, value: Callable[[State], Array]) -> tuple[Array, Array]:
-        """Both from one search for the nearest points."""
-        found = [part.rows(state) for part in (*self.parts, *(() if self.polygon is None else (self.polygon,)))]
-        values, rows = zip(*found, strict=True)
-        return np.concatenate(values), np.vstack(rows)
-
-    def supporting_planes(self, state: State) -> SupportingPlanes:
-        """Planes of the faces about the soles, and the ends of the face that they stand on."""
-        return planes_of(self.parts, state)
+    def _balanced(self) -> list[bool]:
+        return [isinstance(part, SolePolygon) for part in self.parts for _ in part.in_radians]
 
 
 class SolePolygon(NamedTuple):
@@ -143,14 +97,15 @@ class SolePolygon(NamedTuple):
 
     With e = b - a the edge from a to b, anticlockwise, n its inward normal and s = (e . (c - a)) / |e|^2, the distance
     d = n . (c - a) of the centre of mass c changes by n . (dc - (1 - s) da - s db): n turns with the edge.
-
-    Attributes:
-        points: (m, 3) in the axes of their joints [m].
-        joints: (m,) joint that carries each.
     """
 
-    points: Array
-    joints: Indices
+    points: Array  # (m, 3) in the axes of their joints [m]
+    joints: Indices  # (m,) joint that carries each
+
+    @property
+    def in_radians(self) -> tuple[bool, ...]:
+        """None is."""
+        return (False,) * len(self.joints)
 
     def rows(self, state: State) -> tuple[Array, Array]:
         """Distances (m,) inside the edges and their derivative (m, nv); `FAR_INSIDE` and zero for no corner."""

@@ -6,7 +6,7 @@ are asked for, so a thing that is moved after a term was resolved is found where
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import coal
@@ -16,6 +16,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
 from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.base.records import with_values
 from wholebody.figures.link_pieces import drawn_pieces
 from wholebody.figures.state import State
 from wholebody.geometry.pieces import SweptPoints, swept_points
@@ -27,29 +28,24 @@ ACCURACY = 1e-9  # m: to which coal computes a distance; coarser, and a normal i
 
 
 class Surface(NamedTuple):
-    """Convex pieces that count as one surface.
+    """Convex pieces that count as one surface."""
 
-    Attributes:
-        name: of the segment, thing, piece or frame.
-        owners: segments and things that the pieces are part of; none for a point and for what is only drawn.
-        geometry: the geometry model that has the pieces' placements; None for a point.
-        pieces: (k,) indices of the pieces in it.
-        joints: (k,) joint that carries each.
-        shapes: (k,) coal's shapes.
-        reach: (k,) radius of each about its origin, metres.
-        swept: (k,) their points and flat faces, which take longer to find than what they are asked for.
-        fixed: placement of a point in its joint; None for pieces.
-    """
-
-    name: str
+    name: str  # of the segment, thing, piece or frame
+    # segments and things that the pieces are part of; none for a point and for what is only drawn
     owners: tuple[str, ...]
-    geometry: Any
-    pieces: tuple[int, ...]
-    joints: tuple[int, ...]
-    shapes: tuple[Any, ...]
-    reach: tuple[float, ...]
+    geometry: Any  # the geometry model that has the pieces' placements; None for a point
+    pieces: tuple[int, ...]  # (k,) indices of the pieces in it
+    joints: tuple[int, ...]  # (k,) joint that carries each
+    shapes: tuple[Any, ...]  # (k,) coal's shapes
+    reach: tuple[float, ...]  # (k,) radius of each about its origin, metres
+    # (k,) their points and flat faces, which take longer to find than what they are asked for
     swept: tuple[SweptPoints, ...]
-    fixed: Any = None
+    fixed: Any = None  # placement of a point in its joint; None for pieces
+
+    def with_shapes(self, shapes: tuple[Any, ...]) -> Surface:
+        """The same pieces with other shapes."""
+        swept = tuple(swept_points(shape) for shape in shapes)
+        return with_values(self, shapes=shapes, reach=tuple(float(each.reach) for each in swept), swept=swept)
 
     def placed(self, number: int, state: State) -> Any:
         """Placement (pin.SE3) of a piece in the world."""
@@ -58,23 +54,14 @@ class Surface(NamedTuple):
 
 
 class Nearest(NamedTuple):
-    """The nearest points of two surfaces.
+    """The nearest points of two surfaces."""
 
-    Attributes:
-        distance: signed, metres; negative in an overlap.
-        normal: (3,) unit vector from the first surface to the second.
-        point: (3,) a point on the line of both nearest points [m].
-        joint: joint that carries the piece of the second surface.
-        against: joint that carries the piece of the first.
-        pieces: number of the piece of the first surface, and of the second.
-    """
-
-    distance: float
-    normal: Array
-    point: Array
-    joint: int
-    against: int
-    pieces: tuple[int, int]
+    distance: float  # signed, metres; negative in an overlap
+    normal: Array  # (3,) unit vector from the first surface to the second
+    point: Array  # (3,) a point on the line of both nearest points [m]
+    joint: int  # joint that carries the piece of the second surface
+    against: int  # joint that carries the piece of the first
+    pieces: tuple[int, int]  # number of the piece of the first surface, and of the second
 
 
 def surface(scene: Surroundings, name: str, where: str) -> Surface:
@@ -82,11 +69,6 @@ def surface(scene: Surroundings, name: str, where: str) -> Surface:
 
     A link of a file may have no pieces of its own: then its surface is the convex hull of what is drawn of it. If
     nothing is drawn, and it has mass or a joint of its own, it is that of all that moves with it.
-
-    Raises:
-        UnknownNameError: there is nothing of that name.
-        InputError: the name is not a string.
-        WholebodyError: what is drawn cannot be read.
     """
     if not isinstance(name, str):
         raise InputError(f"{where} takes the name of a segment, thing, piece or frame, not {shown(name)}")
@@ -102,8 +84,7 @@ def surface(scene: Surroundings, name: str, where: str) -> Surface:
         raise UnknownNameError("segment, thing, piece or frame", name, known, where) from None
     frame = scene.model.frames[number]
     joint = int(frame.parentJoint)
-    visual = scene.figure.visual
-    drawn = [part for part in visual.geometryObjects if part.parentFrame == number]
+    drawn = [part for part in scene.figure.visual.geometryObjects if part.parentFrame == number]
     if drawn:
         return _of_drawn(name, joint, drawn)
     held_by = scene.model.frames[frame.parentFrame]  # its joint; that of a fixed one has the mass of the link
@@ -111,14 +92,12 @@ def surface(scene: Surroundings, name: str, where: str) -> Surface:
         rigid = carried_by(scene, name, joint)
         if rigid.pieces:
             return rigid
-    ball = coal.Sphere(POINT)
-    return Surface(name, (), None, (), (joint,), (ball,), (POINT,), (swept_points(ball),), frame.placement)
+    return Surface(name, (), None, (), (joint,), (), (), (), frame.placement).with_shapes((coal.Sphere(POINT),))
 
 
-def joined(scene: Surroundings, name: str, owners: Iterable[str]) -> Surface:
+def joined(scene: Surroundings, name: str, owners: Collection[str]) -> Surface:
     """The surface of several segments or things that count as one."""
-    wanted = set(owners)
-    return _of_pieces(scene, name, [index for index, owner in enumerate(scene.piece_owner) if owner in wanted])
+    return _of_pieces(scene, name, [index for index, owner in enumerate(scene.piece_owner) if owner in owners])
 
 
 def carried_by(scene: Surroundings, name: str, joint: int) -> Surface:
@@ -135,33 +114,25 @@ def _of_drawn(name: str, joint: int, drawn: Iterable[pin.GeometryObject]) -> Sur
     for visual in drawn:
         for solid, placement in drawn_pieces(visual, name):
             made.addGeometryObject(pin.GeometryObject(f"{name}:{made.ngeoms}", joint, placement, solid))
-    shapes = tuple(piece.geometry for piece in made.geometryObjects)
-    swept = tuple(swept_points(shape) for shape in shapes)
-    reach = tuple(float(each.reach) for each in swept)
-    return Surface(name, (), made, tuple(range(made.ngeoms)), (joint,) * made.ngeoms, shapes, reach, swept)
+    return _made(name, (), made, range(made.ngeoms))
 
 
-def _of_pieces(scene: Surroundings, name: str, indices: list[int]) -> Surface:
-    pieces = [scene.geometry.geometryObjects[index] for index in indices]
-    owners = tuple(dict.fromkeys(scene.piece_owner[index] for index in indices))
-    swept = tuple(swept_points(piece.geometry) for piece in pieces)
-    return Surface(
-        name,
-        owners,
-        scene.geometry,
-        tuple(indices),
-        tuple(int(piece.parentJoint) for piece in pieces),
-        tuple(piece.geometry for piece in pieces),
-        tuple(float(each.reach) for each in swept),
-        swept,
-    )
+def _of_pieces(scene: Surroundings, name: str, indices: Sequence[int]) -> Surface:
+    return _made(name, tuple(dict.fromkeys(scene.piece_owner[k] for k in indices)), scene.geometry, indices)
+
+
+def _made(name: str, owners: tuple[str, ...], geometry: pin.GeometryModel, indices: Sequence[int]) -> Surface:
+    pieces = [geometry.geometryObjects[index] for index in indices]
+    joints, shapes = tuple(int(piece.parentJoint) for piece in pieces), tuple(piece.geometry for piece in pieces)
+    return Surface(name, owners, geometry, tuple(indices), joints, (), (), ()).with_shapes(shapes)
 
 
 def nearest(first: Surface, second: Surface, state: State) -> Nearest:
     """The nearest points of two surfaces, by coal; of several pairs of pieces, those of the nearest pair."""
     ours = [first.placed(k, state) for k in range(len(first.shapes))]
     theirs = [second.placed(k, state) for k in range(len(second.shapes))]
-    apart = _origins(ours)[:, None] - _origins(theirs)
+    origins, others = (np.array([place.translation for place in placed]) for placed in (ours, theirs))
+    apart = origins[:, None] - others
     least = np.sqrt(np.einsum("ijk,ijk->ij", apart, apart)) - np.add.outer(first.reach, second.reach)
     best: tuple[float, Any, int, int] | None = None
     for number in np.argsort(least, axis=None, kind="stable").tolist():
@@ -174,8 +145,9 @@ def nearest(first: Surface, second: Surface, state: State) -> Nearest:
     assert best is not None
     distance, result, i, j = best
     normal = np.array(result.normal)
-    if not np.linalg.norm(normal) > 0.5:
-        normal = _between(ours[i].translation, theirs[j].translation)
+    if not np.linalg.norm(normal) > 0.5:  # the direction between the origins; up where they coincide
+        length = float(np.linalg.norm(others[j] - origins[i]))
+        normal = (others[j] - origins[i]) / length if length > 0.0 else np.array((0.0, 0.0, 1.0))
     middle = 0.5 * (np.array(result.getNearestPoint1()) + np.array(result.getNearestPoint2()))
     return Nearest(distance, normal, middle, second.joints[j], first.joints[i], (i, j))
 
@@ -184,20 +156,9 @@ def between_pieces(first: Any, placed: Any, second: Any, other: Any) -> Any:
     """Coal's distance of two shapes at their placements (pin.SE3)."""
     request, result = coal.DistanceRequest(), coal.DistanceResult()
     request.gjk_tolerance = request.epa_tolerance = ACCURACY
-    coal.distance(
-        first,
-        coal.Transform3s(placed.rotation, placed.translation),
-        second,
-        coal.Transform3s(other.rotation, other.translation),
-        request,
-        result,
-    )
+    at, there = (coal.Transform3s(place.rotation, place.translation) for place in (placed, other))
+    coal.distance(first, at, second, there, request, result)
     return result
-
-
-def _origins(placements: list[pin.SE3]) -> Array:
-    """Translations (k, 3) of placements."""
-    return np.array([place.translation for place in placements])
 
 
 def foot(surface: Surface, number: int, point: Array, state: State) -> Array:
@@ -207,27 +168,13 @@ def foot(surface: Surface, number: int, point: Array, state: State) -> Array:
     return np.array(found.getNearestPoint2())
 
 
-def _between(first: Array, second: Array) -> Array:
-    """Direction between two centres; up where they coincide."""
-    way = second - first
-    length = float(np.linalg.norm(way))
-    return way / length if length > 0.0 else np.array((0.0, 0.0, 1.0))
-
-
 class Face(NamedTuple):
-    """A flat face of a thing, in the axes of one of its pieces, so that it goes where the thing goes.
+    """A flat face of a thing, in the axes of one of its pieces, so that it goes where the thing goes."""
 
-    Attributes:
-        surface: of the thing.
-        center: (3,) middle of the face [m].
-        axes: (3, 3) rows: two directions in the face, and its outward normal.
-        half: (2,) half its size along the two directions; inf for a half-space [m].
-    """
-
-    surface: Surface
-    center: Array
-    axes: Array
-    half: Array
+    surface: Surface  # of the thing
+    center: Array  # (3,) middle of the face [m]
+    axes: Array  # (3, 3) rows: two directions in the face, and its outward normal
+    half: Array  # (2,) half its size along the two directions; inf for a half-space [m]
 
     @property
     def joint(self) -> int:
@@ -241,19 +188,7 @@ class Face(NamedTuple):
 
 
 def face(scene: Surroundings, name: str, direction: Array, state: State, where: str) -> Face:
-    """The face of a thing that looks towards a direction: of a box the nearest one, else where it reaches farthest.
-
-    Args:
-        scene: has the thing.
-        name: of the thing, or of one of its pieces.
-        direction: (3,) in the world.
-        state: at the start.
-        where: the calling term, for messages.
-
-    Raises:
-        UnknownNameError: there is no such thing.
-        InputError: it is a frame, which has no face.
-    """
+    """The face of a thing that looks towards a direction: of a box the nearest one, else where it reaches farthest."""
     found = surface(scene, name, where)
     if found.fixed is not None:
         raise InputError(f"{where}: {shown(name)} is a frame and has no face; name a thing or a segment")
@@ -268,10 +203,8 @@ def face(scene: Surroundings, name: str, direction: Array, state: State, where: 
         normal = np.eye(3)[axis] * (1.0 if along[axis] >= 0.0 else -1.0)
         others = [k for k in range(3) if k != axis]
         return Face(found, normal * half[axis], np.array([*np.eye(3)[others], normal]), half[others])
-    points = []
-    for number, shape in enumerate(found.shapes):
-        points.append(outermost(shape, found.placed(number, state), direction))
-    everything = np.vstack(points)
+    shapes = enumerate(found.shapes)
+    everything = np.vstack([outermost(shape, found.placed(number, state), direction) for number, shape in shapes])
     height = everything @ direction
     # m: how far below the highest point of a thing its face reaches; more joins faces, less loses corners
     top = everything[height >= height.max() - 2e-3]

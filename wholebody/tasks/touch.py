@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
 
 import numpy as np
@@ -17,7 +16,7 @@ from wholebody.geometry.pieces import swept_points
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import Surroundings, filled
-from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Part, RoundEnd, owner_pairs
+from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, RoundEnd, owner_pairs
 from wholebody.tasks.surfaces import Surface, carried_by, face, nearest, surface
 
 
@@ -35,18 +34,12 @@ class Touch(ContactTerm):
             without pieces what is drawn of it touches, else, if it has mass or a joint, what moves with it.
         thing: name of a thing or of one of its pieces, such as "chair:2", or of another segment.
         weight: factor on the squared distance, as a goal [1/m^2].
-        parts: the rows, once resolved.
-
-    Raises:
-        InputError: a name is not a string, or the weight is not positive.
     """
 
     part: inputs.Name
     thing: inputs.Name
     _: KW_ONLY
     weight: inputs.Weight = 1.0
-    parts: Sequence[Part] = field(init=False, repr=False)
-    touches: tuple[tuple[str, str], ...] = field(init=False, repr=False, default=())
 
     @property
     def frame(self) -> str:
@@ -58,12 +51,7 @@ class Touch(ContactTerm):
         return nearest(self.parts[0].first, self.parts[0].second, state).point  # type: ignore[attr-defined]
 
     def resolve(self, scene: Surroundings, start: Array) -> Touch:
-        """Find the two surfaces.
-
-        Raises:
-            UnknownNameError: there is nothing of that name.
-            InputError: no joint is between the two.
-        """
+        """Find the two surfaces."""
         where = f"Touch({shown(self.part)}, {shown(self.thing)})"
         first, second = surface(scene, self.part, where), surface(scene, self.thing, where)
         check_apart(first, second, where)
@@ -83,10 +71,6 @@ class Lean(ContactTerm):
         part: the segment that leans on it.
         side: (3,) direction in the part's axes that looks at the thing; backwards if left out.
         weight: factor on the squared error, as a goal [1/m^2 and 1/rad^2].
-        parts: the rows, once resolved: the distance, then two angles.
-
-    Raises:
-        InputError: a name is not a string, the side has no direction, or the weight is not positive.
     """
 
     on: inputs.Name
@@ -95,8 +79,6 @@ class Lean(ContactTerm):
     side: inputs.Direction = (-1.0, 0.0, 0.0)
     weight: inputs.Weight = 1.0
     resolved_side: Array = field(init=False, repr=False)
-    parts: Sequence[Part] = field(init=False, repr=False)
-    touches: tuple[tuple[str, str], ...] = field(init=False, repr=False, default=())
 
     @property
     def frame(self) -> str:
@@ -104,12 +86,7 @@ class Lean(ContactTerm):
         return self.part
 
     def resolve(self, scene: Surroundings, start: Array) -> Lean:
-        """Find the surfaces, and the face of the thing that looks at the part.
-
-        Raises:
-            UnknownNameError: there is nothing of that name.
-            InputError: no joint is between the two, or the thing is a frame.
-        """
+        """Find the surfaces, and the face of the thing that looks at the part."""
         where = f"Lean({shown(self.on)})"
         place = inputs.find_place(scene, self.part, where)
         first, second = surface(scene, self.part, where), surface(scene, self.on, where)
@@ -149,11 +126,7 @@ def touched(scene: Surroundings, found: Surface) -> tuple[str, ...]:
 
 
 def check_apart(first: Surface, second: Surface, where: str) -> None:
-    """Refuse two surfaces that cannot move relative to each other.
-
-    Raises:
-        InputError: one joint carries both.
-    """
+    """Refuse two surfaces that cannot move relative to each other."""
     if set(first.joints) == set(second.joints) and len(set(first.joints)) == 1:
         raise InputError(
             f"{where}: {first.name!r} cannot move relative to {second.name!r}; name two with a joint between them"

@@ -73,7 +73,9 @@ def entries_of(term: Goal | Constraint, model: pin.Model) -> list[Entry] | None:
 
 def placement_floats(place: Any) -> Array:
     """The columns of the rotation, then the translation."""
-    return np.concatenate([place.rotation.T.ravel(), place.translation])
+    floats = np.empty((4, 3))
+    floats[:3], floats[3] = place.rotation.T, place.translation
+    return floats.ravel()
 
 
 def _in_joint(place: Place, model: pin.Model) -> pin.SE3:

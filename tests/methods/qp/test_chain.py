@@ -218,6 +218,19 @@ def test_the_effort_is_as_little_as_scipy_finds_from_many_starts(arm, turned):
         assert solution.assessment.optimality < 1e-4
 
 
+def test_ends_at_limits_and_along_bent_goals_are_stationary(arm):
+    """Joints that stop a step and are pulled off their limits again, and steps that swing; the assessment tells."""
+    rng, limits = np.random.default_rng(0), arm.limits
+    for number in range(185):
+        start, there = rng.uniform(limits.lower, limits.upper, (2, len(limits.lower)))
+        if number in (152, 177, 184):
+            goal = wb.Point("tip", place_of(arm, there, "tip").translation)
+            problem = wb.Problem(wb.Scene(arm), start, goals=[goal])
+            met = found(problem, measures=True)
+            assert met.stationary, number
+            assert wb.assess(problem, met.q).optimality < 1e-4, number
+
+
 def test_wide_joints_end_the_shorter_way_round():
     """A joint with two turns of range goes to the place that is nearer to where it begins."""
     model = pin.Model()

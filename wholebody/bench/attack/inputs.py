@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Callable, Mapping
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,8 +15,7 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.bench.attack.case import CORPUS, Verdict, chosen
 from wholebody.figures.packaged_urdf import task_paths, urdf_path
-from wholebody.taskfile import read_task
-from wholebody.taskfile.result import read
+from wholebody.taskfile import read_result, read_task
 from wholebody.tracking.track_files import read_track
 
 _VALUE = rb'"[^"\n]*"|\[[^\[\]\n]*\]|-?\d+\.?\d*'
@@ -32,9 +31,10 @@ def _given(kind: str) -> list[Any]:
 
 def mutated(text: bytes, rng: np.random.Generator) -> bytes:
     """Return a text with one to three mutations, seldom more."""
-    ways = (
-        *(_number,) * 6, *(_value,) * 4, *(_word,) * 3, _misspelt, _misspelt, _flip, _delete, _delete, _repeat, _cut,
-        _insert, _insert, _lines, _lines, _encoded, _nested, _bomb, _empty,
+    spliced = [partial(_spliced, how) for how in ("flip", "delete", "delete", "repeat", "cut", "insert", "insert")]
+    ways: tuple[Callable[[bytes, np.random.Generator], bytes], ...] = (
+        *(_number,) * 6, *(_value,) * 4, *(_word,) * 3, _misspelt, _misspelt, *spliced, _lines, _lines, _encoded,
+        _nested, _bomb, partial(_spliced, "empty"),
     )  # fmt: skip
     count = int(rng.choice([1, 1, 1, 2, 3, 10]))
     for _ in range(count):
@@ -42,36 +42,23 @@ def mutated(text: bytes, rng: np.random.Generator) -> bytes:
     return text
 
 
-def _flip(text: bytes, rng: np.random.Generator) -> bytes:
-    found = bytearray(text or b"x")
-    for _ in range(int(rng.integers(1, 4))):
-        found[int(rng.integers(len(found)))] = int(rng.integers(256))
-    return bytes(found)
-
-
-def _span(text: bytes, rng: np.random.Generator) -> tuple[int, int]:
+def _spliced(how: str, text: bytes, rng: np.random.Generator) -> bytes:
+    """A text of which bytes are others, fewer or more."""
+    if how == "flip":
+        found = bytearray(text or b"x")
+        for _ in range(int(rng.integers(1, 4))):
+            found[int(rng.integers(len(found)))] = int(rng.integers(256))
+        return bytes(found)
+    if how == "empty":
+        return (b"", b"\n", b"\x00" * 100, text * 50)[int(rng.integers(4))]
     first = int(rng.integers(len(text) + 1))
-    return first, min(len(text), first + int(rng.integers(1, 60)))
-
-
-def _delete(text: bytes, rng: np.random.Generator) -> bytes:
-    first, last = _span(text, rng)
-    return text[:first] + text[last:]
-
-
-def _repeat(text: bytes, rng: np.random.Generator) -> bytes:
-    first, last = _span(text, rng)
-    return text[:last] + text[first:last] + text[last:]
-
-
-def _cut(text: bytes, rng: np.random.Generator) -> bytes:
-    return text[: int(rng.integers(len(text) + 1))]
-
-
-def _insert(text: bytes, rng: np.random.Generator) -> bytes:
-    at = int(rng.integers(len(text) + 1))
-    odd: bytes = chosen(rng, _given("odd"))
-    return text[:at] + odd + text[at:]
+    if how == "cut":
+        return text[:first]
+    if how == "insert":
+        odd: bytes = chosen(rng, _given("odd"))
+        return text[:first] + odd + text[first:]
+    last = min(len(text), first + int(rng.integers(1, 60)))
+    return text[:first] + text[last:] if how == "delete" else text[:last] + text[first:last] + text[last:]
 
 
 def _replaced(text: bytes, pattern: bytes, by: Callable[[bytes], bytes], rng: np.random.Generator) -> bytes:
@@ -139,11 +126,7 @@ def _nested(text: bytes, rng: np.random.Generator) -> bytes:
 
 def _bomb(text: bytes, rng: np.random.Generator) -> bytes:
     bomb: bytes = _given("bomb")[0]
-    return bomb + text.partition(b">")[2].partition(b">")[2] if rng.random() < 0.2 else _insert(text, rng)
-
-
-def _empty(text: bytes, rng: np.random.Generator) -> bytes:
-    return (b"", b"\n", b"\x00" * 100, text * 50)[int(rng.integers(4))]
+    return bomb + text.partition(b">")[2].partition(b">")[2] if rng.random() < 0.2 else _spliced("insert", text, rng)
 
 
 ROBOT = {"robot.urdf": "robot.urdf", "part.obj": "box.obj"}
@@ -186,7 +169,7 @@ def _reader(rng: np.random.Generator) -> Reader:
         files = _stored({"track.csv": "track.csv"} | ROBOT)
         return Reader(lambda path: read_track(path, wb.load(path.with_name("robot.urdf"))), files)
     if kind == "result":
-        return Reader(read, _stored({"result.json": "result.json"} | task))
+        return Reader(read_result, _stored({"result.json": "result.json"} | task))
     packaged = rng.random() < 0.15
     if kind == "robot":
         return Reader(wb.load, {"hand.urdf": urdf_path("hand").read_bytes()} if packaged else _stored(ROBOT))

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from wholebody.base.errors import UnknownNameError, WholebodyError
 from wholebody.base.files import Scratch
-from wholebody.base.runner import ONE_THREAD, Child, EndedError, Job, allow_processor, run_jobs
+from wholebody.base.runner import ONE_THREAD, Child, Job, allow_processor, run_jobs
 from wholebody.bench.attack import frames, inputs, solves, terms, ways
 from wholebody.bench.attack.case import KINDS, Case, Verdict
 
@@ -51,7 +51,8 @@ def attack(
         # Half an hour for a first case: it compiles everything, on a machine that has other things to do.
         return None if case is None else Job(case, _attacked, (case, deadline), 1800.0)
 
-    for outcome in run_jobs(next_job, [Child(ONE_THREAD) for _ in range(jobs)]):
+    children = [Child(ONE_THREAD) for _ in range(jobs)]
+    for outcome in run_jobs(next_job, children):
         case = outcome.job.name
         error = outcome.error
         if error is None:
@@ -59,14 +60,13 @@ def attack(
         elif error.overtime and case not in repeated:  # a machine that stood still is no fault of the case
             repeated.add(case)
             again.append(case)
+        elif error.overtime:
+            said = f"hangs: the case had not ended after {deadline:g} s of the processor"
+            yield case, Verdict("wrong", said, deadline)
         else:
-            yield case, _died(error, deadline)
-
-
-def _died(error: EndedError, deadline: float) -> Verdict:
-    if error.overtime:
-        return Verdict("wrong", f"hangs: the case had not ended after {deadline:g} s of the processor", deadline)
-    return Verdict("wrong", f"the process died: {error.how}")
+            yield case, Verdict("wrong", f"the process died: {error.how}")
+    for child in children:
+        child.close()
 
 
 def _attacked(case: Case, deadline: float) -> Verdict:

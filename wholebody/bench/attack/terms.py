@@ -29,7 +29,7 @@ Contact = tuple[dict[str, tuple[wb.Shape, Any]], Any, list[str]]
 def contact(rng: np.random.Generator, folder: Path) -> Verdict:
     """Solve for a contact."""
     kind = str(rng.choice(["Touch", "Touch", "Grasp", "Lean", "Sit", "Stand"]))
-    things, term, frames = {"Touch": _touch, "Grasp": _grasp, "Lean": _lean, "Sit": _sit, "Stand": _stand}[kind](rng)
+    things, term, frames = _asked(kind, rng)
     scene = wb.Scene(wb.load("human", sex=str(rng.choice(["male", "female"]))))
     for name, (shape, at) in things.items():
         scene.add(shape, name=name, at=at)
@@ -64,36 +64,28 @@ def _hit(rng: np.random.Generator) -> tuple[wb.Shape, Any]:
     return _rod(rng)
 
 
-def _touch(rng: np.random.Generator) -> Contact:
-    part = str(rng.choice(["right_index_tip", "left_index_tip", "right_hand", "left_forearm", "right_hand:2"]))
-    return {"thing": _hit(rng)}, wb.Touch(part, "thing"), [part]
-
-
-def _grasp(rng: np.random.Generator) -> Contact:
-    kinds: tuple[Literal["palm"], Literal["power"]] = ("palm", "power")
-    kind = kinds[int(rng.integers(2))]
-    thing = _rod(rng) if kind == "power" else _hit(rng)
-    return {"thing": thing}, wb.Grasp("right", "thing", kind), ["right_palm"]
-
-
-def _lean(rng: np.random.Generator) -> Contact:
-    turn = 0.5 * rng.uniform(-0.5, 0.5)
-    at = (rng.uniform(-0.6, -0.25), rng.uniform(-0.3, 0.3), 1.0, 0.0, 0.0, np.sin(turn), np.cos(turn))
-    return {"thing": (wb.Box((0.05, 2.0, 2.0)), at)}, wb.Lean("thing"), ["thorax"]
-
-
-def _sit(rng: np.random.Generator) -> Contact:
+def _asked(kind: str, rng: np.random.Generator) -> Contact:
+    """Things before, behind or below a standing person, and a contact with them."""
+    if kind == "Touch":
+        part = str(rng.choice(["right_index_tip", "left_index_tip", "right_hand", "left_forearm", "right_hand:2"]))
+        return {"thing": _hit(rng)}, wb.Touch(part, "thing"), [part]
+    if kind == "Grasp":
+        kinds: tuple[Literal["palm"], Literal["power"]] = ("palm", "power")
+        grip = kinds[int(rng.integers(2))]
+        return {"thing": _rod(rng) if grip == "power" else _hit(rng)}, wb.Grasp("right", "thing", grip), ["right_palm"]
+    if kind == "Lean":
+        turn = 0.5 * rng.uniform(-0.5, 0.5)
+        at = (rng.uniform(-0.6, -0.25), rng.uniform(-0.3, 0.3), 1.0, 0.0, 0.0, np.sin(turn), np.cos(turn))
+        return {"thing": (wb.Box((0.05, 2.0, 2.0)), at)}, wb.Lean("thing"), ["thorax"]
+    if kind == "Stand":
+        place = rng.uniform((-0.1, -0.2, -0.15), (0.3, 0.2, 0.1))
+        return {"thing": (wb.Box((0.6, 0.8, 0.3)), place)}, wb.Stand("thing"), ["left_foot", "right_foot"]
     x, y, top = rng.uniform((-0.5, -0.2, 0.3), (-0.2, 0.2, 0.55))
     seat: tuple[wb.Shape, Any] = wb.Box((0.44, 0.48, 0.04)), (x, y, top - 0.02)
     if rng.random() < 0.5:
         return {"thing": seat}, wb.Sit("thing"), ["pelvis"]
     back: tuple[wb.Shape, Any] = wb.Box((0.03, 0.48, 0.36)), (x - 0.22, y, top + 0.42)
     return {"thing": seat, "back": back}, wb.Sit("thing", "back"), ["pelvis"]
-
-
-def _stand(rng: np.random.Generator) -> Contact:
-    at = rng.uniform((-0.1, -0.2, -0.15), (0.3, 0.2, 0.1))
-    return {"thing": (wb.Box((0.6, 0.8, 0.3)), at)}, wb.Stand("thing"), ["left_foot", "right_foot"]
 
 
 def at_the_place(problem: Problem, solution: Solution, frames: Sequence[str]) -> Problem:

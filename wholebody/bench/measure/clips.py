@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
+from wholebody.base.files import parsed_toml
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.reading import read_clip
@@ -20,57 +18,24 @@ from wholebody.motion.worn_equipment import NOTHING, READY
 
 RATE = 30.0  # Hz: of all clips
 
-Key = tuple[float, str, dict[str, float]]
-"""Seconds from the key before, a posture of the figure, and joints that are otherwise, radians."""
 
-
-def _both(**angles: float) -> dict[str, float]:
-    return {f"{side}_{joint}": value for joint, value in angles.items() for side in ("left", "right")}
-
-
-def _swung(forward: str, back: str) -> dict[str, float]:
-    arms = {f"{forward}_shoulder_flexion": 0.6, f"{back}_shoulder_flexion": -0.5}
-    return {**arms, **_both(shoulder_abduction=-0.02, elbow_flexion=0.35)}
-
-
-SYNTHETIC: Mapping[str, tuple[Key, ...]] = MappingProxyType(
-    {
-        "arms that swing close by": (
-            (0.0, "standing", {}),
-            *((0.45, "standing", _swung(*sides)) for sides in (("left", "right"), ("right", "left")) * 3),
-            (0.5, "standing", {}),
-        ),
-        "arms crossed": (
-            (0.0, "standing", {}),
-            (0.8, "standing", _both(shoulder_flexion=0.8, shoulder_abduction=-0.35, elbow_flexion=1.7)),
-            (0.5, "standing", _both(shoulder_flexion=1.0, shoulder_abduction=-0.55, elbow_flexion=1.2)),
-            (0.8, "standing", {}),
-        ),
-        "squat": (
-            (0.0, "standing", {}),
-            (0.9, "squatting", _both(hip_flexion=2.1, shoulder_flexion=0.5, elbow_flexion=0.4)),
-            (0.4, "squatting", _both(hip_flexion=2.1, shoulder_flexion=0.3, elbow_flexion=1.1)),
-            (0.9, "standing", {}),
-        ),
-        "sword cut": (
-            (0.0, "standing", {}),
-            (0.5, "arms_forward", _both(shoulder_flexion=2.5, shoulder_abduction=-0.25, elbow_flexion=0.9)),
-            (0.25, "arms_forward", {
-                **_both(shoulder_abduction=-0.45, elbow_flexion=0.3),
-                "left_shoulder_flexion": 0.5, "right_shoulder_flexion": 0.9, "spine2_rotation": 0.25,
-            }),
-            (0.4, "standing", _both(shoulder_flexion=0.2, shoulder_abduction=-0.2, elbow_flexion=0.8)),
-            (0.6, "standing", {}),
-        ),
-        "from the belly to the feet": (
-            (0.0, "prone", {}),
-            (0.8, "prone", _both(shoulder_flexion=0.3, shoulder_abduction=-0.05, elbow_flexion=2.2)),
-            (1.0, "kneeling", _both(hip_flexion=1.2, shoulder_flexion=0.6, elbow_flexion=0.5)),
-            (0.8, "squatting", {}),
-            (0.9, "standing", {}),
-        ),
+def _read() -> dict[str, list[tuple[float, str, dict[str, float]]]]:
+    """Seconds from the key before, a posture, and joints that are otherwise, of each clip."""
+    file = Path(__file__).with_name("clips.toml")
+    return {
+        name: [
+            (
+                seconds,
+                posture,
+                {joint.replace("both", side): value for joint, value in joints.items() for side in ("left", "right")},
+            )
+            for seconds, posture, joints in keys
+        ]
+        for name, keys in parsed_toml(file.read_text("utf-8"), file.name).items()
     }
-)  # fmt: skip
+
+
+SYNTHETIC = _read()
 """Clips that need no recordings: the way between two postures has no velocity and no acceleration at its ends."""
 
 
@@ -106,8 +71,3 @@ def recordings(folder: Path | None) -> tuple[Path, ...]:
 
 EQUIPMENT = (NOTHING, *READY)
 """What a person wears."""
-
-
-def chosen(wanted: Sequence[str] | None, known: Sequence[str], option: str) -> tuple[str, ...]:
-    """The names that an option chooses, all of them where it is left out; UnknownNameError for others."""
-    return tuple(known) if wanted is None else tuple(checks.known(name, known, "name", option) for name in wanted)

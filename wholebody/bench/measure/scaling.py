@@ -9,13 +9,14 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError, WholebodyError
-from wholebody.base.files import Scratch
 from wholebody.bench.rows import Figure, Panel, Row, measured_ms
 from wholebody.bench.suite.problem_sets.things import Occupied
+from wholebody.bench.suite.stability.bodies import Builder
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.simplification.simplify import simplify
 from wholebody.tracking.drag import Drag
@@ -42,37 +43,20 @@ def chain(joints: int, pieces: int, segments: int | None = None) -> wb.Figure:
     solid = {round(k) for k in np.linspace(0, joints - 1, segments or joints)}
     ends = [*sorted(solid), joints]
     long = {first: (last - first) * LENGTH / joints for first, last in pairwise(ends)}
-    limit = min(6.0 / joints, 2.5)  # rad
-    parts = ['<link name="base"/>']
+    limit, joint, builder = min(6.0 / joints, 2.5), 0, Builder("chain")  # rad
     for k in range(joints):
-        at = f'<origin xyz="{LENGTH / joints if k else 0.0:.9f} 0 0"/>'
-        axis = "0 0 1" if k % 2 == 0 else "0 1 0"
-        parts.append(
-            f'<joint name="joint{k}" type="revolute"><parent link="{f"link{k - 1}" if k else "base"}"/>'
-            f'<child link="link{k}"/>{at}<axis xyz="{axis}"/>'
-            f'<limit lower="{-limit}" upper="{limit}" effort="1" velocity="1"/></joint>'
-        )
-        parts.append(f'<link name="link{k}">{_boxes(long[k], pieces) if k in solid else ""}</link>')
-    parts.append(
-        f'<link name="{TIP}"/><joint name="end" type="fixed"><parent link="link{joints - 1}"/><child link="{TIP}"/>'
-        f'<origin xyz="{LENGTH / joints:.9f} 0 0"/></joint>'
-    )
-    with Scratch() as folder:
-        path = folder / "chain.urdf"
-        path.write_text(f'<robot name="chain">{"".join(parts)}</robot>', encoding="utf-8")
-        return wb.load(path)
+        kind, at = ("rz", "ry")[k % 2], (LENGTH / joints if k else 0.0, 0.0, 0.0)
+        joint = builder.joint(kind, f"joint{k}", parent=joint, at=at, limits=(-limit, limit))
+        for size, middle in _boxes(long[k], pieces) if k in solid else ():
+            builder.shape(joint, wb.Box((size, 0.05, 0.05)), pin.SE3(np.eye(3), np.array((middle, 0.0, 0.0))))
+    builder.frame(joint, TIP, (LENGTH / joints, 0.0, 0.0))
+    return builder.figure()
 
 
-def _boxes(length: float, count: int) -> str:
-    """A row of boxes 5 cm broad that ends short of both joints."""
+def _boxes(length: float, count: int) -> list[tuple[float, float]]:
+    """Lengths and middles of a row of boxes that ends short of both joints."""
     free = max(length - 0.1, 0.1 * length)
-    each = free / count
-    start = 0.5 * (length - free)
-    return "".join(
-        f'<collision><origin xyz="{start + (k + 0.5) * each:.9f} 0 0"/>'
-        f'<geometry><box size="{each:.9f} 0.05 0.05"/></geometry></collision>'
-        for k in range(count)
-    )
+    return [(free / count, 0.5 * (length - free) + (k + 0.5) * free / count) for k in range(count)]
 
 
 def task(figure: wb.Figure, things: int, seed: int) -> tuple[wb.Scene, Array]:
@@ -112,8 +96,6 @@ def _free_posture(figure: wb.Figure, rng: np.random.Generator) -> Array:
 
 def assembly_chain(count: int) -> Assembly:
     """A bent chain of loose bodies, the first joint spherical on the world, whose end is to move by centimetres."""
-    import pinocchio as pin
-
     made, place = Assembly(), pin.SE3.Identity()
     for k in range(count):
         made.body(f"b{k}", place, size=0.1)

@@ -1,56 +1,15 @@
-"""`wholebody bench solve`: a task with new and with used workspaces, and the memory that it takes."""
+"""The memory that a task takes."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-import numpy as np
-
-import wholebody as wb
 from wholebody.base.errors import WholebodyError
 from wholebody.base.files import Scratch
-from wholebody.bench.rows import Figure, Row, measured_ms, quiet, times
-from wholebody.bench.suite.adapters.base import Adapter
-from wholebody.bench.tables import programs_text
-
-TOLERANCE = 1e-5  # m, rad: what methods are asked for
-
-
-def task_rows(path: Path, methods: Sequence[Adapter], count: int) -> Iterator[Row]:
-    """Solve a task `count` times with new problems and methods, and as often with the same ones again."""
-    for adapter in methods:
-        used, method = wb.read_task(path).problem, adapter.make(TOLERANCE, None)
-        for fresh in (True, False):
-            wall, cpu, solutions = [], [], []
-            for number in range(count + 1):
-                problem = wb.read_task(path).problem if fresh else used
-                chosen = adapter.make(TOLERANCE, None) if fresh else method
-                with quiet():
-                    worked, spent, solution = measured_ms(lambda: chosen.solve(problem))  # noqa: B023
-                if number:
-                    wall.append(spent)
-                    cpu.append(worked)
-                    solutions.append(solution)
-            unsolved = [solution.status for solution in solutions if not solution.solved]
-            yield Row(
-                path.stem,
-                adapter.name,
-                {
-                    "problem and method": "new" if fresh else "used before",
-                    "solves": count,
-                    "pairs": len(used.scene.geometry.collisionPairs),
-                    "status": unsolved[0] if unsolved else "solved",
-                    "iterations": int(np.median([solution.iterations for solution in solutions])),
-                    "programs closed by": programs_text(solutions[-1].programs),
-                    **times(wall),
-                    "CPU median ms": float(np.median(cpu)),
-                },
-            )
-
+from wholebody.bench.rows import Figure, Row
 
 PEAKS = """\
 import resource, sys

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -26,29 +26,9 @@ from wholebody.figures.self_pairs import random_postures
 VARIANTS = ("free", "contact", "alone")
 
 
-class Setting(NamedTuple):
-    """What every tool is told of a reach.
-
-    A step takes `dt` [s]; every pair keeps `clearance` [m], and pairs nearer than `within` [m] count; the rest bounds a
-    joint [rad/s] and the root [m/s], [rad/s]. `posture_cost` is that of a radian, where a metre of the goal costs 1;
-    tools square it.
-    """
-
-    dt: float = 0.01
-    clearance: float = 0.010
-    within: float = 0.070
-    joint_speed: float = 4.0
-    root_speed: float = 1.0
-    root_turn: float = 2.0
-    posture_cost: float = 1e-3
-
-
-SETTING = Setting()
-
-
-def _given() -> Any:
-    """The numbers of the reaches."""
-    return numbers("step")
+given = numbers("step")
+SETTING = given.told
+"""What every tool is told of a reach; see the end of `sets.toml`."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +70,6 @@ def track(name: str, steps: int = 200) -> Track:
     figure = wb.load("human")
     start = figure.posture("standing")
     tip, thorax = (figure.placement(start, name).translation for name in ("right_index_tip", "thorax"))
-    given = _given()
     by_way = np.vstack([tip, given.free_m])
     free = smooth_way(by_way, 400)
     scene = wb.Scene(figure)
@@ -128,7 +107,6 @@ def smooth_way(places: Array, steps: int) -> Array:
 
 def add_objects(scene: wb.Scene, start: Array, way: Array, rng: np.random.Generator) -> None:
     """Put boxes, spheres and hulls around a body, clear of how it stands and of a way (k, 3) for its fingertip."""
-    given = _given()
     scene.add(wb.Box(tuple(given.block_m)), name="block", at=given.block_at_m)
     put_objects(scene, Occupied(scene.figure, (start,)), way, rng, given.space_m)
 
@@ -142,7 +120,6 @@ def put_objects(
     `size` of objects and of the room around them is a share of those of the human's reaches. Raises InputError where no
     place was found for one of them.
     """
-    given = _given()
     kinds = ["box"] * boxes + ["sphere"] * given.spheres + ["hull"] * given.hulls
     taken.keep_free(way[::8], size * (given.room_way_m - given.room_start_m))
 
@@ -166,7 +143,7 @@ def _shape(kind: str, rng: np.random.Generator, size: float) -> wb.Shape:
 class Verdict(NamedTuple):
     """What came of one run.
 
-    After each step (steps,): least signed distance of all pairs [m], pairs nearer than `Setting.within`, pairs at the
+    After each step (steps,): least signed distance of all pairs [m], pairs nearer than `SETTING.within`, pairs at the
     clearance to 1 mm, distance of the tip from its target [m]. Of the run: the greatest distance [m] and angle [rad] of
     a foot from where it began; how far the worst joint was out of its limits [rad]; the fastest joint and root as
     shares of the bounds; the mean of all joints' absolute accelerations [rad/s^2].
@@ -247,7 +224,6 @@ def figure_tracks(spec: str, steps: int = 200) -> list[Track]:
 def _ways(figure: wb.Figure, spec: str, dofs: Sequence[int], steps: int) -> tuple[tuple[Array, Array], float]:
     """Postures (steps, nq) through two random ones, and those to the first and back; the figure's least distance."""
     scene, start, still = wb.Scene(figure), figure.neutral, np.zeros(figure.model.nv)
-    given = _given()
     random = random_postures(figure.model, 2 * given.candidates, given.seed).reshape(given.candidates, 2, -1)
     for share in given.shares:
         for pair in random:
@@ -269,9 +245,9 @@ def _ways(figure: wb.Figure, spec: str, dofs: Sequence[int], steps: int) -> tupl
 
 def _least(scene: wb.Scene, q: Array) -> float:
     """Least distance of any pair at postures (n, nq) up to the first that is not free, at most twice the clearance."""
-    least = 2.0 * SETTING.clearance
+    least: float = 2.0 * SETTING.clearance
     for posture in q:
-        if least > _given().own_room_m and len(scene.geometry.collisionPairs):
+        if least > given.own_room_m and len(scene.geometry.collisionPairs):
             least = float(scene.contacts(posture, within=least).distance.min(initial=least))
     return least
 
@@ -287,19 +263,18 @@ def _furnish(scene: wb.Scene, ways: tuple[Array, Array], places: Sequence[Array]
     size = float((high - low).max()) / 2.0
     if block:
         _add_block(scene, places[1], size)
-    given = _given()
     space = (low - size * given.room_space_m).tolist(), (high + size * given.room_space_m).tolist()
     put_objects(scene, taken, tips, np.random.default_rng(given.seed), space, size, given.boxes - block)
 
 
 def _add_block(scene: wb.Scene, places: Array, size: float) -> None:
     """Put a box about the place of the tip that is farthest from the first, as large as leaves the start free."""
-    standing, edges = Occupied(scene.figure, (scene.figure.neutral,)), size * np.array(_given().block_m)
+    standing, edges = Occupied(scene.figure, (scene.figure.neutral,)), size * np.array(given.block_m)
     at = places[np.argmax(np.linalg.norm(places - places[0], axis=1))]
-    for share in _given().shares:
+    for share in given.shares:
         x, y, z = (share * edges).tolist()
         box = wb.Box((x, y, z))
-        if standing.clear_of(box, (*at.tolist(),), size * _given().room_start_m):
+        if standing.clear_of(box, (*at.tolist(),), size * given.room_start_m):
             scene.add(box, name="block", at=tuple(at.tolist()))
             return
     raise InputError(f"{scene.figure.name}: a block at the end of its way would touch it where it starts")

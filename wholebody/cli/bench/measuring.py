@@ -69,26 +69,23 @@ def step(arguments: argparse.Namespace) -> None:
 @measuring(
     "solve",
     "whole solves of a task, and their memory",
-    "Solve the shelf, or a task of your own, with new and with used workspaces, and measure the memory of "
+    "Solve the shelf, or a task of your own, in new processes and in used ones, and measure the memory of "
     "`wholebody pose`. `wholebody bench compare` solves the problem sets.",
     option("--task", type=Path, metavar="TASK.toml", help="(default: the shelf)"),
-    count("--count", 30, "solves"),
     listed("--methods", "such as qp, newton (default: qp qp/osqp)"),
 )
 def solve(arguments: argparse.Namespace) -> None:
-    """Whole solves of a task with new and with used workspaces, and the memory of `wholebody pose`."""
-    from wholebody.bench.measure import solve
+    """Measure; --quick takes one method."""
+    from wholebody.bench.measure.solve import memory
     from wholebody.bench.suite.adapters.registry import adapters
+    from wholebody.bench.suite.compare import own_task
     from wholebody.cli.demo import packaged_tasks
 
-    task, facts, rows = arguments.task or packaged_tasks()["shelf"], machine(), []
-    methods, many = adapters(arguments.methods or ["qp", "qp/osqp"]), 3 if arguments.quick else arguments.count
-    for row in solve.task_rows(task, methods, many):
-        rows.append(row)
-        print(f"{row.case}, {row.tool}, {row['problem and method']}: {row['median ms']:.1f} ms, {row['status']}")
-    peak = solve.memory(task)
-    about = "A task, solved with a new problem and a new method each time, and with the same ones again."
-    text = report(about, {"Solves": rows, "Memory": [peak]}, facts)
+    task, facts = arguments.task or packaged_tasks()["shelf"], machine()
+    methods = adapters(arguments.methods or ["qp", "qp/osqp"][: 1 if arguments.quick else None])
+    rows = [Row(task.stem, row.tool, row.figures) for row in own_task.compared(task, methods, tell=print)]
+    peak = memory(task)
+    text = report(own_task.about(), {"Solves": rows, "Memory": [peak]}, facts)
     publish("solve", text, arguments, facts=facts, tables={"solve": rows, "memory": [peak]})
 
 
@@ -170,7 +167,7 @@ def motion(arguments: argparse.Namespace) -> None:
     publish("motion", motion.motion_report(rows, facts), arguments, charts=charts)
 
 
-WORLD = {"throws": "Thrown at a person", "drops": "The same drops in three engines", "long": "For minutes"}
+WORLD = {"throws": "Thrown at a person", "drops": "The same drops in three engines"}
 """Parts of `wholebody bench world`, and the titles of their tables."""
 
 
@@ -178,15 +175,13 @@ WORLD = {"throws": "Thrown at a person", "drops": "The same drops in three engin
     "world",
     "things that move by themselves: throws at a person, drops beside MuJoCo and Rapier",
     "Throw things at a person who stands, walks or is dragged; drop, slide and stack the same things in wholebody, "
-    "MuJoCo and Rapier; let dominoes, stacks and balls move for minutes. The whole takes about 15 minutes of one "
-    "processor.",
-    listed("--parts", "throws, drops, long (default: all)", "PART"),
+    "MuJoCo and Rapier. The whole takes about ten minutes of one processor.",
+    listed("--parts", "throws, drops (default: all)", "PART"),
     listed("--only", "names of drops (default: all)", "DROP"),
     listed("--engines", "wholebody, mujoco, rapier (default: installed)"),
-    option("--minutes", type=float, default=10.0, metavar="N", help="simulated minutes of the long run (default: 10)"),
 )
 def world(arguments: argparse.Namespace) -> int:
-    """Measure; --quick takes three drops for half a second, one throw of each kind, three seconds of the long run."""
+    """Measure; --quick takes three drops for half a second, and one throw of each kind."""
     from wholebody.bench.measure.throws import throw_summary
 
     found: dict[str, list[Row]] = {part: [] for part in chosen(arguments.parts, WORLD, "--parts")}
@@ -222,12 +217,10 @@ def _world(arguments: argparse.Namespace) -> dict[str, Iterable[Row]]:
     known = {drop.name: drop for drop in drops.drops()}
     names = chosen(arguments.only, known, "--only")[: 3 if quick else None]
     tools = drops.installed(chosen(arguments.engines, drops.ENGINES, "--engines"))
-    minutes = 0.05 if quick else checks.number(arguments.minutes, "--minutes", 0.01, 1000.0, "minutes")
     frames = 30 if quick else None
     return {
         "throws": throws.all_throws(1 if quick else 3, quick),
         "drops": (drops.measure(known[name], tool, frames) for name, tool in product(names, tools)),
-        "long": (throws.long_run(each) for each in (minutes,)),
     }
 
 

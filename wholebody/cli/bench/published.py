@@ -51,7 +51,7 @@ Score a file of answers to problems that `wholebody bench export` wrote, whateve
 overlap of all pairs, clearances, joint limits, what is held, and effort above the best known. The scenes are rebuilt
 from the files by Pinocchio and coal alone. Prints a table, and writes every figure as JSON. Answers that are malformed
 are refused with one sentence that names the entry. Of a folder with a file of answers for each method it makes a
-leaderboard: a page with tables, charts and sentences that say who solves most, and who cannot be told apart.""",
+leaderboard: a page with tables, charts and sentences that say what to choose when, and what cannot be told apart.""",
     option("answers", type=Path, metavar="ANSWERS", help="a file, as answers.schema.json says, or a folder of them"),
     PROBLEMS,
     option(
@@ -91,10 +91,9 @@ def judge(arguments: argparse.Namespace) -> None:
 
 def _leaderboard(arguments: argparse.Namespace) -> None:
     """Judge every file of answers in a folder, and compare them."""
-    from wholebody.bench.suite.published.leaderboard import PAGE, judge_folder, publish, summary
+    from wholebody.bench.suite.published.leaderboard import PAGE, judge_folder, publish
 
     out = arguments.out or Path("out/leaderboard")
-    found = publish(judge_folder(arguments.answers, arguments.problems), arguments.problems, out)
-    for name, leading in summary(found).items():
-        print(f"{name}: {leading}")
+    for sentence in publish(judge_folder(arguments.answers, arguments.problems), arguments.problems, out):
+        print(f"- {sentence.replace('**', '').replace('`', '')}")
     print(f"wrote {out / PAGE}")

@@ -16,8 +16,7 @@ from wholebody.methods.ccd.guards import Kept
 from wholebody.methods.ccd.limbs import Vector, movable
 from wholebody.problem import Problem
 from wholebody.tasks.bounds import Freeze, StepLimit
-from wholebody.tasks.frame import Frame, Orientation
-from wholebody.tasks.hold import Hold
+from wholebody.tasks.frame import Frame, Hold, Orientation
 from wholebody.tasks.inputs import target_rotation
 from wholebody.tasks.point import Point
 from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones

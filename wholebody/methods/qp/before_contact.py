@@ -22,7 +22,7 @@ from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.starts import restarts
 from wholebody.problem import Problem
 from wholebody.solution import TraceEntry
-from wholebody.tasks.approach import approached, has_face
+from wholebody.tasks.contact_parts import approached, has_face
 from wholebody.terms.linearisation import Lineariser
 
 IN_FRONT = 0.01  # m: how far surfaces are in front of faces; more: reached by fewer limbs, and farther from the contact

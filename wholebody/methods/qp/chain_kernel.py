@@ -237,7 +237,7 @@ def _least_effort(
             for i in range(size):
                 square += moved[i] * moved[i]
                 bent += moved[i] * (before[i] - dq[i])
-            share = min(max(square / bent, 0.2), 3.0) if bent > 0.0 else 1.0
+            share = min(max(square / bent, 0.05), 3.0) if bent > 0.0 else 1.0
         share = min(share, 0.3 / longest) if longest > 0.0 else share
         for i in range(size):
             moved[i], before[i] = share * dq[i], dq[i]

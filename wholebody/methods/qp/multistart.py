@@ -74,7 +74,7 @@ class Multistart:
         self.how = "directly"
         self.contradictions: tuple[Contradiction, ...] = ()
         self._start = problem.scene.figure.clamp(problem.start)
-        self._first = 0  # programs of the first attempt
+        self._first: int | None = None  # programs of the first attempt, once it is made
         self._without_gain = 0  # probes in a row that came no nearer, without contacts or relaxed
         self._least = 0.0  # lower bound of the goals' residual, metres
         self._minima = Minima()  # where relaxed probes ended after the true clearances were required
@@ -86,7 +86,7 @@ class Multistart:
     @property
     def _left(self) -> int:
         """Programs that attempts after the first may still solve."""
-        return self.budget.programs - (len(self.trace) - self._first)
+        return self.budget.programs - (0 if self._first is None else len(self.trace) - self._first)
 
     @property
     def best(self) -> LocalSolution:
@@ -116,7 +116,7 @@ class Multistart:
                 local = attempt.stage(q)
                 if local is not None and self._accept(local, attempt.how):
                     return
-                if self.control.over or self._left <= 0 or self._proven():
+                if self.control.over or self._left < 0 or self._proven():
                     return
 
     def _attempts(self, begin: Array) -> Iterator[Attempt]:

@@ -21,7 +21,7 @@ from wholebody.figures.figure import Figure
 from wholebody.geometry.pieces import COAL_ACCURACY
 from wholebody.geometry.proximity import PairTable
 from wholebody.tasks.base import Constraint
-from wholebody.tasks.hold import Hold
+from wholebody.tasks.frame import Hold
 
 
 class Range(NamedTuple):

@@ -177,7 +177,8 @@ class ClipRun:
             starts = ((_Attempt(x), _Way(early=True)) for x in self._starts(own, found.depths))
         else:
             x = own.deviations(begun[window.first : window.end])
-            starts = [(_Attempt(x), _Way(self._near, self._near))]
+            dipping = tuple(self._dips(own, x, set(), met=False))
+            starts = [(_Attempt(x, between=dipping), _Way(self._near, self._near))]
         best: _Attempt | None = None
         ended_early: list[_Attempt] = []
         for start, way in chain(starts, ((start, _Way()) for start in ended_early)):

@@ -21,14 +21,13 @@ CUBE = 0.05 * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1
 
 def _among_all_shapes() -> wb.Problem:
     """An arm among a thing of every shape that its file can have, turned, and a slope below."""
-    figure, ready = robots.arm("seven axes", np.random.default_rng(2))
+    figure, start = robots.arm("seven axes", np.random.default_rng(2))
     turn = pin.rpy.rpyToMatrix(0.3, -0.4, 0.9)
     scene = wb.Scene(figure).add(wb.HalfSpace((0.1, -0.2, 1.0), -0.1), name="slope")
     scene.add(wb.Box((0.1, 0.2, 0.3)), name="box", at=pin.SE3(turn, np.array([0.6, 0.4, 0.2])))
     scene.add(wb.Sphere(0.1), name="ball", at=(0.5, -0.5, 0.6))
     scene.add(wb.Capsule(0.05, 0.3), name="rod", at=pin.SE3(turn, np.array([-0.6, 0.2, 0.5])))
     scene.add(wb.Hull(CUBE), name="cube", at=pin.SE3(turn, np.array([-0.5, -0.4, 0.3])))
-    start = figure.with_joints(figure.neutral, ready)
     return wb.Problem(scene, start, goals=[wb.Point("tool", (0.4, 0.0, 0.5), offset=(0.0, 0.1, 0.0))], clearance=0.002)
 
 
@@ -63,8 +62,7 @@ def test_its_distances_are_ours_for_every_pair() -> None:
 @pytest.mark.parametrize("turned", [False, True])
 def test_it_brings_the_tool_of_an_arm_to_a_place(kind: str, turned: bool) -> None:
     rng = np.random.default_rng(6)
-    figure, ready = robots.arm(kind, rng)
-    start = figure.with_joints(figure.neutral, ready)
+    figure, start = robots.arm(kind, rng)
     witness = figure.clamp(start + rng.uniform(-0.5, 0.5, figure.model.nv))
     place = figure.placement(witness, "tool")
     goal: Any = wb.Frame("tool", place) if turned else wb.Point("tool", pin.SE3(place).translation)

@@ -19,10 +19,10 @@ pytest.importorskip("optik")
 @pytest.mark.parametrize("kind", robots.of_arm.kinds)
 def test_it_places_the_tool_of_an_arm(kind: str) -> None:
     rng = np.random.default_rng(4)
-    figure, ready = robots.arm(kind, rng)
+    figure, start = robots.arm(kind, rng)
     witness = rng.uniform(figure.model.lowerPositionLimit, figure.model.upperPositionLimit)
     target = figure.placement(witness, "tool")
-    problem = wb.Problem(wb.Scene(figure), figure.with_joints(figure.neutral, ready), goals=[wb.Frame("tool", target)])
+    problem = wb.Problem(wb.Scene(figure), start, goals=[wb.Frame("tool", target)])
     (adapter,) = adapters(["optik"])
     q = adapter.make(1e-6, None).solve(problem).q
     assert figure.within_limits(q)
@@ -33,10 +33,8 @@ def test_it_places_the_tool_of_an_arm(kind: str) -> None:
 
 
 def test_a_place_out_of_reach_is_not_called_solved() -> None:
-    figure, ready = robots.arm("industrial", np.random.default_rng(1))
-    problem = wb.Problem(
-        wb.Scene(figure), figure.with_joints(figure.neutral, ready), goals=[wb.Frame("tool", (5, 0, 0))]
-    )
+    figure, start = robots.arm("industrial", np.random.default_rng(1))
+    problem = wb.Problem(wb.Scene(figure), start, goals=[wb.Frame("tool", (5, 0, 0))])
     (adapter,) = adapters(["optik"])
     solution = adapter.make(1e-4, None).solve(problem)
     assert not solution.solved

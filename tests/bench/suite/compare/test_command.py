@@ -48,7 +48,8 @@ def test_held_out_sets_stand_beside_those_of_the_same_question(monkeypatch: pyte
     monkeypatch.delenv("WHOLEBODY_ROBOTS", raising=False)
     said: list[str] = []
     assert beside(said.append) == (
-        "uniform_witnesses", "other_people", "other_clutter", "free_reach_several", "clutter",
+        "uniform_witnesses", "other_people", "other_clutter", "arms_among_things", "free_reach_several", "clutter",
+        "robot_arm",
     )  # fmt: skip
     assert "WHOLEBODY_ROBOTS" in said[0]
     with pytest.raises(InputError, match="does not go with --held-out"):

@@ -113,7 +113,7 @@ class PrunedPlacoTool(PlacoTool):
 
 @lru_cache(maxsize=4)
 def near_pairs(scene: wb.Scene, start: bytes) -> Sequence[tuple[int, int]]:
-    """Pairs of pieces nearer than `Setting.within` in one of 2000 postures about that of the bytes `start`."""
+    """Pairs of pieces nearer than `SETTING.within` in one of 2000 postures about that of the bytes `start`."""
     found = _sampled(scene, np.frombuffer(start), 2000, SETTING.within)
     pairs = [(pair.first, pair.second) for pair in scene.geometry.collisionPairs]
     return [pair for pair, near in zip(pairs, found, strict=True) if near]

@@ -44,7 +44,7 @@ def times(results: Results, families: Sequence[str], adapter: str) -> Figures:
         (family, record.number): max(record.seconds, 1e-9)
         for family in families
         for record in results.taken(family, adapter)
-        if record.success(COARSE)
+        if record.success(COARSE) and isfinite(record.seconds)
     }
 
 

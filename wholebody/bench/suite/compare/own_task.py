@@ -101,19 +101,22 @@ def _row(name: str, cold: float, records: Sequence[Record]) -> Row:
     return Row("task", name, figures)
 
 
-def report(rows: Sequence[Row], title: str, facts: Mapping[str, str], cap: float = 20.0) -> str:
-    """The table as Markdown, refusals and failures below it."""
-    answered = [Row(title, row.tool, row.figures) for row in rows if "worst" in row.figures]
-    silent = [f"`{row.tool}`, {row['outcome']}: {row['said']}" for row in rows if "worst" not in row.figures]
-    about = (
-        f"# {title[:1].upper()}{title[1:]}\n\n"
+def about(cap: float = 20.0) -> str:
+    """What the table of such rows shows."""
+    return (
         "Each method has a process of its own. *Cold* is its first solve, imports and "
         f"set-up included; *warm* the median of {REPEATS} later ones, with the least and the greatest. *Set-up* builds "
         f"a model of the tool's own and is in cold alone. Answers at a tolerance of {DEFAULT[0]:g} are judged from the "
         f"posture: solved where goals are met and everything holds to {COARSE:g} m and rad. A solve is ended after "
         f"{cap:g} s of the processor's time. One problem says nothing of others."
     )
-    return tables.report(about, {"": answered}, facts, silent)
+
+
+def report(rows: Sequence[Row], title: str, facts: Mapping[str, str]) -> str:
+    """The table as Markdown, refusals and failures below it."""
+    answered = [Row(title, row.tool, row.figures) for row in rows if "worst" in row.figures]
+    silent = [f"`{row.tool}`, {row['outcome']}: {row['said']}" for row in rows if "worst" not in row.figures]
+    return tables.report(f"# {title[:1].upper()}{title[1:]}\n\n{about()}", {"": answered}, facts, silent)
 
 
 def panels(rows: Sequence[Row], title: str) -> list[Panel]:

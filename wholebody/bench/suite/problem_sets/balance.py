@@ -8,22 +8,7 @@ import numpy as np
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.bench.suite.problem_sets.bodies import (
-    FEET,
-    TIPS,
-    MassAbove,
-    alone,
-    bent,
-    fitted,
-    floor_scene,
-    human,
-    is_free,
-    movable,
-    point,
-    shaken,
-    standing_problem,
-    until_found,
-)
+from wholebody.bench.suite.problem_sets import bodies
 from wholebody.bench.suite.problem_sets.case import numbers
 
 given = numbers("balance")
@@ -31,20 +16,22 @@ given = numbers("balance")
 
 def posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """In turn: a fingertip low down, one far out, both low down; sides change too."""
-    figure, tip = human(), TIPS[number // 3 % 2]
+    figure, tip = bodies.human(), bodies.TIPS[number // 3 % 2]
 
     def attempt() -> tuple[list[wb.Point], Array] | None:
         goals = _goals(number % 3, tip, rng)
-        equalities = [*_resolved(figure, goals), MassAbove(rng.uniform(*given.over_m))]
-        found = fitted(figure, _beginning(figure, rng), equalities, movable(figure))
-        if found is None or not is_free(alone(figure), found):
+        equalities = [*_resolved(figure, goals), bodies.MassAbove(rng.uniform(*given.over_m))]
+        found = bodies.fitted(figure, _beginning(figure, rng), equalities, bodies.movable(figure))
+        if found is None or not bodies.is_free(bodies.alone(figure), found):
             return None
         return (goals, found) if _least_room(found) > given.margin_m + given.spare_m else None
 
-    goals, witness = until_found(attempt)
-    reached = [point(figure, witness, goal.frame) for goal in goals]
+    goals, witness = bodies.until_found(attempt)
+    reached = [bodies.point(figure, witness, goal.frame) for goal in goals]
     start = figure.posture("standing")
-    return standing_problem(floor_scene(figure), start, reached, wb.Balance(margin=given.margin_m)), witness
+    return bodies.standing_problem(
+        bodies.floor_scene(figure), start, reached, wb.Balance(margin=given.margin_m)
+    ), witness
 
 
 def _goals(kind: int, tip: str, rng: np.random.Generator) -> list[wb.Point]:
@@ -55,8 +42,8 @@ def _goals(kind: int, tip: str, rng: np.random.Generator) -> list[wb.Point]:
 
 
 def _resolved(figure: wb.Figure, goals: list[wb.Point]) -> list[wb.Goal]:
-    start, scene = figure.posture("standing"), alone(figure)
-    feet = [wb.Frame(foot, figure.placement(start, foot)) for foot in FEET]
+    start, scene = figure.posture("standing"), bodies.alone(figure)
+    feet = [wb.Frame(foot, figure.placement(start, foot)) for foot in bodies.FEET]
     return [goal.resolve(scene, start) for goal in (*goals, *feet)]
 
 
@@ -65,8 +52,8 @@ def _beginning(figure: wb.Figure, rng: np.random.Generator) -> Array:
     q = figure.posture("standing")
     bend = float(rng.uniform())
     ends = vars(given.stance_degrees).items()
-    q = bent(figure, q, {name: least + bend * (most - least) for name, (least, most) in ends})
-    q = shaken(figure, figure.clamp(q), given.arms, rng)
+    q = bodies.bent(figure, q, {name: least + bend * (most - least) for name, (least, most) in ends})
+    q = bodies.shaken(figure, figure.clamp(q), given.arms, rng)
     q[2] -= 0.45 * bend
     q[:2] += rng.uniform(-0.1, 0.1, 2)
     pitch = rng.uniform(0.0, 0.6) + 0.3 * bend
@@ -76,9 +63,9 @@ def _beginning(figure: wb.Figure, rng: np.random.Generator) -> Array:
 
 @lru_cache(maxsize=1)
 def _support() -> wb.Balance:
-    return wb.Balance().resolve(alone(human()), human().posture("standing"))
+    return wb.Balance().resolve(bodies.alone(bodies.human()), bodies.human().posture("standing"))
 
 
 def _least_room(q: Array) -> float:
     """Distance of the centre of mass from the nearest edge of the support polygon, metres."""
-    return float(_support().value(alone(human()).state(q)).min())
+    return float(_support().value(bodies.alone(bodies.human()).state(q)).min())

@@ -16,6 +16,7 @@ import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.bench.suite.problem_sets.bodies import alone, bent, fitted, is_free, movable, until_found
 from wholebody.bench.suite.problem_sets.case import numbers
+from wholebody.bench.suite.problem_sets.things import coal_distance, just_outside, placed
 from wholebody.figures.postures import lowest, support
 
 given = numbers("drivers")
@@ -118,11 +119,9 @@ def _pitch(degrees: float) -> tuple[float, float, float, float]:
 
 def _lowest_along(figure: wb.Figure, q: Array, direction: Array, segments: tuple[str, ...]) -> float:
     """How far the pieces of segments reach against a unit direction (3,), metres along it."""
-    places = _placed(figure, q)
-    pieces = figure.geometry.geometryObjects
     return min(
         -support(piece.geometry, place, -direction)
-        for piece, place in zip(pieces, places, strict=True)
+        for piece, place in placed(figure, q)
         if piece.name.partition(":")[0] in segments
     )
 
@@ -131,30 +130,16 @@ def _bar(figure: wb.Figure, q: Array, side: str) -> pin.SE3:
     """Where a bar lies along a palm and touches the hand."""
     palm = figure.placement(q, f"{side}_palm")
     joint = figure.model.frames[figure.frame_id(f"{side}_palm")].parentJoint
-    hand = [
-        (piece.geometry, coal.Transform3s(place.rotation, place.translation))
-        for piece, place in zip(figure.geometry.geometryObjects, _placed(figure, q), strict=True)
-        if piece.parentJoint == joint
-    ]
-    shape, request = coal.Capsule(*given.bar_m), coal.DistanceRequest()
-    request.gjk_tolerance = request.epa_tolerance = 1e-9
-    turn = np.column_stack([palm.rotation[:, 2], palm.rotation[:, 0], palm.rotation[:, 1]])
+    hand = [(piece.geometry, place) for piece, place in placed(figure, q) if piece.parentJoint == joint]
+    turn, shape = (
+        np.column_stack([palm.rotation[:, 2], palm.rotation[:, 0], palm.rotation[:, 1]]),
+        coal.Capsule(*given.bar_m),
+    )
+
+    def at(height: float) -> pin.SE3:
+        return pin.SE3(turn, palm.translation + height * palm.rotation[:, 2])
 
     def gap(height: float) -> float:
-        at = coal.Transform3s(turn, palm.translation + height * palm.rotation[:, 2])
-        return min(
-            float(coal.distance(piece, place, shape, at, request, coal.DistanceResult())) for piece, place in hand
-        )
+        return min(coal_distance(*piece, shape, at(height), exact=True) for piece in hand)
 
-    low, high = 0.0, 0.2
-    for _ in range(50):
-        half = 0.5 * (low + high)
-        low, high = (half, high) if gap(half) < 0.0 else (low, half)
-    return pin.SE3(turn, palm.translation + high * palm.rotation[:, 2])
-
-
-def _placed(figure: wb.Figure, q: Array) -> list[pin.SE3]:
-    data = figure.model.createData()
-    geometry_data = pin.GeometryData(figure.geometry)
-    pin.updateGeometryPlacements(figure.model, data, figure.geometry, geometry_data, q)
-    return list(geometry_data.oMg)
+    return at(just_outside(gap, 0.0, 0.2))

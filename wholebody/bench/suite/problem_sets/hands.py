@@ -9,17 +9,7 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.bench.suite.problem_sets.bodies import (
-    alone,
-    bent,
-    fitted,
-    floor_scene,
-    human,
-    is_free,
-    shaken,
-    standing_problem,
-    until_found,
-)
+from wholebody.bench.suite.problem_sets import bodies
 from wholebody.bench.suite.problem_sets.case import numbers
 
 of_loop = numbers("closed_loop")
@@ -27,29 +17,29 @@ of_loop = numbers("closed_loop")
 
 def closed_loop(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """In turn a bar and a box, brought to a place and an orientation."""
-    figure = human()
+    figure = bodies.human()
     apart = float(rng.uniform(*of_loop.apart_m))
     shape, ahead = _shape(number % 2, apart - 2.0 * of_loop.grip_m, rng)
     middle = np.array((ahead, 0.0, 0.5 * apart))
-    scene = floor_scene(figure).attach(shape, to="right_palm", name="load", at=middle)
+    scene = bodies.floor_scene(figure).attach(shape, to="right_palm", name="load", at=middle)
     other = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array((0.0, 0.0, apart)))
-    q = bent(figure, figure.posture("standing"), vars(of_loop.bent_degrees))
+    q = bodies.bent(figure, figure.posture("standing"), vars(of_loop.bent_degrees))
 
     def level() -> Array | None:
         """The thing held level before the belly, elbows anyhow, (nq,)."""
-        near = shaken(figure, q, 0.5 * of_loop.spread, rng)
+        near = bodies.shaken(figure, q, 0.5 * of_loop.spread, rng)
         return _holding(scene, near, other, np.array(of_loop.level), np.array(of_loop.start_m), middle)
 
     def turned() -> Array | None:
         turn = pin.exp3(rng.uniform(-of_loop.turned_rad, of_loop.turned_rad, 3)) @ np.array(of_loop.level)
-        near = shaken(figure, start, of_loop.spread, rng)
+        near = bodies.shaken(figure, start, of_loop.spread, rng)
         return _holding(scene, near, other, turn, rng.uniform(*of_loop.middle_m), middle)
 
-    start = until_found(level)
-    witness = until_found(turned)
+    start = bodies.until_found(level)
+    witness = bodies.until_found(turned)
     goals = [wb.Frame("right_palm", figure.placement(witness, "right_palm"))]
     grip = wb.Hold("left_palm", other, relative_to="right_palm")
-    return standing_problem(scene, start, goals, grip), witness
+    return bodies.standing_problem(scene, start, goals, grip), witness
 
 
 def _shape(kind: int, length: float, rng: np.random.Generator) -> tuple[wb.Shape, float]:
@@ -67,8 +57,10 @@ def _holding(scene: wb.Scene, q: Array, other: pin.SE3, turn: Array, place: Arra
         wb.Frame("right_palm", pin.SE3(turn, place - turn @ middle)),
         wb.Relative("left_palm", "right_palm", other),
     ]
-    found = fitted(figure, q, [goal.resolve(alone(figure), q) for goal in goals], figure.dofs("upper_body"))
-    return found if found is not None and is_free(scene, found) else None
+    found = bodies.fitted(
+        figure, q, [goal.resolve(bodies.alone(figure), q) for goal in goals], figure.dofs("upper_body")
+    )
+    return found if found is not None and bodies.is_free(scene, found) else None
 
 
 of_contact = numbers("self_contact")
@@ -91,21 +83,21 @@ class Touch:
 
 def self_contact(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """In turn: a hand on the other elbow, both on the hips, arms crossed; in every other round turned as asked."""
-    figure = human()
+    figure = bodies.human()
     start = figure.posture("standing")
     kind, turned = number % 3, number // 3 % 2 == 1
-    begin = bent(figure, start, vars(of_contact.begin_degrees[kind]))
+    begin = bodies.bent(figure, start, vars(of_contact.begin_degrees[kind]))
 
     def attempt() -> tuple[Array, list[Touch]] | None:
         touches = _touches(kind, ("left", "right")[number // 6 % 2], rng)
-        witness = _laid(figure, shaken(figure, begin, of_contact.spread, rng), touches)
-        if witness is None or not is_free(alone(figure), witness, of_contact.gap_m[0]):
+        witness = _laid(figure, bodies.shaken(figure, begin, of_contact.spread, rng), touches)
+        if witness is None or not bodies.is_free(bodies.alone(figure), witness, of_contact.gap_m[0]):
             return None
         return witness, touches
 
-    witness, touches = until_found(attempt)
+    witness, touches = bodies.until_found(attempt)
     goals = [_goal(figure, witness, touch, turned) for touch in touches]
-    return standing_problem(floor_scene(figure), start, goals), witness
+    return bodies.standing_problem(bodies.floor_scene(figure), start, goals), witness
 
 
 def _touches(kind: int, hand: str, rng: np.random.Generator) -> list[Touch]:
@@ -136,7 +128,7 @@ def _on_hip(hand: str, rng: np.random.Generator) -> Touch:
 
 def _laid(figure: wb.Figure, q: Array, touches: list[Touch]) -> Array | None:
     """A posture near q, (nq,), with the hands some millimetres from what they lie on; None if there is none."""
-    scene, dofs = alone(figure), figure.dofs("upper_body")
+    scene, dofs = bodies.alone(figure), figure.dofs("upper_body")
     least, most = of_contact.gap_m
     heights = [0.1] * len(touches)
     for _ in range(6):
@@ -144,7 +136,7 @@ def _laid(figure: wb.Figure, q: Array, touches: list[Touch]) -> Array | None:
             wb.Relative(f"{touch.hand}_palm", touch.segment, touch.at(height), orientation=False).resolve(scene, q)
             for touch, height in zip(touches, heights, strict=True)
         ]
-        found = fitted(figure, q, goals, dofs)
+        found = bodies.fitted(figure, q, goals, dofs)
         if found is None:
             return None
         q = found
@@ -165,6 +157,6 @@ def _gap(scene: wb.Scene, q: Array, touch: Touch) -> float:
 def _goal(figure: wb.Figure, q: Array, touch: Touch, turned: bool) -> wb.Relative:
     """The palm where it is in the posture q, as seen from the segment."""
     palm = f"{touch.hand}_palm"
-    state = alone(figure).state(q)
+    state = bodies.alone(figure).state(q)
     base, hand = (pin.SE3(state.frame(figure.frame_id(name))) for name in (touch.segment, palm))
     return wb.Relative(palm, touch.segment, base.actInv(hand), orientation=turned)

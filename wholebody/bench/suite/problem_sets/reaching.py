@@ -10,69 +10,53 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
-from wholebody.bench.suite.problem_sets.bodies import (
-    FEET,
-    ROOM,
-    TIPS,
-    alone,
-    bent,
-    fitted,
-    floor_scene,
-    human,
-    is_free,
-    movable,
-    point,
-    sampled_posture,
-    shaken,
-    standing_problem,
-    until_found,
-)
+from wholebody.bench.suite.problem_sets import bodies
 from wholebody.bench.suite.problem_sets.case import Posed, numbers
 from wholebody.bench.suite.problem_sets.things import Occupied, add_things
 
 
 def free(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """Where the fingertip is in a random posture of the upper body becomes the target."""
-    figure = human()
+    figure = bodies.human()
     start = figure.posture("standing")
-    witness = sampled_posture(figure, start, rng)
-    goals = [point(figure, witness, TIPS[number % len(TIPS)])]
-    return standing_problem(floor_scene(figure), start, goals), witness
+    witness = bodies.sampled_posture(figure, start, rng)
+    goals = [bodies.point(figure, witness, bodies.TIPS[number % len(bodies.TIPS)])]
+    return bodies.standing_problem(bodies.floor_scene(figure), start, goals), witness
 
 
 def several(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """In turn: both fingertips; both and the eyes; one palm with its orientation, the other fingertip and the eyes."""
-    figure = human()
+    figure = bodies.human()
     start = figure.posture("standing")
-    witness = sampled_posture(figure, start, rng)
+    witness = bodies.sampled_posture(figure, start, rng)
     away = np.array((rng.uniform(*numbers("free_reach_several").seen_m), 0.0, 0.0))
     look = wb.Axis("gaze", (1, 0, 0), toward=figure.placement(witness, "gaze").act(away))
-    points = [point(figure, witness, tip) for tip in TIPS]
+    points = [bodies.point(figure, witness, tip) for tip in bodies.TIPS]
     palm = wb.Frame("right_palm", figure.placement(witness, "right_palm"))
     goals: list[list[wb.Goal]] = [[*points], [*points, look], [palm, points[1], look]]
-    return standing_problem(floor_scene(figure), start, goals[number % len(goals)]), witness
+    return bodies.standing_problem(bodies.floor_scene(figure), start, goals[number % len(goals)]), witness
 
 
 def among(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """A reach among things that touch neither how the person stands nor the witness."""
-    return reach_among(human(), TIPS[number % len(TIPS)], rng)
+    return reach_among(bodies.human(), bodies.TIPS[number % len(bodies.TIPS)], rng)
 
 
 def reach_among(figure: wb.Figure, tip: str, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """A problem with twenty random things, and a posture (nq,) that solves it."""
     start = figure.posture("standing")
-    witness = sampled_posture(figure, start, rng)
-    scene = floor_scene(figure)
-    add_things(scene, numbers("clutter").things, Occupied(figure, (start, witness)), ROOM, rng)
-    return standing_problem(scene, start, [point(figure, witness, tip)]), witness
+    witness = bodies.sampled_posture(figure, start, rng)
+    scene = bodies.floor_scene(figure)
+    add_things(scene, numbers("clutter").things, Occupied(figure, (start, witness)), bodies.ROOM, rng)
+    return bodies.standing_problem(scene, start, [bodies.point(figure, witness, tip)]), witness
 
 
 def uniform(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """All joints anywhere within their limits, the feet then put on their places; one fingertip, or both."""
-    figure, given = human(), numbers("uniform_witnesses")
+    figure, given = bodies.human(), numbers("uniform_witnesses")
     start = figure.posture("standing")
-    feet = [wb.Frame(foot, figure.placement(start, foot)).resolve(alone(figure), start) for foot in FEET]
-    limits, dofs = figure.limits, movable(figure)
+    feet = [wb.Frame(foot, figure.placement(start, foot)).resolve(bodies.alone(figure), start) for foot in bodies.FEET]
+    limits, dofs = figure.limits, bodies.movable(figure)
     toes = [name for name in figure.joints if "toe" in name]
     standing = figure.joint_values(start)
 
@@ -83,12 +67,14 @@ def uniform(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
         q[:3] += rng.uniform(*given.pelvis_m)
         turn = np.append(0.5 * given.lean_rad * rng.normal(size=3), 1.0)
         q[3:7] = turn / np.linalg.norm(turn)
-        found = fitted(figure, figure.clamp(q), feet, dofs)
-        return found if found is not None and is_free(alone(figure), found) else None
+        found = bodies.fitted(figure, figure.clamp(q), feet, dofs)
+        return found if found is not None and bodies.is_free(bodies.alone(figure), found) else None
 
-    witness = until_found(attempt)
-    tips = TIPS if number % 2 else (TIPS[number // 2 % 2],)
-    return standing_problem(floor_scene(figure), start, [point(figure, witness, tip) for tip in tips]), witness
+    witness = bodies.until_found(attempt)
+    tips = bodies.TIPS if number % 2 else (bodies.TIPS[number // 2 % 2],)
+    return bodies.standing_problem(
+        bodies.floor_scene(figure), start, [bodies.point(figure, witness, tip) for tip in tips]
+    ), witness
 
 
 @lru_cache(maxsize=2)
@@ -103,17 +89,19 @@ def person(number: int) -> wb.Figure:
 def people(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """The reach among twenty things, by other people."""
     count = numbers("other_people").people
-    return reach_among(person(number % count), TIPS[number // count % 2], rng)
+    return reach_among(person(number % count), bodies.TIPS[number // count % 2], rng)
 
 
 def clutter(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """A reach among more and other things."""
-    figure = human()
+    figure = bodies.human()
     start = figure.posture("standing")
-    witness = sampled_posture(figure, start, rng)
-    scene = floor_scene(figure)
-    add_things(scene, numbers("other_clutter").things, Occupied(figure, (start, witness)), ROOM, rng, make=_other_thing)
-    return standing_problem(scene, start, [point(figure, witness, TIPS[number % 2])]), witness
+    witness = bodies.sampled_posture(figure, start, rng)
+    scene = bodies.floor_scene(figure)
+    add_things(
+        scene, numbers("other_clutter").things, Occupied(figure, (start, witness)), bodies.ROOM, rng, make=_other_thing
+    )
+    return bodies.standing_problem(scene, start, [bodies.point(figure, witness, bodies.TIPS[number % 2])]), witness
 
 
 def _other_thing(number: int, rng: np.random.Generator) -> tuple[str, wb.Shape]:
@@ -136,27 +124,29 @@ of_passage = numbers("passage")
 
 def passage(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """In turn a window and two boards; left and right in turn of two."""
-    figure, side = human(), ("left", "right")[number // 2 % 2]
+    figure, side = bodies.human(), ("left", "right")[number // 2 % 2]
     start = figure.posture("standing")
-    begin = bent(figure, start, vars(of_passage.begin_degrees), [side])
+    begin = bodies.bent(figure, start, vars(of_passage.begin_degrees), [side])
     standing = Occupied(figure, (start,))
 
     def attempt() -> tuple[Array, list[tuple[wb.Box, pin.SE3]]] | None:
         wrist = _wrist(side, rng)
         boards = _boards(number % 2, wrist, rng)
-        goal = wb.Frame(f"{side}_hand", wrist).resolve(alone(figure), start)
-        witness = fitted(figure, shaken(figure, begin, of_passage.spread, rng), [goal], figure.dofs("upper_body"))
-        if witness is None or not is_free(alone(figure), witness):
+        goal = wb.Frame(f"{side}_hand", wrist).resolve(bodies.alone(figure), start)
+        witness = bodies.fitted(
+            figure, bodies.shaken(figure, begin, of_passage.spread, rng), [goal], figure.dofs("upper_body")
+        )
+        if witness is None or not bodies.is_free(bodies.alone(figure), witness):
             return None
         taken = standing, Occupied(figure, (witness,))
-        clear = all(body.clear_of(board, at, ROOM) for body in taken for board, at in boards)
+        clear = all(body.clear_of(board, at, bodies.ROOM) for body in taken for board, at in boards)
         return (witness, boards) if clear else None
 
-    witness, boards = until_found(attempt)
-    scene = floor_scene(figure)
+    witness, boards = bodies.until_found(attempt)
+    scene = bodies.floor_scene(figure)
     for count, (board, at) in enumerate(boards):
         scene.add(board, name=f"board {count}", at=at)
-    return standing_problem(scene, start, [point(figure, witness, f"{side}_index_tip")]), witness
+    return bodies.standing_problem(scene, start, [bodies.point(figure, witness, f"{side}_index_tip")]), witness
 
 
 def _wrist(side: str, rng: np.random.Generator) -> pin.SE3:
@@ -201,13 +191,13 @@ of_drag = numbers("drag")
 
 def drag(number: int, rng: np.random.Generator) -> Posed:
     """The goals are where the fingertip is in each posture of `way`; the first is where it is at the start."""
-    figure, tip = human(), TIPS[number % len(TIPS)]
+    figure, tip = bodies.human(), bodies.TIPS[number % len(bodies.TIPS)]
     postures = way(figure, rng)
-    scene = floor_scene(figure)
-    add_things(scene, of_drag.things, Occupied(figure, postures), ROOM, rng)
-    goals = [point(figure, q, tip) for q in postures]
+    scene = bodies.floor_scene(figure)
+    add_things(scene, of_drag.things, Occupied(figure, postures), bodies.ROOM, rng)
+    goals = [bodies.point(figure, q, tip) for q in postures]
     moving = tuple((goal,) for goal in goals[1:])
-    return standing_problem(scene, postures[0], goals[:1]), postures[0], moving, tuple(postures[1:])
+    return bodies.standing_problem(scene, postures[0], goals[:1]), postures[0], moving, tuple(postures[1:])
 
 
 def way(figure: wb.Figure, rng: np.random.Generator) -> Array:
@@ -224,9 +214,9 @@ def way(figure: wb.Figure, rng: np.random.Generator) -> Array:
         while len(frames) <= spans:
             resting = len(frames) > spans - of_drag.spans_to_rest
             for _ in range(1 if resting else 40):
-                point = control[-1] if resting else shaken(figure, control[-1], of_drag.stride, rng)
+                point = control[-1] if resting else bodies.shaken(figure, control[-1], of_drag.stride, rng)
                 span = _span(np.array([*control[-3:], point]))
-                if all(is_free(alone(figure), q) for q in span):
+                if all(bodies.is_free(bodies.alone(figure), q) for q in span):
                     control.append(point)
                     frames.append(span)
                     break

@@ -1,4 +1,4 @@
-"""Robots, their tools to places among things: arms with links of random lengths, and robots as they come.
+"""Robots, their tools to places among things: arms of random and of known lengths, and robots as they come.
 
 Robots as they come are six arms and six humanoids of public descriptions. These are not a part of this package: the
 environment variable `WHOLEBODY_ROBOTS` names the folder of the wheel example-robot-data, or one that holds it.
@@ -18,7 +18,7 @@ import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.base.files import Scratch
-from wholebody.bench.suite.problem_sets.bodies import CLEARANCE, ROOM, alone, floor_scene, is_free, until_found
+from wholebody.bench.suite.problem_sets.bodies import CLEARANCE, ROOM, alone, fitted, floor_scene, is_free, until_found
 from wholebody.bench.suite.problem_sets.case import numbers
 from wholebody.bench.suite.problem_sets.things import Occupied, add_things
 from wholebody.figures.self_pairs import random_postures
@@ -28,8 +28,13 @@ of_arm = numbers("robot_arm")
 
 def arms(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """The kinds of arm in turn; a place and an orientation in every other round, only a place in the others."""
-    figure, ready = arm(of_arm.kinds[number % len(of_arm.kinds)], rng)
-    model, start = figure.model, figure.with_joints(figure.neutral, ready)
+    figure, start = arm(of_arm.kinds[number % len(of_arm.kinds)], rng)
+    return _among_random(figure, start, rng, number // len(of_arm.kinds) % 2 == 1)
+
+
+def _among_random(figure: wb.Figure, start: Array, rng: np.random.Generator, turned: bool) -> tuple[wb.Problem, Array]:
+    """A place of the tool in a random posture, among eight things that are clear of it and of the start (nq,)."""
+    model = figure.model
 
     def sampled() -> Array | None:
         q: Array = rng.uniform(model.lowerPositionLimit, model.upperPositionLimit)
@@ -38,23 +43,81 @@ def arms(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     witness = until_found(sampled)
     scene = floor_scene(figure)
     add_things(scene, of_arm.things, Occupied(figure, (start, witness)), ROOM, rng, of_arm.space_m)
-    place = figure.placement(witness, "tool")
-    turned = number // len(of_arm.kinds) % 2 == 1
-    goal = wb.Frame("tool", place) if turned else wb.Point("tool", place.translation)
-    return wb.Problem(scene, start, goals=[goal], clearance=CLEARANCE), witness
+    return _asked(scene, start, witness, "tool", turned), witness
+
+
+def _asked(scene: wb.Scene, start: Array, witness: Array, tip: str, turned: bool) -> wb.Problem:
+    """A tip where a witness (nq,) has it, turned as there or as it comes."""
+    place = scene.figure.placement(witness, tip)
+    goal = wb.Frame(tip, place) if turned else wb.Point(tip, place.translation)
+    return wb.Problem(scene, start, goals=[goal], clearance=CLEARANCE)
+
+
+of_known = numbers("arms_among_things")
+
+
+def among(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
+    """The arms in turn, then what they reach into; in every other round after all with an orientation."""
+    figure, start = known_arm(of_known.arms[number % len(of_known.arms)])
+    kind, turned = of_known.kinds[number // len(of_known.arms) % len(of_known.kinds)], False
+    turned = number // (len(of_known.arms) * len(of_known.kinds)) % 2 == 1
+    if kind == "clutter":
+        return _among_random(figure, start, rng, turned)
+    reach, dofs, model = _reach(figure), np.arange(figure.model.nv), figure.model
+
+    def attempt() -> tuple[wb.Scene, Array] | None:
+        scene, place = _furnished(figure, kind, reach, rng)
+        goal = wb.Point("tool", place).resolve(alone(figure), start)
+        found = fitted(figure, rng.uniform(model.lowerPositionLimit, model.upperPositionLimit), [goal], dofs)
+        free = found is not None and is_free(scene, found) and is_free(scene, start)
+        return (scene, found) if free and found is not None else None
+
+    scene, witness = until_found(attempt)
+    return _asked(scene, start, witness, "tool", turned), witness
+
+
+@lru_cache(maxsize=8)
+def known_arm(name: str) -> tuple[wb.Figure, Array]:
+    """One of the arms of `sets.toml`, and the posture (nq,) that it begins in."""
+    given = getattr(of_known, name)
+    axes = [Axis(axis, tuple(at), low, high, ready) for axis, at, (low, high), ready in given.axes]
+    return _built(name, axes, tuple(given.tool), of_known.radii_m)
+
+
+@lru_cache(maxsize=8)
+def _reach(figure: wb.Figure) -> float:
+    """How far a tool gets from the first joint in one of 200 random postures [m]."""
+    base, rng = figure.model.jointPlacements[1].translation, np.random.default_rng(0)
+    limits = figure.model.lowerPositionLimit, figure.model.upperPositionLimit
+    places = [figure.placement(rng.uniform(*limits), "tool").translation for _ in range(200)]
+    return float(np.linalg.norm(np.array(places) - base, axis=1).max())
+
+
+def _furnished(figure: wb.Figure, kind: str, reach: float, rng: np.random.Generator) -> tuple[wb.Scene, Array]:
+    """A scene with a shelf, a bin or a table around an arm, and a place (3,) to reach in, over or under it."""
+    given = getattr(of_known, kind)
+    scene, turn = floor_scene(figure), pin.utils.rotate("z", float(rng.uniform(-of_known.turn_rad, of_known.turn_rad)))
+    at = pin.SE3(turn, turn @ (reach * rng.uniform(*given.at)))
+    for number, (size, middle) in enumerate(given.boards):
+        x, y, z = (reach * length for length in size)
+        place = at * pin.SE3(np.eye(3), reach * np.array(middle))
+        scene.add(wb.Box((x, y, z)), name=f"{kind} {number}", at=place)
+    where = given.places[int(rng.integers(len(given.places)))]
+    return scene, at.act(reach * rng.uniform(*where))
 
 
 class Axis(NamedTuple):
     """A joint: its axis, where it is on the link before it [m], its limits and how it stands when work begins [rad]."""
 
     axis: str
-    at: tuple[float, float, float]
-    limit: float
+    at: tuple[float, ...]
+    low: float
+    high: float
     ready: float
 
 
-def arm(kind: str, rng: np.random.Generator) -> tuple[wb.Figure, dict[str, float]]:
-    """Return an arm with links of random lengths, and the joint values it is ready with, elbow bent, the tool in front.
+def arm(kind: str, rng: np.random.Generator) -> tuple[wb.Figure, Array]:
+    """Return an arm with links of random lengths, and the posture (nq,) it is ready in, elbow bent, the tool in front.
 
     `kind`: "seven axes": a shoulder, an elbow and a wrist that turn as a person's do; "industrial": six axes, the elbow
     beside the shoulder's plane, the last three crossing; "parallel": six axes, three of them parallel, no three of the
@@ -65,19 +128,23 @@ def arm(kind: str, rng: np.random.Generator) -> tuple[wb.Figure, dict[str, float
     beside = round(float(rng.uniform(*of_arm.beside_m)), 3) if kind == "industrial" else 0.0
     known = {"lower": lower, "upper": upper, "fore": fore, "hand": hand, "beside": beside}
 
-    def place(words: list[Any]) -> tuple[float, float, float]:
+    def place(words: list[Any]) -> tuple[float, ...]:
         """Metres, from numbers and sums of a length and a number."""
-        x, y, z = (_length(word, known) for word in words)
-        return x, y, z
+        return tuple(_length(word, known) for word in words)
 
     made = getattr(of_arm, kind.replace(" ", "_"))
-    axes = [Axis(axis, place(at), limit, ready) for axis, at, limit, ready in made.axes]
-    tool = place(made.tool)
+    axes = [Axis(axis, place(at), -limit, limit, ready) for axis, at, limit, ready in made.axes]
+    return _built(kind.replace(" ", "_"), axes, place(made.tool), of_arm.radii_m)
+
+
+def _built(name: str, axes: list[Axis], tool: tuple[float, ...], radii: list[float]) -> tuple[wb.Figure, Array]:
+    """The figure of some axes and a tool at the end, and its ready posture (nq,)."""
     with Scratch() as folder:
-        path = folder / f"{kind.replace(' ', '_')}.urdf"
-        path.write_text(_urdf(kind.replace(" ", "_"), axes, tool), encoding="utf-8")
+        path = folder / f"{name}.urdf"
+        path.write_text(_urdf(name, axes, tool, radii), encoding="utf-8")
         figure = wb.load(path)
-    return figure, {f"axis{number}": axis.ready for number, axis in enumerate(axes, start=1)}
+    ready = {f"axis{number}": axis.ready for number, axis in enumerate(axes, start=1)}
+    return figure, figure.with_joints(figure.neutral, ready)
 
 
 def _length(word: str | float, known: dict[str, float]) -> float:
@@ -88,11 +155,10 @@ def _length(word: str | float, known: dict[str, float]) -> float:
     return known[name] - float(less) if less else known[name]
 
 
-def _urdf(name: str, axes: list[Axis], tool: tuple[float, float, float]) -> str:
+def _urdf(name: str, axes: list[Axis], tool: tuple[float, ...], ends_m: list[float]) -> str:
     """The file: every link is a cylinder from its joint to the next one."""
     ends = [axis.at for axis in axes] + [tool]
-    thick, thin = of_arm.radii_m
-    radii = np.linspace(thick, thin, len(ends))
+    radii = np.linspace(ends_m[0], ends_m[-1], len(ends))
     lines = [f'<robot name="{name}">']
     lines += [_link(f"link{number}", end, float(radii[number])) for number, end in enumerate(ends)]
     lines.append('<link name="tool"/>')
@@ -100,7 +166,7 @@ def _urdf(name: str, axes: list[Axis], tool: tuple[float, float, float]) -> str:
         lines.append(
             f'<joint name="axis{number}" type="revolute"><parent link="link{number - 1}"/><child link="link{number}"/>'
             f'<origin xyz="{_numbers(axis.at)}"/><axis xyz="{axis.axis}"/>'
-            f'<limit lower="{-axis.limit}" upper="{axis.limit}" effort="100" velocity="3"/></joint>'
+            f'<limit lower="{axis.low}" upper="{axis.high}" effort="100" velocity="3"/></joint>'
         )
     lines.append(
         f'<joint name="grip" type="fixed"><parent link="link{len(axes)}"/><child link="tool"/>'
@@ -109,7 +175,7 @@ def _urdf(name: str, axes: list[Axis], tool: tuple[float, float, float]) -> str:
     return "\n".join([*lines, "</robot>"])
 
 
-def _link(name: str, end: tuple[float, float, float], radius: float) -> str:
+def _link(name: str, end: tuple[float, ...], radius: float) -> str:
     way = np.array(end)
     length = float(np.linalg.norm(way))
     middle = _numbers(tuple(0.5 * way))
@@ -175,7 +241,4 @@ def described(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]
     taken = Occupied(figure, (start, witness))
     space = taken.centres.min(axis=0) - of_robots.around_m, taken.centres.max(axis=0) + of_robots.around_m
     add_things(scene, of_robots.things, taken, ROOM, rng, (space[0].tolist(), space[1].tolist()))
-    place = figure.placement(witness, tip)
-    turned = number // len(of_robots.files) % 2 == 1
-    goal = wb.Frame(tip, place) if turned else wb.Point(tip, place.translation)
-    return wb.Problem(scene, start, goals=[goal], clearance=CLEARANCE), witness
+    return _asked(scene, start, witness, tip, number // len(of_robots.files) % 2 == 1), witness

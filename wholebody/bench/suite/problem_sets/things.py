@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import lru_cache
 from typing import Any
 
 import coal
@@ -18,10 +19,34 @@ from wholebody.geometry.placement import placement
 KINDS = ("box", "sphere", "capsule", "hull")
 
 
-def coal_distance(first: Any, at: pin.SE3, second: Any, there: pin.SE3) -> float:
+def coal_distance(first: Any, at: pin.SE3, second: Any, there: pin.SE3, exact: bool = False) -> float:
     """Signed distance of two shapes of coal at placements, metres: a call of its own, which keeps nothing."""
     put, other = (coal.Transform3s(place.rotation, place.translation) for place in (at, there))
-    return float(coal.distance(first, put, second, other, coal.DistanceRequest(), coal.DistanceResult()))
+    request = coal.DistanceRequest()
+    if exact:
+        request.gjk_tolerance = request.epa_tolerance = 1e-9
+    return float(coal.distance(first, put, second, other, request, coal.DistanceResult()))
+
+
+@lru_cache(maxsize=2)
+def _room(figure: wb.Figure) -> tuple[pin.Data, pin.GeometryData]:
+    """For all postures of a figure: making it takes a hundred times as long as placing the pieces."""
+    return figure.model.createData(), pin.GeometryData(figure.geometry)
+
+
+def placed(figure: wb.Figure, q: Array) -> list[tuple[pin.GeometryObject, pin.SE3]]:
+    """The pieces of a figure, and where each is in a posture (nq,)."""
+    data, found = _room(figure)
+    pin.updateGeometryPlacements(figure.model, data, figure.geometry, found, q)
+    return [(piece, pin.SE3(at)) for piece, at in zip(figure.geometry.geometryObjects, found.oMg, strict=True)]
+
+
+def just_outside(gap: Callable[[float], float], inside: float, outside: float) -> float:
+    """Where a gap, negative at one end of a way and not at the other, is zero to rounding: by bisection."""
+    for _ in range(50):
+        half = 0.5 * (inside + outside)
+        inside, outside = (half, outside) if gap(half) < 0.0 else (inside, half)
+    return outside
 
 
 def shape_of(geometry: Any) -> tuple[str, list[float]]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
-from xml.sax.saxutils import quoteattr
+from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
@@ -17,9 +17,9 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
 from wholebody.bench.suite.problem_sets.things import shape_of
-from wholebody.bench.suite.published.rebuilt import VERSION
+from wholebody.bench.suite.published.rebuilt import VERSION, model_of
 from wholebody.figures.figure import Figure
-from wholebody.figures.urdf.writing import urdf_axis
+from wholebody.figures.urdf.writing import add_joint, exact, urdf_axis
 
 Meshes = dict[str, str]
 """Text of OBJ files by their path below the folder of an export."""
@@ -88,7 +88,7 @@ def body_files(figure: Figure, name: str, meshes: Meshes) -> BodyFiles:
     model = figure.model
     links = _links(model)
     text = _urdf(figure, name, links, meshes)
-    read = _read(text, figure.root)
+    read = model_of(text, figure.root)
     order = _order(figure, read)
     joints = [joint for joint in read.names if joint != "universe" and joint in figure.joints]
     place = {joint: model.joints[figure.joint_id(joint)] for joint in joints}
@@ -134,33 +134,30 @@ def _links(model: pin.Model) -> tuple[str, ...]:
 
 
 def _urdf(figure: Figure, name: str, links: tuple[str, ...], meshes: Meshes) -> str:
+    """A link for each joint with its pieces, the joints, and a link without mass for each further frame."""
     model = figure.model
     first = 1 if figure.root == "free" else 0
-    lines = ['<?xml version="1.0" encoding="utf-8"?>', f"<robot name={quoteattr(name)}>"]
+    top = ElementTree.Element("robot", name=name)
     for joint in range(first, model.njoints):
-        lines.append(f"  <link name={quoteattr(links[joint])}>")
-        if joint:
-            lines += _inertial(model.inertias[joint])
+        link = ElementTree.SubElement(top, "link", name=links[joint])
+        if joint and model.inertias[joint].mass >= 1e-6:  # kg: less has a link that is only a place
+            _add_inertia(link, model.inertias[joint])
         for piece in figure.geometry.geometryObjects:
             if piece.parentJoint == joint:
-                lines += _collision(piece, meshes, name)
-        lines.append("  </link>")
+                _add_piece(link, piece, meshes, name)
     for joint in range(first + 1, model.njoints):
-        lines += _joint(model, joint, links)
+        _add_joint(top, model, joint, links)
     for frame in model.frames:
         marks = frame.type in (pin.FrameType.BODY, pin.FrameType.OP_FRAME)
         if marks and frame.name not in links and frame.parentJoint >= first and frame.name != "universe":
-            lines += [
-                f"  <link name={quoteattr(frame.name)}/>",
-                f'  <joint name={quoteattr(frame.name + "_mount")} type="fixed">',
-                f"    <parent link={quoteattr(links[frame.parentJoint])}/><child link={quoteattr(frame.name)}/>",
-                f"    {_origin(frame.placement)}",
-                "  </joint>",
-            ]
-    return "\n".join([*lines, "</robot>", ""])
+            ElementTree.SubElement(top, "link", name=frame.name)
+            parent = links[frame.parentJoint]
+            add_joint(top, f"{frame.name}_mount", "fixed", parent, frame.name, origin=frame.placement)
+    ElementTree.indent(top)
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{ElementTree.tostring(top, encoding="unicode")}\n'
 
 
-def _joint(model: pin.Model, joint: int, links: tuple[str, ...]) -> list[str]:
+def _add_joint(top: ElementTree.Element, model: pin.Model, joint: int, links: tuple[str, ...]) -> None:
     known, at = urdf_axis(model, joint), model.joints[joint].idx_q
     if known is None or known.kind == "continuous":
         raise InputError(
@@ -172,59 +169,38 @@ def _joint(model: pin.Model, joint: int, links: tuple[str, ...]) -> list[str]:
     if not max(abs(low), abs(high)) < most:
         raise InputError(f"joint {model.names[joint]!r} has no limits; give it limits to publish it")
     speed = min(float(model.velocityLimit[model.joints[joint].idx_v]), most)
-    return [
-        f'  <joint name={quoteattr(model.names[joint])} type="{known.kind}">',
-        f"    <parent link={quoteattr(links[model.parents[joint]])}/><child link={quoteattr(links[joint])}/>",
-        f"    {_origin(model.jointPlacements[joint])}",
-        f'    <axis xyz="{_numbers(known.axis)}"/>',
-        f'    <limit lower="{low!r}" upper="{high!r}" effort="1000" velocity="{speed!r}"/>',
-        "  </joint>",
-    ]
+    add_joint(
+        top, model.names[joint], known.kind, links[model.parents[joint]], links[joint],
+        origin=model.jointPlacements[joint], axis=known.axis,
+        limit={"lower": low, "upper": high, "effort": 1000.0, "velocity": speed},
+    )  # fmt: skip
 
 
-def _inertial(inertia: pin.Inertia) -> list[str]:
-    if inertia.mass < 1e-6:  # kg: of a link that only has a place
-        return []
-    spin = inertia.inertia
-    names = (("ixx", 0, 0), ("ixy", 0, 1), ("ixz", 0, 2), ("iyy", 1, 1), ("iyz", 1, 2), ("izz", 2, 2))
-    terms = " ".join(f'{name}="{float(spin[a, b])!r}"' for name, a, b in names)
-    return [
-        f'    <inertial><origin xyz="{_numbers(inertia.lever)}"/><mass value="{float(inertia.mass)!r}"/>',
-        f"      <inertia {terms}/></inertial>",
-    ]
+def _add_inertia(link: ElementTree.Element, inertia: pin.Inertia) -> None:
+    made, spin = ElementTree.SubElement(link, "inertial"), inertia.inertia
+    ElementTree.SubElement(made, "origin", xyz=exact(inertia.lever))
+    ElementTree.SubElement(made, "mass", value=exact([inertia.mass]))
+    names = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
+    ElementTree.SubElement(made, "inertia", {name: exact([spin[place]]) for name, place in names.items()})
 
 
-def _collision(piece: pin.GeometryObject, meshes: Meshes, body: str) -> list[str]:
+def _add_piece(link: ElementTree.Element, piece: pin.GeometryObject, meshes: Meshes, body: str) -> None:
     shape = described(piece.geometry, meshes, f"{body}-{piece.name}")
-    kind, after = shape["type"], []
+    made = ElementTree.SubElement(link, "collision", name=piece.name)
+    turned = exact(pin.rpy.matrixToRpy(piece.placement.rotation))
+    ElementTree.SubElement(made, "origin", xyz=exact(piece.placement.translation), rpy=turned)
+    inner, kind = ElementTree.SubElement(made, "geometry"), shape["type"]
     if kind == "box":
-        text = f'<box size="{_numbers(shape["size"])}"/>'
+        ElementTree.SubElement(inner, "box", size=exact(shape["size"]))
     elif kind == "sphere":
-        text = f'<sphere radius="{shape["radius"]!r}"/>'
+        ElementTree.SubElement(inner, "sphere", radius=exact([shape["radius"]]))
     elif kind == "capsule":  # as Pinocchio reads capsules; others see the cylinder within
-        text = f'<cylinder radius="{shape["radius"]!r}" length="{shape["length"]!r}"/>'
-        after = [f"    <collision_checking><capsule name={quoteattr(piece.name)}/></collision_checking>"]
+        ElementTree.SubElement(inner, "cylinder", {key: exact([shape[key]]) for key in ("radius", "length")})
+        ElementTree.SubElement(ElementTree.SubElement(link, "collision_checking"), "capsule", name=piece.name)
     elif kind == "convex":
-        text = f"<mesh filename={quoteattr('../' + shape['mesh'])}/>"
+        ElementTree.SubElement(inner, "mesh", filename=f"../{shape['mesh']}")
     else:
         raise InputError(f"piece {piece.name!r} is a {kind}, which no URDF has; give the body other pieces")
-    return [
-        f"    <collision name={quoteattr(piece.name)}>{_origin(piece.placement)}",
-        f"      <geometry>{text}</geometry></collision>",
-        *after,
-    ]
-
-
-def _origin(place: pin.SE3) -> str:
-    return f'<origin xyz="{_numbers(place.translation)}" rpy="{_numbers(pin.rpy.matrixToRpy(place.rotation))}"/>'
-
-
-def _numbers(values: Any) -> str:
-    return " ".join(repr(float(value) + 0.0) for value in values)
-
-
-def _read(text: str, root: str) -> pin.Model:
-    return pin.buildModelFromXML(text, pin.JointModelFreeFlyer()) if root == "free" else pin.buildModelFromXML(text)
 
 
 def _order(figure: Figure, read: pin.Model) -> Indices:

@@ -34,8 +34,7 @@ class Judged:
     """One problem from one seed, judged.
 
     `outcome` is answered, refused (as `said`) or unanswered; the score is infinite without an answer, and of the worst
-    frame where goals move. It is solved to 1e-3, and finely to 1e-4. `effort_above`: above the best known, as a share;
-    NaN where it is not solved, or where goals move.
+    of the `frames` where goals move. `best`: least effort that is known; NaN where goals move.
     """
 
     problem: str
@@ -43,15 +42,24 @@ class Judged:
     outcome: str
     said: str
     score: Score
-    solved: bool
-    solved_fine: bool
-    effort_above: float
     seconds: float
+    best: float
+    frames: int = 0
 
     @property
-    def set(self) -> str:
-        """Name of its set."""
-        return self.problem.partition("/")[0]
+    def solved(self) -> bool:
+        """Whether goals are met and all that must hold is kept, to 1e-3."""
+        return self.score.worst <= SOLVED
+
+    @property
+    def solved_fine(self) -> bool:
+        """The same to 1e-4."""
+        return self.score.worst <= 1e-4
+
+    @property
+    def effort_above(self) -> float:
+        """Effort above the best known, as a share; NaN where it is not solved, or where goals move."""
+        return self.score.effort / self.best - 1.0 if self.solved and self.best else nan
 
 
 @dataclass(frozen=True)
@@ -112,17 +120,15 @@ def judge(answers: Answers, folder: Path) -> Verdict:
     return Verdict(answers, str(index["fingerprint"]), int(index["per_set"]), tuple(judged), tuple(rows))
 
 
-def _judged(folder: Path, name: str, seed: str, answer: Answer | None, best: float | None) -> Judged:
-    if answer is None:
-        return Judged(name, seed, UNANSWERED, "", NONE, False, False, nan, nan)
-    if answer.postures is None:
-        return Judged(name, seed, REFUSED, answer.refused, NONE, False, False, nan, nan)
+def _judged(folder: Path, name: str, seed: str, answer: Answer | None, known: float | None) -> Judged:
+    best = nan if known is None else known
+    if answer is None or answer.postures is None:
+        outcome, said = (UNANSWERED, "") if answer is None else (REFUSED, answer.refused)
+        return Judged(name, seed, outcome, said, NONE, nan, best)
     problem = Rebuilt(folder, name)
     score = worst_of([problem.score(q, frame) for frame, q in enumerate(answer.postures)])
-    solved = score.worst <= SOLVED
-    above = score.effort / best - 1.0 if solved and best else nan
-    # 1e-4 m and rad is the stricter of the two accuracies.
-    return Judged(name, seed, ANSWERED, "", score, solved, score.worst <= 1e-4, above, answer.seconds)
+    frames = len(answer.postures) if problem.moving else 0
+    return Judged(name, seed, ANSWERED, "", score, answer.seconds, best, frames)
 
 
 def set_score(name: str, seed: str, mine: Sequence[Judged]) -> SetScore:
@@ -180,9 +186,9 @@ def _row(row: SetScore) -> dict[str, Any]:
 
 
 def _answer(one: Judged) -> dict[str, Any]:
-    plain = asdict(one)
-    score = plain.pop("score")
-    return {**plain, **score, "worst": one.score.worst}
+    given = {name: getattr(one, name) for name in ("problem", "seed", "outcome", "said", "solved", "solved_fine")}
+    figures = {"effort_above": one.effort_above, "seconds": one.seconds, **asdict(one.score), "worst": one.score.worst}
+    return given | figures
 
 
 def _plain(value: Any) -> Any:

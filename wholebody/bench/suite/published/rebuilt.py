@@ -258,13 +258,17 @@ def read_body(folder: Path, path: str) -> Body:
     urdf = folder / str(content["urdf"])
     text = read_text(urdf, "URDF")
     try:
-        free = content["root"] == "free"
-        model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer()) if free else pin.buildModelFromXML(text)
+        model = model_of(text, content["root"])
     except (ValueError, RuntimeError) as error:
         raise FileFormatError(f"{urdf}: Pinocchio cannot read it ({error}); export the problems again") from None
     if model.nq != len(content["coordinates"]):
         raise FileFormatError(f"{urdf}: it has {model.nq} coordinates, and {path} names {len(content['coordinates'])}")
     return Body(model, content, tuple(_shape(folder, item["shape"]) for item in content["pieces"]))
+
+
+def model_of(urdf: str, root: str) -> pin.Model:
+    """Pinocchio's model of a URDF on a root that is "free" or "fixed"."""
+    return pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer()) if root == "free" else pin.buildModelFromXML(urdf)
 
 
 def _piece(body: Body, item: Mapping[str, Any], shape: Any) -> pin.GeometryObject:

@@ -1,17 +1,23 @@
-"""Variants of a task file: another person, another target of its first goal, things at other places."""
+"""Studies from files: variants of a task file, and a study as a TOML file."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from wholebody.base import checks
+from wholebody.base.checks import shown
 from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.base.files import is_file
 from wholebody.base.records import with_values
 from wholebody.geometry.placement import placement
+from wholebody.methods import METHODS
 from wholebody.problem import Problem
-from wholebody.taskfile.reading import Entry, read_contents
+from wholebody.taskfile.kinds import PLACEMENT, POSITION, ByName, Choice, Flag, Key, Table, Text
+from wholebody.taskfile.reading import Contents, Entry, contents_of, read_contents
+from wholebody.taskfile.schema import FIGURES
 from wholebody.taskfile.task import task_from
 
 SIZE = frozenset(("sex", "stature", "mass", "percentile", "proportions", "age"))
@@ -22,39 +28,24 @@ class TaskFile:
     """A task file of which variants are made; it can be sent to another process."""
 
     def __init__(self, path: Path) -> None:
-        """Read the file and check it.
-
-        Raises:
-            FileFormatError, UnknownNameError, InputError: as for `read_task`.
-        """
+        """Read the file and check it."""
         self.path = path
         self._place = path.absolute()  # a process that reads it again may work in another folder
         self.contents = read_contents(path)
         self.task = task_from(self.contents, path)
 
-    def check(self, person: Mapping[str, Any] | None, target: Any, layout: Any) -> None:
-        """Check values of a variant.
-
-        Raises:
-            InputError: the file has no goal with a place, or a value is of another kind.
-            UnknownNameError: an unknown thing or option.
-        """
-        if target is not None:
+    def check(self, people: Iterable[Mapping[str, Any]], targets: Iterable[Any], layouts: Iterable[Any]) -> None:
+        """Check values of variants."""
+        for person in people:
+            self._figure(person)
+        for target in targets:
             self._goal()
             checks.numbers(target, (3,), "study: a target")
-        if layout is not None:
+        for layout in layouts:
             self._things(layout)
-        if person is not None:
-            self._figure(person)
 
     def __call__(self, person: Mapping[str, Any] | None, target: Any, layout: Any) -> Problem:
-        """The problem of a variant.
-
-        Args:
-            person: options of the figure, see `wb.load`; None for those of the file.
-            target: (3,) metres, of the first goal of type point or frame; None for that of the file.
-            layout: name of a thing to its placement; None for those of the file.
-        """
+        """The problem of a variant."""
         tables = dict(self.contents.tables)
         if person is not None:
             tables["figure"] = [self._figure(person)]
@@ -106,3 +97,53 @@ class TaskFile:
             checks.known(name, known, "thing", "study: a layout")
             placement(at, f"study: the layout's {name}")
         return dict(layout)
+
+
+@dataclass(frozen=True)
+class StudyFile:
+    """The content of a study file: the arguments of `wb.study`."""
+
+    path: Path  # the file
+    task: Path  # the task file
+    people: dict[str, Any] | None  # by name; None where the file has none
+    targets: dict[str, Any] | None
+    layouts: dict[str, Any] | None
+    method: str | None  # None for that of the task
+    warm_start: bool  # see `wb.study`
+
+
+_TOP = (Key("task", Text(), True), Key("method", Choice(tuple(METHODS))), Key("warm_start", Flag()))
+_NAME = Key("name", Text(), True)
+_PLACES = ByName(PLACEMENT, "things that move", "table = [0.6, 0.0, 0.4]", "m")
+_TABLES = {
+    "person": Table((_NAME, *FIGURES["human"].keys), True),
+    "target": Table((_NAME, Key("at", POSITION, True)), True),
+    "layout": Table((_NAME, Key("move", _PLACES, True)), True),
+}
+
+
+def read_study(path: Path) -> StudyFile:
+    """Read a study file; paths in it are relative to its folder."""
+    contents = contents_of(path, "study file", _TOP, _TABLES)
+    top, where = contents.top.values, contents.top.where
+    task = path.parent / top["task"]
+    if not is_file(task):
+        there = sorted(file.name for file in task.parent.glob("*.toml")) if task.parent.is_dir() else []
+        raise UnknownNameError("task file", top["task"], there, str(where.at("task")))
+    people, targets, layouts = (_by_name(contents, table) for table in _TABLES)
+    if not (people or targets or layouts):
+        raise where.fault("nothing varies; write a [[person]], [[target]] or [[layout]]")
+    return StudyFile(path, task, people, targets, layouts, top.get("method"), top.get("warm_start", False))
+
+
+def _by_name(contents: Contents, table: str) -> dict[str, Any] | None:
+    """What the entries of a table say by name; None without the table."""
+    found: dict[str, Any] = {}
+    for entry in contents.tables.get(table, ()):
+        name = entry.values["name"]
+        if name in found:
+            told = f"{shown(name)} is the name of another {table} too; give it another one"
+            raise entry.where.at("name").fault(told)
+        rest = {key: value for key, value in entry.values.items() if key != "name"}
+        found[name] = rest if table == "person" else next(iter(rest.values()))
+    return found or None

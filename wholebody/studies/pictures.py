@@ -1,16 +1,20 @@
-"""Pictures of a reach map: heat maps of its heights as PNG, and as a page with a slider."""
+"""Pictures: heat maps of a reach map as PNG and as a page with a slider, and the chart of many solves."""
 
 from __future__ import annotations
 
 import base64
 import html
 import io
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.base.files import write
 
 INCHES = 2.4  # width of one height
@@ -128,3 +132,60 @@ def png(chart: Any) -> bytes:
     stream = io.BytesIO()
     chart.canvas.print_png(stream, metadata={"Software": None})  # `savefig` would draw twice, for the layout
     return stream.getvalue()
+
+
+MOST = 100  # rows or columns; letters of more are too small to read
+WIDTH, HEIGHT = 0.9, 0.3  # inches of a cell
+
+COLORS: Mapping[str, str] = MappingProxyType(
+    {
+        "solved": "#009e73",
+        "unreachable": "#e69f00",
+        "infeasible": "#d55e00",
+        "stalled": "#cc79a7",
+        "refused": "#999999",
+        "ended": "#666666",
+        "cancelled": "#dddddd",
+    }
+)
+"""Of outcomes, by Okabe and Ito (2008), whose colours are also told apart by people who are colour-blind."""
+
+
+def draw_outcomes(records: Sequence[Any], path: Path) -> Path:
+    """Draw the outcomes of records as a table into a PNG file: targets are columns; returns the path."""
+    from matplotlib.patches import Patch
+
+    if unknown := {one.outcome for one in records} - COLORS.keys():
+        raise InputError(f"chart: no outcome is called {sorted(unknown)[0]!r}; outcomes are {', '.join(COLORS)}")
+    factors = [one.factors or {"": one.name} for one in records]
+    places = [
+        (", ".join(value for factor, value in each.items() if factor != "target"), each.get("target", ""))
+        for each in factors
+    ]
+    if twice := [place for place, count in Counter(places).items() if count > 1]:
+        name = ", ".join(filter(None, twice[0]))
+        raise InputError(f"chart: {places.count(twice[0])} records are called {name!r}; give records of one run")
+    rows, columns = (list(dict.fromkeys(place[k] for place in places)) for k in (0, 1))
+    if not 0 < max(len(rows), len(columns)) <= MOST:
+        raise InputError(
+            f"chart: {len(rows)} rows and {len(columns)} columns; give records of 1 to {MOST} of each, such as a part"
+        )
+    wide = WIDTH * len(columns) + 0.09 * max(map(len, rows)) + 1.8  # inches of a letter of a row's name
+    chart, axes = new_chart(1, 1, (wide, HEIGHT * len(rows) + 1.2))
+    axis = axes[0, 0]
+    for one, (row, column) in zip(records, places, strict=True):
+        x, y = columns.index(column), rows.index(row)
+        axis.fill([x, x + 1, x + 1, x], [y, y, y + 1, y + 1], facecolor=COLORS[one.outcome], edgecolor="white")
+        if one.goal_error > 0.0 and not one.solved:
+            axis.text(x + 0.5, y + 0.5, f"{1e3 * one.goal_error:.0f} mm", ha="center", va="center", fontsize="x-small")
+    axis.set(xlim=(0, len(columns)), ylim=(len(rows), 0))
+    # so that matplotlib reads no formula in a name
+    axis.set_xticks(
+        np.arange(len(columns)) + 0.5, [*(name.replace("$", r"\$") for name in columns)], fontsize="x-small"
+    )
+    axis.set_yticks(np.arange(len(rows)) + 0.5, [*(name.replace("$", r"\$") for name in rows)], fontsize="x-small")
+    axis.tick_params(length=0)
+    seen = {one.outcome for one in records}
+    patches = [Patch(facecolor=color, label=outcome) for outcome, color in COLORS.items() if outcome in seen]
+    chart.legend(handles=patches, loc="outside right upper", fontsize="x-small", frameon=False)
+    return write(path, png(chart))

@@ -1,0 +1,243 @@
+"""Parts of a grip: bars and rings that a hand closes around, and sides of a thing that are pressed against each other.
+
+A bar has the direction of its thing's longest axis. A ring, such as a steering wheel, is held at the side of the hand,
+where its rim counts as a bar.
+
+The normal of a contact is the direction from a finger to the nearest point of the thing. Two contacts oppose where
+their normals are antiparallel. By their angle from that a friction cone has to be wide: forces along the line between
+two contacts hold a thing where both normals are within the friction angle of it (Nguyen 1988, "Constructing
+force-closure grasps"). Of several fingers the mean of their normals counts.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
+from wholebody.figures.state import State
+from wholebody.geometry.hull import coal_convex
+from wholebody.geometry.pieces import swept_points
+from wholebody.tasks.axis import across
+from wholebody.tasks.base import SupportingPlanes
+from wholebody.tasks.contact_parts import Gap, between, one_sided, through
+from wholebody.tasks.inputs import Place
+from wholebody.tasks.surfaces import Face, Surface, between_pieces, nearest, outermost
+
+ROUNDNESS = 0.1  # largest deviation of a ring's pieces from a circle and its plane, as a share of its radius
+STEP = 1e-4  # m, rad: half of the differences that the derivative of a normal is made of
+SHORTEST = 1e-6  # length of a mean normal, and sine of an angle, below which they have no direction
+
+AHEAD, BEHIND = ([pin.exp6(sign * STEP * axis) for axis in np.eye(6)] for sign in (1.0, -1.0))
+
+
+def bar_of(thing: Surface, state: State, where: str) -> Face:
+    """A "face" through the middle of a thing, whose normal is the thing's longest axis; `half` has all three sizes."""
+    at = thing.placed(0, state)
+    bounded = [(shape, thing.placed(k, state)) for k, shape in enumerate(thing.shapes) if np.isfinite(thing.reach[k])]
+    if not bounded:
+        raise InputError(f"{where}: {thing.name!r} has no end, so no hand closes around it; take it by the palm")
+    center, half = np.zeros(3), np.zeros(3)
+    for axis, along in enumerate(at.rotation.T):
+        ends = [outermost(shape, placed, sign * along) @ along for shape, placed in bounded for sign in (1.0, -1.0)]
+        low, high = float(np.concatenate(ends).min()), float(np.concatenate(ends).max())
+        center[axis], half[axis] = 0.5 * (low + high) - float(at.translation @ along), 0.5 * (high - low)
+    order = np.argsort(half, kind="stable")
+    return Face(thing, center, np.eye(3)[order], half[order])
+
+
+def rim_of(thing: Surface, outwards: Array, state: State) -> Face | None:
+    """The rim of a ring where it lies in a direction (3,) from the ring's middle, as a bar; None for no ring.
+
+    Axes: the ring's own, outwards in its plane, along the rim. `half`: of its thickness, twice, and of the straight.
+    """
+    if len(thing.shapes) < 8:  # least number of pieces of a ring
+        return None
+    middles = []
+    shapes = [(shape, thing.placed(k, state)) for k, shape in enumerate(thing.shapes)]
+    for shape, place in shapes:
+        high = np.array([(outermost(shape, place, axis) @ axis).max() for axis in np.eye(3)])
+        low = np.array([(outermost(shape, place, -axis) @ axis).min() for axis in np.eye(3)])
+        middles.append(0.5 * (low + high))
+    points = np.array(middles)
+    center = points.mean(axis=0)
+    _, sizes, axes = np.linalg.svd(points - center, full_matrices=False)
+    way = (points - center) @ axes.T
+    radii = np.hypot(way[:, 0], way[:, 1])
+    radius, n = float(radii.mean()), axes[2]
+    flat = np.abs(way[:, 2]).max() <= ROUNDNESS * radius and np.ptp(radii) <= 2.0 * ROUNDNESS * radius
+    if not (flat and sizes[1] >= (1.0 - ROUNDNESS) * sizes[0]):  # all around, not an arc
+        return None
+    level = outwards - (outwards @ n) * n
+    # sine of the angle to a ring's axis below which a direction names no place of the rim
+    if np.linalg.norm(level) < 0.1:  # it looks along the ring's axis: the rim's highest place
+        up = np.array((0.0, 0.0, 1.0))
+        level = up - (up @ n) * n
+    e = level / np.linalg.norm(level)
+    at = thing.placed(0, state)
+    local = np.array([n, e, np.cross(n, e)]) @ at.rotation
+    ends = [np.concatenate([outermost(shape, place, way) @ n for shape, place in shapes]) for way in (n, -n)]
+    thick = 0.5 * float(ends[0].max() - ends[1].min())
+    # share of a ring's radius along which its rim counts as straight: it turns by 14 degrees
+    return Face(thing, at.actInv(center + radius * e), local, np.array([thick, thick, 0.25 * radius]))
+
+
+class Crossing(NamedTuple):
+    """A bar that crosses the palm: one row across the palm, and one along the bar that is zero within its room [m].
+
+    The first row is what x . w has beyond its room, with x the axis of the fingers and w the way from the palm's middle
+    to the bar's axis.
+    """
+
+    place: Place  # the palm
+    bar: Face  # the bar
+    low: float  # where along it the palm may be, from its middle [m]
+    high: float
+    across: float = 0.0  # largest x . w, either way [m]
+    in_radians: tuple[bool, ...] = (False, False)
+
+    def rows(self, state: State) -> tuple[Array, Array]:
+        """The two rows, and wrenches."""
+        value, rows = self._all(state)
+        low, high = np.array([-self.across, -self.high]), np.array([self.across, -self.low])
+        excess = value - np.clip(value, low, high)
+        return excess, np.where(((excess != 0.0) | (low == high))[:, None], rows, 0.0)
+
+    def planes(self, state: State) -> SupportingPlanes:
+        """The ends of the room along the bar, and those across the palm where it has room."""
+        value, rows = self._all(state)
+        ends = np.array([value[1] + self.low, -value[1] - self.high])
+        across = np.array([value[0] - self.across, -value[0] - self.across])
+        sides = 4 if self.across else 2
+        return one_sided(np.r_[ends, across][:sides], np.vstack([rows[1], -rows[1], rows[0], -rows[0]])[:sides])
+
+    def _all(self, state: State) -> tuple[Array, Array]:
+        """What is across the palm and how far the bar's middle is along the bar (2,), and their derivative (2, nv)."""
+        center, axes = self.bar.at(state)
+        frame, along = state.frame(self.place.frame), axes[2]
+        palm, fingers = frame.translation, frame.rotation[:, 0]
+        way = center - palm
+        level = fingers - (fingers @ along) * along  # x . (1 - l l') (c - p) = level . way
+        reach = float(along @ way)
+        # of the hand against the thing, seen from the thing: the hand's velocity v and rotation w
+        wrench = through(palm, np.array([-level, -along]))
+        wrench[0, 3:] += pin.skew(fingers) @ (way - reach * along)
+        return np.array([level @ way, reach]), between(state, wrench, self.place.joint, self.bar.joint)
+
+
+class Looking(NamedTuple):
+    """The palm's z within an angle of a direction in the world, or of a plane across it: one row [rad]."""
+
+    place: Place  # the palm
+    direction: Array  # (3,) unit
+    most: float  # largest angle from it [rad]
+    level: bool  # whether the angle is to the plane across the direction
+    in_radians: tuple[bool, ...] = (True,)
+
+    def rows(self, state: State) -> tuple[Array, Array]:
+        """The angle beyond, and a moment."""
+        axis = state.frame(self.place.frame).rotation[:, 2]
+        cosine = float(np.clip(axis @ self.direction, -1.0, 1.0))
+        angle = abs(float(np.arcsin(cosine))) if self.level else float(np.arccos(cosine))
+        wrench = np.zeros((1, 6))
+        beyond = max(0.0, angle - self.most)
+        if beyond > 0.0:
+            slope = (1.0 if cosine > 0.0 else -1.0) if self.level else -1.0
+            moment = pin.skew(axis) @ self.direction
+            wrench[0, 3:] = slope * moment / max(float(np.linalg.norm(moment)), 1e-6)
+        return np.array([beyond]), between(state, wrench, self.place.joint, 0)
+
+
+class Opposing(NamedTuple):
+    """The normals of one contact and of several others on a thing within an angle of opposite: one row.
+
+    The row is the angle beyond it, zero within it, times a lever.
+    """
+
+    first: Surface  # surface on one side, such as a thumb
+    others: tuple[Surface, ...]  # surfaces on the other, such as fingers
+    thing: Surface  # what is between them
+    smooth: Surface  # the same with its edges `rounded`, whose normals count
+    most: float  # largest angle from opposite [rad]
+    # distance of the farthest contact from which the angle does not count; nearer, it counts more and more [m]. Far
+    # away the normals say where the thing is, not how it is held
+    far: float
+    # of the arc that the row then measures [m]: so short that a finger rather turns than leaves to where the angle does
+    # not count, which ends a descent there. 1 for the angle itself
+    lever: float = 1.0
+
+    @property
+    def in_radians(self) -> tuple[bool, ...]:
+        """Whether the row is the angle itself."""
+        return (self.lever == 1.0,)
+
+    def rows(self, state: State) -> tuple[Array, Array]:
+        """The angle beyond, and wrenches on every finger."""
+        surfaces, thing = (self.first, *self.others), self.thing
+        distances = [nearest(surface, thing, state).distance for surface in surfaces]
+        farthest = int(np.argmax(distances))
+        left = 1.0 - max(distances[farthest], 0.0) / self.far
+        if left <= 0.0:
+            return np.zeros(1), np.zeros((1, state.model.nv))
+        # how much of the angle counts at the distance of the farthest contact, all at contact, and its derivative
+        share, fall = left * left, -2.0 * left / self.far * (distances[farthest] > 0.0)
+        nears = [nearest(surface, self.smooth, state) for surface in surfaces]
+        normals = np.array([near.normal for near in nears])
+        total = normals[1:].sum(axis=0)
+        length = max(float(np.linalg.norm(total)), SHORTEST)
+        mean = total / length
+        cosine = float(np.clip(-normals[0] @ mean, -1.0, 1.0))
+        beyond = float(np.arccos(cosine)) - self.most
+        if beyond <= 0.0:
+            return np.zeros(1), np.zeros((1, state.model.nv))
+        ahead = mean + cosine * normals[0]  # of the mean across the first normal: the angle grows along it
+        sine = float(np.linalg.norm(ahead))
+        toward = ahead / sine if sine > SHORTEST else across(normals[0])[0]
+        back = normals[0] + cosine * mean
+        other = back / sine if sine > SHORTEST else across(mean)[0]
+        row = fall * beyond * Gap(surfaces[farthest], thing).rows(state)[1]
+        for number, (surface, near) in enumerate(zip(surfaces, nears, strict=True)):
+            force = share * (toward if number == 0 else other / length)
+            wrench = _by_twist(surface, self.smooth, state, near.pieces) @ force
+            row += between(state, wrench[None], near.against, near.joint)
+        return np.array([self.lever * share * beyond]), self.lever * row
+
+
+def rounded(thing: Surface) -> Surface:
+    """The surface with boxes and hulls smaller by the radius of their rounded edges; the normals on others stay."""
+    return thing.with_shapes(tuple(_rounded(shape) for shape in thing.shapes))
+
+
+def _rounded(shape: Any) -> Any:
+    """A piece smaller by nine tenths of the radius of the largest ball in it, so that normals turn on its faces."""
+    if isinstance(shape, coal.Box):
+        half = np.asarray(shape.halfSide)
+        return coal.Box(*(2.0 * (half - 0.9 * half.min())))
+    if not isinstance(shape, coal.Convex):
+        return shape
+    from scipy.optimize import linprog
+    from scipy.spatial import ConvexHull, HalfspaceIntersection
+
+    normals, offsets = np.split(swept_points(shape).faces, [3], axis=1)
+    ball = linprog((0, 0, 0, -1), np.column_stack([normals, np.ones(len(normals))]), offsets, bounds=(None, None)).x
+    planes = np.column_stack([normals, 0.9 * ball[3] - offsets])
+    hull = ConvexHull(HalfspaceIntersection(planes, ball[:3]).intersections)
+    used, triangles = np.unique(hull.simplices, return_inverse=True)
+    return coal_convex(hull.points[used], triangles.reshape(-1, 3))
+
+
+def _by_twist(surface: Surface, thing: Surface, state: State, pieces: tuple[int, int]) -> Array:
+    """Derivative (6, 3) of the normal of two pieces by the twist of the first at the world's origin, by differences."""
+    i, j = pieces
+    place, other = surface.placed(i, state), thing.placed(j, state)
+    found = np.empty((6, 3))
+    for axis, (ahead, behind) in enumerate(zip(AHEAD, BEHIND, strict=True)):
+        ends = [
+            between_pieces(surface.shapes[i], moved * place, thing.shapes[j], other).normal for moved in (ahead, behind)
+        ]
+        found[axis] = (np.array(ends[0]) - np.array(ends[1])) / (2.0 * STEP)
+    return found
