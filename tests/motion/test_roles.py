@@ -70,6 +70,15 @@ def test_what_follows_nothing_is_told(human: wb.Figure) -> None:
         assert matched(motion, human, {"skeleton": {"head": "leftHand"}}).joints["head"] == "leftHand"
 
 
+def test_nothing_is_told_where_all_joints_were_named(human: wb.Figure) -> None:
+    names = {"skeleton": {"left_shoulder": "a", "left_elbow": "b", "left_wrist": "c"}}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        wb.retarget(still(("a", "b", "c")), human, names)
+    with pytest.warns(UserWarning, match="no joint of motion is known for .*left_hand"):
+        wb.retarget(still(("a", "b", "c", "d")), human, names)
+
+
 @pytest.mark.parametrize("turn", [0.0, 2.0])
 def test_structure_tells_what_names_do_not(turn: float, human: wb.Figure) -> None:
     """A person's own skeleton whose joints have numbers, however it stands and wherever it looks."""

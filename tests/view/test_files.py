@@ -6,6 +6,7 @@ import io
 import os
 import shutil
 import subprocess
+import time
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from PIL import Image
 import wholebody as wb
 from wholebody.base.errors import InputError, MissingPackageError, UnknownNameError
 from wholebody.view import Viewer
-from wholebody.view.browser import Browser, find_chromium
+from wholebody.view.browser import Browser, BrowserError, find_chromium
 from wholebody.view.movie import movie
 from wholebody.view.style import LOOK
 
@@ -116,6 +117,16 @@ def test_without_a_browser_pages_are_saved_and_pictures_refused(
         with pytest.raises(MissingPackageError, match="apt-get install chromium"):
             attempt()
     assert os.listdir(tmp_path) == ["scene.html"]
+
+
+def test_a_program_that_is_no_browser_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However early it has ended when it is asked."""
+    monkeypatch.setenv("WHOLEBODY_CHROMIUM", "true")
+    for seconds in (0.0, 0.1):
+        with Browser() as browser:
+            time.sleep(seconds)
+            with pytest.raises(BrowserError, match=r"/true --headless"):
+                browser.evaluate("0")
 
 
 def test_saving_the_same_twice_gives_the_same_bytes(exhibit: Any, tmp_path: Path) -> None:

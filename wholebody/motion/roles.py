@@ -30,7 +30,7 @@ class Roles(NamedTuple):
         frames: role to frame of the figure.
         turns: role to the frame of the figure that has the orientation of the role.
         table: name of the table that matched the skeleton.
-        missing: roles of the figure that no joint of the skeleton is known to have.
+        missing: roles of the figure that no joint of the skeleton is known to have, if there are others to name.
         told: roles whose joints are known by the skeleton's structure alone.
     """
 
@@ -77,6 +77,7 @@ def matched(
             f"no bones of the skeleton are known to belong to {figure.name} ({what}); name them in a TOML file with "
             "the tables [skeleton] and [figure]"
         )
+    asked = () if said and set(joints) <= set(found.values()) else ROLES  # else no joint is left that could be named
     segments = _column("person_turn")
     segments = segments if set(segments.values()) <= set(figure.segments) else {}
     return Roles(
@@ -84,7 +85,7 @@ def matched(
         {role: frames[role] for role in common},
         {role: segments.get(role, frames[role]) for role in common},
         table,
-        tuple(role for role in ROLES if role in frames and role not in found),
+        tuple(role for role in asked if role in frames and role not in found),
         tuple(role for role in common if role in more),
     )
 

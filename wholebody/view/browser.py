@@ -82,10 +82,11 @@ class Browser:
         self._pid: int | None = None
         self._scratch = Scratch()
         self._folder = self._scratch.path
-        self._start(executable, self._written(page) if page else "about:blank")
+        self._path = executable
+        self._start(self._written(page) if page else "about:blank")
         atexit.register(self.close)
 
-    def _start(self, executable: str, url: str) -> None:
+    def _start(self, url: str) -> None:
         """Start Chromium with the reading end of one pipe as descriptor 3, the writing end of another as 4."""
         theirs_in, self._out = os.pipe()
         self._in, theirs_out = os.pipe()
@@ -96,11 +97,11 @@ class Browser:
             for fd, flag in ((0, os.O_RDONLY), (1, os.O_WRONLY), (2, os.O_WRONLY))
         ]
         actions += [(os.POSIX_SPAWN_DUP2, high_in, 3), (os.POSIX_SPAWN_DUP2, high_out, 4)]  # type: ignore[list-item]
-        command = [executable, *_FLAGS, f"--user-data-dir={self._folder / 'profile'}", url]
+        command = [self._path, *_FLAGS, f"--user-data-dir={self._folder / 'profile'}", url]
         try:
-            self._pid = os.posix_spawn(executable, command, os.environ, file_actions=actions, setpgroup=0)
+            self._pid = os.posix_spawn(self._path, command, os.environ, file_actions=actions, setpgroup=0)
         except OSError as error:
-            raise BrowserError(f"{executable} could not be started: {error}") from None
+            raise BrowserError(f"{self._path} could not be started: {error}") from None
         finally:
             for descriptor in (theirs_in, theirs_out, high_in, high_out):
                 os.close(descriptor)
@@ -222,7 +223,7 @@ class Browser:
             while rest:
                 rest = rest[os.write(self._out, rest) :]
         except OSError:
-            raise BrowserError("the browser has ended; make a new one") from None
+            raise self._gone() from None
         end = time.monotonic() + self.timeout
         while self._number not in self._answers:
             self._receive(end)
@@ -232,15 +233,20 @@ class Browser:
         result: dict[str, Any] = answer["result"]
         return result
 
+    def _gone(self) -> BrowserError:
+        if self._session is not None:
+            return BrowserError("the browser has ended; make a new one")
+        return BrowserError(
+            f"the browser did not start; try it by hand: {self._path} --headless --dump-dom about:blank"
+        )
+
     def _receive(self, end: float) -> None:
         """Read the next messages of the browser."""
         if not select.select([self._in], [], [], max(end - time.monotonic(), 0.0))[0]:
             raise BrowserError(f"the browser did not answer within {self.timeout:g} s")
         chunk = os.read(self._in, 1 << 20)
         if not chunk:
-            raise BrowserError(
-                "the browser ended unexpectedly; try it by hand: chromium --headless --dump-dom about:blank"
-            )
+            raise self._gone()
         *whole, self._partial = (self._partial + chunk).split(b"\0")
         for text in whole:
             message = json.loads(text)
