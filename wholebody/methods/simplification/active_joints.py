@@ -186,14 +186,16 @@ def _excess(problem: Problem, state: State, locked: Mask) -> float:
     if not terms or not chosen.any():
         return 0.0
     idx_q, idx_v, low, high = idx_q[chosen], idx_v[chosen], low[chosen], high[chosen]
-    begin, share = np.clip(problem.start[idx_q], low, high), np.linspace(0.0, 1.0, 26)
+    begin = np.clip(problem.start[idx_q], low, high)
+    turn = np.linspace(0.0, np.pi, 101)  # the shares of the way are dense at the limits, where discomfort is steep
+    step = 0.5 * np.sin(turn)[:, None] * turn[1]
     least, q = np.zeros(len(idx_v)), problem.start.copy()
     for end in (low, high):
         slopes = []
-        for part in share:
+        for part in 0.5 - 0.5 * np.cos(turn):
             q[idx_q] = begin + part * (end - begin)
             state.update(q)
             slopes.append(sum((term.weight * term.gradient(state)[idx_v] for term in terms), np.zeros(len(idx_v))))
-        slope = np.array(slopes) * (share[1] * (end - begin))
+        slope = np.array(slopes) * (end - begin) * step
         least = np.minimum(least, np.cumsum(0.5 * (slope[1:] + slope[:-1]), axis=0).min(axis=0))
     return -float(least.sum())
