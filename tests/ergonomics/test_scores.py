@@ -316,3 +316,6 @@ def test_the_command_prints_a_table_and_json(tmp_path: Path, capsys: pytest.Capt
     assert found["assessment"]["penetration"] < 1e-5
     assert main(["assess", str(tmp_path / "result.json"), "--ergonomics", "--coupling", "firm"]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+    for option in (["--load", "6"], ["--repeated"], ["--seated", "no"]):
+        assert main(["assess", str(tmp_path / "result.json"), *option]) == 2
+        assert f"{option[0]} is read by the scores" in capsys.readouterr().err

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from wholebody.base.errors import InputError
 from wholebody.cli.command import command, flag, option
 
 FLAGS = {
@@ -45,6 +46,7 @@ exit code: 1 if the posture violates a limit, a constraint or a clearance by mor
 )
 def run(arguments: argparse.Namespace) -> int:
     """Judge and print; 1 if the posture violates something."""
+    _check_options(arguments)
     from wholebody.assessment.posture import assess
     from wholebody.taskfile import result
 
@@ -68,6 +70,16 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         _show(judged, scores)
     return 0 if judged.holds(1e-4) else 1  # m, rad: of limits, constraints and clearances
+
+
+def _check_options(arguments: argparse.Namespace) -> None:
+    """Refuse options that only the scores of ergonomics read, where these are not asked for."""
+    usual = {"load": 0.0, "coupling": "good", "seated": None, "sex": "male", "percentile": 50.0} | dict.fromkeys(
+        FLAGS, False
+    )
+    given = [name for name, value in usual.items() if getattr(arguments, name) != value]
+    if given and not arguments.ergonomics:
+        raise InputError(f"--{given[0].replace('_', '-')} is read by the scores of ergonomics alone; add --ergonomics")
 
 
 def _show(judged: Any, scores: Any) -> None:

@@ -219,6 +219,7 @@ def test_finer_pieces_can_be_asked_for_and_added_volume_is_said():
 MASS, ORIGIN = '<mass value="5"/>', '<origin xyz="0 0 0.05"/>'
 ODD = {
     "NaN mass": (MASS, '<mass value="nan"/>', "a finite number"),
+    "a mass as Python writes it": (MASS, '<mass value="1_0"/>', "a finite number"),
     "negative mass": (MASS, '<mass value="-1"/>', "has the mass -1; give kilograms"),
     "huge mass": (MASS, '<mass value="2147483647"/>', "at most 1e.09"),
     "no mass": (MASS, "", "without <mass>"),
@@ -253,6 +254,15 @@ def test_numbers_and_encodings_that_no_robot_has_are_refused(what, tmp_path):
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 400
+
+
+def test_blanks_around_numbers_change_nothing(tmp_path):
+    """Pinocchio's reader drops an inertial whose mass has blanks around it, and takes such a moment for 0."""
+    text = TEXT.replace(MASS, '<mass value=" 5 "/>', 1).replace('ixx="0.01"', 'ixx=" 0.01 "', 1)
+    arm, spaced = load(ARM), load(write(tmp_path, text), package_dirs=[ARM.parents[1]])
+    assert text != TEXT
+    for one, other in zip(arm.model.inertias, spaced.model.inertias, strict=True):
+        np.testing.assert_array_equal(one.toDynamicParameters(), other.toDynamicParameters())
 
 
 def test_another_encoding_is_read(tmp_path):

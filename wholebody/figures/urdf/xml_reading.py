@@ -54,15 +54,21 @@ def unique_names(elements: Sequence[Element], kind: str, path: Path) -> tuple[st
 
 
 def numbers(element: Element, name: str, place: str, count: int, default: str | None = None) -> tuple[float, ...]:
-    """Return the finite numbers of an attribute; another count is refused with the element's place in the file."""
+    """Return the finite numbers of an attribute; another count is refused with the element's place in the file.
+
+    Blanks around them are taken out of the element, for Pinocchio's reader takes a number with blanks for none.
+    """
     text: Any = element.get(name, default)
     try:
-        found = tuple(float(word) for word in text.split())
+        words = text.split()
+        found = tuple(float("_" if "_" in word else word) for word in words)  # Python alone reads 1_0 as a number
     except (ValueError, AttributeError):
         found = ()
     if len(found) != count or not all(math.isfinite(number) for number in found):
         wanted = "a finite number" if count == 1 else f"{count} finite numbers"
         raise FileFormatError(f"{place}: <{element.tag}> has {name}={_short(text)}; give {wanted}")
+    if name in element.attrib:
+        element.set(name, " ".join(words))
     return found
 
 
