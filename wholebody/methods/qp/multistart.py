@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wholebody.assessment.posture import assess
 from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
@@ -103,6 +104,7 @@ class Multistart:
         if other is not None:
             self._accept(self._directly(other), "directly")
         self._find_closest()
+        self._descend_again()
         self._restart_for_measure()
         if self.best.violation.worst <= self.budget.tolerance:
             self.contradictions = ()  # by less than the tolerance
@@ -206,6 +208,19 @@ class Multistart:
             self._minima.add(probe.violation.total, probe.converged)
             return probe
         return self._descend(probe.q, "restart", most=max(self._left, 1))
+
+    def _descend_again(self) -> None:
+        """Where contacts are met by an end that is no local minimum of the measures, descend from it once more.
+
+        Steps along a curved surface or over a kink can end early. Only contacts are tested: the test takes a fifth of
+        the time of a reach to a point.
+        """
+        problem, met = self.problem, self.best.violation.worst <= self.budget.tolerance
+        touches = any(hasattr(term, "touches") for term in (*problem.goals, *problem.constraints))
+        if not (met and touches and self.budget.measures) or self.control.over:
+            return
+        if assess(problem, self.best.q).optimality > 1e-2:  # rad: good answers are nearer to a local minimum
+            self._accept(self._directly(self.best.q), self.how)
 
     def _restart_for_measure(self) -> None:
         """Where all is met, search for a lower minimum of the measures from other starts, which are screened first.
