@@ -212,8 +212,8 @@ class Multistart:
     def _descend_again(self) -> None:
         """Where contacts are met by an end that is no local minimum of the measures, descend from it once more.
 
-        Steps along a curved surface or over a kink can end early. Only contacts are tested: the test takes a fifth of
-        the time of a reach to a point.
+        Steps along a curved surface or over a kink can end early. Only contacts are tested: the test takes a quarter
+        of the time of a reach to a point.
         """
         problem, met = self.problem, self.best.violation.worst <= self.budget.tolerance
         touches = any(hasattr(term, "touches") for term in (*problem.goals, *problem.constraints))
