@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Set
 from dataclasses import fields, is_dataclass
 from operator import is_
 from typing import Any, TypeVar
@@ -12,12 +12,13 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.errors import InputError, TermError
 from wholebody.base.fields import Range
 from wholebody.base.pool import Loan
 from wholebody.figures.state import UNIT_TOLERANCE, State
 from wholebody.geometry.placement import FARTHEST
+from wholebody.scene.geometry_model import SceneGeometry
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace, borrowed
 from wholebody.tasks.answers import in_words, is_own
@@ -124,29 +125,36 @@ class Problem(checks.FixedAttributes):
         self.touching = tuple(_owner_pair(scene, pair) for pair in pairs)
         self._plan: tuple[_Planned, TermPlan] | None = None
         """The terms as arrays, and the terms that they were made of; every solve begins with it."""
-        with scene.borrow() as workspace:
-            state = workspace.state.update(self.start)
-            self.measures: tuple[Measure, ...] = (
-                self._usual_measures() if measured is None else tuple(m.resolve(scene, self.start) for m in measured)
-            )
-            self.defaults, self.left_out = self._usual_constraints(state, stated)
-            self.constraints: tuple[Constraint, ...] = (*stated, *self.defaults)
-            self._check_frozen(state)
-            _check_goals(self.goals, state)
-            self._check_terms(state)
-            self.clearances = self._clearances(workspace)
+        self.measures: tuple[Measure, ...] = (
+            self._usual_measures() if measured is None else tuple(m.resolve(scene, self.start) for m in measured)
+        )
+        own = any(map(is_own, (*self.goals, *stated, *self.measures)))
+        if own or self.bounds or scene.figure.root == "free":
+            with scene.borrow() as workspace:
+                state = workspace.state.update(self.start)
+                self.defaults, self.left_out = self._usual_constraints(state, stated)
+                self.constraints: tuple[Constraint, ...] = (*stated, *self.defaults)
+                self._check_frozen(state)
+                _check_goals(self.goals, state)
+                self._check_terms(state)
+        else:
+            self.defaults, self.left_out = self._usual_constraints(None, stated)
+            self.constraints = (*stated, *self.defaults)
+        self.clearances = self._clearances()
 
     def _usual_measures(self) -> tuple[Measure, ...]:
         scene, start, ranges = self.scene, self.start, self.range_of_motion
-        if not (ranges and scene.figure.ranges):
-            return default_measures(scene, start, ranges=False)
         key = "measures", ranges, start.tobytes()
         return scene.built.known(key, lambda: default_measures(scene, start, ranges=ranges))
 
-    def _usual_constraints(self, state: State, stated: Sequence[Constraint]) -> tuple[tuple[Constraint, ...], str]:
+    def _usual_constraints(
+        self, state: State | None, stated: Sequence[Constraint]
+    ) -> tuple[tuple[Constraint, ...], str]:
+        """What is added to the constraints, and what is left out; the state is that of the start of a free root."""
         scene, start, ranges, known = self.scene, self.start, self.range_of_motion, frozenset(map(type, stated))
-        required = self.balance is True
-        balance = stands(scene, state, stated, self.bounds, self.goals) if self.balance is None else required
+        required = balance = self.balance is True
+        if self.balance is None and state is not None:
+            balance = stands(scene, state, stated, self.bounds, self.goals)
         if not (balance or (ranges and scene.figure.ranges)):
             return (), ""
         moves = scene.built.moves if balance else 0  # shoes carry too
@@ -331,21 +339,31 @@ class Problem(checks.FixedAttributes):
             if is_own(measure):
                 check_measure(f"measures[{number}]", measure, state)
 
-    def _clearances(self, workspace: Workspace) -> Array:
-        pairs, owners = workspace.table.pairs, workspace.owners
-        asked = np.full(len(pairs), self.clearance)
+    def _clearances(self) -> Array:
+        built, clearance = self.scene.built, self.clearance
+        asked = np.full(len(built.table.pairs), clearance)
         brought = [pair for term in (*self.goals, *self.constraints) for pair in term.touching]
-        allowed = {*self.touching, *brought} | {(b, a) for a, b in (*self.touching, *brought)}
+        allowed = frozenset((*self.touching, *brought))
         if allowed:
-            named = [(owners[a], owners[b]) in allowed for a, b in pairs]
-            asked[np.array(named, dtype=bool)] = 0.0
-        near = workspace.near_views(self.start, self.clearance + 1e-9)
-        if not len(near.number):
-            return asked
-        kept = np.maximum(near.distance, 0.0)
-        resting = near.distance >= -1e-6
-        asked[near.number[resting]] = np.minimum(asked[near.number[resting]], kept[resting])
+            asked[built.known(("touching", allowed), lambda: _between(built, allowed))] = 0.0
+        key = "resting", clearance, built.moves, self.start.tobytes()
+        number, kept = built.known(key, lambda: self._resting(clearance))
+        asked[number] = np.minimum(asked[number], kept)
         return asked
+
+    def _resting(self, clearance: float) -> tuple[Indices, Array]:
+        """Pairs (k,) that are nearer than a clearance at the start, but do not penetrate, and their distances (k,)."""
+        with self.scene.borrow() as workspace:
+            near = workspace.near_views(self.start, clearance + 1e-9)
+            resting = near.distance >= -1e-6
+            return near.number[resting], np.maximum(near.distance[resting], 0.0)
+
+
+def _between(built: SceneGeometry, allowed: Set[tuple[str, str]]) -> Mask:
+    """Which pairs are of owners that stand in some pairs of names, in either order."""
+    owners = built.owners
+    pairs = [(owners[a], owners[b]) for a, b in built.table.pairs.tolist()]
+    return np.array([pair in allowed or pair[::-1] in allowed for pair in pairs], dtype=bool)
 
 
 def _check_goals(goals: Sequence[Goal], state: State) -> None:
