@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterable, Sequence, Set
 from dataclasses import fields, is_dataclass
+from functools import partial
 from operator import is_
 from typing import Any, TypeVar
 
@@ -108,7 +109,7 @@ class Problem(checks.FixedAttributes):
         self.scene = checks.instance(scene, Scene, "Problem: scene", "make one with wb.Scene(figure)")
         self._revision = scene.revision
         self.start = _start(scene, start)
-        self.clearance = _clearance(clearance)
+        self.clearance = CLEARANCE(clearance, "clearance")
         terms = [*_checked(goals, _ARGUMENTS["goals"], "goals")]
         given = [*_checked(constraints, _ARGUMENTS["constraints"], "constraints")]
         self.measures_given = measures is not None
@@ -128,40 +129,32 @@ class Problem(checks.FixedAttributes):
         self.measures: tuple[Measure, ...] = (
             self._usual_measures() if measured is None else tuple(m.resolve(scene, self.start) for m in measured)
         )
-        own = any(map(is_own, (*self.goals, *stated, *self.measures)))
-        if own or self.bounds or scene.figure.root == "free":
-            with scene.borrow() as workspace:
-                state = workspace.state.update(self.start)
-                self.defaults, self.left_out = self._usual_constraints(state, stated)
-                self.constraints: tuple[Constraint, ...] = (*stated, *self.defaults)
-                self._check_frozen(state)
-                _check_goals(self.goals, state)
-                self._check_terms(state)
-        else:
-            self.defaults, self.left_out = self._usual_constraints(None, stated)
-            self.constraints = (*stated, *self.defaults)
+        with scene.borrow() as workspace:
+            state = workspace.state
+            if scene.figure.root == "free" or self.bounds or any(map(is_own, (*self.goals, *stated, *self.measures))):
+                state.update(self.start)
+            self.defaults, self.left_out = self._usual_constraints(state, stated)
+            self.constraints: tuple[Constraint, ...] = (*stated, *self.defaults)
+            self._check_frozen(state)
+            _check_goals(self.goals, state)
+            self._check_terms(state)
         self.clearances = self._clearances()
 
     def _usual_measures(self) -> tuple[Measure, ...]:
         scene, start, ranges = self.scene, self.start, self.range_of_motion
-        key = "measures", ranges, start.tobytes()
-        return scene.built.known(key, lambda: default_measures(scene, start, ranges=ranges))
+        make = partial(default_measures, scene, start, ranges=ranges)
+        return scene.built.known(("measures", ranges, start.tobytes()), make)
 
-    def _usual_constraints(
-        self, state: State | None, stated: Sequence[Constraint]
-    ) -> tuple[tuple[Constraint, ...], str]:
-        """What is added to the constraints, and what is left out; the state is that of the start of a free root."""
+    def _usual_constraints(self, state: State, stated: Sequence[Constraint]) -> tuple[tuple[Constraint, ...], str]:
         scene, start, ranges, known = self.scene, self.start, self.range_of_motion, frozenset(map(type, stated))
-        required = balance = self.balance is True
-        if self.balance is None and state is not None:
-            balance = stands(scene, state, stated, self.bounds, self.goals)
+        required = self.balance is True
+        balance = stands(scene, state, stated, self.bounds, self.goals) if self.balance is None else required
         if not (balance or (ranges and scene.figure.ranges)):
             return (), ""
         moves = scene.built.moves if balance else 0  # shoes carry too
-        return scene.built.known(
-            ("constraints", ranges, balance, required, known, moves, start.tobytes()),
-            lambda: default_constraints(scene, start, known, ranges=ranges, balance=balance, required=required),
-        )
+        key = "constraints", ranges, balance, required, known, moves, start.tobytes()
+        make = partial(default_constraints, scene, start, known, ranges=ranges, balance=balance, required=required)
+        return scene.built.known(key, make)
 
     def __repr__(self) -> str:
         asked = [*self.goals, *self.constraints, *self.bounds]
@@ -345,9 +338,9 @@ class Problem(checks.FixedAttributes):
         brought = [pair for term in (*self.goals, *self.constraints) for pair in term.touching]
         allowed = frozenset((*self.touching, *brought))
         if allowed:
-            asked[built.known(("touching", allowed), lambda: _between(built, allowed))] = 0.0
+            asked[built.known(("touching", allowed), partial(_between, built, allowed))] = 0.0
         key = "resting", clearance, built.moves, self.start.tobytes()
-        number, kept = built.known(key, lambda: self._resting(clearance))
+        number, kept = built.known(key, partial(self._resting, clearance))
         asked[number] = np.minimum(asked[number], kept)
         return asked
 
@@ -361,8 +354,7 @@ class Problem(checks.FixedAttributes):
 
 def _between(built: SceneGeometry, allowed: Set[tuple[str, str]]) -> Mask:
     """Which pairs are of owners that stand in some pairs of names, in either order."""
-    owners = built.owners
-    pairs = [(owners[a], owners[b]) for a, b in built.table.pairs.tolist()]
+    pairs = ((built.owners[a], built.owners[b]) for a, b in built.table.pairs.tolist())
     return np.array([pair in allowed or pair[::-1] in allowed for pair in pairs], dtype=bool)
 
 
@@ -386,10 +378,6 @@ def _start(scene: Scene, start: Array | str | None) -> Array:
     if not pin.isNormalized(scene.model, q, UNIT_TOLERANCE):
         raise InputError("the start's quaternion is not of unit length; normalise it with pin.normalize(model, q)")
     return np.array(pin.normalize(scene.model, q))
-
-
-def _clearance(value: float) -> float:
-    return CLEARANCE(value, "clearance")
 
 
 def _checked(terms: Any, kinds: tuple[type, ...], what: str) -> Sequence[Any]:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from wholebody import tasks
 from wholebody.base.arrays import Array
+from wholebody.base.records import with_values
 from wholebody.figures.description import Limits
 from wholebody.figures.figure import Figure
 from wholebody.methods.control import Control
@@ -132,12 +133,12 @@ class PlainChain:
 
     def goals(self, entries: list[Entry]) -> Goals:
         """Entries of goals with the numbers of these joints."""
-        integers, row = [], 0
-        for entry in entries:
+        integers, row = np.empty((len(entries), 6), dtype=np.int64), 0
+        for k, entry in enumerate(entries):
             joint, base, *kinds = entry.integers
-            integers.append((row, self._number[joint], self._number[base], *kinds))
+            integers[k] = row, self._number[joint], self._number[base], *kinds
             row += entry.rows
-        return Goals(np.array([entry.floats for entry in entries]), np.array(integers, dtype=np.int64))
+        return Goals(np.array([entry.floats for entry in entries]), integers)
 
     def room(self, rows: int) -> Room:
         """Room for descents with so many rows: the same for the same number."""
@@ -307,7 +308,7 @@ class _Seeded:
             samples = (self.chain.posture(each, self.at) for each in branches.cheaper(most))
             q = next((each for each in samples if self._is_free(each)), None)
             if met is not None:
-                return met._replace(blocked=q)
+                return with_values(met, blocked=q)
             if q is not None:
                 return Met(q, tuple(self.trace), False)
         for seeds in self.chain.seeds(self.start, self.budget.seed, SEEDS.together * more):
@@ -322,12 +323,12 @@ class _Seeded:
         enough = enough if self.distance is not None else 1
         asked = np.array([budget.tolerance, SEEDS.damping**2, min(budget.iterations, SEEDS.steps), enough])
         reach = compiled_kernel().reach
-        while len(seeds) and not self.control.over:
+        while len(seeds):
             found = np.empty((len(seeds), 4))
             taken = reach(chain.chain, self.goals, self.room, seeds, self.nearest, asked, found)
             ends = found[:taken].tolist()
             for left, _, _, steps in ends:
-                if steps and not self.control.over:
+                if steps and not self.control.reason:
                     self.trace.append(TraceEntry(left, 0.0, 0.0, 0.0, "seed"))
                     self.control.tell(self.trace[-1])
             for effort, k in sorted((end[1], k) for k, end in enumerate(ends) if end[1] < np.inf):
@@ -339,6 +340,8 @@ class _Seeded:
                     return Met(q, tuple(self.trace), known, self.blocked if free else None)
                 self.least, self.blocked = (effort, q) if effort < self.least else (self.least, self.blocked)
             seeds = seeds[taken:]
+            if self.control.over:
+                break
         return None
 
     def _effort(self, q: Array) -> float:
@@ -358,10 +361,14 @@ def _distance(problem: Problem, chain: PlainChain, at: Array) -> SquaredDistance
     if len(measures) != 1 or type(measures[0]) not in (tasks.Effort, tasks.Displacement):
         return None
     distance: SquaredDistance = measures[0].distance  # type: ignore[attr-defined]
+    if not distance.weights[chain.idx_v].all():
+        return None
     weights = distance.weights.copy()
     weights[chain.idx_v] = 0.0
+    if not weights.any():
+        return distance
     rest = weights * pin.difference(problem.scene.model, distance.reference, at)
-    return distance if (distance.weights[chain.idx_v] > 0.0).all() and not rest.any() else None
+    return None if rest.any() else distance
 
 
 @lru_cache(maxsize=64)

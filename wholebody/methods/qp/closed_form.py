@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from wholebody.base.arrays import Array
+from wholebody.base.records import with_values
 from wholebody.methods.qp.chain_kernel import Chain
 from wholebody.methods.qp.closed_form_kernel import BRANCHES, CROSSING, PARALLEL, THREE_PARALLEL, Arm
 
@@ -69,7 +70,7 @@ def _solvable(arm: Arm) -> Arm | None:
             away = np.cross(there[group] - o[group[-1]], h[group])
             if (np.linalg.norm(away, axis=1) > ALIKE).any() or np.ptp(o[group], axis=0).max() > ALIKE:
                 return None
-    return arm._replace(points=points)
+    return with_values(arm, points=points)
 
 
 def _held_at(arm: Arm, points: Array, value: float) -> tuple[Array, Array]:
