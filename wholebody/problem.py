@@ -333,21 +333,20 @@ class Problem(checks.FixedAttributes):
                 check_measure(f"measures[{number}]", measure, state)
 
     def _clearances(self) -> Array:
-        built, clearance = self.scene.built, self.clearance
-        asked = np.full(len(built.table.pairs), clearance)
+        built = self.scene.built
+        asked = np.full(len(built.table.pairs), self.clearance)
         brought = [pair for term in (*self.goals, *self.constraints) for pair in term.touching]
         allowed = frozenset((*self.touching, *brought))
         if allowed:
             asked[built.known(("touching", allowed), partial(_between, built, allowed))] = 0.0
-        key = "resting", clearance, built.moves, self.start.tobytes()
-        number, kept = built.known(key, partial(self._resting, clearance))
+        number, kept = built.known(("resting", self.clearance, built.moves, self.start.tobytes()), self._resting)
         asked[number] = np.minimum(asked[number], kept)
         return asked
 
-    def _resting(self, clearance: float) -> tuple[Indices, Array]:
-        """Pairs (k,) that are nearer than a clearance at the start, but do not penetrate, and their distances (k,)."""
+    def _resting(self) -> tuple[Indices, Array]:
+        """Pairs (k,) nearer than the clearance at the start that do not penetrate, and their distances (k,)."""
         with self.scene.borrow() as workspace:
-            near = workspace.near_views(self.start, clearance + 1e-9)
+            near = workspace.near_views(self.start, self.clearance + 1e-9)
             resting = near.distance >= -1e-6
             return near.number[resting], np.maximum(near.distance[resting], 0.0)
 

@@ -24,7 +24,7 @@ from wholebody.figures.description import Limits
 from wholebody.figures.figure import Figure
 from wholebody.methods.control import Control
 from wholebody.methods.qp.chain_kernel import Chain, Goals, Room
-from wholebody.methods.qp.closed_form import closed_form
+from wholebody.methods.qp.closed_form import Branches, closed_form
 from wholebody.methods.qp.closed_form import compiled_kernel as closed_form_kernel
 from wholebody.methods.qp.closed_form_kernel import BRANCHES
 from wholebody.methods.qp.multistart import Budget
@@ -58,26 +58,6 @@ class Met(NamedTuple):
     def complete(self) -> bool:
         """Whether no descent from here can lead to less."""
         return self.stationary and self.blocked is None
-
-
-class Branches(NamedTuple):
-    """Branches of a closed form; arrays have a row a posture.
-
-    Attributes:
-        values: (k, n) of the joints.
-        effort: (k,) of each; inf where it does not exist or is beyond limits.
-        least: (m, n) those that take less effort than the samples beside them, the least first.
-    """
-
-    values: Array
-    effort: Array
-    least: Array
-
-    def cheaper(self, most: float) -> Array:
-        """Those (j, n) within limits whose effort is less than `most`, the least first."""
-        order = self.effort.argsort()
-        found: Array = self.values[order[self.effort[order] < most]]
-        return found
 
 
 class PlainChain:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,6 +22,26 @@ ALIKE = 1e-4  # rad: axes that differ by less count as parallel; m: lines that p
 HELD = (6, 0, 2)
 """Joints of seven that may be held; the elbow's angle does not change where an arm moves with its end at rest."""
 TRIED = (0.0, 0.7, -1.9)  # rad: of a joint that is held; what axes have in common at these they always have
+
+
+class Branches(NamedTuple):
+    """Branches of a closed form; arrays have a row a posture.
+
+    Attributes:
+        values: (k, n) of the joints.
+        effort: (k,) of each; inf where it does not exist or is beyond limits.
+        least: (m, n) those that take less effort than the samples beside them, the least first.
+    """
+
+    values: Array
+    effort: Array
+    least: Array
+
+    def cheaper(self, most: float) -> Array:
+        """Those (j, n) within limits whose effort is less than `most`, the least first."""
+        order = self.effort.argsort()
+        found: Array = self.values[order[self.effort[order] < most]]
+        return found
 
 
 def closed_form(chain: Chain) -> Arm | None:
