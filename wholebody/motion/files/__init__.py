@@ -45,7 +45,7 @@ def check_ending(path: str | os.PathLike[str]) -> Path:
 def read_frames(path: str | os.PathLike[str], figure: Figure) -> Frames:
     """Read postures of a figure from a file in the format that the ending of its name says; see `wb.read_clip`."""
     path = checked_path(path, "path")
-    return READERS[_ending(path, READERS, "read", (".bvh",))](path, figure)
+    return READERS[_ending(path, READERS, "read", (".bvh", ".glb", ".gltf"))](path, figure)
 
 
 def _ending(path: Path, known: Collection[str], done: str, others: Collection[str] = ()) -> str:
