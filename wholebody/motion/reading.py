@@ -12,7 +12,7 @@ from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, InputError, one_line
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
-from wholebody.motion.files import amass, archive, bvh, columns, gltf_reading, read_frames
+from wholebody.motion.files import FBX, amass, archive, bvh, columns, gltf_reading, read_frames
 from wholebody.motion.files.base import Frames
 from wholebody.motion.retargeting import retarget
 from wholebody.motion.roles import column_names
@@ -43,9 +43,8 @@ def read_skeleton(path: str | os.PathLike[str], *, unit: str | None = None, up: 
         choice(up, UP, "read_skeleton: up")
     motion = _skeleton(path, unit, up)
     if motion is None:
-        raise FileFormatError(
-            f"{one_line(path.name)}: is no skeleton; give a BVH or glTF file, or an archive of AMASS (.npz)"
-        )
+        other = "is no skeleton; give a BVH or glTF file, or an archive of AMASS (.npz)"
+        raise FileFormatError(f"{one_line(path.name)}: {FBX if path.suffix.lower() == '.fbx' else other}")
     _say(motion, path)
     return motion
 
