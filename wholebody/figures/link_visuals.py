@@ -9,12 +9,14 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
+import coal
 import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import WholebodyError
 from wholebody.figures.figure import Figure
+from wholebody.figures.link_pieces import triangles_of
 from wholebody.figures.surface.nets import clustered
 from wholebody.geometry.mesh_cache import cached_entry
 from wholebody.geometry.meshes import read_parts
@@ -51,7 +53,9 @@ def drawn_of(figure: Figure) -> list[Drawn]:
         given: Color = (red, green, blue, alpha)
         place = np.array(shown.placement.homogeneous)
         if not shown.meshPath:
-            made.append(Drawn(link, joint, place, shown.geometry, given))
+            solid = shown.geometry
+            drawn = triangles_of(solid) if isinstance(solid, coal.BVHModelBase) else solid
+            made.append(Drawn(link, joint, place, drawn, given))
             continue
         try:
             parts = mesh_parts(shown.meshPath, tuple(float(part) for part in shown.meshScale))
@@ -80,7 +84,7 @@ def mesh_parts(path: str, scale: tuple[float, ...]) -> MeshParts:
         turn = slice(None, None, -1 if np.prod(scale) < 0.0 else 1)  # a mirrored face keeps its outer side
         parts = [(vertices * scale, faces[:, turn], color) for vertices, faces, color in read_parts(place)]
         fine = sum(len(faces) for _, faces, _ in parts) <= MANY
-        return tuple(part if fine else _thinned(*part) for part in parts)
+        return tuple(part if fine else (*thinned(part[0], part[1]), part[2]) for part in parts)
 
     try:
         content = place.read_bytes()
@@ -91,12 +95,11 @@ def mesh_parts(path: str, scale: tuple[float, ...]) -> MeshParts:
     return cached_entry(key, make, _packed, _unpacked)
 
 
-def _thinned(
-    vertices: Array, faces: NDArray[np.int64], color: Color | None
-) -> tuple[Array, NDArray[np.int64], Color | None]:
+def thinned(vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
+    """Vertices (k, 3) and faces (l, 3) of a mesh without what is finer than `FINE`."""
     kept = clustered(vertices, faces, np.floor(vertices / FINE).astype(np.int64))
     used, local = np.unique(kept, return_inverse=True)
-    return vertices[used], local.reshape(-1, 3), color
+    return vertices[used], local.reshape(-1, 3)
 
 
 def _packed(parts: MeshParts) -> bytes:

@@ -107,7 +107,7 @@ class GltfDocument:
         fields = self.tree["accessors"][index]
         size, kind = SIZES[fields["type"]], np.dtype(TYPES[fields["componentType"]])
         count = int(fields["count"])
-        found = np.zeros((count, size), kind)
+        found: NDArray[Any] = np.zeros((count, size), kind)
         if "bufferView" in fields:
             found = self._view(fields["bufferView"], kind, size, count, fields.get("byteOffset", 0))
         if "sparse" in fields:
@@ -129,7 +129,8 @@ class GltfDocument:
         data = self._buffer(view["buffer"])
         if count < 1 or begin < 0 or begin + stride * (count - 1) + kind.itemsize * size > len(data):
             raise ValueError(f"part {index} of the buffer goes beyond its end")
-        return np.ndarray((count, size), kind, data, begin, (stride, kind.itemsize))
+        found: NDArray[Any] = np.ndarray((count, size), kind, data, begin, (stride, kind.itemsize))
+        return found
 
     def _buffer(self, index: int) -> bytes:
         if index not in self._buffers:

@@ -15,7 +15,6 @@ from wholebody.base.checks import is_number
 from wholebody.base.errors import FileFormatError, InputError, MissingPackageError, WholebodyError, one_line
 from wholebody.base.files import check_file
 from wholebody.geometry.convex import check_mesh
-from wholebody.geometry.gltf_document import GltfDocument
 
 SUFFIXES = (".obj", ".stl", ".ply", ".gltf", ".glb", ".dae")
 
@@ -87,6 +86,8 @@ def _bent(path: Path) -> list[tuple[Array, NDArray[np.int64], tuple[float, float
     """The parts of a glTF file whose meshes bones bend, which trimesh leaves as they were bound; None of others."""
     if path.suffix.lower() not in (".gltf", ".glb"):
         return None
+    from wholebody.geometry.gltf_document import GltfDocument
+
     check_file(path, "mesh")
     _check_content(path)
     document = GltfDocument(path)

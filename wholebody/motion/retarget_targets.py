@@ -64,6 +64,35 @@ def footfalls(motion: SkeletonMotion, roles: Roles) -> Footfalls:
     return Footfalls(stands, heights)
 
 
+def soled(motion: SkeletonMotion, roles: Roles, steps: Footfalls, places: dict[str, Array]) -> dict[str, Array]:
+    """Places (n, 3) of a skeleton's toes as if its feet had the two joints as high above their soles as the figure's.
+
+    Skeletons differ in where these joints are, by 20 degrees and more of the way between them. While both stand the
+    sole is flat, which says in the ankle's axes where the toes of the figure would be. Places (3,) are those of the
+    figure's neutral posture.
+    """
+    found = {}
+    for side in ("left", "right"):
+        ankle, toe = f"{side}_ankle", f"{side}_toe"
+        if not {ankle, toe} <= steps.stands.keys() & places.keys():
+            continue
+        flat = steps.stands[ankle] & steps.stands[toe]
+        start, end = (motion.names.index(roles.joints[role]) for role in (ankle, toe))
+        ways, turns = motion.positions[:, end] - motion.positions[:, start], motion.rotations[:, start]
+        lengths = np.linalg.norm(ways, axis=1)
+        own = places[toe] - places[ankle]
+        rise = float(own[2] / np.linalg.norm(own))
+        heading = ways[flat] * (1.0, 1.0, 0.0)
+        along = np.linalg.norm(heading, axis=1)
+        if not flat.any() or np.median(along) < 0.5 * np.median(lengths):  # a foot that hangs says nothing
+            continue
+        wanted = heading / np.maximum(along, SMALL)[:, None] * np.sqrt(1.0 - rise**2) + (0.0, 0.0, rise)
+        local = np.einsum("nji,nj->ni", turns[flat], wanted).mean(axis=0)
+        local /= np.linalg.norm(local)
+        found[toe] = motion.positions[:, start] + lengths[:, None] * (turns @ local)
+    return found
+
+
 def held(
     points: dict[str, Array], steps: Footfalls, places: dict[str, Array], lowest: float, dt: float
 ) -> dict[str, Array]:
@@ -216,7 +245,8 @@ def targets(motion: SkeletonMotion, figure: Figure, roles: Roles, steps: Footfal
     places, turned, lowest = standing_places(figure, roles)
     own = _Body(places)
     joint = {role: motion.names.index(name) for role, name in roles.joints.items()}
-    source = _Body({role: motion.positions[:, k] for role, k in joint.items()})
+    centres = {role: motion.positions[:, k] for role, k in joint.items()}
+    source = _Body(centres | soled(motion, roles, steps, places))
     turns = _turns(motion, joint, own, turned, rest_axes(motion, roles))
     root, scale = turns.get("pelvis", _pelvis(source, motion)), 1.0
     if figure.root == "fixed":  # only what moves relative to the pelvis can be followed

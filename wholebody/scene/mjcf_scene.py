@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from os import PathLike
 from typing import Any
 
-import numpy as np
 import pinocchio as pin
 
 from wholebody.base.checks import path as as_path
@@ -14,9 +13,9 @@ from wholebody.base.checks import text, warn
 from wholebody.base.errors import FileFormatError
 from wholebody.base.files import check_file
 from wholebody.figures.link_pieces import Concavity
-from wholebody.figures.mjcf.compiled import Compiled, placement
-from wholebody.figures.mjcf.figure import SHAPES, mjcf_figure
-from wholebody.figures.urdf.xml_reading import read_xml
+from wholebody.figures.mjcf.compiled import Compiled, is_mjcf, placement
+from wholebody.figures.mjcf.figure import mjcf_figure
+from wholebody.figures.mjcf.shapes import SHAPES
 from wholebody.geometry.shapes import Box, Capsule, Compound, Cylinder, Ellipsoid, HalfSpace, Mesh, Shape, Sphere
 from wholebody.scene.matter.body import Body
 from wholebody.scene.scene import Scene
@@ -41,7 +40,7 @@ def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Co
     """
     place = as_path(path, "read_scene: path")
     check_file(place, "scene")
-    if read_xml(place, "MJCF").tag != "mujoco":
+    if not is_mjcf(place):
         raise FileFormatError(
             f"{place}: a scene is an MJCF file, whose outermost element is <mujoco>; wb.load reads a URDF"
         )
@@ -66,7 +65,7 @@ def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Co
         if parts:
             shape = parts[0][0] if len(parts) == 1 else Compound(tuple(parts))
             at = compiled.place(top) * (parts[0][1] if len(parts) == 1 else pin.SE3.Identity())
-            color = _color(compiled, compiled.geoms(top)[0])
+            color = compiled.color(compiled.geoms(top)[0])
             mass = float(model.body_subtreemass[top])
             scene.add(shape, name=_free_name(scene, names["body"][top]), at=at, body=Body(mass=mass), color=color)
     if left:
@@ -86,7 +85,7 @@ def _add_fixed(scene: Scene, compiled: Compiled, body: int, place: pin.SE3, left
         name = compiled.names["body" if body and len(geoms) == 1 else "geom"][
             body if body and len(geoms) == 1 else geom
         ]
-        scene.add(shape, name=_free_name(scene, name), at=place * at, color=_color(compiled, geom))
+        scene.add(shape, name=_free_name(scene, name), at=place * at, color=compiled.color(geom))
 
 
 def _parts(compiled: Compiled, bodies: Sequence[int], left: list[str]) -> list[tuple[Shape, pin.SE3]]:
@@ -124,14 +123,6 @@ def _shape(compiled: Compiled, geom: int) -> tuple[Shape, pin.SE3] | None:
         "box": lambda: Box((2.0 * a, 2.0 * b, 2.0 * c)),
     }
     return shapes[kind](), at
-
-
-def _color(compiled: Compiled, geom: int) -> tuple[float, ...] | None:
-    material = int(compiled.model.geom_matid[geom])
-    color = compiled.model.mat_rgba[material] if material >= 0 else compiled.model.geom_rgba[geom]
-    if np.allclose(color, (0.5, 0.5, 0.5, 1.0)):
-        return None  # MuJoCo's own, where the file has none
-    return tuple(float(value) for value in color)
 
 
 def _free_name(scene: Scene, name: str) -> str:

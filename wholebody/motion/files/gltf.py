@@ -17,6 +17,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
+from wholebody.figures.link_pieces import triangles_of
 from wholebody.figures.link_visuals import Color, drawn_of
 from wholebody.figures.surface import Surface, surface_of
 from wholebody.geometry.gltf_builder import VERTICES, GltfBuilder
@@ -195,6 +196,5 @@ def triangles(shape: Any) -> Any:
     if isinstance(shape, coal.Ellipsoid):
         return creation.icosphere().apply_scale(np.array(shape.radii))
     if isinstance(shape, coal.BVHModelBase):
-        faces = [[shape.tri_indices(k)[corner] for corner in range(3)] for k in range(shape.num_tris)]
-        return Trimesh(np.asarray(shape.vertices()), np.array(faces), process=False)
+        return Trimesh(*triangles_of(shape), process=False)
     return convex.convex_hull(np.array(shape.points()))
