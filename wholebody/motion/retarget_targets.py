@@ -19,6 +19,7 @@ from wholebody.figures.figure import Figure
 from wholebody.geometry.pieces import box_corners
 from wholebody.motion.roles import Roles
 from wholebody.motion.skeleton import RIGID, SkeletonMotion
+from wholebody.motion.soles import soled
 from wholebody.motion.stance import StanceFeet, speeds
 from wholebody.motion.windows import Window, long_runs, runs
 
@@ -62,35 +63,6 @@ def footfalls(motion: SkeletonMotion, roles: Roles) -> Footfalls:
         if {f"{side}_toe", f"{side}_ankle"} <= stands.keys():
             stands[f"{side}_ankle"] &= stands[f"{side}_toe"]
     return Footfalls(stands, heights)
-
-
-def soled(motion: SkeletonMotion, roles: Roles, steps: Footfalls, places: dict[str, Array]) -> dict[str, Array]:
-    """Places (n, 3) of a skeleton's toes as if its feet had the two joints as high above their soles as the figure's.
-
-    Skeletons differ in where these joints are, by 20 degrees and more of the way between them. While both stand the
-    sole is flat, which says in the ankle's axes where the toes of the figure would be. Places (3,) are those of the
-    figure's neutral posture.
-    """
-    found = {}
-    for side in ("left", "right"):
-        ankle, toe = f"{side}_ankle", f"{side}_toe"
-        if not {ankle, toe} <= steps.stands.keys() & places.keys():
-            continue
-        flat = steps.stands[ankle] & steps.stands[toe]
-        start, end = (motion.names.index(roles.joints[role]) for role in (ankle, toe))
-        ways, turns = motion.positions[:, end] - motion.positions[:, start], motion.rotations[:, start]
-        lengths = np.linalg.norm(ways, axis=1)
-        own = places[toe] - places[ankle]
-        rise = float(own[2] / np.linalg.norm(own))
-        heading = ways[flat] * (1.0, 1.0, 0.0)
-        along = np.linalg.norm(heading, axis=1)
-        if not flat.any() or np.median(along) < 0.5 * np.median(lengths):  # a foot that hangs says nothing
-            continue
-        wanted = heading / np.maximum(along, SMALL)[:, None] * np.sqrt(1.0 - rise**2) + (0.0, 0.0, rise)
-        local = np.einsum("nji,nj->ni", turns[flat], wanted).mean(axis=0)
-        local /= np.linalg.norm(local)
-        found[toe] = motion.positions[:, start] + lengths[:, None] * (turns @ local)
-    return found
 
 
 def held(
@@ -246,7 +218,7 @@ def targets(motion: SkeletonMotion, figure: Figure, roles: Roles, steps: Footfal
     own = _Body(places)
     joint = {role: motion.names.index(name) for role, name in roles.joints.items()}
     centres = {role: motion.positions[:, k] for role, k in joint.items()}
-    source = _Body(centres | soled(motion, roles, steps, places))
+    source = _Body(centres | soled(motion, roles, steps.stands, places))
     turns = _turns(motion, joint, own, turned, rest_axes(motion, roles))
     root, scale = turns.get("pelvis", _pelvis(source, motion)), 1.0
     if figure.root == "fixed":  # only what moves relative to the pelvis can be followed

@@ -21,12 +21,12 @@ from wholebody.motion.retarget_targets import (
     footfalls,
     has_trunk,
     known_bones,
-    soled,
     standing_places,
     targets,
 )
 from wholebody.motion.roles import Roles, matched
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
+from wholebody.motion.soles import soled
 from wholebody.motion.stance import paths
 from wholebody.tracking.tracks import check_figure
 
@@ -117,7 +117,7 @@ def errors_of(motion: SkeletonMotion, clip: Clip, roles: Roles) -> dict[str, Arr
     places = dict(zip(roles.frames, ways, strict=True))
     centres = {role: motion.positions[:, motion.names.index(joint)] for role, joint in roles.joints.items()}
     if clip.figure.root == "free":
-        centres |= soled(motion, roles, footfalls(motion, roles), standing_places(clip.figure, roles)[0])
+        centres |= soled(motion, roles, footfalls(motion, roles).stands, standing_places(clip.figure, roles)[0])
     found = {}
     for ends in (ends for side in ("left", "right") for limb in LIMBS for ends in known_bones(limb, side, places)):
         start, end = (centres[role] for role in ends)

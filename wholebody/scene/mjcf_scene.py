@@ -15,10 +15,14 @@ from wholebody.base.files import check_file
 from wholebody.figures.link_pieces import Concavity
 from wholebody.figures.mjcf.compiled import Compiled, is_mjcf, placement
 from wholebody.figures.mjcf.figure import mjcf_figure
+from wholebody.figures.mjcf.height_fields import height_field
 from wholebody.figures.mjcf.shapes import SHAPES
-from wholebody.geometry.shapes import Box, Capsule, Compound, Cylinder, Ellipsoid, HalfSpace, Mesh, Shape, Sphere
+from wholebody.geometry.shapes import Box, Capsule, Compound, Cylinder, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
 from wholebody.scene.matter.body import Body
 from wholebody.scene.scene import Scene
+
+MOST_PRISMS = 10_000
+"""Convex pieces of a height field: making each takes half a millisecond."""
 
 
 def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Concavity = None) -> Scene:
@@ -26,7 +30,8 @@ def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Co
 
     The robot is what `wb.load` returns. The geoms of the world, of static and of mocap bodies are fixed things, at most
     one for each geom; a body with a free joint alone is a thing that moves by itself, with the mass of the file spread
-    evenly. Geoms that can touch nothing are markers and left out; height fields are left out with a warning.
+    evenly. Geoms that can touch nothing are markers and left out. A height field is one thing of convex prisms; one
+    that needs too many is left out with a warning.
 
     Args:
         path: the file.
@@ -69,7 +74,7 @@ def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Co
             mass = float(model.body_subtreemass[top])
             scene.add(shape, name=_free_name(scene, names["body"][top]), at=at, body=Body(mass=mass), color=color)
     if left:
-        warn(f"{place}: height fields are not kept: {', '.join(left)}")
+        warn(f"{place}: not kept, as they need over {MOST_PRISMS} convex pieces or move: {', '.join(left)}")
     return scene
 
 
@@ -105,13 +110,16 @@ def _parts(compiled: Compiled, bodies: Sequence[int], left: list[str]) -> list[t
 
 
 def _shape(compiled: Compiled, geom: int) -> tuple[Shape, pin.SE3] | None:
-    """A geom's shape, and its placement on its body; None for a height field."""
+    """A geom's shape, and its placement on its body; None for a height field that is too fine."""
     model = compiled.model
     at = placement(model.geom_pos[geom], model.geom_quat[geom])
     a, b, c = (float(value) for value in model.geom_size[geom])
     kind = SHAPES[int(model.geom_type[geom])]
     if kind == "hfield":
-        return None
+        prisms = height_field(compiled, geom)
+        if len(prisms) > MOST_PRISMS:
+            return None
+        return Compound(tuple((Hull(prism), pin.SE3.Identity()) for prism in prisms)), at
     if kind in ("mesh", "sdf"):
         return Mesh(compiled.mesh(geom)), at
     shapes: dict[str, Any] = {

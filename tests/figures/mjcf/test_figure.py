@@ -141,6 +141,14 @@ def test_pairs_are_those_of_the_file(tmp_path: Path) -> None:
     reasons = {frozenset((pair.a, pair.b)): pair.reason for pair in figure.excluded_pairs}
     assert reasons[frozenset(("base:0", "hand:0"))] == "their contact bits do not meet"
     assert reasons[frozenset(("upper:0", "hand:0"))] == "the file excludes them"
+    named = bits.replace('type="sphere" size', 'name="ball" type="sphere" size')
+    named = named.replace('<geom contype="2"', '<geom name="foot" contype="2"')
+    pair = '<contact><pair geom1="foot" geom2="ball"/></contact></mujoco>'
+    geometry = wb.load(written(tmp_path, named.replace("</mujoco>", pair)), samples=0).geometry
+    names = [piece.name for piece in geometry.geometryObjects]
+    tested = {frozenset((names[pair.first], names[pair.second])) for pair in geometry.collisionPairs}
+    assert frozenset(("base:0", "hand:1")) in tested  # the ball can touch nothing else
+    assert not [pair for pair in tested if "hand:1" in pair and "base:0" not in pair]
 
 
 def test_a_linear_equality_is_followed_and_others_are_told(tmp_path: Path) -> None:
@@ -240,7 +248,9 @@ def test_what_is_drawn_is_what_mujocos_viewer_draws(tmp_path: Path) -> None:
     place = data.oMi[figure.joint_id(kinds["tuple"].joint)].homogeneous @ kinds["tuple"].placement
     geom = next(k for k in range(model.ngeom) if model.geom_type[k] == mujoco.mjtGeom.mjGEOM_MESH)
     first = model.mesh_vertadr[model.geom_dataid[geom]]
-    wanted = model.mesh_vert[first : first + len(vertices)] @ theirs.geom_xmat[geom].reshape(3, 3).T + theirs.geom_xpos[geom]
+    wanted = (
+        model.mesh_vert[first : first + len(vertices)] @ theirs.geom_xmat[geom].reshape(3, 3).T + theirs.geom_xpos[geom]
+    )
     np.testing.assert_allclose(vertices @ place[:3, :3].T + place[:3, 3], wanted, atol=1e-6)
     assert len(faces) == 6
     assert wb.load(written(tmp_path, ARM.replace('type="mesh" mesh="wedge"', 'size=".01"'))).visual is not None

@@ -132,8 +132,15 @@ class Compiled:
         )
 
     def collides(self, geom: int) -> bool:
-        """Whether a geom can touch another one: its contact bits are not all zero."""
-        return bool(self.model.geom_contype[geom] or self.model.geom_conaffinity[geom])
+        """Whether a geom can touch another one: its contact bits are not all zero, or the file names a pair with it."""
+        bits = self.model.geom_contype[geom] or self.model.geom_conaffinity[geom]
+        return bool(bits) or any(geom in pair for pair in self.pairs)
+
+    @cached_property
+    def pairs(self) -> frozenset[frozenset[int]]:
+        """Pairs of geoms that the file names (<pair>); they can touch whatever their contact bits are."""
+        ends = zip(self.model.pair_geom1.tolist(), self.model.pair_geom2.tolist(), strict=True)
+        return frozenset(frozenset(pair) for pair in ends)
 
     def color(self, geom: int) -> tuple[float, float, float, float] | None:
         """A geom's own colour, else that of its material times the mean of its texture; None without both."""

@@ -101,13 +101,15 @@ def _postures(compiled: Compiled, robot: RobotModel) -> dict[str, Array]:
 
 
 def _untested(compiled: Compiled, geoms: Sequence[int]) -> Callable[[int, int], str | None]:
-    """Why two pieces, which belong to these geoms, are never tested: contact bits, <exclude>."""
+    """Why two pieces, which belong to these geoms, are never tested: contact bits or <exclude>, and no <pair>."""
     model = compiled.model
     types, affinities = np.array(model.geom_contype[geoms]), np.array(model.geom_conaffinity[geoms])
     bodies = np.array(model.geom_bodyid[geoms])
     excluded = {frozenset((value >> 16, value & 0xFFFF)) for value in map(int, model.exclude_signature)}
 
     def reason(first: int, second: int) -> str | None:
+        if frozenset((geoms[first], geoms[second])) in compiled.pairs:
+            return None
         if not (types[first] & affinities[second]) | (types[second] & affinities[first]):
             return "their contact bits do not meet"
         pair = frozenset((int(bodies[first]), int(bodies[second])))
@@ -135,6 +137,8 @@ def _left_out(compiled: Compiled, mine: Sequence[int]) -> list[str]:
         notes.append(f"bodies without a shape beside the robot ({', '.join(bare)}) are not kept")
     if robots:
         notes.append(f"other robots of the file ({', '.join(robots)}) are not read: root='{robots[0]}' reads one")
+    if model.nflex:
+        notes.append(f"{model.nflex} soft bodies (flex) are not kept")
     if model.ntendon:
         notes.append(f"{model.ntendon} tendons are not kept")
     return notes
