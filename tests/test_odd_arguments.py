@@ -28,7 +28,6 @@ from wholebody.geometry.shapes import Compound
 from wholebody.motion import measures
 from wholebody.motion.sphere_filling import Spheres, fill_with_spheres
 from wholebody.view import Viewer
-from wholebody.view.parts import Part, Parts
 from wholebody.view.timeline import timeline
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -169,16 +168,6 @@ def solvable(path: Path, term: Any) -> None:
     wb.solve(problem(path, **{key: [term]}), wb.QP(budget=0, restarts=0))
 
 
-def falling(path: Path, body: wb.Body) -> wb.Scene:
-    """A scene with a ball that moves by itself, far from everything."""
-    made = wb.Scene(figure(path))
-    return made.add(wb.Sphere(0.1), name="faller", at=(9.0, 0.0, 0.0), body=body)
-
-
-def fall(path: Path, body: wb.Body) -> None:
-    RigidBodies(falling(path, body)).advance(0.001)
-
-
 class Level(wb.methods.AssemblyConstraint):
     """A body at the height of another."""
 
@@ -309,19 +298,9 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
 
     yield "Box", Call(wb.Box, {"size": (1.0, 1.0, 1.0)}, put)
     yield "Sphere", Call(wb.Sphere, {"radius": 1.0}, put)
-    falls = {"density": 700.0, "material": "metal", "velocity": (0.1, 0.0, 0.0), "angular_velocity": (0.0, 1.0, 0.0)}
-    yield "Body", Call(wb.Body, falls, lambda made: fall(path, made))
-    yield "Body(mass)", Call(wb.Body, {"mass": 1.0}, lambda made: fall(path, made))
-    against = {"name": "rubber", "against": {"wood": (0.8, 0.9)}, "others": (0.5, 0.5)}
-    yield "Material", Call(wb.dynamics.Material, against, lambda made: fall(path, wb.Body(material=made)))
     moved = {**thing, "body": wb.Body()}
     yield "Scene.add(body)", Call(lambda **given: scene(path).add(**given), moved)
     yield "Scene.add(material)", Call(lambda **given: scene(path).add(**given), {**thing, "material": "metal"})
-    yield "RigidBodies", Call(RigidBodies, {"scene": falling(path, wb.Body()), "gravity": (0.0, 0.0, -9.81)})
-    engine = RigidBodies(falling(path, wb.Body()))
-    yield "RigidBodies.advance", Call(engine.advance, {"dt": 0.01, "kinematic": {}})
-    yield "RigidBodies.placement", Call(engine.placement, {"name": "faller"})
-    yield "RigidBodies.twist", Call(engine.twist, {"name": "faller"})
     yield "Capsule", Call(wb.Capsule, {"radius": 1.0, "length": 1.0}, put)
     yield "Ellipsoid", Call(wb.Ellipsoid, {"semi_axes": (1.0, 1.0, 1.0)}, put)
     yield "HalfSpace", Call(wb.HalfSpace, {"normal": (0.0, 0.0, 1.0), "offset": 0.0}, put)
@@ -557,14 +536,6 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Viewer.color", Call(viewer.color, {"segments": {"link1": (1.0, 0.0, 0.0)}}, lambda _: viewer.show(q))
     yield "Viewer.look", Call(viewer.look, {"eye": at, "target": (0.0, 0.0, 0.0)}, lambda _: viewer.show(q))
     yield "Viewer.save", Call(viewer.save, {"path": path / "x.html"})
-    yield "Parts", Call(Parts, {"parts": {"one": [Part(wb.Sphere(0.1))]}}, Viewer)
-    yield "Parts(part)", Call(lambda part: Parts({"one": [part]}), {"part": Part(wb.Sphere(0.1))}, Viewer)
-    part = {"shape": wb.Sphere(0.1), "at": at, "color": (1.0, 0.0, 0.0, 1.0)}
-    yield "Part", Call(Part, part, lambda made: shown(Parts({"one": [made]})))
-    one = Parts({"one": [Part(wb.Sphere(0.1))]})
-    yield "Parts.posture", Call(one.posture, {"placements": {"one": at}})
-    yield "Parts.posture(at)", Call(lambda at: one.posture({"one": at}), {"at": at})
-    yield "Parts.contacts", Call(one.contacts, {"q": one.posture({"one": at}), "within": 0.1})
 
     followed = {
         "scene": there,
@@ -789,11 +760,6 @@ def human() -> wb.Figure:
     return wb.load("human")
 
 
-def shown(parts: Parts) -> None:
-    with Viewer(parts) as viewer:
-        viewer.show(np.array(pin.neutral(parts.model)))
-
-
 def public() -> Iterator[tuple[str, Any]]:
     """Names and objects of the reference page, of `wholebody.__all__` and of `wholebody.tracking.__all__`."""
     for entry in re.findall(r"^::: ([\w.]+)$", (ROOT / "docs" / "reference.md").read_text(), re.MULTILINE):
@@ -824,17 +790,13 @@ def surface() -> list[str]:
 
 ANSWERS = (
     "SceneObject", "Contacts", "ObjectPenetration", "FirstContact", "Piece", "Solution", "TraceEntry", "Assessment",
-    "Task", "Step", "QPStep", "Simplified", "LeftOut",
-    "Recording", "Judgement", "Dragged", "DragJudgement", "InteractionScene", "Wrench", "Recording.of",
-    "Scene.of_parts", "ClipCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding", "Deviation",
-    "Torques", "SphereFilling", "AssemblySolution", "AssemblyStep",
-    "SolveRecord", "SolveRecord.of", "SolveRecord.row", "SolveRecord.as_json", "SolveRecord.from_json", "SolveProgress",
-    "Records.to_parquet", "ReachMap", "Accommodation", "Ergonomics", "BodyAngles", "Rula", "Reba", "StaticTorques",
-    "Sight", "Result", "Contacts.joined",
-    "Scene.of_parts", "ClipCheck", "DerivativeCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding",
-    "Deviation",
-    "Torques", "SphereFilling",
-    "Torques", "SphereFilling", "AvoidedCase", "BatchProgress", "WorldFrame", "Overlap", "EngineFrame", "Event",
+    "Task", "Step", "QPStep", "Simplified", "LeftOut", "Recording", "Judgement", "Dragged", "DragJudgement",
+    "InteractionScene", "Wrench", "Recording.of", "Scene.of_parts", "ClipCheck", "Beyond", "Avoided",
+    "AvoidanceReport", "Contact", "Sliding", "Deviation", "Torques", "SphereFilling", "AssemblySolution",
+    "AssemblyStep", "SolveRecord", "SolveRecord.of", "SolveRecord.row", "SolveRecord.as_json",
+    "SolveRecord.from_json", "SolveProgress", "Records.to_parquet", "ReachMap", "Accommodation", "Ergonomics",
+    "BodyAngles", "Rula", "Reba", "StaticTorques", "Sight", "Result", "Contacts.joined", "DerivativeCheck",
+    "AvoidedCase", "BatchProgress", "WorldFrame", "Overlap", "EngineFrame", "Event",
 )  # fmt: skip
 """What calls return: nobody builds it, so its constructor is not fed."""
 
