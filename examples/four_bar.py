@@ -11,7 +11,6 @@ from presenting import DARK, OAK, STEEL, command_line
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.bench import plot_style as style
-from wholebody.geometry.shapes import Compound
 
 GROUND, CRANK, COUPLER, ROCKER = 0.40, 0.12, 0.36, 0.28  # m: a crank-rocker, for 0.12 + 0.40 < 0.36 + 0.28
 TRACER = np.array((0.18, 0.0, 0.16))  # m: the point of the coupler whose curve is drawn
@@ -83,19 +82,18 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> list[dict[str, 
 
 def drawn() -> wb.Assembly:
     """The bars as they are drawn: bodies of the same names without joints, and two posts that represent the ground."""
-    upright = pin.rpy.rpyToMatrix(0.0, 0.5 * np.pi, 0.0)  # the capsule's z along the bar's x
 
-    def rod(length: float, y: float) -> tuple[wb.Shape, pin.SE3]:
-        return wb.Capsule(radius=0.012, length=length), pin.SE3(upright, np.array((0.5 * length, y, 0.0)))
+    def rod(end: Array, y: float, radius: float) -> tuple[wb.Shape, pin.SE3]:
+        turn = 0.5 * np.pi - np.arctan2(end[2], end[0])  # the capsule's z along the bar
+        middle = pin.SE3(pin.rpy.rpyToMatrix(0.0, turn, 0.0), 0.5 * end + (0.0, y, 0.0))
+        return wb.Capsule(radius, float(np.linalg.norm(end))), middle
 
-    long, turn = float(np.linalg.norm(TRACER)), 0.5 * np.pi - np.arctan2(TRACER[2], TRACER[0])
-    arm = wb.Capsule(radius=0.007, length=long), pin.SE3(pin.rpy.rpyToMatrix(0.0, turn, 0.0), 0.5 * TRACER)
-    tracer = wb.Sphere(0.014), pin.SE3(np.eye(3), TRACER)
-    made = wb.Assembly().body("crank", shape=Compound((rod(CRANK, -0.03),)), color=DARK)
-    made.body("coupler", shape=Compound((rod(COUPLER, 0.0), arm, tracer)), color=STEEL)
-    made.body("rocker", shape=Compound((rod(ROCKER, -0.03),)), color=OAK)
-    for name, x in (("left post", 0.0), ("right post", GROUND)):
-        made.add(wb.Box((0.06, 0.1, 0.03)), name=name, at=(x, 0.0, -0.03), color=DARK)
+    x = np.array((1.0, 0.0, 0.0))
+    coupler = [rod(COUPLER * x, 0.0, 0.012), rod(TRACER, 0.0, 0.007), (wb.Sphere(0.014), TRACER)]
+    made = wb.Assembly().body("crank", shape=[rod(CRANK * x, -0.03, 0.012)], color=DARK)
+    made.body("coupler", shape=coupler, color=STEEL).body("rocker", shape=[rod(ROCKER * x, -0.03, 0.012)], color=OAK)
+    for name, at in (("left post", 0.0), ("right post", GROUND)):
+        made.add(wb.Box((0.06, 0.1, 0.03)), name=name, at=(at, 0.0, -0.03), color=DARK)
     return made
 
 
