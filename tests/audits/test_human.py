@@ -8,7 +8,7 @@ import pytest
 from tests.audits.human_contacts import distance
 from tests.audits.human_sizes import _girth, dimensions, ranges
 from wholebody.figures import load
-from wholebody.view.surface.fields import ball, round_cone, union
+from wholebody.figures.surface.fields import ball, round_cone, union
 
 
 def test_a_girth_is_that_of_the_hull() -> None:
