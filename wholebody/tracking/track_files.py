@@ -160,7 +160,7 @@ def _columns(place: str, first: list[str], wanted: list[str]) -> list[str]:
         known(name, wanted, "column", place)
     twice = [name for name in wanted if names.count(name) > 1]
     if twice:
-        raise FileFormatError(f"{place}: the column {twice[0]} stands there twice; leave one out")
+        raise FileFormatError(f"{place}: the column {twice[0]} occurs twice; leave one out")
     missing = [name for name in wanted if name not in names]
     root = [name for name in missing if name in ROOT_COLUMNS]
     if TIME in missing:
@@ -186,7 +186,7 @@ def _numbers(
             rows.append([float(value) for value in line])
         except ValueError:
             wrong = next(value for value in line if not is_number(value))
-            raise FileFormatError(f"{path.name}, line {number}: {shown(wrong)} is no number") from None
+            raise FileFormatError(f"{path.name}, line {number}: {shown(wrong)} is not a number") from None
         places.append(number)
         decimals = max(decimals, len(line[at].strip().partition(".")[2]) if "e" not in line[at].lower() else 17)
     if len(rows) < 2:
@@ -221,4 +221,4 @@ def _lines(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
             if line:
                 yield reader.line_num, line
     except csv.Error as error:
-        raise FileFormatError(f"{path.name}, line {reader.line_num}: is no CSV ({error})") from None
+        raise FileFormatError(f"{path.name}, line {reader.line_num}: is not CSV ({error})") from None
