@@ -111,7 +111,10 @@ def retarget_motions(arguments: argparse.Namespace) -> int:
     motion = read_skeleton(arguments.files[0], unit=arguments.unit, up=arguments.up)
     figure = figure_of(arguments)
     with bar("retargeting") as tell:
-        clip = retarget(motion, figure, arguments.names, progress=lambda share: tell(share, "retargeting"))
+        clip = retarget(
+            motion, figure, ground=None if arguments.ground == "none" else "auto", names=arguments.names,
+            progress=lambda share: tell(share, "retargeting"),
+        )  # fmt: skip
     print(f"wrote {clip.write(arguments.out)}: {len(clip)} frames, {clip.duration:.3f} s, of {figure.name}")
     return 0
 
