@@ -151,7 +151,7 @@ def test_a_person_stands_on_the_floor_and_does_not_slide(human: wb.Figure) -> No
     loose = wb.retarget(motion, human, ground=None)
     assert slides(loose, stands).mean() > 2e-2  # legs are of other lengths
     errors = [np.median(np.concatenate(list(wb.motion.bone_errors(motion, each).values()))) for each in (clip, loose)]
-    assert errors[0] - errors[1] < np.radians(1.0)
+    assert errors[0] - errors[1] < np.radians(1.5)
 
 
 def test_a_person_climbs_stairs_that_stand_there(human: wb.Figure) -> None:

@@ -81,14 +81,17 @@ def convert(arguments: argparse.Namespace) -> int:
     "skeletons' motions for a figure",
     """\
 Turn the motion of a skeleton (BVH, AMASS) into a clip of a figure of any proportions: directions of limbs as recorded,
-within joint limits and reach cones, smooth, standing feet held. The clip may collide with itself: `wholebody clip
-check` says where, `wholebody clip avoid` frees it. Several files are written into a folder; what it holds already is
+within joint limits, speed limits and reach cones, smooth, what rests held on the ground, free of itself and the floor.
+`wholebody clip check` says what is left. Several files are written into a folder; what it holds already is
 not made again.""",
     *MOTIONS,
     option(
         "out", type=Path, metavar="OUT", help="the file to write: .npz, .bvh, .csv, .txt or .glb; of several a folder"
     ),
     option("--names", type=Path, metavar="FILE.toml", help="which bone is which part"),
+    option(
+        "--ground", choices=("auto", "none"), default="auto", help="find where feet rest, or follow the skeleton alone"
+    ),
     option("--unit", metavar="UNIT", help="of lengths, such as centimetres (default: recognised)"),
     option("--up", choices=("y", "z"), help="the axis that points up (default: recognised)"),
     *JOBS,
