@@ -14,6 +14,7 @@ from wholebody.figures.figure import Figure
 from wholebody.geometry.pieces import box_corners
 from wholebody.motion.roles import Roles
 from wholebody.motion.skeleton import RIGID, SkeletonMotion
+from wholebody.motion.soles import soled
 from wholebody.motion.standing_ground import Ground
 
 SMALL = 1e-9
@@ -110,7 +111,7 @@ def rest_axes(motion: SkeletonMotion, roles: Roles) -> Array | None:
     return np.stack([np.cross(left, up), left, up], axis=1)
 
 
-def targets(motion: SkeletonMotion, figure: Figure, roles: Roles, ground: Ground | None, path: float | None) -> Targets:
+def targets(motion: SkeletonMotion, figure: Figure, roles: Roles, ground: Ground, path: float | None) -> Targets:
     """Goals of all frames; where the skeleton's feet stand on the lowest level, the figure's are near the plane z = 0.
 
     `path` is the metres of the figure for each metre of the way and of the ground's heights; None for as many as its
@@ -119,7 +120,8 @@ def targets(motion: SkeletonMotion, figure: Figure, roles: Roles, ground: Ground
     places, turned, lowest = standing_places(figure, roles)
     own = _Body(places)
     joint = {role: motion.names.index(name) for role, name in roles.joints.items()}
-    source = _Body({role: motion.positions[:, k] for role, k in joint.items()})
+    centres = {role: motion.positions[:, k] for role, k in joint.items()}
+    source = _Body(centres | soled(motion, roles, ground.rests, places))
     turns = _turns(motion, joint, own, turned, rest_axes(motion, roles))
     root, scale = turns.get("pelvis", _pelvis(source, motion)), 1.0
     if figure.root == "fixed":  # only what moves relative to the pelvis can be followed
@@ -132,10 +134,10 @@ def targets(motion: SkeletonMotion, figure: Figure, roles: Roles, ground: Ground
     else:
         scale = _leg(own) / max(_leg(source), SMALL) if _leg(own) and _leg(source) else 1.0
         path = scale if path is None else path
-        under = np.zeros(len(motion)) if ground is None else ground.below(len(motion))
+        under = ground.below(len(motion))
         hips = np.array([path, path, scale]) * source.places["hips"]
         hips[:, 2] += (path - scale) * under
-        lows = {} if ground is None else ground.lowest
+        lows = ground.lowest
         foot = next((part for part in ("left_ankle", "left_toe") if part in lows and own.has(part)), None)
         if foot is not None:
             hips[:, 2] += own.places[foot][2] - lowest - scale * lows[foot]

@@ -15,9 +15,10 @@ from wholebody.geometry.shapes import HalfSpace
 from wholebody.motion.clip import Clip
 from wholebody.motion.held_points import Holds, held_points, surface_of
 from wholebody.motion.retarget_run import Run
-from wholebody.motion.retarget_targets import LIMBS, known_bones, targets
+from wholebody.motion.retarget_targets import LIMBS, known_bones, standing_places, targets
 from wholebody.motion.roles import Roles, matched
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
+from wholebody.motion.soles import soled
 from wholebody.motion.stance import paths
 from wholebody.motion.standing_ground import NOTHING, Ground
 from wholebody.motion.standing_ground import ground as find_ground
@@ -81,13 +82,13 @@ def retarget(
             "name both ends of one"
         )
     world = Scene(figure) if scene is None else scene
-    if scene is None and found is not None and figure.root == "free":
+    if scene is None and ground is not None and figure.root == "free":
         world.add(HalfSpace(), name="floor")
     holds = None
-    if found is not None or scene is not None:
-        found = NOTHING if found is None else found
-        surface = surface_of(scene) if scene is not None else None
-        holds = Holds(held_points(figure, roles, found), found, wanted.path, motion.dt, surface)
+    if ground is not None or scene is not None:
+        held = NOTHING if ground is None else found
+        surface = None if scene is None else surface_of(scene)
+        holds = Holds(held_points(figure, roles, held), held, wanted.path, motion.dt, surface)
     with world.borrow() as workspace:
         clip = Clip(
             figure, Run(figure, wanted, roles, motion.dt, holds, workspace).run(progress), motion.dt, motion.name
@@ -108,13 +109,11 @@ def _ground(
     figure: Figure,
     given: object,
     names: str | os.PathLike[str] | Mapping[str, Mapping[str, str]] | None,
-) -> Ground | None:
-    """The ground of a recording, as it is asked for."""
-    if given is None:
-        return None
+) -> Ground:
+    """The ground of a recording, stated or found."""
     if figure.root != "free":  # no ground moves with a pelvis
         return NOTHING
-    if isinstance(given, str) and given == "auto":
+    if given is None or (isinstance(given, str) and given == "auto"):
         return find_ground(motion, names)
     found = instance(given, Ground, "retarget: ground", 'give "auto", wb.motion.ground(motion) or None')
     if any(len(mask) != len(motion) for mask in found.rests.values()) or any(
@@ -140,6 +139,7 @@ def bone_errors(
 
     Returns:
         Errors by names such as "left_shoulder to left_elbow"; a bone without both ends, or without a length, has none.
+        Those of feet are between soles: skeletons have ankles and toes at other heights above them.
 
     Raises:
         InputError: the clip has another number of frames, or no bones are known to belong to the figure.
@@ -157,9 +157,13 @@ def errors_of(motion: SkeletonMotion, clip: Clip, roles: Roles) -> dict[str, Arr
     """`bone_errors` with known roles."""
     ways = paths(clip.figure, clip.q, tuple(roles.frames.values())).swapaxes(0, 1)
     places = dict(zip(roles.frames, ways, strict=True))
+    centres = {role: motion.positions[:, motion.names.index(joint)] for role, joint in roles.joints.items()}
+    if clip.figure.root == "free":
+        named = {"skeleton": roles.joints}
+        centres |= soled(motion, roles, find_ground(motion, named).rests, standing_places(clip.figure, roles)[0])
     found = {}
     for ends in (ends for side in ("left", "right") for limb in LIMBS for ends in known_bones(limb, side, places)):
-        start, end = (motion.positions[:, motion.names.index(roles.joints[role])] for role in ends)
+        start, end = (centres[role] for role in ends)
         theirs, ours = end - start, places[ends[1]] - places[ends[0]]
         lengths = np.linalg.norm(theirs, axis=1) * np.linalg.norm(ours, axis=1)
         if lengths.min() > 1e-9:
