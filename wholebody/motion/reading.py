@@ -90,7 +90,7 @@ def read_clip(
     try:
         if frames is None:
             assert motion is not None
-            return retarget(motion, figure, names)
+            return retarget(motion, figure, names=names)
         return Clip(figure, frames.q, frames.dt, frames.name)
     except InputError as error:
         raise FileFormatError(f"{one_line(path.name)}: {error}") from None
