@@ -24,6 +24,7 @@ ROOMS = (
         "methods",
         "tracking",
         "motion",
+        "planning",
         "dynamics",
         "ergonomics",
         "taskfile",
