@@ -9,7 +9,7 @@ held (as projections do, Berenson and others 2011).
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -31,7 +31,13 @@ GAIN = 5e-3  # rad, m: by which a step comes nearer at least; smaller = longer m
 
 
 class LocalPlanner(Protocol):
-    """Makes the edges of trees."""
+    """Makes the edges of trees.
+
+    Attributes:
+        searches: how many paths are looked for, of which the shortest counts; more = shorter, later.
+    """
+
+    searches: ClassVar[int]
 
     def admit(self, q: Array) -> None:
         """Let motions be as near to things as the posture q (nq,) is, which is an end of the whole motion."""
@@ -49,6 +55,8 @@ class LocalPlanner(Protocol):
 class Geodesics:
     """Geodesics of Pinocchio, for figures that hold nothing."""
 
+    searches = 8
+
     def __init__(self, problem: Problem, workspace: Workspace, resolution: float = 0.2) -> None:
         """Take a problem without constraints, and the length of a part of a motion, radians."""
         self._workspace, self._model, self._resolution = workspace, workspace.model, resolution
@@ -63,6 +71,11 @@ class Geodesics:
         """See `LocalPlanner`."""
         near = self._workspace.near(q, self._clearance + MARGIN + NOISE)
         self._required[near.number] = np.minimum(self._required[near.number], near.distance - NOISE)
+
+    def free(self, q: Array) -> bool:
+        """Whether a posture (nq,) keeps the distances."""
+        near = self._workspace.near_views(q, WITHIN)
+        return not (near.distance < self._required[near.number]).any()
 
     def towards(self, q: Array, target: Array, most: float = np.inf) -> tuple[list[Array], bool]:
         """See `LocalPlanner`."""
@@ -98,6 +111,8 @@ class Geodesics:
 
 class TrackedMotions:
     """Motions by steps of the QP tracker, for figures that hold something on the way."""
+
+    searches = 2
 
     def __init__(self, problem: Problem) -> None:
         """Take a problem whose constraints and bounds hold on the way."""

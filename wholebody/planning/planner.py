@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -33,7 +33,6 @@ KEPT = 1e-4  # m, rad: by which limits, constraints and clearances may be missed
 PASSED = 5e-4  # m: overlap between two frames that counts
 OVER = 1.001  # of the limits of velocity and acceleration: the last slowing may end a little above them
 ENDS = 8  # postures that meet goals; more = ends that are reached more easily, for a solve each
-RUNS = 8  # searches, of whose paths the shortest counts; more = shorter, later
 ENOUGH = 1500  # postures of all trees, after which no other search begins
 ROOM = 1.0  # m: by which samples move a free root along each axis
 ROUNDS = 50  # of the trees, until they get another end
@@ -105,7 +104,7 @@ def plan(
     goals = _goals(goal)
     problem = Problem(scene, start, goals=goals, constraints=constraints, clearance=clearance)
     _check_end(problem, problem.start, "start")
-    ends = _answers(problem, rng) if goals else iter([_posture(problem, goal)])
+    ends = _answers(problem, rng) if goals else iter([_End(_posture(problem, goal))])
 
     def ended() -> bool:
         return processor_time() - began > limit
@@ -144,13 +143,21 @@ def _check_end(problem: Problem, q: Array, what: str) -> None:
             raise InputError(f"plan: the {what} is {by:.3g} m or rad beyond {name}; give a posture of wb.solve")
 
 
-def _answers(problem: Problem, rng: np.random.Generator) -> Iterator[Array | str]:
-    """Postures (nq,) that meet the goals, or in words why one was not found."""
+class _End(NamedTuple):
+    """A posture (nq,) at which a motion may end; None where goals were not met, and why."""
+
+    q: Array | None
+    why: str = ""
+
+
+def _answers(problem: Problem, rng: np.random.Generator) -> Iterator[_End]:
+    """Ends that meet the goals: from the start, then from random postures."""
     solution = QP().solve(problem)
-    yield solution.q if solution.solved else solution.message
+    yield _End(solution.q if solution.solved else None, solution.message)
     for _ in range(ENDS - 1):
-        solution = QP(restarts=0, budget=0).solve(problem.with_start(_drawn(problem, problem.start, 1.0, rng)))
-        yield solution.q if solution.solved else solution.message
+        start = problem.with_start(_drawn(problem, problem.start, 1.0, rng))
+        solution = QP(restarts=0, budget=0).solve(start)
+        yield _End(solution.q if solution.solved else None, solution.message)
 
 
 def _drawn(problem: Problem, near: Array, spread: float, rng: np.random.Generator) -> Array:
@@ -169,7 +176,7 @@ class _Search:
         self,
         problem: Problem,
         local: LocalPlanner,
-        ends: Iterator[Array | str],
+        ends: Iterator[_End],
         rng: np.random.Generator,
         ended: Callable[[], bool],
     ) -> None:
@@ -182,7 +189,7 @@ class _Search:
     def shortest(self) -> tuple[list[Array] | None, str]:
         """The shortest of some paths, with shortcuts, and how it was found; or None and why there is none."""
         model, best, most, size, runs = self._problem.scene.model, None, np.inf, 0, 0
-        while runs < RUNS and size < ENOUGH and not self._ended():
+        while runs < self._local.searches and size < ENOUGH and not self._ended():
             path, trees = self._path()
             runs, size = runs + 1, size + trees.size
             if path is None:
@@ -202,26 +209,26 @@ class _Search:
         """A path from the start to an end by new trees, which stay empty where it is straight."""
         start, model, rounds = self._problem.start, self._problem.scene.model, 0
         trees = RRTConnect(self._local, model, start)
-        for end in self._reached:
-            trees.add_end(end)
+        for reached in self._reached:
+            trees.add_end(reached)
         while not self._ended():
             if rounds % ROUNDS == 0 or not self._reached:
                 end = next(self._ends, None)
-                if isinstance(end, str):
-                    self._said = self._said or end
-                    continue
-                if end is not None:
-                    self._local.admit(end)
-                    way, met = self._local.towards(start, end)
-                    if met:
-                        return [start, *way[:-1], end], trees
-                    trees.add_end(end)
-                    self._reached.append(end)
-                elif not self._reached:
+                if end is None and not self._reached:
                     break
+                if end is not None and end.q is None:
+                    self._said = self._said or end.why
+                    continue
+                if end is not None and end.q is not None:
+                    self._local.admit(end.q)
+                    way, met = self._local.towards(start, end.q)
+                    if met:
+                        return [start, *way[:-1], end.q], trees
+                    trees.add_end(end.q)
+                    self._reached.append(end.q)
             rounds += 1
-            end = self._reached[self._rng.integers(len(self._reached))]
-            middle = np.asarray(pin.interpolate(model, start, end, self._rng.uniform()))
+            near = self._reached[self._rng.integers(len(self._reached))]
+            middle = np.asarray(pin.interpolate(model, start, near, self._rng.uniform()))
             spread = self._spreads[self._rng.integers(len(self._spreads))]
             path = trees.grow(_drawn(self._problem, middle, spread, self._rng))
             if path is not None:

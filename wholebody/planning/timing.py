@@ -134,7 +134,7 @@ def squared_rates(first: Array, second: Array, velocity: Array, acceleration: Ar
 
 
 def _bounds_of_u(first: Array, second: Array, acceleration: Array) -> tuple[Array, Array, Array, Array]:
-    """Bounds of u: it lies between ``low + low_slope b`` and ``high + high_slope b``, an entry for each joint that moves."""
+    """Coefficients: u lies between ``low + low_slope b`` and ``high + high_slope b``, for each joint that moves."""
     moving = np.abs(first) > 1e-12
     size, turn = np.abs(first[moving]), second[moving] / first[moving]
     reach = acceleration[moving] / size
