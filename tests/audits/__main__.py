@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from wholebody.base.checks import number
-from wholebody.base.errors import InputError, WholebodyError
+from wholebody.base.errors import WholebodyError
 from wholebody.base.files import make_folder
 from wholebody.bench.rows import only, report
 from wholebody.bench.tables import machine, write_rows, write_text
