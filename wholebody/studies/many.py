@@ -9,6 +9,9 @@ from dataclasses import dataclass, is_dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
+import numpy as np
+import pinocchio as pin
+
 from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.batches import run_batch, shared
@@ -21,6 +24,7 @@ from wholebody.problem import Problem
 from wholebody.studies.records import ENDED, REFUSED, Records, RecordStore, SolveRecord
 from wholebody.studies.sending import Sender, Sent
 from wholebody.tasks.answers import is_own
+from wholebody.tasks.bounds import Freeze
 from wholebody.version import __version__
 
 MOST_JOBS = 4096
@@ -326,7 +330,7 @@ def _solved(make: Make, method: Method, q: Array | None) -> SolveRecord:
     try:
         problem = check_problem(make(), "the task's answer")
         if q is not None and q.shape == problem.start.shape:
-            warm = empty.of(method.solve(problem.with_start(q)))
+            warm = empty.of(method.solve(_begun(problem, q)))
             if warm.solved:
                 return warm
         return empty.of(method.solve(problem))
@@ -341,9 +345,18 @@ def _solve_from(given: Sequence[_Start], method: Method) -> list[dict[str, Any] 
     answers: list[dict[str, Any] | None] = []
     for make, q in given:
         problem = check_problem(make(), "the task's answer")
-        record = SolveRecord("").of(_alone(method).solve(problem.with_start(q)))
+        record = SolveRecord("").of(_alone(method).solve(_begun(problem, q)))
         answers.append({name: getattr(record, name) for name in _ANSWERED} if record.solved else None)
     return answers
+
+
+def _begun(problem: Problem, q: Array) -> Problem:
+    """A problem that begins at the answer (nq,) of another one, where that is free to move: what is frozen stays."""
+    model, away = problem.scene.model, np.asarray(pin.difference(problem.scene.model, problem.start, q))
+    for bound in problem.bounds:
+        if isinstance(bound, Freeze):
+            away[problem.scene.figure.dofs(bound.joints)] = 0.0
+    return problem.with_start(np.asarray(pin.integrate(model, problem.start, away)))
 
 
 def _alone(method: Any) -> Any:
