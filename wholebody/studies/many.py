@@ -40,6 +40,9 @@ T = TypeVar("T")
 _Start = tuple[Make, Any]
 """A problem, and the posture (nq,) from which it is solved."""
 
+_Run = tuple[Any, Sequence[Make]]
+"""The posture (nq,) from which the first of some problems is tried, None for its own start; and the problems."""
+
 
 class SolveProgress(NamedTuple):
     """Told when a problem is done.
@@ -127,7 +130,8 @@ def solve_many(
         cluster: address of a dask scheduler that runs them; None for this machine.
         warm_start: begin each problem at the answer of the one before it, if that is solved and of the same figure.
             One that is not solved from there is solved from its own start. Runs of 16 problems in the order given are
-            linked so, whatever `jobs` is. An answer may then be another local solution than without.
+            linked so, and their first ones, whatever `jobs` is. An answer may then be another local solution than
+            without.
         seconds: deadline of each problem, by the clock; its record's outcome is then "ended". None for none.
         folder: keeps the records (`records.sqlite`). What it holds already of the same problem and method is not solved
             again: a run that was ended goes on. Made if it does not exist.
@@ -187,10 +191,15 @@ def run_cases(runs: Sequence[Sequence[Case]], running: Running, store: RecordSto
 
     over = tell is not None and tell(SolveProgress(len(done), len(order), None)) is True
     waiting = [run for run in numbered if any(k not in done for k in run)]
-    alone: list[range] = []
-    for work in (waiting, alone):  # the cases of a run whose process ended are done again, one by one
+    # The first of each run begin at each other's answers, one after the other, and the rest of a run at its first: so
+    # all runs are of one family of postures, whatever `jobs` is.
+    linked = [run for run in waiting if len(run) > 1]
+    heads, alone = [[run[0] for run in linked]] if len(linked) > 1 else [], list[Sequence[int]]()
+    tails = [run[1:] if heads else run for run in linked] + [run for run in waiting if len(run) == 1]
+    for work in (heads, tails, alone):  # the cases of a run whose process ended are done again, one by one
         if not over and work:
-            over = _run(work, order, running, keep, alone)
+            begun = {k: done[k - 1].q for run in tails for k in run[:1] if heads and work is tails and k - 1 in done}
+            over = _run(work, order, running, keep, alone, begun)
     if not over and waiting:
         _from_neighbours(order, done, running, keep)
     return Records([done.get(k, order[k].record) for k in range(len(order))])
@@ -249,23 +258,29 @@ def _nearest(
 
 
 def _run(
-    work: Sequence[range], order: Sequence[Case], running: Running, keep: Callable[[int, SolveRecord], bool],
-    alone: list[range],
+    work: Sequence[Sequence[int]], order: Sequence[Case], running: Running, keep: Callable[[int, SolveRecord], bool],
+    alone: list[Sequence[int]], begun: Mapping[int, Any],
 ) -> bool:  # fmt: skip
-    """Do runs; whether the caller ended them. Runs of several cases whose process ended are left in `alone`."""
+    """Do runs; whether the caller ended them. Runs of several cases whose process ended are left in `alone`.
+
+    `begun` has the posture (nq,), or None, from which the first case of a run is tried before its own start.
+    """
     sender = Sender()
 
-    def here(run: range) -> Any:
-        return _solve_runs([[order[k].make for k in run]], running.method)[0]
+    def made(run: Sequence[int]) -> _Run:
+        return begun.get(run[0]), [order[k].make for k in run]
 
-    def there(runs: list[range], full: bool) -> Job:
-        given = sender.sent([[order[k].make for k in run] for run in runs], full)
+    def here(run: Sequence[int]) -> Any:
+        return _solve_runs([made(run)], running.method)[0]
+
+    def there(runs: list[Sequence[int]], full: bool) -> Job:
+        given = sender.sent([made(run) for run in runs], full)
         return Job(runs, _sent_to, (_solve_runs, given, running.method), (running.seconds or 0.0) * len(runs[0]))
 
     with closing(_done(work, [order[k] for run in work for k in run], running, (here, there))) as outcomes:
         for run, answers, error in outcomes:
             if error is not None and len(run) > 1:
-                alone.extend(range(k, k + 1) for k in run)
+                alone.extend([k] for k in run)
                 continue
             found = [{"outcome": ENDED, "message": str(error)}] if error is not None else answers
             for k, answer in zip(run, found, strict=True):
@@ -306,11 +321,10 @@ def _sent_to(function: Callable[[Any, Method], Any], given: Sent, method: Method
     return function(value, method)
 
 
-def _solve_runs(runs: Sequence[Sequence[Make]], method: Method) -> list[list[dict[str, Any]]]:
+def _solve_runs(runs: Sequence[_Run], method: Method) -> list[list[dict[str, Any]]]:
     """Solve the problems of runs: what their records say."""
     answers: list[list[dict[str, Any]]] = []
-    for run in runs:
-        q = None
+    for q, run in runs:
         answers.append([])
         for make in run:
             record = _solved(make, method, q)

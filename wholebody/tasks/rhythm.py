@@ -1,4 +1,4 @@
-"""Measure: how shoulder girdle, lumbar spine and knees share the motion of arm, pelvis and hips, and the stance."""
+"""Measure: how shoulder girdle, lumbar spine and knees share the motion of arm, pelvis and hips."""
 
 from __future__ import annotations
 
@@ -37,14 +37,6 @@ is 16, 32, 58 and 75. He squats more than most: people who lift as they like nei
 (Davis et al. 2002, Occupational Ergonomics 3(2)), so the share, and the weight, are an ESTIMATE beside his."""
 
 
-STANCE_WEIGHT = 10.0
-"""1/rad^2, beside an effort of 3 for a hip's flexion and 10 for its abduction: a stride or a straddle as deep as a squat
-must be worth it. ESTIMATE."""
-
-LINEAR = -1.0
-"""Onset of a joint that follows another one at every angle."""
-
-
 Three: TypeAlias = tuple[int, int, int]
 
 
@@ -52,8 +44,7 @@ class Elevation(NamedTuple):
     """A joint that follows the elevation e of a limb: its usual angle is ``most (1 - cos e) + rest``.
 
     With an onset o it follows the flexion f alone: ``most (f + sqrt(f^2 + o^2) - o) / 2 + rest``, which is about
-    ``most f`` where f is much more than o, and does not change where the limb is bent back. With the onset `LINEAR` it
-    is ``most f + rest``.
+    ``most f`` where f is much more than o, and does not change where the limb is bent back.
     """
 
     idx_q: Three  # the joint, flexion and abduction of the limb: places in the posture
@@ -74,15 +65,13 @@ class Lumbar(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Rhythm(Measure):
-    """Squared distance of clavicles, spine, knees and stance from their usual share of a motion [rad^2, weighted].
+    """Squared distance of clavicles, lumbar spine and knees from their usual share of a motion [rad^2, weighted].
 
-    ``100 sum (c - 13 deg (1 - cos e))^2 + 25 sum (k - k_0)^2 + 10 ((d - d_0)^2 + (w - w_0)^2) + 10 (l - l_0)^2``:
+    ``100 sum (c - 13 deg (1 - cos e))^2 + 25 sum (k - k_0)^2 + 10 (l - l_0)^2``:
 
     - c is the elevation of a clavicle and e that of its arm in the clavicle (scapulohumeral rhythm);
     - k is the flexion of a knee beyond its share of the flexion f of its hip,
       ``0.9 (f + sqrt(f^2 + 0.4^2) - 0.4) / 2`` in radians, and k_0 the same at the start;
-    - d is the flexion of the left hip less that of the right one, and w the sum of their abductions, which is that of
-      the width of the stance; d_0 and w_0 the same at the start;
     - l is the flexion of the lumbar spine beyond its share of the tilt t of the pelvis, ``46 deg tanh(2.5 sin t)``, and
       l_0 the same at the start (lumbar-pelvic rhythm).
 
@@ -90,8 +79,7 @@ class Rhythm(Measure):
 
     Attributes:
         weight: factor on the measure.
-        knees: knees with their hips, and one hip with the other, once resolved; they count where there is a lumbar
-            spine.
+        knees: knees with their hips, once resolved; they count where there is a lumbar spine.
     """
 
     weight: inputs.Weight = 1.0
@@ -107,7 +95,6 @@ class Rhythm(Measure):
             raise InputError("Rhythm: this figure has no clavicles and no lumbar spine; leave the measure out")
         names = ("knee_flexion", "hip_flexion", "hip_abduction")
         knees = _elevations(figure, names, KNEE_WEIGHT, KNEE_SHARE, KNEE_ONSET) if lumbar is not None else ()
-        knees += _stance(figure) if lumbar is not None else ()
         knees = tuple(with_values(knee, rest=_beyond(start, knee)[0]) for knee in knees)
         return filled(self, girdles=girdles, knees=knees, lumbar=lumbar)
 
@@ -168,16 +155,6 @@ def _elevations(
     return tuple(found)
 
 
-def _stance(figure: Figure) -> tuple[Elevation, ...]:
-    """One hip's flexion with the other's, and one's abduction against the other's."""
-    pairs = [[f"{side}_hip_{motion}" for side in ("left", "right")] for motion in ("flexion", "abduction")]
-    return tuple(
-        Elevation(*_places(figure, (*names, names[1])), STANCE_WEIGHT, most, onset=LINEAR)
-        for names, most in zip(pairs, (1.0, -1.0), strict=True)
-        if _has(figure, names)
-    )
-
-
 def _has(figure: Figure, names: Sequence[str]) -> bool:
     return set(names) <= set(figure.joints)
 
@@ -199,8 +176,6 @@ def _lumbar(figure: Figure, start: Array) -> Lumbar | None:
 def _beyond(q: Array, part: Elevation) -> tuple[float, tuple[float, float, float]]:
     """Angle of a joint beyond its share [rad], and its slopes by the joint, flexion and abduction."""
     angle, flexion, abduction = (float(q[place]) for place in part.idx_q)
-    if part.onset == LINEAR:
-        return angle - part.most * flexion - part.rest, (1.0, -part.most, 0.0)
     if part.onset:
         root = math.hypot(flexion, part.onset)
         share, slope = 0.5 * (flexion + root - part.onset), 0.5 * (1.0 + flexion / root)

@@ -151,9 +151,7 @@ def rhythms(
     for e in range(len(elevations)):
         flexion, abduction = q[elevation_places[e, 1]], q[elevation_places[e, 2]]
         rise, onset = elevations[e, 1], elevations[e, 3]
-        if onset < 0.0:  # linear
-            share, slopes[1], slopes[2] = flexion, -rise, 0.0
-        elif onset > 0.0:
+        if onset > 0.0:
             root = np.sqrt(flexion * flexion + onset * onset)
             share = 0.5 * (flexion + root - onset)
             slopes[1], slopes[2] = -rise * 0.5 * (1.0 + flexion / root), 0.0
