@@ -5,12 +5,9 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, is_dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple, TypeVar
-
-import numpy as np
-import pinocchio as pin
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array
@@ -23,8 +20,8 @@ from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
 from wholebody.studies.records import ENDED, REFUSED, Records, RecordStore, SolveRecord, answer_of
 from wholebody.studies.sending import Sender, Sent
+from wholebody.studies.starting import begun_at, warmed
 from wholebody.tasks.answers import is_own
-from wholebody.tasks.bounds import Freeze
 from wholebody.version import __version__
 
 MOST_JOBS = 4096
@@ -336,7 +333,7 @@ def _solved(make: Make, method: Method, q: Array | None) -> dict[str, Any]:
     try:
         problem = check_problem(make(), "the task's answer")
         if q is not None and q.shape == problem.start.shape:
-            warm = method.solve(_begun(problem, q))
+            warm = method.solve(begun_at(problem, q))
             if warm.solved:
                 return answer_of(warm)
         return answer_of(method.solve(problem))
@@ -352,23 +349,9 @@ def _solve_from(given: Sequence[_Start], method: Method) -> list[dict[str, Any] 
     answers: list[dict[str, Any] | None] = []
     for make, q in given:
         problem = check_problem(make(), "the task's answer")
-        solution = _alone(method).solve(_begun(problem, q))
+        solution = warmed(method).solve(begun_at(problem, q))
         answers.append(answer_of(solution) if solution.solved else None)
     return answers
-
-
-def _begun(problem: Problem, q: Array) -> Problem:
-    """A problem that begins at the answer (nq,) of another one, where that is free to move: what is frozen stays."""
-    model, away = problem.scene.model, np.asarray(pin.difference(problem.scene.model, problem.start, q))
-    for bound in problem.bounds:
-        if isinstance(bound, Freeze):
-            away[problem.scene.figure.dofs(bound.joints)] = 0.0
-    return problem.with_start(np.asarray(pin.integrate(model, problem.start, away)))
-
-
-def _alone(method: Any) -> Any:
-    """The method without starts of its own, where it has such: those of the first solve led to nothing."""
-    return replace(method, restarts=0) if hasattr(method, "restarts") and is_dataclass(type(method)) else method
 
 
 def fingerprint(*asked: Any) -> str:
