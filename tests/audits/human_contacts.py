@@ -16,7 +16,7 @@ from wholebody.bench.suite.problem_sets.things import coal_distance
 from wholebody.figures.human.capsules import SPREAD
 
 if TYPE_CHECKING:
-from wholebody.figures.figure import Figure
+    from wholebody.figures.figure import Figure
 
 TOUCHING = 5.0
 """mm: parts nearer than this touch."""
