@@ -93,7 +93,7 @@ def qp(arguments: argparse.Namespace) -> None:
 @measuring(
     "human",
     "compare the person with people: sizes, ranges, self-contacts, everyday tasks",
-    "Measure the dimensions, circumferences and ranges of motion of the person beside those of people, "
+    "Measure the dimensions and ranges of motion of the person beside those of people, "
     "bring parts of the body together, and solve thirteen everyday tasks. With --update-docs the page becomes "
     "docs/human.md, with a picture of each contact and task.",
 )
