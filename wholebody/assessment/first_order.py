@@ -146,7 +146,7 @@ def _residual(asked: _Asked, state: State, active: _Active) -> Array:
     if not scale.any():
         return np.zeros(nv)
     _, left = _balanced(objective, signed, one_sided)
-    return left / scale
+    return np.asarray(left / scale)
 
 
 def _blockers(asked: _Asked, state: State, near: NearPairs, clearances: Array) -> tuple[Blocker, ...]:

@@ -105,8 +105,8 @@ class Multistart:
         if other is not None:
             self._accept(self._directly(other), "directly")
         self._find_closest()
-        self._descend_again()
-        self._restart_for_measure()
+        poor = self._descend_again()
+        self._restart_for_measure(max(self.budget.restarts_for_measure, SEARCH.poor if poor else 0))
         if self.best.violation.worst <= self.budget.tolerance:
             self.contradictions = ()  # by less than the tolerance
         if self._out_of_reach:  # although a closer posture may be near
@@ -210,8 +210,10 @@ class Multistart:
             return probe
         return self._descend(probe.q, "restart", most=max(self._left, 1))
 
-    def _descend_again(self) -> None:
+    def _descend_again(self) -> bool:
         """Where contacts are met by an end that is no local minimum of the measures, descend from beside it once more.
+
+        The answer is whether it is none even then.
 
         Steps along a curved surface can end early, and so they do at a kink: two points touch at once, and the one that
         counts as the contact is that which should leave. Beside the kink, along the gradient that nothing balances, the
@@ -220,11 +222,11 @@ class Multistart:
         problem, tolerance = self.problem, self.budget.tolerance
         touches = any(hasattr(term, "touches") for term in (*problem.goals, *problem.constraints))
         if not (touches and self.budget.measures and self.best.violation.worst <= tolerance):
-            return
+            return False
         for share in (0.3, 1.0, 0.1):  # of that step: more leaves more kinks, and comes to other minima
             judged = assess(problem, self.best.q)
-            if judged.optimality <= 1e-2 or self.control.over:  # rad: good answers are nearer to a local minimum
-                return
+            if judged.optimality <= SEARCH.optimal or self.control.over:
+                return False
             way = -share * judged.first_order.residual
             start = problem.scene.figure.clamp(np.asarray(pin.integrate(problem.scene.model, self.best.q, way)))
             local = self._descent(self.budget.iterations, None, "", tolerance=0.1 * tolerance).run(start)
@@ -234,13 +236,14 @@ class Multistart:
                 self._best = local  # what it costs more was bought with the tolerance
             else:
                 self._accept(local, self.how)
+        return assess(problem, self.best.q).optimality > SEARCH.optimal
 
-    def _restart_for_measure(self) -> None:
+    def _restart_for_measure(self, count: int) -> None:
         """Where all is met, search for a lower minimum of the measures from other starts, which are screened first.
 
         A feasible posture costs a few programs, and its measure tells which minimum it is near; a descent costs many.
         """
-        count, tolerance = self.budget.restarts_for_measure, self.budget.tolerance
+        tolerance = self.budget.tolerance
         if not (count and self.budget.measures and self.best.violation.worst <= tolerance):
             return
         rng, screened = np.random.default_rng([self.budget.seed, count]), SEARCH.screened * count
