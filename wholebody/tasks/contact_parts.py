@@ -106,7 +106,7 @@ class Gap(NamedTuple):
         return np.array([near.distance]), between(state, wrench, near.joint, near.against)
 
     def planes(self, state: State) -> SupportingPlanes:
-        """Of faces and edges that what touches is not beyond, and of the angle between the normals where a point is on its piece."""
+        """Of faces and edges that what touches is not beyond, and of the angle where a point is on its own piece."""
         near = nearest(self.first, self.second, state)
         if near.distance > PLANES_WITHIN:
             return no_planes(state.model.nv)
