@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import wholebody as wb
 from tests.answers import honest
-from wholebody.base.errors import InputError
+from wholebody.base.errors import InputError, TermError
 from wholebody.methods.damped_least_squares import DampedLeastSquares
 
 
@@ -159,5 +159,5 @@ class _Fickle(wb.Goal):
 def test_a_goal_that_changes_its_rows_is_refused_or_followed(arm: wb.Figure, before: int) -> None:
     goal = _Fickle()
     goal.asked = before
-    with suppress(wb.TermError):
+    with suppress(TermError):
         DampedLeastSquares().solve(wb.Problem(wb.Scene(arm), goals=[goal]))
