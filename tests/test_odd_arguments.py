@@ -607,7 +607,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         "figure": {"left_wrist": "link4", "left_elbow": "link2"},
     }
     yield "retarget", Call(wb.retarget, {"motion": skeleton, "figure": arm, "names": bones, "progress": print})
-    errors = {"motion": skeleton, "clip": wb.retarget(skeleton, arm, bones), "names": bones}
+    errors = {"motion": skeleton, "clip": wb.retarget(skeleton, arm, names=bones), "names": bones}
     yield "bone_errors", Call(wb.motion.bone_errors, errors)
     yield "read_clip", Call(wb.read_clip, {"path": path / "walk.npz", "figure": arm})
     checked = {"clip": clip, "scene": wb.Scene(arm), "depth": 1e-3, "progress": lambda done: None}
