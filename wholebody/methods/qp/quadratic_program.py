@@ -200,18 +200,16 @@ class SplitForm(NamedTuple):
     Attributes:
         diagonal: (n + m + k,) diagonal Hessian.
         linear: (n + m + k,).
-        matrix: (m + k, n + m + k) rows [T -I 0; C 0 I], dense.
-        lower, upper: (m + k,) bounds of the rows.
-        box_lower, box_upper: (n + m + k,) bounds of z; infinite for r and s.
+        matrix: (m + k, n + m + k) rows [T -I 0; C 0 I].
+        least: (m + k,) what the first m rows are, and the others are at least.
+        box: (2, n) bounds of x; r and s have none.
     """
 
     diagonal: Array
     linear: Array
     matrix: Array
-    lower: Array
-    upper: Array
-    box_lower: Array
-    box_upper: Array
+    least: Array
+    box: Array
 
 
 class SparseForm(NamedTuple):

@@ -219,7 +219,7 @@ class StepProgram:
         self._settled = solved
         if solved:
             working.pushing = self._integers[2 * k : 2 * k + count].copy()
-            by = working.solver.count([ACTIVE_SET])
+            by = working.solver.count(ACTIVE_SET)
             return Answer(self._x, motion, turn, worst, spare, missed, least, True, 0, by), damping, asked
         rows, program = self._parts.rows, self._parts.program
         answer = working.solve(program, rows.key)

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.base.records import with_values
 from wholebody.methods.qp.active_set import compiled_kernel, room_for
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram, Room, work_size
 from wholebody.methods.qp.settings import CORRECTIONS
@@ -33,9 +32,9 @@ class WorkingSet:
         self.reset()
 
     def solve(self, program: QuadraticProgram, key: NDArray[np.intp]) -> QPSolution:
-        """Solve a program by growing its set of elastic rows until no other row is violated.
+        """Solve a program from the active set of the one before; the solver does where that does not settle.
 
-        The answer is the full program's: rows left out are satisfied, and would not push.
+        The set of elastic rows grows until no other row is violated: rows left out are satisfied, and would not push.
 
         Args:
             program: the full program.
@@ -45,8 +44,10 @@ class WorkingSet:
             answer = self._from_the_last(program, key)
             if answer is not None:
                 return answer
-            self.held = None  # correcting the same set once more would end the same
-        return self._round_by_round(program, key)
+        answer = self.solver.solve(program)
+        self._remember(answer.active, key)
+        self.solver.count(answer.by)
+        return answer
 
     def reset(self) -> None:
         """Drop the guess."""
@@ -71,7 +72,7 @@ class WorkingSet:
         if rounds < 0:
             return None
         self._remember(active, key)
-        return QPSolution(x, active, True, 0, self.solver.count([ACTIVE_SET]))
+        return QPSolution(x, active, True, 0, self.solver.count(ACTIVE_SET))
 
     def room(self, program: QuadraticProgram) -> Room:
         """Room of the compiled loops for a program, kept from one to the next."""
@@ -80,32 +81,6 @@ class WorkingSet:
         if room is None or size > len(room.work) or len(program.least) > len(room.chosen):
             room = self._room = room_for(program, 2)
         return room
-
-    def _round_by_round(self, program: QuadraticProgram, key: NDArray[np.intp]) -> QPSolution:
-        """The answer where nothing is known, or the solver has to be asked."""
-        pushing: Mask = (key[:, None] == self.pushing).any(axis=1)  # of a few keys: np.isin would sort all
-        chosen = (program.least > CORRECTIONS.near) | pushing
-        lower, upper = (None, None) if self.held is None else self.held
-        closed: list[str] = []
-        iterations = 0
-        for attempt in range(CORRECTIONS.rounds + 1):
-            if attempt == CORRECTIONS.rounds:
-                chosen[:] = True
-            smaller = program.with_elastic(chosen)
-            guess = None if lower is None or upper is None else ActiveSet(lower, upper, pushing[chosen])
-            answer = self.solver.solve(smaller, guess)
-            closed.append(answer.by)
-            iterations += answer.iterations
-            missed = (program.elastic @ answer.x < program.least - 1e-9) & ~chosen
-            lower, upper = answer.active.lower, answer.active.upper
-            pushing = np.zeros(len(key), dtype=bool)
-            pushing[chosen] = answer.active.elastic
-            if not missed.any():
-                break
-            chosen |= missed
-        active = ActiveSet(answer.active.lower, answer.active.upper, pushing)
-        self._remember(active, key)
-        return with_values(answer, active=active, iterations=iterations, by=self.solver.count(closed))
 
     def _remember(self, active: ActiveSet, key: NDArray[np.intp]) -> None:
         self.held = np.array([active.lower, active.upper])
