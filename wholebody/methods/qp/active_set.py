@@ -87,14 +87,8 @@ def without_gradient(program: QuadraticProgram, active: ActiveSet, target: Array
     """
     program.check_shapes(active)
     x = np.empty(program.size)
-    parts = (
-        program.diagonal, program.rows, target, program.weight, program.elastic, program.least,
-        program.elastic_weight, program.lower, program.upper,
-    )  # fmt: skip
-    finite = compiled_kernel().minimise_without_gradient(
-        *map(np.ascontiguousarray, parts), *active, CORRECTIONS.tolerance, work, x
-    )
-    return x if finite else None
+    without = with_values(program, linear=np.zeros(program.size), target=target).packed()
+    return x if compiled_kernel().minimise_with(without, active, CORRECTIONS.tolerance, work, x) else None
 
 
 def minimise(program: QuadraticProgram, start: Array, iterations: int) -> tuple[Array, ActiveSet, int]:
@@ -151,12 +145,8 @@ def compiled_kernel() -> Any:
     index, x = np.zeros(0, dtype=np.intp), np.zeros(1)
     room = Room(np.empty(work_size(1, 0, 0)), index, active.elastic)
     active_set_kernel.primal_dual_active_set(program, index, active, 1, CORRECTIONS, room, x)
-    active_set_kernel.solve_growing(
-        *program, index, index, *active, room.chosen, index, room.work, np.array(CORRECTIONS, dtype=float), x
-    )
-    active_set_kernel.minimise_without_gradient(
-        program.diagonal, *program[2:], *active, CORRECTIONS.tolerance, room.work, x
-    )
+    active_set_kernel.grow(program, index, index, active, CORRECTIONS, room, x)
+    active_set_kernel.minimise_with(program, active, CORRECTIONS.tolerance, room.work, x)
     semismooth_kernel()
     return active_set_kernel
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
 from wholebody.methods.qp.dense_kernel import dot
 from wholebody.methods.qp.face_kernel import Face, face, minimise_on_face, stack_elastic, stack_soft
@@ -12,45 +12,7 @@ from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram, 
 from wholebody.methods.qp.settings import Corrections
 
 
-@compiled(error_model="numpy")
-def solve_growing(
-    diagonal: Array,
-    linear: Array,
-    rows: Array,
-    target: Array,
-    weight: Array,
-    elastic: Array,
-    least: Array,
-    elastic_weight: Array,
-    lower: Array,
-    upper: Array,
-    key: Indices,
-    known: Indices,
-    at_lower: Mask,
-    at_upper: Mask,
-    pushing: Mask,
-    chosen: Mask,
-    places: Indices,
-    work: Array,
-    limits: Array,
-    x: Array,
-) -> int:
-    """`grow`, whose records are given part by part: the first ten are the program, then comes `key` to `x`.
-
-    A record of ten arrays costs 3.4 us at a call from Python beside 2.3 us of the arrays, and 1 us to be made.
-    """
-    program = QuadraticProgram(diagonal, linear, rows, target, weight, elastic, least, elastic_weight, lower, upper)
-    room = Room(work, places, chosen)
-    return grow(program, key, known, ActiveSet(at_lower, at_upper, pushing), limits_of(limits), room, x)
-
-
-@compiled(inner=True, forceinline=True)
-def limits_of(numbers: Array) -> Corrections:
-    """`Corrections` from an array of its fields."""
-    return Corrections(numbers[0], int(numbers[1]), int(numbers[2]), int(numbers[3]), int(numbers[4]), numbers[5])
-
-
-@compiled(inner=True, error_model="numpy", forceinline=True)
+@compiled(error_model="numpy", forceinline=True)
 def grow(
     program: QuadraticProgram,
     key: Indices,
@@ -155,38 +117,19 @@ def primal_dual_active_set(
 
 
 @compiled(error_model="numpy")
-def minimise_without_gradient(
-    diagonal: Array,
-    rows: Array,
-    target: Array,
-    weight: Array,
-    elastic: Array,
-    least: Array,
-    elastic_weight: Array,
-    lower: Array,
-    upper: Array,
-    at_lower: Mask,
-    at_upper: Mask,
-    pushing: Mask,
-    tolerance: float,
-    work: Array,
-    x: Array,
-) -> bool:
-    """Minimiser x (n,) of a program with g = 0 and its active set fixed, clipped to the bounds; whether it is finite.
+def minimise_with(program: QuadraticProgram, active: ActiveSet, tolerance: float, work: Array, x: Array) -> bool:
+    """Minimiser x (n,) of a program with its active set fixed, clipped to the bounds; whether it is finite.
 
-    The first nine are the program's, the next three the active set. `work` is room; see `Room`.
+    `work` is room; see `Room`.
     """
-    program = QuadraticProgram(
-        diagonal, np.zeros(len(x)), rows, target, weight, elastic, least, elastic_weight, lower, upper
-    )
-    active = ActiveSet(at_lower, at_upper, pushing)
-    own = face(work, len(x), len(target), len(least))
+    soft = len(program.target)
+    own = face(work, len(x), soft, len(program.least))
     stack_soft(program, own)
-    pushes = pushing.nonzero()[0]
+    pushes = active.elastic.nonzero()[0]
     stack_elastic(program, pushes, own)
-    finite = minimise_on_face(program, active, own, len(target) + len(pushes), tolerance, x)
+    finite = minimise_on_face(program, active, own, soft + len(pushes), tolerance, x)
     for i in range(len(x)):
-        x[i] = min(max(x[i], lower[i]), upper[i])
+        x[i] = min(max(x[i], program.lower[i]), program.upper[i])
     return finite
 
 

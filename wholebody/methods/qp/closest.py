@@ -23,7 +23,7 @@ from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.control import Control
 from wholebody.methods.qp.iterates import Iterate, LocalSolution
-from wholebody.methods.qp.rows import Rows
+from wholebody.methods.qp.rows import Rows, StepSize
 from wholebody.methods.qp.settings import NEAREST
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import Subproblem, compiled_kernel
@@ -78,9 +78,7 @@ class Closest:
         while used < most and here.violation.worst > enough and radius > LEAST_RADIUS and not self._control.over:
             used += 1
             rows = here.rows
-            program = self._subproblem.program(
-                here.at, rows, 0.5 * radius, None, 0.0, np.zeros(len(rows.soft_error)), False
-            )
+            program = self._subproblem.program(here.at, rows, StepSize(0.5 * radius, 0.0, 0.0, False))
             if bent is None:
                 lineariser.state.update(here.at.q)
                 bent = self._curvature(rows, push if here.violation.hold <= NEAREST.held else np.zeros_like(push))

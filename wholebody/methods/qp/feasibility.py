@@ -22,6 +22,7 @@ from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.methods.control import Control
 from wholebody.methods.qp.iterates import Iterate, LocalSolution
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
+from wholebody.methods.qp.rows import StepSize
 from wholebody.methods.qp.settings import FEASIBILITY, PROGRAM
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import Subproblem
@@ -101,8 +102,8 @@ class Feasibility:
         return _end(here, here.violation.worst <= self.tolerance, count)
 
     def _program(self, here: Iterate, box: float) -> QuadraticProgram:
-        none = np.zeros(len(here.rows.soft_error))
-        return self.subproblem.program(here.at, here.rows, box / PROGRAM.box, None, FEASIBILITY.damping, none, False)
+        size = StepSize(box / PROGRAM.box, 0.0, FEASIBILITY.damping, False)
+        return self.subproblem.program(here.at, here.rows, size)
 
     def _turned_on(self, here: Iterate, program: QuadraticProgram, step: Array, wrapped: set[int]) -> Array | None:
         """The posture (nq,) with the joint at its other limit that presses hardest at one; None where there is none.

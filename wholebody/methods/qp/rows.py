@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram, Room
-from wholebody.methods.qp.settings import PROGRAM
+from wholebody.methods.qp.settings import PROGRAM, Corrections, ProgramNumbers, StepNumbers, Weights
 
 SAME = 0.99  # cosine of the angle between two rows from which on they count as one
 
@@ -20,37 +20,19 @@ class StepSize(NamedTuple):
     """What a program says of the step beside its rows.
 
     Attributes:
-        scale: of the measures.
         radius: about the largest entry of the step, radians and metres.
         pull: largest error of a goal that is asked for, metres and radians; 0 asks for all of them.
-        damping: how much of the goals' neglected second derivative is added.
+        damping: while a goal is far, times a metre of lever, the share of the largest weighted error that is added to
+            the curvature; where all is asked for, of the weighted squared error (Sugihara 2011).
+        measures: whether they count; without them the nearest posture to the goals is sought.
         gain: share of its tangential part that the step has.
-        measures: whether they count.
-        box: half width of the box, radians and metres.
-        overlap: largest violation of an elastic row that is asked for.
-        least_curvature, proximal, lever: see `settings.ProgramNumbers`.
     """
 
-    scale: float
     radius: float
     pull: float
     damping: float
-    gain: float
     measures: bool
-    box: float
-    overlap: float
-    least_curvature: float
-    proximal: float
-    lever: float
-
-
-def step_size(scale: float, radius: float, pull: float, damping: float, gain: float, measures: bool) -> Array:
-    """The fields of `StepSize`, with the numbers of the method."""
-    box, overlap = PROGRAM.box * radius, PROGRAM.error_clamp * radius
-    return np.array([
-        scale, radius, pull, damping, gain, measures, box, overlap, PROGRAM.least_curvature, PROGRAM.proximal_share,
-        PROGRAM.lever,
-    ])  # fmt: skip
+    gain: float = 1.0
 
 
 class Terms(NamedTuple):
@@ -61,13 +43,13 @@ class Terms(NamedTuple):
             both (3) or none (-1).
         bound: (2, c) lower and upper bounds of the values.
         share: (g,) weights of the goals' rows, as shares of the largest.
-        weights: (5,) `settings.Weights`.
+        weights: of the rows.
     """
 
     kind: Indices
     bound: Array
     share: Array
-    weights: Array
+    weights: Weights
 
 
 class LinearRows(NamedTuple):
@@ -214,13 +196,69 @@ class Seen(NamedTuple):
     most: float
 
 
+class Near(NamedTuple):
+    """Contacts of a linearisation: pieces (k, 2), distance (k,), normal (k, 3), and least clearance (k or more,)."""
+
+    pair: Indices
+    distance: Array
+    normal: Array
+    asked: Array
+
+
+class PackedRows(NamedTuple):
+    """The arrays of a `PackedLinearisation`, and the numbers (contacts,) of its pairs."""
+
+    value: Array
+    jacobian: Array
+    gap: Array
+    gap_contact: Indices
+    clearance: Array
+    measure: Array
+    box: Array
+    q: Array
+    number: Indices
+
+
+class LastStep(NamedTuple):
+    """What a tracker remembers of the step before.
+
+    Attributes:
+        before: (nq + m + 2,) where it ended: the posture, the errors of its soft rows there to first order, the
+            residual of its goals, and 1 where there was such a step.
+        after: (nq + m + 2,) the same of this step, but for the posture, where the program is solved.
+        held: (2, n) bounds that held its answer; those that hold this one's where it is solved.
+        pushed: keys of its elastic rows that pushed, in ascending order.
+    """
+
+    before: Array
+    after: Array
+    held: Mask
+    pushed: Indices
+
+
+class StepRoom(NamedTuple):
+    """Room of a step's program, see `tracking_kernel.parts`: integers (5 k,), masks (2 n + 2 k,)."""
+
+    floats: Array
+    integers: Indices
+    masks: Mask
+
+
+class StepControl(NamedTuple):
+    """The numbers of a tracker's programs; `scale` is that of the measures."""
+
+    scale: float
+    program: ProgramNumbers
+    corrections: Corrections
+    step: StepNumbers
+
+
 class StepParts(NamedTuple):
     """The program of a step, in room that the next one overwrites.
 
     Attributes:
         x: (n,) its answer.
         columns: (4, n) diagonal, linear, lower and upper of the program.
-        soft: (3, m) errors, weights and targets of the soft rows; the targets are first what is added to the errors.
         rows: it is made of.
         program: the program.
         active: active set of the answer.
@@ -230,7 +268,6 @@ class StepParts(NamedTuple):
 
     x: Array
     columns: Array
-    soft: Array
     rows: Rows
     program: QuadraticProgram
     active: ActiveSet

@@ -21,7 +21,7 @@ from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.control import Control
 from wholebody.methods.qp.iterates import Iterate, LocalSolution, PredictedReduction, Step, StepAcceptance, judge
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
-from wholebody.methods.qp.rows import Multipliers
+from wholebody.methods.qp.rows import Multipliers, StepSize
 from wholebody.methods.qp.settings import DESCENT, PROGRAM
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import Subproblem, lagrangian, multipliers_of
@@ -91,15 +91,8 @@ class SQP:
                 converged = True
                 break
             count += 1
-            program = self.subproblem.program(
-                self._bent(here),
-                here.rows,
-                self._radius,
-                None if self._full_step else self._pull,
-                self._damping,
-                self._shift,
-                self.measures,
-            )
+            size = StepSize(self._radius, 0.0 if self._full_step else self._pull, self._damping, self.measures)
+            program = self.subproblem.program(self._bent(here), here.rows, size, self._shift)
             program = self._shortened(program, len(here.rows.soft_error))
             answer = self._working_set.solve(program, here.rows.key)
             step = self._predicted_step(here, program, answer)

@@ -18,7 +18,17 @@ from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
 from wholebody.figures.state import State
 from wholebody.methods.qp.quadratic_program import QuadraticProgram, work_size
-from wholebody.methods.qp.rows import Rows, StepParts, Terms, step_size
+from wholebody.methods.qp.rows import (
+    Bodies,
+    LastStep,
+    PackedRows,
+    Rows,
+    StepControl,
+    StepParts,
+    StepRoom,
+    StepSize,
+    Terms,
+)
 from wholebody.methods.qp.settings import CORRECTIONS, PROGRAM, STEP, WEIGHTS
 from wholebody.methods.qp.solvers.base import ACTIVE_SET
 from wholebody.methods.qp.subproblem import Subproblem
@@ -92,9 +102,10 @@ class StepProgram:
         self._unknown = np.zeros((2, self._variables), dtype=bool)
         self._workspace = workspace
         self._before = np.zeros(state.model.nq + self._soft + 2)
-        """See `tracking_kernel.solve`."""
+        """See `LastStep`."""
         self._after = self._before.copy()
         self._sizes, self._laid_out = (0, 0), dict[tuple[int, int], StepParts]()
+        self._control = StepControl(self._subproblem.scale, PROGRAM, CORRECTIONS, STEP)
         self.take(dt)
         self._grow(64)
 
@@ -102,7 +113,7 @@ class StepProgram:
         """Make the next steps take so long, for what measures do meanwhile."""
         # without goals the measures are the task
         gain = min(1.0, seconds / STEP.settling) if self.goals else 1.0
-        self._numbers = numbers_of(self._subproblem.scale, gain)
+        self._size = StepSize(STEP.radius, PROGRAM.error_clamp * STEP.radius, 0.0, True, gain)
 
     def hold(self, constraints: Sequence[Constraint]) -> bool:
         """Take others in place of the problem's constraints, with the same bounds; the last step is forgotten.
@@ -205,20 +216,26 @@ class StepProgram:
         own, working = self._subproblem, self._working_set
         own.check_rows(at.goals, len(at.value) - at.goals)
         k = own.one_sided + len(at.gap)
-        if 5 * k > len(self._integers):
+        if 5 * k > len(self._room.integers):
             self._grow(2 * k)
-        contacts, turning, workspace = at.contacts, self.turning, self._workspace
+        contacts = at.contacts
         self._sizes = (k, own.one_sided + len(contacts.distance))
         held = self._unknown if working.held is None else working.held
         solved, count, motion, turn, worst, spare, missed, least, damping, asked = self._kernel.solve(
-            at.value, at.jacobian, at.gap, at.gap_contact, at.clearance, contacts.number, at.measure, at.box, at.q,
-            self._before, self._after, given.kind, given.bound, given.share, held, working.pushing,
-            workspace.state.columns, turning.joints, contacts.placements, workspace.table.reach, turning.twists,
-            self._floats, self._integers, self._masks, self._numbers, measures, working.hot, least_damping,
-        )  # fmt: skip
+            PackedRows(
+                at.value, at.jacobian, at.gap, at.gap_contact, at.clearance, at.measure, at.box, at.q, contacts.number
+            ),
+            LastStep(self._before, self._after, held, working.pushing),
+            given,
+            self.turning.bodies(contacts.placements),
+            self._room,
+            with_values(self._size, damping=least_damping, measures=measures),
+            self._control,
+            working.hot,
+        )
         self._settled = solved
         if solved:
-            working.pushing = self._integers[2 * k : 2 * k + count].copy()
+            working.pushing = self._room.integers[2 * k : 2 * k + count].copy()
             by = working.solver.count(ACTIVE_SET)
             return Answer(self._x, motion, turn, worst, spare, missed, least, True, 0, by), damping, asked
         rows, program = self._parts.rows, self._parts.program
@@ -240,9 +257,7 @@ class StepProgram:
         state, rows = self._there.update(pin.integrate(self._there.model, at.q, displacement)), self._parts.rows
         there = self._holds.at(state)[self._among] - self._asked
         curved = there - (rows.soft_error + rows.soft @ displacement)[self.goals :]
-        other: bool = self._kernel.run_ahead(
-            curved, rows.soft_error, self.goals, at.q, 2.0 * STEP.resting, STEP.curved, STEP.straight, self._before
-        )
+        other: bool = self._kernel.run_ahead(curved, rows.soft_error, self.goals, at.q, STEP, self._before)
         return other
 
     @property
@@ -252,7 +267,7 @@ class StepProgram:
         if found is None:
             layout = self._kernel.parts.py_func  # a compiled loop would look up each record's class to return it
             sizes = (self._variables, self.goals, self._soft, *self._sizes)
-            found = layout(self._floats, self._integers, self._masks, *sizes)
+            found = layout(self._room, *sizes)
             self._laid_out[self._sizes] = found
         return found
 
@@ -260,9 +275,10 @@ class StepProgram:
         """Make room for so many elastic rows."""
         n, m = self._variables, self._soft
         room = 5 * n + 3 * m + m * n + elastic * (n + 3) + work_size(n, m, elastic)  # see `tracking_kernel.parts`
-        self._floats = np.zeros(room)
-        self._integers, self._masks = np.zeros(5 * elastic, dtype=np.intp), np.zeros(2 * (n + elastic), dtype=bool)
-        self._x = self._floats[:n]
+        self._room = StepRoom(
+            np.zeros(room), np.zeros(5 * elastic, dtype=np.intp), np.zeros(2 * (n + elastic), dtype=bool)
+        )
+        self._x = self._room.floats[:n]
         self._laid_out.clear()
 
 
@@ -274,34 +290,23 @@ def _holding(problem: Problem, state: State, held: NDArray[np.intp]) -> tuple[li
     return holding.tolist(), np.searchsorted(np.flatnonzero(np.isin(owner, holding)), held)
 
 
-def numbers_of(scale: float, gain: float) -> Array:
-    """The numbers of a tracker's programs, (25,).
-
-    They are those of `StepSize`, in which a step replaces its damping and whether measures count; of `Corrections`;
-    damping of the pull of goals out of reach; error below which a goal rests; how far what is held is run ahead of at
-    most; and the weights of the rows.
-
-    Args:
-        scale: of the measures.
-        gain: share of the way to the least measures that a step is to go.
-    """
-    size = step_size(scale, STEP.radius, PROGRAM.error_clamp * STEP.radius, 0.0, gain, True)
-    return np.concatenate([size, CORRECTIONS, (STEP.damping, STEP.resting, STEP.curved), WEIGHTS])
-
-
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
     from wholebody.methods.qp import tracking_kernel
 
     compiled_turning()
-    none, index, one = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros(1, dtype=np.intp)
-    pair, places = np.zeros((2, 1), dtype=bool), np.zeros((0, 4, 3))
+    none, index, joint = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros(1, dtype=np.intp)
+    two, size = np.zeros((2, 0)), StepSize(1.0, 1.0, 0.0, True)
     tracking_kernel.solve(
-        none, np.zeros((0, 1)), none, index, none, index, np.zeros((2, 2)), np.zeros((2, 1)), none, np.zeros(2),
-        np.zeros(2), index, np.zeros((2, 0)), none, pair, index, np.zeros((1, 6)), np.repeat(one, 3), places, none,
-        np.zeros((3, 1, 6)), np.zeros(5 + work_size(1, 0, 0)), index, np.zeros(2, dtype=bool),
-        numbers_of(1.0, 1.0), True, False, 0.0,
-    )  # fmt: skip
-    tracking_kernel.run_ahead(none, none, 0, none, 0.0, 0.0, 0.0, np.zeros(2))
+        PackedRows(none, np.zeros((0, 1)), none, index, none, np.zeros((2, 2)), np.zeros((2, 1)), none, index),
+        LastStep(np.zeros(2), np.zeros(2), np.zeros((2, 1), dtype=bool), index),
+        Terms(index, two, none, WEIGHTS),
+        Bodies(np.zeros((1, 6)), joint, joint, joint, index, np.zeros((0, 4, 3)), none, np.zeros((3, 1, 6))),
+        StepRoom(np.zeros(5 + work_size(1, 0, 0)), index, np.zeros(2, dtype=bool)),
+        size,
+        StepControl(1.0, PROGRAM, CORRECTIONS, STEP),
+        False,
+    )
+    tracking_kernel.run_ahead(none, none, 0, none, STEP, np.zeros(2))
     return tracking_kernel

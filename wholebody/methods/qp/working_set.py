@@ -27,7 +27,6 @@ class WorkingSet:
         self.solver = solver
         self._kernel = compiled_kernel()
         self._room: Room | None = None
-        self._limits = np.array(CORRECTIONS, dtype=float)
         self.held: Mask | None = None
         self.reset()
 
@@ -65,10 +64,7 @@ class WorkingSet:
         assert self.held is not None
         active = ActiveSet(self.held[0].copy(), self.held[1].copy(), np.empty(len(key), dtype=bool))
         program.check_shapes(active)
-        room = self.room(program)
-        rounds = self._kernel.solve_growing(
-            *program, key, self.pushing, *active, room.chosen, room.places, room.work, self._limits, x
-        )
+        rounds = self._kernel.grow(program, key, self.pushing, active, CORRECTIONS, self.room(program), x)
         if rounds < 0:
             return None
         self._remember(active, key)

@@ -54,11 +54,11 @@ class OSQPSolver(QPSolver):
         # of them with a hot start: more take several times as long as semismooth Newton steps
         for limit in ROUNDS[:2] if self.hot_start else ROUNDS:
             iterations += workspace.run(limit)
-            self.uncorrected = workspace.x()
+            near = self.uncorrected = workspace.x()
             solution = solve_from(program, workspace.active(), CORRECTIONS.of_guess)
             if solution is not None:
                 return with_values(solution, iterations=iterations, by=self.name)
-        return last_resort(program, self.uncorrected, iterations)
+        return last_resort(program, near, iterations)
 
     def workspace(self, program: QuadraticProgram) -> Workspace:
         """The workspace with a program in it, set up anew where its pattern does not fit."""
