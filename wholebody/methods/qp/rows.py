@@ -11,8 +11,9 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram, Room
-from wholebody.methods.qp.settings import PROGRAM, Corrections, ProgramNumbers, StepNumbers, Weights
+from wholebody.methods.qp.settings import PROGRAM
 
+NUMBERS = 29  # of `step_program.numbers_of`
 SAME = 0.99  # cosine of the angle between two rows from which on they count as one
 
 
@@ -43,13 +44,13 @@ class Terms(NamedTuple):
             both (3) or none (-1).
         bound: (2, c) lower and upper bounds of the values.
         share: (g,) weights of the goals' rows, as shares of the largest.
-        weights: of the rows.
+        weights: (5,) `settings.Weights`.
     """
 
     kind: Indices
     bound: Array
     share: Array
-    weights: Weights
+    weights: Array
 
 
 class LinearRows(NamedTuple):
@@ -219,38 +220,12 @@ class PackedRows(NamedTuple):
     number: Indices
 
 
-class LastStep(NamedTuple):
-    """What a tracker remembers of the step before.
-
-    Attributes:
-        before: (nq + m + 2,) where it ended: the posture, the errors of its soft rows there to first order, the
-            residual of its goals, and 1 where there was such a step.
-        after: (nq + m + 2,) the same of this step, but for the posture, where the program is solved.
-        held: (2, n) bounds that held its answer; those that hold this one's where it is solved.
-        pushed: keys of its elastic rows that pushed, in ascending order.
-    """
-
-    before: Array
-    after: Array
-    held: Mask
-    pushed: Indices
-
-
 class StepRoom(NamedTuple):
     """Room of a step's program, see `tracking_kernel.parts`: integers (5 k,), masks (2 n + 2 k,)."""
 
     floats: Array
     integers: Indices
     masks: Mask
-
-
-class StepControl(NamedTuple):
-    """The numbers of a tracker's programs; `scale` is that of the measures."""
-
-    scale: float
-    program: ProgramNumbers
-    corrections: Corrections
-    step: StepNumbers
 
 
 class StepParts(NamedTuple):

@@ -18,17 +18,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
 from wholebody.figures.state import State
 from wholebody.methods.qp.quadratic_program import QuadraticProgram, work_size
-from wholebody.methods.qp.rows import (
-    Bodies,
-    LastStep,
-    PackedRows,
-    Rows,
-    StepControl,
-    StepParts,
-    StepRoom,
-    StepSize,
-    Terms,
-)
+from wholebody.methods.qp.rows import NUMBERS, PackedRows, Rows, StepParts, StepRoom, StepSize, Terms
 from wholebody.methods.qp.settings import CORRECTIONS, PROGRAM, STEP, WEIGHTS
 from wholebody.methods.qp.solvers.base import ACTIVE_SET
 from wholebody.methods.qp.subproblem import Subproblem
@@ -99,13 +89,17 @@ class StepProgram:
         self._holds = ConstraintValues([problem.constraints[k] for k in self._holding], state)
         self._asked = terms.bound[0, self._held]
         self._there = State(state.model)
-        self._unknown = np.zeros((2, self._variables), dtype=bool)
         self._workspace = workspace
-        self._before = np.zeros(state.model.nq + self._soft + 2)
-        """See `LastStep`."""
-        self._after = self._before.copy()
+        table, length = workspace.table, state.model.nq + self._soft + 2
+        self._places = np.concatenate([[len(terms.kind)], terms.kind, *self.turning.joints])
+        self._fixed = np.concatenate([
+            numbers_of(self._subproblem.scale), terms.share, terms.bound.ravel(), table.reach,
+            np.zeros(18 * state.model.njoints + 2 * length),
+        ])  # fmt: skip
+        self._share = self._fixed[NUMBERS : NUMBERS + self.goals]
+        self._memory = self._fixed[len(self._fixed) - 2 * length :].reshape(2, length)
+        """See `tracking_kernel.solve`, like the arrays before."""
         self._sizes, self._laid_out = (0, 0), dict[tuple[int, int], StepParts]()
-        self._control = StepControl(self._subproblem.scale, PROGRAM, CORRECTIONS, STEP)
         self.take(dt)
         self._grow(64)
 
@@ -113,7 +107,7 @@ class StepProgram:
         """Make the next steps take so long, for what measures do meanwhile."""
         # without goals the measures are the task
         gain = min(1.0, seconds / STEP.settling) if self.goals else 1.0
-        self._size = StepSize(STEP.radius, PROGRAM.error_clamp * STEP.radius, 0.0, True, gain)
+        self._fixed[4] = gain
 
     def hold(self, constraints: Sequence[Constraint]) -> bool:
         """Take others in place of the problem's constraints, with the same bounds; the last step is forgotten.
@@ -121,7 +115,7 @@ class StepProgram:
         Returns:
             Whether they are of the same classes and frames; if not, nothing is done.
         """
-        self._before[-1], self._curving, self._bend = 0.0, False, 0.0
+        self._memory[0, -1], self._curving, self._bend = 0.0, False, 0.0
         return self._holds.take([constraints[k] for k in self._holding])
 
     def solve(self, at: PackedLinearisation, measures: bool) -> Answer:
@@ -154,15 +148,15 @@ class StepProgram:
             displacement: (nv,).
             whole: whether that is the last program's answer as it was.
         """
-        after = self._after
+        before, after = self._memory
         if not (whole and self._settled):
             rows, program = self._parts.rows, self._parts.program
             gone = rows.soft @ displacement
             left = (gone - program.target)[: self.goals]
             after[len(q) : -2] = rows.soft_error + gone
             after[-2], after[-1] = sqrt(left @ left), 1.0
-        after[: len(q)] = q
-        self._before, self._after = after, self._before
+        before[:] = after
+        before[: len(q)] = q
 
     @property
     def rows(self) -> Rows:
@@ -220,24 +214,25 @@ class StepProgram:
             self._grow(2 * k)
         contacts = at.contacts
         self._sizes = (k, own.one_sided + len(contacts.distance))
-        held = self._unknown if working.held is None else working.held
-        solved, count, motion, turn, worst, spare, missed, least, damping, asked = self._kernel.solve(
-            PackedRows(
-                at.value, at.jacobian, at.gap, at.gap_contact, at.clearance, at.measure, at.box, at.q, contacts.number
-            ),
-            LastStep(self._before, self._after, held, working.pushing),
-            given,
-            self.turning.bodies(contacts.placements),
-            self._room,
-            with_values(self._size, damping=least_damping, measures=measures),
-            self._control,
-            working.hot,
+        if working.held is not None and working.held is not self._last:
+            self._last[:] = working.held
+        if self._mixed:
+            self._share[:] = given.share
+        self._fixed[2], self._fixed[3] = least_damping, measures
+        rows_at = PackedRows(
+            at.value, at.jacobian, at.gap, at.gap_contact, at.clearance, at.measure, at.box, at.q, contacts.number
         )
+        solved, count, motion, turn, worst, spare, missed, least, damping, asked = self._kernel.solve(
+            rows_at, self._workspace.state.columns, contacts.placements, working.pushing, self._fixed, self._places,
+            self._room, working.hot,
+        )  # fmt: skip
         self._settled = solved
         if solved:
             working.pushing = self._room.integers[2 * k : 2 * k + count].copy()
-            by = working.solver.count(ACTIVE_SET)
+            working.held, by = self._last, working.solver.count(ACTIVE_SET)
             return Answer(self._x, motion, turn, worst, spare, missed, least, True, 0, by), damping, asked
+        if working.hot:
+            working.held = None  # what the call did to it did not settle
         rows, program = self._parts.rows, self._parts.program
         answer = working.solve(program, rows.key)
         motion, turn = self.turning.motion(at, answer.x)
@@ -257,7 +252,7 @@ class StepProgram:
         state, rows = self._there.update(pin.integrate(self._there.model, at.q, displacement)), self._parts.rows
         there = self._holds.at(state)[self._among] - self._asked
         curved = there - (rows.soft_error + rows.soft @ displacement)[self.goals :]
-        other: bool = self._kernel.run_ahead(curved, rows.soft_error, self.goals, at.q, STEP, self._before)
+        other: bool = self._kernel.run_ahead(curved, rows.soft_error, self.goals, at.q, STEP, self._memory[0])
         return other
 
     @property
@@ -278,7 +273,7 @@ class StepProgram:
         self._room = StepRoom(
             np.zeros(room), np.zeros(5 * elastic, dtype=np.intp), np.zeros(2 * (n + elastic), dtype=bool)
         )
-        self._x = self._room.floats[:n]
+        self._x, self._last = self._room.floats[:n], self._room.masks[: 2 * n].reshape(2, n)
         self._laid_out.clear()
 
 
@@ -290,23 +285,30 @@ def _holding(problem: Problem, state: State, held: NDArray[np.intp]) -> tuple[li
     return holding.tolist(), np.searchsorted(np.flatnonzero(np.isin(owner, holding)), held)
 
 
+def numbers_of(scale: float) -> Array:
+    """The numbers of a tracker's programs, (29,).
+
+    They are those of `StepSize`, in which a step replaces its damping and whether measures count, of `ProgramNumbers`,
+    `Corrections` and `Weights`; the scale of the measures; damping of the pull of goals out of reach; error below which
+    a goal rests; and how far what is held is run ahead of at most.
+    """
+    size = StepSize(STEP.radius, PROGRAM.error_clamp * STEP.radius, 0.0, True)
+    return np.concatenate([
+        size, PROGRAM, CORRECTIONS, WEIGHTS, (scale, STEP.damping, STEP.resting, STEP.curved),
+    ])  # fmt: skip
+
+
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
     from wholebody.methods.qp import tracking_kernel
 
     compiled_turning()
-    none, index, joint = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros(1, dtype=np.intp)
-    two, size = np.zeros((2, 0)), StepSize(1.0, 1.0, 0.0, True)
+    none, index = np.zeros(0), np.zeros(0, dtype=np.intp)
     tracking_kernel.solve(
         PackedRows(none, np.zeros((0, 1)), none, index, none, np.zeros((2, 2)), np.zeros((2, 1)), none, index),
-        LastStep(np.zeros(2), np.zeros(2), np.zeros((2, 1), dtype=bool), index),
-        Terms(index, two, none, WEIGHTS),
-        Bodies(np.zeros((1, 6)), joint, joint, joint, index, np.zeros((0, 4, 3)), none, np.zeros((3, 1, 6))),
-        StepRoom(np.zeros(5 + work_size(1, 0, 0)), index, np.zeros(2, dtype=bool)),
-        size,
-        StepControl(1.0, PROGRAM, CORRECTIONS, STEP),
-        False,
-    )
+        np.zeros((1, 6)), np.zeros((0, 4, 3)), index, np.append(numbers_of(1.0), np.zeros(18 + 4)),
+        np.zeros(4, dtype=np.intp), StepRoom(np.zeros(5 + work_size(1, 0, 0)), index, np.zeros(2, dtype=bool)), False,
+    )  # fmt: skip
     tracking_kernel.run_ahead(none, none, 0, none, STEP, np.zeros(2))
     return tracking_kernel

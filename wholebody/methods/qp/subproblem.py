@@ -86,8 +86,8 @@ class Subproblem:
         self.one_sided = int(low.sum() + high.sum())
         neither = (self._lower != self._upper) & ~low & ~high
         kind = np.where(neither, -1, low + 2 * high).astype(np.intp)
-        self.terms = Terms(kind, np.array([self._lower, self._upper]).reshape(2, -1), share, WEIGHTS)
-        self._kernel = compiled_kernel()
+        self.terms = Terms(kind, np.array([self._lower, self._upper]).reshape(2, -1), share, np.array(WEIGHTS))
+        self._numbers, self._kernel = np.array(PROGRAM), compiled_kernel()
 
     def rows(self, at: Linearisation) -> Rows:
         """Sort the rows of a linearisation.
@@ -159,7 +159,7 @@ class Subproblem:
         columns = np.array([curvature, at.gradient, at.lower, at.upper])
         least = np.empty(len(rows.elastic_violation))
         target = np.zeros(len(rows.soft_error)) if shift is None else shift.copy()
-        self._kernel.fill_program(columns, rows, target, least, step, PROGRAM, self.scale)
+        self._kernel.fill_program(columns, rows, target, least, step, self._numbers, self.scale)
         program = QuadraticProgram(
             columns[0], columns[1], rows.soft, target, rows.soft_weight, rows.elastic, least, rows.elastic_weight,
             columns[2], columns[3],
@@ -209,10 +209,10 @@ def compiled_kernel() -> Any:
     none, matrix, index = np.zeros(0), np.zeros((0, 1)), np.zeros(0, dtype=np.intp)
     rows = Rows(matrix, none, none, 0, matrix, none, index, 0, index, none)
     there = LinearRows(none, matrix, none, matrix, none, matrix, index, none, index)
-    subproblem_kernel.fill_rows(there, Terms(index, np.zeros((2, 0)), none, WEIGHTS), rows)
+    subproblem_kernel.fill_rows(there, Terms(index, np.zeros((2, 0)), none, np.array(WEIGHTS)), rows)
     subproblem_kernel.violation(rows, none, none)
     size = StepSize(1.0, 1.0, 1.0, True)
-    subproblem_kernel.fill_program(np.ones((4, 1)), rows, none.copy(), none.copy(), size, PROGRAM, 1.0)
+    subproblem_kernel.fill_program(np.ones((4, 1)), rows, none.copy(), none.copy(), size, np.array(PROGRAM), 1.0)
     subproblem_kernel.work(none, none, index, none, index, none)
     three = np.zeros(3)
     subproblem_kernel.add_kinematic_hessian(matrix, np.zeros((0, 6)), none, three, three, three)

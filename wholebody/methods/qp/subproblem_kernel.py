@@ -8,7 +8,7 @@ from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
 from wholebody.methods.qp.dense_kernel import dot, sort
 from wholebody.methods.qp.rows import LinearRows, Rows, StepSize, Terms
-from wholebody.methods.qp.settings import ProgramNumbers
+from wholebody.methods.qp.settings import ProgramNumbers, Weights
 
 MOST_ROWS = 4096  # more than one contact ever has
 
@@ -19,7 +19,8 @@ def fill_rows(there: LinearRows, given: Terms, rows: Rows) -> None:
     errors, values, gaps, clearance = there.error, there.value, there.gap, there.clearance
     error_jacobian, value_jacobian, gap_jacobian = there.error_jacobian, there.value_jacobian, there.gap_jacobian
     number, gap_contact, kind, bound, share = there.number, there.gap_contact, given.kind, given.bound, given.share
-    weights, elastic_weight, nv = given.weights, rows.elastic_weight, rows.soft.shape[1]
+    elastic_weight, nv, w = rows.elastic_weight, rows.soft.shape[1], given.weights
+    weights = Weights(w[0], w[1], w[2], w[3], w[4])
     soft, soft_error, soft_weight, elastic = rows.soft, rows.soft_error, rows.soft_weight, rows.elastic
     violated, contact, key = rows.elastic_violation, rows.contact, rows.key
     goals, square = len(errors), 0.0
@@ -91,7 +92,7 @@ def violation(rows: Rows, share: Array, displacement: Array) -> tuple[float, flo
 
 @compiled(forceinline=True)
 def fill_program(
-    columns: Array, rows: Rows, target: Array, least: Array, step: StepSize, numbers: ProgramNumbers, scale: float
+    columns: Array, rows: Rows, target: Array, least: Array, step: StepSize, given: Array, scale: float
 ) -> None:
     """Fill in the numbers of a program that are not rows or weights.
 
@@ -102,9 +103,10 @@ def fill_program(
         target: (m,) what is added to the errors; it becomes the targets of the soft rows.
         least: (k,) becomes the least values of the elastic rows.
         step: its size.
-        numbers: of the method.
+        given: (9,) `settings.ProgramNumbers`.
         scale: what the measures are multiplied by.
     """
+    numbers = ProgramNumbers(given[0], given[1], given[2], given[3], given[4], given[5], given[6], given[7], given[8])
     diagonal, linear, lower, upper = columns[0], columns[1], columns[2], columns[3]
     soft_error, soft_weight, violations, goals = rows.soft_error, rows.soft_weight, rows.elastic_violation, rows.goals
     largest, square, farthest, heaviest_error, box = 0.0, 0.0, 0.0, 0.0, numbers.box * step.radius

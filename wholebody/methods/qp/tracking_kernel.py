@@ -10,37 +10,63 @@ from wholebody.methods.qp.active_set_kernel import grow
 from wholebody.methods.qp.dense_kernel import dot
 from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram, Room
 from wholebody.methods.qp.rows import (
+    NUMBERS,
     Bodies,
-    LastStep,
     LinearRows,
     PackedRows,
     Rows,
-    StepControl,
     StepParts,
     StepRoom,
     StepSize,
     Terms,
 )
-from wholebody.methods.qp.settings import StepNumbers
+from wholebody.methods.qp.settings import Corrections, StepNumbers
 from wholebody.methods.qp.subproblem_kernel import fill_program, fill_rows
 from wholebody.methods.qp.turning_kernel import moved
 
 
+@compiled(inner=True, forceinline=True)
+def fixed_terms(fixed: Array, places: Indices, goals: int) -> Terms:
+    """The terms among what does not change; see `solve`."""
+    count, end = places[0], NUMBERS + goals
+    bound = fixed[end : end + 2 * count].reshape((2, count))
+    return Terms(places[1 : count + 1], bound, fixed[NUMBERS:end], fixed[20:25])
+
+
+@compiled(inner=True, forceinline=True)
+def fixed_bodies(fixed: Array, places: Indices, goals: int, columns: Array, placement: Array) -> Bodies:
+    """The joints and pieces among what does not change, where they are; see `solve`."""
+    wide, pieces, first = len(columns), len(placement), 1 + places[0]
+    joints, own = places[first : len(places) - pieces], NUMBERS + goals + 2 * places[0]
+    count, room = len(joints) - 2 * wide, own + pieces
+    return Bodies(
+        columns, joints[:wide], joints[wide : 2 * wide], joints[2 * wide :], places[len(places) - pieces :], placement,
+        fixed[own:room], fixed[room : room + 18 * count].reshape((3, count, 6)),
+    )  # fmt: skip
+
+
 @compiled(error_model="numpy")
 def solve(
-    at: PackedRows, last: LastStep, given: Terms, bodies: Bodies, room: StepRoom, size: StepSize, control: StepControl,
+    at: PackedRows, columns: Array, placement: Array, pushed: Indices, fixed: Array, places: Indices, room: StepRoom,
     hot: bool,
 ) -> tuple[bool, int, float, float, float, float, float, float, float, float]:  # fmt: skip
     """Sort the rows of a linearisation, build the program of a step and solve it from the last active set.
 
+    What does not change comes in two arrays, not in records: at a call from Python a record costs 0.35 us for each of
+    its arrays, an array 0.15 us.
+
     Args:
         at: the linearisation.
-        last: the step before; what is remembered of this one is written.
-        given: the terms.
-        bodies: where the step begins.
-        room: for the program.
-        size: of the step, with the least damping, where the last step does not ask for more.
-        control: numbers.
+        columns: of the joint Jacobian, see `Bodies`.
+        placement: (p, 4, 3) of the pieces.
+        pushed: keys of the elastic rows that pushed in the last program, in ascending order.
+        fixed: `step_program.numbers_of`; weights of the goals, bounds of the constraints, reach of the pieces; room of
+            `Bodies`; and two rows (nq + m + 2,) of what is remembered: where the last step ended, its posture, the
+            errors of its soft rows there to first order, the residual of its goals, and 1 where there was such a step;
+            the same of this step, but for the posture, where the program is solved.
+        places: number and kinds of constraints, see `Terms`; place and joint of each column, parents of joints, and
+            joints of pieces, see `Bodies`.
+        room: for the program; the first masks are the bounds that held the last answer.
         hot: whether to solve the program, not only to build it.
 
     Returns:
@@ -48,14 +74,18 @@ def solve(
         violation of an elastic row; least room that a contact row has after the step, and largest violation of an
         elastic row then; least clearance asked of a contact; the damping, and what the answer asks for.
     """
-    value, jacobian, clearance, kind, q, held = at.value, at.jacobian, at.clearance, given.kind, at.q, last.held
-    after, numbers = last.after, control.step
-    n, goals, contacts = at.box.shape[1], len(given.share), len(at.number)
+    value, jacobian, clearance, q = at.value, at.jacobian, at.clearance, at.q
+    goals = len(value) - places[0]
+    given = fixed_terms(fixed, places, goals)
+    kind, n, contacts = given.kind, at.box.shape[1], len(at.number)
     equal, one_sided = 0, 0
     for c in range(len(kind)):
         equal += kind[c] == 0
         one_sided += (kind[c] == 3) * 2 + (kind[c] == 1) + (kind[c] == 2)
-    m, terms = goals + equal, goals + len(kind)
+    m, terms, last = goals + equal, goals + len(kind), len(q)
+    memory = fixed[len(fixed) - 2 * (last + m + 2) :].reshape((2, last + m + 2))
+    before, after = memory[0], memory[1]
+    size = StepSize(fixed[0], fixed[1], fixed[2], fixed[3] > 0.0, fixed[4])
     own = parts(room, n, goals, m, one_sided + len(at.gap), one_sided + contacts)
     rows, x = own.rows, own.x
     there = LinearRows(
@@ -66,36 +96,32 @@ def solve(
     target, soft, soft_error, elastic, violations, key = (
         own.program.target, rows.soft, rows.soft_error, rows.elastic, rows.elastic_violation, rows.key,
     )  # fmt: skip
-    at_lower, at_upper = own.active.lower, own.active.upper
     error = 0.0
     for r in range(goals):
         error += value[r] * value[r]
     error = max(np.sqrt(error), 1e-12)
-    damping = _run_ahead_of(last.before, q, rows, target, size, numbers, error)
+    damping = _run_ahead_of(before, q, rows, target, size, fixed[26:29], error)
     for i in range(n):
         own.columns[0, i], own.columns[1, i] = at.measure[1, i], at.measure[0, i]
         own.columns[2, i], own.columns[3, i] = at.box[0, i], at.box[1, i]
     damped = StepSize(size.radius, size.pull, damping, size.measures, size.gain)
-    fill_program(own.columns, rows, target, own.program.least, damped, control.program, control.scale)
+    fill_program(own.columns, rows, target, own.program.least, damped, fixed[5:14], fixed[25])
     least_asked, worst = np.inf, 0.0
     for c in range(contacts):
         least_asked = min(least_asked, clearance[c])
     for violated in violations:
         worst = max(worst, violated)
-    for i in range(n):
-        at_lower[i], at_upper[i] = held[0, i], held[1, i]
     rounds = -1
+    limits = Corrections(fixed[14], int(fixed[15]), int(fixed[16]), int(fixed[17]), int(fixed[18]), fixed[19])
     if hot:
-        rounds = grow(own.program, rows.key, last.pushed, own.active, control.corrections, own.room, x)
+        rounds = grow(own.program, rows.key, pushed, own.active, limits, own.room, x)
     if rounds < 0:
         return False, 0, 0.0, 0.0, worst, -np.inf, np.inf, least_asked, damping, 0.0
-    for i in range(n):
-        held[0, i], held[1, i] = at_lower[i], at_upper[i]
     count = _sorted_keys(key, own.active.elastic, own.pushing)
     left = 0.0
     for r in range(m):
         gone = dot(soft[r], x)
-        after[len(q) + r] = soft_error[r] + gone
+        after[last + r] = soft_error[r] + gone
         if r < goals:
             left += (gone - target[r]) ** 2
     left = np.sqrt(left)
@@ -106,20 +132,21 @@ def solve(
         missed = max(missed, -ahead)
         if j >= one_sided:
             spare = min(spare, ahead)
-    asked = numbers.damping * min(1.0, left / error) if left > numbers.resting else 0.0
-    way, turn = moved(x, bodies)
+    asked = fixed[26] * min(1.0, left / error) if left > fixed[27] else 0.0
+    way, turn = moved(x, fixed_bodies(fixed, places, goals, columns, placement))
     return True, count, way, turn, worst, spare, missed, least_asked, damping, asked
 
 
 @compiled(inner=True, forceinline=True)
 def _run_ahead_of(
-    before: Array, q: Array, rows: Rows, shift: Array, size: StepSize, numbers: StepNumbers, error: float
+    before: Array, q: Array, rows: Rows, shift: Array, size: StepSize, numbers: Array, error: float
 ) -> float:
     """Write what is added to the errors of the soft rows, as the last step was curved; returns the damping.
 
-    `error` is the norm of the goals' errors.
+    `numbers` are damping, error below which a goal rests, and how far what is held is run ahead of at most; `error` is
+    the norm of the goals' errors.
     """
-    curved = numbers.curved
+    damping, rest, curved = numbers[0], numbers[1], numbers[2]
     soft_error, goals = rows.soft_error, rows.goals
     last, m = len(q), len(soft_error)
     known = _is_known(before, q)
@@ -132,10 +159,10 @@ def _run_ahead_of(
     # what a goal that rests is missed by, because the last step was curved; a goal that moves is not run ahead of
     resting = size.measures
     for r in range(goals):
-        resting = resting and abs(shift[r]) < numbers.resting
+        resting = resting and abs(shift[r]) < rest
     if not resting:
         shift[:goals] = 0.0
-    own: float = numbers.damping * min(1.0, before[last + m] / error)
+    own: float = damping * min(1.0, before[last + m] / error)
     return max(size.damping, own)
 
 
@@ -173,7 +200,7 @@ def run_ahead(curved: Array, soft_error: Array, goals: int, q: Array, numbers: S
         goals: how many of them are goals'.
         q: (nq,) the posture.
         numbers: of steps.
-        before: (nq + m + 2,) see `LastStep`.
+        before: (nq + m + 2,) see `solve`.
 
     Returns:
         Whether a row is to run ahead by more than `straight` farther, or less far, than it did.

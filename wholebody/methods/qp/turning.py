@@ -33,7 +33,7 @@ class Turning:
         self._single = np.array([len(own) == 1 for own in points], dtype=bool)
         self._seen = Seen(TRACKING.room, BAND, LEVER_DISTANCE, TRACKING.off, TRACKING.inside, TRACKING.unseen)
         place: Indices = state.spread(np.arange(state.model.nv, dtype=float)).astype(np.intp)
-        self._joints: tuple[Indices, Indices, Indices, Indices] = (
+        self.joints: tuple[Indices, Indices, Indices, Indices] = (
             place,
             state.column_joint,
             state.parents,
@@ -44,7 +44,7 @@ class Turning:
     def bodies(self, placements: Array, reach: Array | None = None) -> Bodies:
         """The joints where the state is, and the pieces at their placements; `reach` (p,) is another one of these."""
         far = self._workspace.table.reach if reach is None else reach
-        return Bodies(self._workspace.state.columns, *self._joints, placements, far, self._twists)
+        return Bodies(self._workspace.state.columns, *self.joints, placements, far, self._twists)
 
     def motion(self, at: PackedLinearisation, displacement: Array) -> tuple[float, float]:
         """Longest way of any point of any piece, metres, and largest turn, to first order in the displacement (nv,)."""
