@@ -49,12 +49,10 @@ def asked(monkeypatch):
     return answers
 
 
-def test_as_it_comes_only_the_first_program_is_osqps(over_a_table, asked):
+def test_as_it_comes_the_solver_is_asked_where_no_active_set_settles(over_a_table, asked):
     solution = wb.QP().solve(over_a_table)
     assert solution.method == "qp"
-    assert solution.programs["osqp"] >= 1
-    assert solution.programs["active set"] > solution.programs["osqp"]
-    assert asked[0].iterations > 0
+    assert solution.programs["active set"] > 0.9 * sum(solution.programs.values())
     assert len(asked) <= sum(count for by, count in solution.programs.items() if by != "active set")
 
 

@@ -214,8 +214,8 @@ class StepProgram:
             self._grow(2 * k)
         contacts = at.contacts
         self._sizes = (k, own.one_sided + len(contacts.distance))
-        if working.held is not None and working.held is not self._last:
-            self._last[:] = working.held
+        if working.held is not self._last:
+            self._last[:] = False if working.held is None else working.held
         if self._mixed:
             self._share[:] = given.share
         self._fixed[2], self._fixed[3] = least_damping, measures
@@ -224,15 +224,15 @@ class StepProgram:
         )
         solved, count, motion, turn, worst, spare, missed, least, damping, asked = self._kernel.solve(
             rows_at, self._workspace.state.columns, contacts.placements, working.pushing, self._fixed, self._places,
-            self._room, working.hot,
+            self._room, working.solver.hot_start,
         )  # fmt: skip
         self._settled = solved
         if solved:
             working.pushing = self._room.integers[2 * k : 2 * k + count].copy()
             working.held, by = self._last, working.solver.count(ACTIVE_SET)
             return Answer(self._x, motion, turn, worst, spare, missed, least, True, 0, by), damping, asked
-        if working.hot:
-            working.held = None  # what the call did to it did not settle
+        if working.solver.hot_start:
+            working.reset()  # what was known of the last one did not settle
         rows, program = self._parts.rows, self._parts.program
         answer = working.solve(program, rows.key)
         motion, turn = self.turning.motion(at, answer.x)

@@ -39,12 +39,14 @@ class WorkingSet:
             program: the full program.
             key: (k,) names of its elastic rows.
         """
-        if self.hot:
-            answer = self._from_the_last(program, key)
-            if answer is not None:
-                return answer
-        answer = self.solver.solve(program)
-        self._remember(answer.active, key)
+        answer = self._corrected(program, key) if self.solver.hot_start else None
+        if answer is None and self.solver.hot_start and self.held is not None:
+            self.reset()  # the last set may have led astray
+            answer = self._corrected(program, key)
+        if answer is None:
+            answer = self.solver.solve(program)
+        self.held = np.array([answer.active.lower, answer.active.upper])
+        self.pushing = np.sort(key[answer.active.elastic])
         self.solver.count(answer.by)
         return answer
 
@@ -53,22 +55,14 @@ class WorkingSet:
         self.held = None
         self.pushing = np.zeros(0, dtype=np.intp)
 
-    @property
-    def hot(self) -> bool:
-        """Whether the next program is to begin from the answer of the last."""
-        return self.held is not None and self.solver.hot_start
-
-    def _from_the_last(self, program: QuadraticProgram, key: NDArray[np.intp]) -> QPSolution | None:
+    def _corrected(self, program: QuadraticProgram, key: NDArray[np.intp]) -> QPSolution | None:
         """The answer by the active set of the program before, corrected; None where that does not settle."""
         x: Array = np.empty(program.size)
-        assert self.held is not None
-        active = ActiveSet(self.held[0].copy(), self.held[1].copy(), np.empty(len(key), dtype=bool))
+        lower, upper = np.zeros((2, program.size), dtype=bool) if self.held is None else self.held.copy()
+        active = ActiveSet(lower, upper, np.empty(len(key), dtype=bool))
         program.check_shapes(active)
         rounds = self._kernel.grow(program, key, self.pushing, active, CORRECTIONS, self.room(program), x)
-        if rounds < 0:
-            return None
-        self._remember(active, key)
-        return QPSolution(x, active, True, 0, self.solver.count(ACTIVE_SET))
+        return None if rounds < 0 else QPSolution(x, active, True, 0, ACTIVE_SET)
 
     def room(self, program: QuadraticProgram) -> Room:
         """Room of the compiled loops for a program, kept from one to the next."""
@@ -77,7 +71,3 @@ class WorkingSet:
         if room is None or size > len(room.work) or len(program.least) > len(room.chosen):
             room = self._room = room_for(program, 2)
         return room
-
-    def _remember(self, active: ActiveSet, key: NDArray[np.intp]) -> None:
-        self.held = np.array([active.lower, active.upper])
-        self.pushing = np.sort(key[active.elastic])
