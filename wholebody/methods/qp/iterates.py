@@ -15,19 +15,12 @@ from wholebody.terms.linearisation import Linearisation
 
 
 class StepAcceptance(NamedTuple):
-    """How a step did.
+    """How a step did."""
 
-    Attributes:
-        accepted: whether it is taken.
-        good: whether it achieved the predicted reduction.
-        poor: whether it achieved much less.
-        by: "measure" or "goal", by which it was judged; "rejected", or "rejected measure" where the measures led.
-    """
-
-    accepted: bool
-    good: bool
-    poor: bool
-    by: str
+    accepted: bool  # whether it is taken
+    good: bool  # whether it achieved the predicted reduction
+    poor: bool  # whether it achieved much less
+    by: str  # "measure" or "goal", by which it was judged; "rejected", or "rejected measure" where the measures led
 
 
 class PredictedReduction(NamedTuple):
@@ -38,21 +31,13 @@ class PredictedReduction(NamedTuple):
 
 
 class LocalSolution(NamedTuple):
-    """Where a descent ended.
+    """Where a descent ended."""
 
-    Attributes:
-        q: (nq,) posture.
-        violation: the residual violation.
-        measure: weighted sum of the measures.
-        converged: whether it ended because nothing better is near, rather than out of iterations.
-        iterations: how many programs were solved.
-    """
-
-    q: Array
-    violation: Violation
-    measure: float
-    converged: bool
-    iterations: int
+    q: Array  # (nq,) posture
+    violation: Violation  # the residual violation
+    measure: float  # weighted sum of the measures
+    converged: bool  # whether it ended because nothing better is near, rather than out of iterations
+    iterations: int  # how many programs were solved
 
 
 class Iterate(NamedTuple):
@@ -66,23 +51,14 @@ class Iterate(NamedTuple):
 
 
 class Step(NamedTuple):
-    """What a program says about the way from a posture.
+    """What a program says about the way from a posture."""
 
-    Attributes:
-        dq: (nv,) the step: the program's answer, or its normal part where the measures have nothing to gain.
-        parts: the answer's parts; None far from the goals, and where measures do not count.
-        flat: whether the tangential part saves less of the measures than counts.
-        answer: (nv,) the program's answer.
-        predicted: the reduction that the program predicts.
-        multipliers: of the program; None as for the parts.
-    """
-
-    dq: Array
-    parts: Parts | None
-    flat: bool
-    answer: Array
-    predicted: PredictedReduction
-    multipliers: Multipliers | None
+    dq: Array  # (nv,) the step: the program's answer, or its normal part where the measures have nothing to gain
+    parts: Parts | None  # the answer's parts; None far from the goals, and where measures do not count
+    flat: bool  # whether the tangential part saves less of the measures than counts
+    answer: Array  # (nv,) the program's answer
+    predicted: PredictedReduction  # the reduction that the program predicts
+    multipliers: Multipliers | None  # of the program; None as for the parts
 
 
 def judge(

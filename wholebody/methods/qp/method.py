@@ -74,8 +74,7 @@ class QP(Checked):
     def name(self) -> str:
         """Name for tables: "qp" as it comes; else what stands behind the slash is asked for every program.
 
-        "qp/active_set" and "+hot_start" begin with the active set of the program before, and ask their solver where that
-        does not settle.
+        "qp/active_set" and "+hot_start" begin with the last active set, and ask their solver where it does not settle.
         """
         if self.hot_start:
             return {"osqp": "qp", "active_set": "qp/active_set"}.get(self.solver, f"qp/{self.solver}+hot_start")

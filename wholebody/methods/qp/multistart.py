@@ -47,17 +47,11 @@ class Budget(NamedTuple):
 
 
 class Attempt(NamedTuple):
-    """A part of a search.
+    """A part of a search."""
 
-    Attributes:
-        starts: (nq,) postures to begin at.
-        stage: where it leads from one; None where that is given up.
-        how: what the message says of an answer that it found.
-    """
-
-    starts: Iterable[Array]
-    stage: Callable[[Array], LocalSolution | None]
-    how: str
+    starts: Iterable[Array]  # (nq,) postures to begin at
+    stage: Callable[[Array], LocalSolution | None]  # where it leads from one; None where that is given up
+    how: str  # what the message says of an answer that it found
 
 
 class Multistart:

@@ -33,32 +33,20 @@ from wholebody.terms.linearisation import PackedLinearisation
 
 
 class Answer(NamedTuple):
-    """Answer to the program of a step.
+    """Answer to the program of a step."""
 
-    Attributes:
-        x: (n,) displacement; overwritten by the next program.
-        motion: longest way of any point of any piece, metres, to first order.
-        turn: largest turn of a piece, radians.
-        worst: largest violation of an elastic row at x = 0, metres.
-        spare: least distance beyond its clearance that a contact has after the displacement, metres, to first order;
-            negative infinite where it is not known.
-        missed: largest violation of an elastic row after the displacement, metres or radians, to first order.
-        asked: least clearance asked of a contact, metres; infinite without contacts.
-        exact: see `QPSolution`, like the next two.
-        iterations: of the solver.
-        by: what closed the program.
-    """
-
-    x: Array
-    motion: float
-    turn: float
-    worst: float
+    x: Array  # (n,) displacement; overwritten by the next program
+    motion: float  # longest way of any point of any piece, metres, to first order
+    turn: float  # largest turn of a piece, radians
+    worst: float  # largest violation of an elastic row at x = 0, metres
+    # least distance beyond its clearance that a contact has after the displacement, metres, to first order; negative
+    # infinite where it is not known
     spare: float
-    missed: float
-    asked: float
-    exact: bool
-    iterations: int
-    by: str
+    missed: float  # largest violation of an elastic row after the displacement, metres or radians, to first order
+    asked: float  # least clearance asked of a contact, metres; infinite without contacts
+    exact: bool  # see `QPSolution`, like the next two
+    iterations: int  # of the solver
+    by: str  # what closed the program
 
 
 class StepProgram:
