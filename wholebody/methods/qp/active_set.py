@@ -1,20 +1,10 @@
 """From a guess to the exact answer of a quadratic program: by correcting active sets, else by semismooth Newton steps.
 
-With the active set fixed the program is a linear system. Eliminating x leaves one symmetric positive definite system in
-the multipliers y of the soft and active elastic rows A (Schur complement of the diagonal),
-
-    (A_F D_F^-1 A_F' + W^-1) y = A x_fixed-part - A_F D_F^-1 g_F - b,        x_F = -D_F^-1 (g_F + A_F' y),
-
-of a few dozen unknowns: about 30 us. Weights enter as their inverse, so large ones cost no accuracy. With more rows
-than variables, and where rows repeat each other to rounding, the system in x is the better one: the least squares
-problem of the weighted rows, by QR. The set is then corrected where signs are wrong (the primal-dual active set method,
-Hintermueller, Ito and Kunisch 2002), which ends after a few corrections when the guess was near. First-order solvers
-such as OSQP thereby end in answers exact to rounding.
-
-Correcting sets may not end. Semismooth Newton steps with an exact line search do: the objective is convex, piecewise
-quadratic and smooth, and on a piece its minimiser is a linear least squares problem. Each step goes towards that
-minimiser as far as the objective falls; along a line its derivative is piecewise linear and increasing, so the best
-step is found exactly (Nocedal and Wright 2006, section 16.7, does the same for bounds).
+docs/theory/qp_programs.md has the equations. With the active set fixed the program is a linear system: in the
+multipliers (Schur complement of the diagonal), or, with more rows than variables and where rows repeat each other to
+rounding, in x by QR of the weighted rows. The set is then corrected where signs are wrong (Hintermueller, Ito and
+Kunisch 2002). That may not end. Semismooth Newton steps with an exact line search do: the objective is convex,
+piecewise quadratic and smooth, and along a line its derivative is piecewise linear and increasing.
 """
 
 from __future__ import annotations

@@ -1,12 +1,8 @@
 """Feasibility first: from a start to a feasible posture, by whole Gauss-Newton steps in a small box, without measures.
 
-Each program asks for the whole residual of the goals and lets no degree of freedom go farther than the box. So the step
-slides along what is in the way with all of its length: the joints that are held up stay, and the others go on. A step
-that asks for a part of the errors and least motion, as `sqp` does, gets no nearer there. Steps are taken as they are;
-where they go to and fro the box shrinks.
-
-Where a joint is held up by its limit, and turning on by what is missing to a full turn leads to its other limit, it is
-put there: a goal beyond the limit of a shoulder that turns by 320 degrees is reached from the other side.
+The step slides along what is in the way with all of its length: the joints that are held up stay, and the others go
+on. A step that asks for a part of the errors and least motion, as `sqp` does, gets no nearer there. Where a joint is
+held up by its limit, and turning on by what is missing to a full turn leads to its other limit, it is put there.
 """
 
 from __future__ import annotations
@@ -37,29 +33,17 @@ AT_LIMIT = 1e-6  # rad
 
 @dataclass
 class Feasibility:
-    """One attempt; call `run` once.
+    """One attempt; call `run` once."""
 
-    Attributes:
-        problem: to be solved.
-        subproblem: builds the programs.
-        lineariser: linearises the problem.
-        solver: solves the programs.
-        tolerance: metres and radians.
-        iterations: most programs to solve.
-        trace: grows by one entry a program.
-        note: what to call the programs in the trace.
-        control: what may end it.
-    """
-
-    problem: Problem
-    subproblem: Subproblem
-    lineariser: Lineariser
-    solver: QPSolver
-    tolerance: float
-    iterations: int
-    trace: list[TraceEntry] = field(default_factory=list)
-    note: str = "feasibility"
-    control: Control = field(default_factory=lambda: Control(np.inf))
+    problem: Problem  # to be solved
+    subproblem: Subproblem  # builds the programs
+    lineariser: Lineariser  # linearises the problem
+    solver: QPSolver  # solves the programs
+    tolerance: float  # metres and radians
+    iterations: int  # most programs to solve
+    trace: list[TraceEntry] = field(default_factory=list)  # grows by one entry a program
+    note: str = "feasibility"  # what to call the programs in the trace
+    control: Control = field(default_factory=lambda: Control(np.inf))  # what may end it
 
     def run(self, start: Array) -> LocalSolution:
         """Go from a posture within limits, shape (nq,), to a feasible one; else to a stationary one."""

@@ -35,35 +35,24 @@ LEAST_RADIUS = 1e-7
 
 @dataclass
 class SQP:
-    """One descent; call `run` once.
+    """One descent; call `run` once."""
 
-    Attributes:
-        subproblem: builds the programs.
-        lineariser: linearises the problem.
-        solver: solves the programs.
-        tolerance: metres and radians.
-        iterations: most programs to solve.
-        offset: (goal rows,) subtracted from the goal errors: a nearer goal on the way to the true one.
-        trace: grows by one entry an iteration.
-        note: what to call the iterations in the trace.
-        measures: whether the measures count from the beginning; without them only the goals are sought, and the first
-            feasible posture is the end.
-        full_step: whether to ask for all of the way to the goals in every step, damped by how far they are, until
-            steps are rejected or gain little; else for a piece of it.
-        control: what may end it.
-    """
-
-    subproblem: Subproblem
-    lineariser: Lineariser
-    solver: QPSolver
-    tolerance: float
-    iterations: int
+    subproblem: Subproblem  # builds the programs
+    lineariser: Lineariser  # linearises the problem
+    solver: QPSolver  # solves the programs
+    tolerance: float  # metres and radians
+    iterations: int  # most programs to solve
+    # (goal rows,) subtracted from the goal errors: a nearer goal on the way to the true one
     offset: Array | None = None
-    trace: list[TraceEntry] = field(default_factory=list)
-    note: str = ""
+    trace: list[TraceEntry] = field(default_factory=list)  # grows by one entry an iteration
+    note: str = ""  # what to call the iterations in the trace
+    # whether the measures count from the beginning; without them only the goals are sought, and the first feasible
+    # posture is the end
     measures: bool = True
+    # whether to ask for all of the way to the goals in every step, damped by how far they are, until steps are rejected
+    # or gain little; else for a piece of it
     full_step: bool = False
-    control: Control = field(default_factory=lambda: Control(np.inf))
+    control: Control = field(default_factory=lambda: Control(np.inf))  # what may end it
 
     def __post_init__(self) -> None:
         """Begin with a wide trust region and nothing remembered."""

@@ -1,14 +1,8 @@
 """A program in the split form that sparse and active-set solvers like: every residual is a variable of its own.
 
-With z = [x, r, s] the objective is diagonal, which spares a factorisation of x's dense Hessian: measured, OSQP takes a
-third of the time and DAQP two thirds.
-
-    minimise  1/2 z' diag(D, w, v) z + [g, 0, 0]' z
-    subject to  lower <= x <= upper,    T x - r = e,    C x + s >= l
-
-Solvers get it scaled: z = [a x, R r, S s], rows times the roots of their weights as far as `Scaling.heaviest`. The
-objective of the residuals is then 1, and the rest of a weight is in their coefficients. The program is the true
-one, however heavy its rows: the heaviest are nearly hard, since their residuals hardly count in them.
+The objective is diagonal then, which spares a factorisation of x's dense Hessian: OSQP takes a third of the time and
+DAQP two thirds. Solvers get it scaled (docs/theory/qp_programs.md): the program is the true one, and its heaviest rows
+are nearly hard, since their residuals hardly count in them.
 """
 
 from __future__ import annotations
