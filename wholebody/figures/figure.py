@@ -178,6 +178,12 @@ class Figure(checks.FixedAttributes):
             pin.forwardKinematics(self.model, data, q)
             return pin.updateFramePlacement(self.model, data, frame).copy()
 
+    def joint_placement(self, q: Array, joint: int) -> pin.SE3:
+        """Return the placement in the world, at the posture q (nq,), of a joint by its index in the model."""
+        with self._data.borrow() as data:
+            pin.forwardKinematics(self.model, data, self._checked(q))
+            return data.oMi[joint].copy()
+
     def joint_id(self, name: str) -> int:
         """Return the index of a joint in the model; "root" is the free root."""
         if isinstance(name, str) and name == "root" and self.root == "free":

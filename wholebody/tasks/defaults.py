@@ -67,7 +67,7 @@ def default_constraints(
         return tuple(
             found
         ), f"the default Balance is left out: {str(error).removeprefix('Balance: ').partition(';')[0]}"
-    return (*found, Balance(margin=STEADY * least_width(corners)).resolve(scene, start)), ""
+    return (*found, Balance(margin=STEADY * least_width(corners)).on_polygon(corners, scene)), ""
 
 
 def stands(

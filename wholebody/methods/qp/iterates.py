@@ -59,6 +59,7 @@ class Step(NamedTuple):
     answer: Array  # (nv,) the program's answer
     predicted: PredictedReduction  # the reduction that the program predicts
     multipliers: Multipliers | None  # of the program; None as for the parts
+    saves: float  # by how much the measures decrease, to second order, with the program's answer
 
 
 def judge(

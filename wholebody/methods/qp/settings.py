@@ -101,6 +101,7 @@ class SeedNumbers(NamedTuple):
     together: int = 10  # seeds of a batch
     batches: int = 25  # most. More: fewer problems are left to the slower search, which then begins later.
     compared: int = 5  # ends of which the one of least effort is taken. More: less effort, more time.
+    samples: int = 24  # values of the joint of seven that a closed form holds. More: less effort, more time.
     worth: float = 0.9  # share of the effort of an answer below which a rejected end is descended from too
 
 
