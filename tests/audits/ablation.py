@@ -180,7 +180,11 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         "Lagrangian in the judgement of steps": (sqp, "lagrangian", lambda multipliers, measure, rows: measure),
         "supporting planes": (linearisation, "term_planes", lambda terms, counts, state: None),
         "second derivatives of contacts": (descent, "_bent", lambda self, here: here.at),
-        "warm start from the last active set": (WorkingSet, "hot", property(lambda self: False)),
+        "warm start from the last active set": (
+            WorkingSet,
+            "held",
+            property(lambda self: None, lambda self, held: None),
+        ),
         "seeds of arms": (qp, "from_seeds", lambda *given: None),
         "before contact": (multistart, "before_contact", lambda *given: iter(())),
         "feasibility first": (search, "_feasibility_first", lambda self, start: self.best),
