@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.base.records import with_values
 
 
 class QuadraticProgram(NamedTuple):
@@ -70,12 +69,6 @@ class QuadraticProgram(NamedTuple):
     def size(self) -> int:
         """Number of variables n."""
         return len(self.diagonal)
-
-    def with_elastic(self, chosen: Mask) -> QuadraticProgram:
-        """The program with the chosen ones of its elastic rows, (k,) of bool."""
-        return with_values(
-            self, elastic=self.elastic[chosen], least=self.least[chosen], elastic_weight=self.elastic_weight[chosen]
-        )
 
     def value(self, x: Array) -> float:
         """Objective at x, shape (n,)."""
