@@ -152,9 +152,10 @@ def test_times_of_three_decimals_have_their_mean_step(rate: float, hand: wb.Figu
         read_track(path, hand)
 
 
-def test_columns_may_be_few_and_in_degrees(hand: wb.Figure, tmp_path: Path) -> None:
+@pytest.mark.parametrize("unit", [" [deg]", "_deg", " (°)", "(Degrees)"])
+def test_columns_may_be_few_and_in_degrees(unit: str, hand: wb.Figure, tmp_path: Path) -> None:
     path = tmp_path / "glove.csv"
-    path.write_text("time,right_index_mcp_flexion [deg]\n0.0,0\n0.1,45\n0.2,90\n")
+    path.write_text(f"time,right_index_mcp_flexion{unit}\n0.0,0\n0.1,45\n0.2,90\n")
     with pytest.warns(UserWarning, match=r"no column for root_x.* and \d+ more; they stay as in the neutral posture"):
         read = read_track(path, hand)
     found = [hand.joint_values(q) for q in read.q]
