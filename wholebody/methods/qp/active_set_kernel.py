@@ -105,14 +105,14 @@ def primal_dual_active_set(
             return False
         for c in range(k):
             reached[c] = dot(elastic[places[c]], x)
-        if _is_right(program, places, active, own, limits.tolerance, x):
+        if attempt < limits.at_once:
+            wrong = _correct_all(program, places, active, own, limits.tolerance, x)
+        else:
+            wrong = _correct_worst(program, places, active, own, limits.tolerance, x)
+        if not wrong:
             for i in range(n):
                 x[i] = min(max(x[i], lower[i]), upper[i])
             return True
-        if attempt < limits.at_once:
-            _correct_all(program, places, active, own, limits.tolerance, x)
-        else:
-            _correct_worst(program, places, active, own, limits.tolerance, x)
     return False
 
 
@@ -134,71 +134,46 @@ def minimise_with(program: QuadraticProgram, active: ActiveSet, tolerance: float
 
 
 @compiled(inner=True, error_model="numpy", forceinline=True)
-def _is_right(
-    program: QuadraticProgram, places: Indices, active: ActiveSet, own: Face, tolerance: float, x: Array
-) -> bool:
-    """Whether an active set is that of its minimiser x (n,)."""
-    target, least, lower, upper = program.target, program.least, program.lower, program.upper
-    at_lower, at_upper, pushing = active.lower, active.upper, active.elastic
-    multiplier, gradient, reached = own.multiplier, own.gradient, own.reached
-    for i in range(len(x)):
-        if at_lower[i]:
-            right = gradient[i] >= 0.0
-        elif at_upper[i]:
-            right = gradient[i] <= 0.0
-        else:
-            right = lower[i] - tolerance <= x[i] <= upper[i] + tolerance
-        if not right:
-            return False
-    following = len(target)
-    for c in range(len(places)):
-        j = places[c]
-        if pushing[j]:
-            right = multiplier[following] <= 0.0
-            following += 1
-        else:
-            right = reached[c] >= least[j] - tolerance
-        if not right:
-            return False
-    return True
-
-
-@compiled(inner=True, error_model="numpy", forceinline=True)
 def _correct_all(
     program: QuadraticProgram, places: Indices, active: ActiveSet, own: Face, tolerance: float, x: Array
-) -> None:
-    """Put right everything that is wrong in an active set with the minimiser x (n,)."""
+) -> bool:
+    """Put right everything that is wrong in an active set with the minimiser x (n,); whether anything was."""
     target, least, lower, upper = program.target, program.least, program.lower, program.upper
     at_lower, at_upper, pushing = active.lower, active.upper, active.elastic
     multiplier, gradient, reached = own.multiplier, own.gradient, own.reached
+    wrong = False
     for i in range(len(x)):
-        held_low, held_high = at_lower[i], at_upper[i]
-        at_lower[i] = gradient[i] >= 0.0 if held_low else x[i] < lower[i] - tolerance
-        at_upper[i] = gradient[i] <= 0.0 if held_high else x[i] > upper[i] + tolerance
+        low = gradient[i] >= 0.0 if at_lower[i] else x[i] < lower[i] - tolerance
+        high = gradient[i] <= 0.0 if at_upper[i] else x[i] > upper[i] + tolerance
+        wrong = wrong or low != at_lower[i] or high != at_upper[i]
+        at_lower[i], at_upper[i] = low, high
     following = len(target)
     for c in range(len(places)):
         j = places[c]
+        push = reached[c] < least[j] - tolerance
         if pushing[j]:
-            pushing[j] = multiplier[following] <= 0.0
+            push = multiplier[following] <= 0.0
             following += 1
-        else:
-            pushing[j] = reached[c] < least[j] - tolerance
+        wrong = wrong or push != pushing[j]
+        pushing[j] = push
+    return wrong
 
 
 @compiled(inner=True, error_model="numpy", forceinline=True)
 def _correct_worst(
     program: QuadraticProgram, places: Indices, active: ActiveSet, own: Face, tolerance: float, x: Array
-) -> None:
-    """Put right the entry that is most wrong, in units of x."""
+) -> bool:
+    """Put right the entry that is most wrong, in units of x; whether any was."""
     diagonal, target, elastic = program.diagonal, program.target, program.elastic
     least, lower, upper = program.least, program.lower, program.upper
     at_lower, at_upper, pushing = active.lower, active.upper, active.elastic
     multiplier, gradient, reached = own.multiplier, own.gradient, own.reached
-    worst, mask, place = -np.inf, at_lower, 0
+    worst, mask, place, found = -np.inf, at_lower, 0, False
     for i in range(len(x)):
         pull = abs(gradient[i]) / diagonal[i]
         next_lower = gradient[i] >= 0.0 if at_lower[i] else x[i] < lower[i] - tolerance
         next_upper = gradient[i] <= 0.0 if at_upper[i] else x[i] > upper[i] + tolerance
+        found = found or next_lower != at_lower[i] or next_upper != at_upper[i]
         wrong = pull if at_lower[i] else lower[i] - x[i]
         if next_lower != at_lower[i] and wrong > worst:
             worst, mask, place = wrong, at_lower, i
@@ -217,6 +192,9 @@ def _correct_worst(
                 norm += elastic[j, i] * elastic[j, i] / diagonal[i]
             wrong = multiplier[following] * norm
             following += 1
+        found = found or flips
         if flips and wrong > worst:
             worst, mask, place = wrong, pushing, j
-    mask[place] = not mask[place]
+    if found:
+        mask[place] = not mask[place]
+    return found
