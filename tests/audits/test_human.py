@@ -2,32 +2,11 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 import pytest
 
-from tests.audits.__main__ import main
 from tests.audits.human_contacts import distance
 from tests.audits.human_sizes import dimensions, ranges
 from wholebody.figures import load
-
-
-def test_a_small_run_writes_page_and_numbers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    docs = tmp_path / "docs"
-    docs.mkdir()
-    assert main(["human", "--quick", "--out", str(tmp_path / "out"), "--update-docs", str(docs)]) == 0
-    found = json.loads((tmp_path / "out" / "human.json").read_text())
-    assert len(found["dimensions"]) == 34
-    assert [row["status"] for row in found["tasks"]] == ["solved"] * 3
-    assert all(row["plausible"] for row in found["tasks"])
-    reached = {row["contact"] for row in found["contacts"] if row["reached"]}
-    assert reached >= {"palms together", "palm flat on a table", "thighs on the seat"}
-    text = (docs / "human.md").read_text()
-    assert text.startswith("# The person, measured")
-    assert "| sitting height |" in text
-    assert "![" not in text  # a short run draws nothing
-    assert "reach high: solved" in capsys.readouterr().out
 
 
 def test_dimensions_keep_to_what_is_likely() -> None:
