@@ -23,7 +23,7 @@ from wholebody.scene.workspace import Workspace, borrowed
 from wholebody.tasks.answers import in_words, is_own
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.checks import check_measure, check_rows
-from wholebody.tasks.defaults import default_constraints, default_measures, stands
+from wholebody.tasks.defaults import balancing, default_constraints, default_measures, standing
 from wholebody.terms.linearisation import Lineariser
 from wholebody.terms.plan import TermPlan, Terms, make_plan
 
@@ -145,14 +145,17 @@ class Problem(checks.FixedAttributes):
 
     def _usual_constraints(self, state: State, stated: Sequence[Constraint]) -> tuple[tuple[Constraint, ...], str]:
         scene, start, ranges, known = self.scene, self.start, self.range_of_motion, frozenset(map(type, stated))
-        required = self.balance is True
-        balance = stands(scene, state, stated, self.bounds, self.goals) if self.balance is None else required
-        if not (balance or (ranges and scene.figure.ranges)):
+        required, steady, terms = self.balance is True, tuple[str, ...](), (*stated, *self.goals)
+        if required:
+            steady = balancing(scene, stated)
+        elif self.balance is None:
+            steady = standing(scene, state, terms, self.bounds)
+        if not (steady or (ranges and scene.figure.ranges)):
             return (), ""
-        moves = scene.built.moves if balance else 0  # shoes carry too
+        moves = scene.built.moves if steady else 0  # shoes carry too
         return scene.built.known(
-            ("constraints", ranges, balance, required, known, moves, start.tobytes()),
-            lambda: default_constraints(scene, start, known, ranges=ranges, balance=balance, required=required),
+            ("constraints", ranges, steady, required, known, moves, start.tobytes()),
+            lambda: default_constraints(scene, start, known, ranges=ranges, standing=steady, required=required),
         )
 
     def __repr__(self) -> str:

@@ -13,6 +13,7 @@ import pinocchio as pin
 
 from wholebody.base import checks
 from wholebody.base.errors import InputError
+from wholebody.figures.joined import join, welded
 from wholebody.geometry.placement import placement as to_placement
 from wholebody.geometry.proximity import PairTable
 from wholebody.geometry.shapes import Box, Capsule, Cylinder, Ellipsoid, Hull, Mesh, Shape, Sphere
@@ -39,8 +40,14 @@ class SceneContents(checks.FixedAttributes):
 
     _correction = "make another with wb.Scene(figure), or change its things by add, move and remove"
 
-    def __init__(self, figure: Figure) -> None:
-        """Make a scene with the figure alone; an InputError if it is none."""
+    def __init__(self, figure: Figure | Mapping[str, Any]) -> None:
+        """Make a scene with a figure alone, or with several by name; see `figures.join` for those.
+
+        Raises:
+            InputError: no figure, or several that cannot be joined.
+        """
+        if isinstance(figure, Mapping):
+            figure = join(figure)
         if not isinstance(getattr(figure, "model", None), pin.Model):
             raise InputError(f"Scene takes a figure, not {checks.shown(figure)}; load one with wb.load('human')")
         self.figure = figure
@@ -119,6 +126,38 @@ class SceneContents(checks.FixedAttributes):
         return int(self.figure.frame_id(name))
 
     # ---- changes
+
+    def add_figure(self, figure: Figure, *, name: str, at: Any = (0.0, 0.0, 0.0), root: str | None = None) -> Self:
+        """Add a figure to a scene of figures that have names, and return the scene.
+
+        `scene.figure` is another one then: postures (nq,) become longer by those of the new figure, which come last.
+
+        Args:
+            figure: one figure.
+            name: its name, which comes before the names of its parts: "anna/right_palm".
+            at: where its world is; see `figures.join`.
+            root: "fixed" to fix a free root as in its first posture; None to leave it as it is.
+
+        Raises:
+            InputError: the scene was made of one figure without a name, or the figure, its name, root or placement
+                cannot be used.
+        """
+        if not self.figure.members:
+            raise InputError(
+                f"add_figure: the scene's figure has no name; make it with wb.Scene({{'anna': figure, {name!r}: other}})"
+            )
+        if name in self.figure.members:
+            raise InputError(f"add_figure: the scene has a figure {name!r} already; give this one another name")
+        if root is not None:
+            checks.choice(root, ("fixed",), "add_figure: root")
+        known = {other: (member.figure, member.at) for other, member in self.figure.members.items()}
+        made = join({**known, name: (figure if root is None else welded(figure), at)})
+        with self._lock:
+            if taken := next((thing for thing in self._objects if thing in made.segments), None):
+                raise InputError(f"add_figure: the scene has a thing {taken!r} already; give the figure another name")
+            object.__setattr__(self, "figure", made)
+            self._changed()
+        return self
 
     def add(
         self,

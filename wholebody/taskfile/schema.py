@@ -108,7 +108,7 @@ GOALS = {
     "frame": _form(tasks.Frame, "frame target weight", frame=FRAME),
     "orientation": _form(tasks.Orientation, "frame target weight", frame=FRAME),
     "axis": _form(tasks.Axis, "frame axis direction toward weight", frame=FRAME),
-    "center_of_mass": _form(tasks.CenterOfMass, "target axes weight"),
+    "center_of_mass": _form(tasks.CenterOfMass, "target axes weight figure"),
     "relative": _form(tasks.Relative, "frame to placement orientation weight", frame=FRAME, to=FRAME),
     "posture": _form(tasks.Posture, "target joints weight", target=kinds.POSTURE, joints=Several(GROUP)),
     **CONTACTS,
