@@ -145,7 +145,8 @@ class Problem(checks.FixedAttributes):
 
     def _usual_constraints(self, state: State, stated: Sequence[Constraint]) -> tuple[tuple[Constraint, ...], str]:
         scene, start, ranges, known = self.scene, self.start, self.range_of_motion, frozenset(map(type, stated))
-        required, steady, terms = self.balance is True, tuple[str, ...](), (*stated, *self.goals)
+        required, steady = self.balance is True, tuple[str, ...]()
+        terms: list[Constraint | Goal] = [*stated, *self.goals]
         if required:
             steady = balancing(scene, stated)
         elif self.balance is None:

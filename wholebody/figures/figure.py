@@ -28,8 +28,8 @@ def one_figure(figure: object, what: str) -> Figure:
     if found.root == "several":
         name = next(iter(found.members), next(iter(found.bodies)))
         raise InputError(
-            f"{what} is several figures, {checks.some(list(found.bodies))}; give one of them, "
-            f"figure.members[{name!r}].figure, and its postures, figure.part({name!r}, q)"
+            f"{what} is several figures; give one of them, figure.members[{name!r}].figure, with its postures, "
+            f"figure.part({name!r}, q), or its clip, clip.part({name!r})"
         )
     return found
 
@@ -119,7 +119,7 @@ class Figure(checks.FixedAttributes):
         self._made: dict[str, Array] = {}
         self._outer: tuple[pin.GeometryObject, ...] | None = None
         names = list(model.names)
-        self.roots = MappingProxyType({names[k].removesuffix("_joint"): k for k in free_roots(model)})
+        self.roots = MappingProxyType({f"{names[k].rpartition('/')[0]}/root".lstrip("/"): k for k in free_roots(model)})
         several = description.prefixes != ("",)
         self.root = "several" if several else "free" if self.roots else "fixed"
         self.bodies = MappingProxyType({prefix: _joints_of(names, prefix) for prefix in description.prefixes})
@@ -355,11 +355,11 @@ class Figure(checks.FixedAttributes):
             raise InputError(f"{self.name} has a fixed root and stays where it is; load it with root='free'")
         if getattr(scene, "model", None) is not self.model or not hasattr(scene, "piece_owner"):
             raise InputError(f"grounded: give a scene of this figure, not {checks.shown(scene)}; see wb.Scene(figure)")
-        q = self._checked(q)
+        model, q = scene.model, self._checked(q)
         for name, joint in self.roots.items():
             prefix = name.removesuffix("root")
             own = tuple(segment for segment in self.segments if segment.startswith(prefix))
-            q = grounded(self.model, own, q, scene, int(self.model.joints[joint].idx_q) + 2)
+            q = grounded(model, own, q, scene, int(model.joints[joint].idx_q) + 2)
         return q
 
     def reduced(self, joints: str | Sequence[str], posture: str | Array | None = None) -> Figure:
@@ -380,8 +380,8 @@ class Figure(checks.FixedAttributes):
     def mounted(self, other: Figure, *, on: str, name: str | None = None, at: Any = (0.0, 0.0, 0.0)) -> Figure:
         """Return this figure with another one on a frame: a hand on an arm, a tool with joints in a hand.
 
-        A free root of the other is fixed as in its first posture. Its names get its name in front: "hand/index_flexion".
-        Pieces of the two are tested against each other but for those that touch where it is mounted: see
+        A free root of the other is fixed as in its first posture. Its name comes before its names: "hand/palm".
+        Pieces of the two are tested against each other, but for those that touch where it is mounted; see
         `excluded_pairs`.
 
         Args:

@@ -13,7 +13,7 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
 from wholebody.base.records import with_values
-from wholebody.figures.description import Articulated, Chain, Description, ExcludedPair, Member
+from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, ExcludedPair, Member
 from wholebody.figures.figure import Figure
 from wholebody.figures.motion_ranges import CoupledRange, EllipticRange, MotionRange
 from wholebody.figures.self_pairs import carriers_above
@@ -106,7 +106,8 @@ def mounted(base: Figure, other: Figure, frame: int, name: str, at: Any) -> Figu
 
 def welded(figure: Figure) -> Figure:
     """The figure with its free root fixed as in its first posture; itself where it is fixed."""
-    return figure.reduced(figure.joints) if figure.roots else figure
+    fixed: Figure = figure.reduced(figure.joints) if figure.roots else figure
+    return fixed
 
 
 def _name(name: Any) -> str:
@@ -117,29 +118,37 @@ def _name(name: Any) -> str:
 
 
 def _checked(figure: Any, name: Any) -> Figure:
-    checks.instance(figure, Figure, f"figure {name!r}", "load one with wb.load('human')")
-    if figure.members:
+    one = checks.instance(figure, Figure, f"figure {name!r}", "load one with wb.load('human')")
+    if one.root == "several":
         raise InputError(f"{name!r} is several figures already; give each of them its own name")
-    if figure.outer:
+    if one.outer:
         raise InputError(
-            f"{name!r} has detail {figure.detail!r}, whose pieces are too coarse to meet another figure; load it with "
+            f"{name!r} has detail {one.detail!r}, whose pieces are too coarse to meet another figure; load it with "
             "detail='capsules' or 'hulls'"
         )
-    return figure
+    return one
 
 
 def _with(model: pin.Model, figure: Figure, prefix: str, frame: int, at: pin.SE3) -> tuple[pin.Model, _Part]:
     """A model with a figure's joints on a frame of it too, and the figure as a part of it."""
     own = pin.Model(figure.model)
     for k in range(1, own.njoints):
-        own.names[k] = prefix + own.names[k]
+        own.names[k] = prefix + (ROOT_JOINT if k in figure.roots.values() else own.names[k])
     for k in range(1, own.nframes):
         own.frames[k].name = prefix + own.frames[k].name
-    seat = model.frames[frame]
+    seat, carrier = model.frames[frame], int(model.frames[frame].parentJoint)
+    world = seat.placement * at
     made = pin.appendModel(model, own, frame, at)
-    joints = (int(seat.parentJoint), *(made.getJointId(name) for name in list(own.names)[1:]))
+    joints = (carrier, *(made.getJointId(name) for name in list(own.names)[1:]))
+    # of a reduced figure Pinocchio puts the masses of what was locked to the wrong places
+    for k in range(1, model.njoints):
+        made.inertias[made.getJointId(model.names[k])] = model.inertias[k]
+    for k in range(1, own.njoints):
+        made.inertias[joints[k]] = own.inertias[k]
+    seated = made.getJointId(model.names[carrier])
+    made.inertias[seated] = model.inertias[carrier] + world.act(own.inertias[0])
     frames = (frame, *(made.getFrameId(one.name, one.type) for one in list(own.frames)[1:]))
-    return made, _Part(figure, joints, frames, seat.placement * at, prefix)
+    return made, _Part(figure, (seated, *joints[1:]), frames, world, prefix)
 
 
 def _geometry(parts: Sequence[_Part], between: Sequence[Indices]) -> pin.GeometryModel:

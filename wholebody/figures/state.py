@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array
 from wholebody.base.checks import instance, posture, whole
 from wholebody.base.errors import InputError
+from wholebody.figures.description import ROOT_JOINT
 from wholebody.geometry.memory_views import placement_view
 
 DOUBLE = np.dtype(np.float64)
@@ -191,8 +192,15 @@ def _restored(model: pin.Model, q: Array) -> State:
 
 
 def free_roots(model: pin.Model) -> tuple[int, ...]:
-    """The joints that are floating bases. A joint without limits too has more coordinates than degrees of freedom."""
-    return tuple(k for k in range(1, model.njoints) if model.parents[k] == 0 and model.joints[k].nq == 7)
+    """The joints that are floating bases: the first one, and of figures that were joined those with a root's name.
+
+    A joint without limits too has more coordinates than degrees of freedom.
+    """
+    return tuple(
+        k
+        for k in range(1, model.njoints)
+        if (k == 1 or model.names[k].endswith(f"/{ROOT_JOINT}")) and model.joints[k].nq == 7
+    )
 
 
 def root_freedoms(model: pin.Model) -> NDArray[np.bool_]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from wholebody.base.checks import choice
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, InputError, one_line
-from wholebody.figures.figure import Figure
+from wholebody.figures.figure import Figure, one_figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.files import amass, archive, bvh, columns, read_frames
 from wholebody.motion.files.base import Frames
@@ -70,6 +70,8 @@ def read_clip(
     """
     path = checked_path(path, "path")
     check_figure(figure, "read_clip")
+    if path.suffix.lower() != ".npz":
+        one_figure(figure, f"read_clip: {path.name} holds one figure, and the figure")
     motion = _skeleton(path, None, None)
     if path.suffix.lower() == ".csv" and names is not None:
         frames: Frames | None = columns.read(path, figure, column_names(names, figure))

@@ -11,14 +11,13 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import function, instance, warn
 from wholebody.base.errors import InputError
-from wholebody.figures.figure import Figure
+from wholebody.figures.figure import Figure, one_figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.posture_fit import Fitter, Goals, smooth
 from wholebody.motion.retarget_targets import LIMBS, Footfalls, Targets, footfalls, has_trunk, known_bones, targets
 from wholebody.motion.roles import Roles, matched
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
 from wholebody.motion.stance import paths
-from wholebody.tracking.tracks import check_figure
 
 ALONE, TOGETHER = 25, 4  # most iterations of a frame alone, and of all frames at once
 
@@ -49,7 +48,7 @@ def retarget(
         InputError: no bones are known to belong to the figure, or two ends of none.
     """
     motion = checked_motion(motion, "retarget: motion")
-    check_figure(figure, "retarget")
+    one_figure(figure, "retarget: figure")
     function(progress, "progress")
     roles = matched(motion, figure, names)
     if roles.told:

@@ -144,7 +144,7 @@ class SceneContents(checks.FixedAttributes):
         """
         if not self.figure.members:
             raise InputError(
-                f"add_figure: the scene's figure has no name; make it with wb.Scene({{'anna': figure, {name!r}: other}})"
+                f"add_figure: the scene's figure has no name; make it with wb.Scene({{'anna': figure, {name!r}: ...}})"
             )
         if name in self.figure.members:
             raise InputError(f"add_figure: the scene has a figure {name!r} already; give this one another name")

@@ -95,9 +95,15 @@ class SceneGeometry:
         standing: Indices = np.flatnonzero(self.table.joint == 0).astype(np.intp)
         # those of joined figures, "anna/seat", have numbers below zero: each figure's its own
         own = {name: -number for number, name in enumerate({owner.partition("/")[0]: 0 for owner in owners})}
-        self.standing = standing, np.array(
-            [self.number_of.get(owners[k], own[owners[k].partition("/")[0]] if "/" in owners[k] else 0) for k in standing],
-            dtype=np.intp,
+        self.standing = (
+            standing,
+            np.array(
+                [
+                    self.number_of.get(owners[k], own[owners[k].partition("/")[0]] if "/" in owners[k] else 0)
+                    for k in standing
+                ],
+                dtype=np.intp,
+            ),
         )
         self.rows = ContactRowBuilder(self.table)
         compiled_kernel()  # of `far_moved`: compile now, not during a solve

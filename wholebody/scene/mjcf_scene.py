@@ -25,18 +25,20 @@ from wholebody.scene.scene import Scene
 def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Concavity = None) -> Scene:
     """Return the scene of an MJCF file, as MuJoCo compiles it.
 
-    The robot is what `wb.load` returns. The geoms of the world, of static and of mocap bodies are fixed things, at most
-    one for each geom; a body with a free joint alone is a thing that moves by itself, with the mass of the file spread
-    evenly. Geoms that can touch nothing are markers and left out; height fields are left out with a warning.
+    The robot is what `wb.load` returns; several have the name of their body before their names. The geoms of the
+    world, of static and of mocap bodies are fixed things, at most one for each geom; a body with a free joint alone is
+    a thing that moves by itself, with the mass of the file spread evenly. Geoms that can touch nothing are markers and
+    left out; height fields are left out with a warning.
 
     Args:
         path: the file.
-        root: as for `wb.load`: "fixed", "free", or the name of one of several robots.
+        root: as for `wb.load`: "fixed", "free", or the name of one of several robots, the others being left out; of
+            several robots each keeps its own without it.
         concavity: as for `wb.load`.
 
     Raises:
         FileFormatError: a file that cannot be read, with the place and the correction.
-        InputError: several robots and none chosen, or a concavity out of range.
+        InputError: several robots and a root for all, or a concavity out of range.
         MissingPackageError: MuJoCo is not installed.
     """
     place = as_path(path, "read_scene: path")
@@ -48,9 +50,14 @@ def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Co
     if root is not None:
         text(root, "read_scene: root")
     compiled = Compiled(place)
-    scene = Scene(mjcf_figure(compiled, root, concavity))
     names, model = compiled.names, compiled.model
-    mine = compiled.tree(compiled.robot(None if root in (None, "fixed", "free") else root))
+    if root is None and len(compiled.robots) > 1:
+        robots = {names["body"][top]: top for top in compiled.robots}
+        scene = Scene({_figure_name(name): mjcf_figure(compiled, name, concavity) for name in robots})
+        mine = [body for top in robots.values() for body in compiled.tree(top)]
+    else:
+        scene = Scene(mjcf_figure(compiled, root, concavity))
+        mine = list(compiled.tree(compiled.robot(None if root in (None, "fixed", "free") else root)))
     left: list[str] = []
     _add_fixed(scene, compiled, 0, pin.SE3.Identity(), left)
     for top in compiled.children[0]:
@@ -132,6 +139,11 @@ def _color(compiled: Compiled, geom: int) -> tuple[float, ...] | None:
     if np.allclose(color, (0.5, 0.5, 0.5, 1.0)):
         return None  # MuJoCo's own, where the file has none
     return tuple(float(value) for value in color)
+
+
+def _figure_name(body: str) -> str:
+    """The name of a figure: that of its body, whose slashes would end it."""
+    return body.strip("/").replace("/", "-")
 
 
 def _free_name(scene: Scene, name: str) -> str:

@@ -79,7 +79,7 @@ class CenterOfMass(Goal):
 
     def resolve(self, scene: Surroundings, start: Array) -> CenterOfMass:
         """Find the figure; InputError if no moving part of it has mass."""
-        frames = ()
+        frames: tuple[str, ...] = ()
         if self.figure is not None:
             frames = (f"{known(self.figure, scene.figure.members, 'figure', 'CenterOfMass')}/",)
         return filled(self, joints=inputs.joints_with_mass(scene, "CenterOfMass", frames))

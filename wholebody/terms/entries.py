@@ -39,10 +39,10 @@ WIDTHS = {
 """Floats and integers of a goal or constraint in its table. The first integer is its first row, then:
 
 RESIDUAL: joint, joint of the base, whether the place and the rotation count, whether there is a base other than the
-world; PLANE: joint; MASS_CENTER: first joint that counts, and the one after the last; AXIS: joint, whether the target is a place; COORDINATE, TURN, ROOT: place in the posture and in the
-tangent; CONE: joint, joint of the reference, how many edges, the first of them; COUPLED, ELLIPSE: place in the posture
-and in the tangent of each coordinate, -1 for none, two of them for each angle of an ellipse; TWIST: joint, joint of the
-reference.
+world; PLANE: joint; AXIS: joint, whether the target is a place; MASS_CENTER: first joint that counts, and the one after
+the last; COORDINATE, TURN, ROOT: place in the posture and in the tangent; CONE: joint, joint of the reference, how many
+edges, the first of them; COUPLED, ELLIPSE: place in the posture and in the tangent of each coordinate, -1 for none, two
+of them for each angle of an ellipse; TWIST: joint, joint of the reference.
 """
 
 Integers: TypeAlias = NDArray[np.int64]

@@ -121,8 +121,9 @@ class Track:
         if self.joints != figure.joints:
             raise InputError(f"{self.name}: its joints are in another order than {figure.name}'s; use posed(...)")
         figure.warn_of_angles(self.q, self.name)
-        if figure.root == "free":
-            off = np.abs(np.linalg.norm(self.q[:, 3:ROOT_SIZE], axis=1) - 1.0)
+        for root in figure.roots.values():
+            first = int(figure.model.joints[root].idx_q)
+            off = np.abs(np.linalg.norm(self.q[:, first + 3 : first + ROOT_SIZE], axis=1) - 1.0)
             if off.max() > UNIT_TOLERANCE:
                 frame = int(np.argmax(off > UNIT_TOLERANCE))
                 raise InputError(
@@ -174,7 +175,8 @@ def posed(
         q[:, figure.model.joints[figure.joint_id(joint)].idx_q] = values
     if roots is not None:
         if figure.root != "free":
-            raise InputError(f"{name}: {figure.name} is fixed to the world; leave roots out")
+            what = "is fixed to the world" if figure.root == "fixed" else "are several figures"
+            raise InputError(f"{name}: {figure.name} {what}; leave roots out")
         for frame, root in enumerate(roots):
             try:
                 q[frame, :ROOT_SIZE] = pin.SE3ToXYZQUAT(placement(root))

@@ -48,12 +48,15 @@ class LinkVisuals:
         links, joints: names of the links that are drawn, and of the joints that carry them.
     """
 
-    def __init__(self, figure: Any) -> None:
+    def __init__(self, figure: Any, skinned: tuple[str, ...] = ()) -> None:
+        """Read the visuals, but for links whose names begin with one of `skinned`: figures that have a surface."""
         names, frames = figure.model.names, figure.model.frames
         made: list[Drawn] = []
         broken = set()
         for shown in figure.visual.geometryObjects:
             link, joint = str(frames[shown.parentFrame].name), str(names[shown.parentJoint])
+            if link.startswith(skinned):
+                continue
             red, green, blue, alpha = (float(part) for part in shown.meshColor)
             given: Color = (red, green, blue, alpha)
             place = np.array(shown.placement.homogeneous)

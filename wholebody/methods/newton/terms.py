@@ -66,7 +66,9 @@ def goal_equations(problem: Problem, bodies: FigureBodies, goals: Sequence[Goal]
         elif isinstance(goal, Axis):
             _axis(result, bodies, goal, label)
         elif isinstance(goal, CenterOfMass):
-            result.add(_mass_center(bodies, label, goal.joints, np.eye(3)[: len(goal.axes)], goal.resolved_target), role)
+            result.add(
+                _mass_center(bodies, label, goal.joints, np.eye(3)[: len(goal.axes)], goal.resolved_target), role
+            )
         elif isinstance(goal, Posture):
             bodies.add_posture_goals(result, label, goal.resolved_target, set(goal.dofs.tolist()), role)
         else:
@@ -124,9 +126,7 @@ def _axis(equations: EquationSet, bodies: FigureBodies, goal: Axis, label: str) 
     equations.add(Toward(np.array([[body]]), [label], axes[None], point[None], places), role)
 
 
-def _mass_center(
-    bodies: FigureBodies, label: str, joints: range | None, directions: Array, height: Array
-) -> Batch:
+def _mass_center(bodies: FigureBodies, label: str, joints: range | None, directions: Array, height: Array) -> Batch:
     inertias = list(bodies.model.inertias)[1:]
     mass = np.array([inertia.mass for inertia in inertias])
     if joints is not None:  # of one of several figures

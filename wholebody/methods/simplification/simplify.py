@@ -173,7 +173,9 @@ def _smaller_figure(problem: Problem, part: ActiveJoints | None) -> tuple[Figure
     if part is None or part.moving[1:].all():
         return scene.figure, scene.geometry
     names = scene.model.names
-    keep = [names[j].removesuffix("_joint") if is_root(names[j]) else names[j] for j in np.flatnonzero(part.moving).tolist()]
+    keep = [
+        names[j].removesuffix("_joint") if is_root(names[j]) else names[j] for j in np.flatnonzero(part.moving).tolist()
+    ]
     figure = scene.figure.reduced(keep, problem.start)
     locked = [j for j in range(1, scene.model.njoints) if not part.moving[j]]
     _, geometries = pin.buildReducedModel(scene.model, [scene.geometry], locked, problem.start)
