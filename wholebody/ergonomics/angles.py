@@ -14,7 +14,8 @@ import pinocchio as pin
 from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
-from wholebody.figures.figure import Figure, one_figure
+from wholebody.figures.figure import Figure
+from wholebody.figures.joined import one_figure
 
 SIDES = ("left", "right")
 NAMES = {"pelvis", "thorax", "neck", "head"}.union(

@@ -17,21 +17,11 @@ from wholebody.base.records import as_dict
 from wholebody.figures.body_spec import geometry_of
 from wholebody.figures.description import Description, followers_of, is_root, limits_of
 from wholebody.figures.grounding import grounded
+from wholebody.figures.joining import mounted_parts
 from wholebody.figures.model_check import LARGEST, Turning, check_model
 from wholebody.figures.reduction import reduced_parts
 from wholebody.figures.state import free_roots, root_freedoms
-
-
-def one_figure(figure: object, what: str) -> Figure:
-    """A figure that is one alone; an InputError for something else, and for several that were joined."""
-    found = checks.instance(figure, Figure, what, "load one with wb.load('human')")
-    if found.root == "several":
-        name = next(iter(found.members), next(iter(found.bodies)))
-        raise InputError(
-            f"{what} is several figures; give one of them, figure.members[{name!r}].figure, with its postures, "
-            f"figure.part({name!r}, q), or its clip, clip.part({name!r})"
-        )
-    return found
+from wholebody.geometry.placement import placement
 
 
 def _joints_of(names: Sequence[str], prefix: str) -> range:
@@ -394,9 +384,12 @@ class Figure(checks.FixedAttributes):
             UnknownNameError: there is no such frame.
             InputError: no figure, or a name or a placement that cannot be used.
         """
-        from wholebody.figures.joined import mounted
-
-        return mounted(self, other, self.frame_id(on), other.name if name is None else name, at)
+        checks.instance(other, Figure, "mounted: other", "load one with wb.load('hand')")
+        frame, prefix = self.frame_id(on), checks.text(other.name if name is None else name, "mounted: name")
+        if "/" in prefix or prefix in {*self.groups, *self.joints}:
+            raise InputError(f"mounted: {self.name} has a part {prefix!r}, or it has a slash; give name=")
+        parts = mounted_parts(self, other, frame, f"{prefix}/", placement(at, "mounted: at"))
+        return Figure(f"{self.name} with {prefix}", *parts[:2], "own", *parts[2:])
 
     def describe(self) -> Description:
         """Return the named parts of the figure, to build another one from them."""

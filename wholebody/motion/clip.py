@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.checks import array, instance, number, shown, text, time_step
 from wholebody.base.errors import InputError
-from wholebody.figures.figure import Figure, one_figure
+from wholebody.figures.figure import Figure
+from wholebody.figures.joined import one_figure
 from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.tracking.tracks import MOST_FRAMES, Track, check_figure, check_frames
 

@@ -15,7 +15,8 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
-from wholebody.figures.figure import Figure, one_figure
+from wholebody.figures.figure import Figure
+from wholebody.figures.joined import one_figure
 from wholebody.motion.stance import pieces_on
 from wholebody.tasks.balance import convex_polygon, edges, low_points
 

@@ -10,7 +10,8 @@ from pathlib import Path
 from wholebody.base.checks import choice
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, InputError, one_line
-from wholebody.figures.figure import Figure, one_figure
+from wholebody.figures.figure import Figure
+from wholebody.figures.joined import one_figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.files import amass, archive, bvh, columns, read_frames
 from wholebody.motion.files.base import Frames

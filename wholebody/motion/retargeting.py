@@ -11,7 +11,8 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import function, instance, warn
 from wholebody.base.errors import InputError
-from wholebody.figures.figure import Figure, one_figure
+from wholebody.figures.figure import Figure
+from wholebody.figures.joined import one_figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.posture_fit import Fitter, Goals, smooth
 from wholebody.motion.retarget_targets import LIMBS, Footfalls, Targets, footfalls, has_trunk, known_bones, targets

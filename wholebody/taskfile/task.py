@@ -106,7 +106,7 @@ def task_from(contents: Contents, file: Path) -> Task:
 def _figure(contents: Contents) -> Figure:
     """The figure of the file, or its figures, each with what it is called."""
     entries = contents.tables["figure"]
-    if len(entries) == 1 and not entries[0].values.keys() & {"called", "at"}:
+    if not entries[0].where.number and not entries[0].values.keys() & {"called", "at"}:
         return _loaded(entries[0])
     found: dict[str, tuple[Figure, Any]] = {}
     for entry in entries:

@@ -16,7 +16,8 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.checks import known
-from wholebody.figures.figure import Figure, one_figure
+from wholebody.figures.figure import Figure
+from wholebody.figures.joined import one_figure
 from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Sphere
 from wholebody.scene.scene import Scene
 from wholebody.tracking.frame import FRAME

@@ -17,7 +17,8 @@ from wholebody.base.checks import TIME_STEP, TIME_STEP_ASKED, instance, is_numbe
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, InputError
 from wholebody.base.files import checked_target, read_text, write
-from wholebody.figures.figure import Figure, one_figure
+from wholebody.figures.figure import Figure
+from wholebody.figures.joined import one_figure
 from wholebody.tracking.tracks import LARGEST as LARGEST_VALUE
 from wholebody.tracking.tracks import Track
 

@@ -73,7 +73,8 @@ class Track:
         if not all(isinstance(joint, str) for joint in joints):
             raise InputError(f"{self.name}: joints is {shown(self.joints)}; give names, such as figure.joints")
         object.__setattr__(self, "joints", tuple(joints))
-        if len(self.joints) not in (q.shape[1], q.shape[1] - ROOT_SIZE):
+        roots, rest = divmod(q.shape[1] - len(self.joints), ROOT_SIZE)
+        if roots < 0 or rest:
             raise InputError(
                 f"{self.name}: {q.shape[1]} values a frame do not fit {len(self.joints)} joints; give one value "
                 "for each joint, after seven for a free root"
@@ -132,6 +133,8 @@ class Track:
 
     def _place(self, size: int, column: int) -> str:
         root = size - len(self.joints)
+        if root > ROOT_SIZE:  # of several figures, each of which has its root before its joints
+            return f"value {column}"
         return f"value {column} of the root" if column < root else f"joint {self.joints[column - root]}"
 
 

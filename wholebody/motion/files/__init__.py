@@ -8,7 +8,8 @@ from pathlib import Path
 
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, one_line
-from wholebody.figures.figure import Figure, one_figure
+from wholebody.figures.figure import Figure
+from wholebody.figures.joined import one_figure
 from wholebody.motion.files import archive, bvh, columns, gltf, joint_profile
 from wholebody.motion.files.base import Frames, Motion
 
