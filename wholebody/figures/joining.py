@@ -188,7 +188,8 @@ def _merged(parts: Sequence[_Part]) -> Description:
 
 
 def _described(part: _Part) -> Description:
-    old, prefix, figure = part.figure.describe(), part.prefix, part.figure
+    old: Description = part.figure.describe()
+    prefix, figure = part.prefix, part.figure
 
     def named(names: Sequence[str]) -> tuple[str, ...]:
         return tuple(prefix + name for name in names)
