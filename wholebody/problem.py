@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from operator import is_
 from typing import Any, TypeVar
@@ -77,7 +77,7 @@ class Problem(checks.FixedAttributes):
     def __init__(
         self,
         scene: Scene,
-        start: Array | str | None = None,
+        start: Array | str | Mapping[str, Array | str] | None = None,
         *,
         goals: Iterable[Goal] = (),
         constraints: Iterable[Constraint | Bound] = (),
@@ -91,7 +91,8 @@ class Problem(checks.FixedAttributes):
 
         Args:
             scene: figure and things.
-            start: (nq,) posture, or the name of one of the figure's; None for the figure's first posture.
+            start: (nq,) posture, or the name of one of the figure's; of several figures also a posture by figure. None
+                for the first posture.
             goals: equalities that are met if possible.
             constraints: what must always hold; bounds on the displacement are given here too.
             measures: costs to minimise; None for `Effort()`, and `Rhythm()` beside it for a person.
@@ -359,11 +360,11 @@ def _check_goals(goals: Sequence[Goal], state: State) -> None:
             check_rows(f"goals[{number}]", goal, goal.error, state)
 
 
-def _start(scene: Scene, start: Array | str | None) -> Array:
+def _start(scene: Scene, start: Array | str | Mapping[str, Array | str] | None) -> Array:
     figure = scene.figure
     if start is None:
         return np.array(figure.posture(figure.postures[0]), dtype=float)
-    if isinstance(start, str):
+    if isinstance(start, (str, Mapping)):
         return np.array(figure.posture(start), dtype=float)
     q = checks.posture(start, scene.model.nq, "start")
     figure.warn_of_angles(q, "start")

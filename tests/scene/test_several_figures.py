@@ -12,6 +12,8 @@ import wholebody as wb
 from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
 from wholebody.bench.suite.problem_sets.robots import known_arm
 from wholebody.tasks import Balance
+from wholebody.tracking import Track, follow, judge
+from wholebody.tracking.live_subjects import handle_frames
 
 TURNED = (1.4, 0.1, 0.0, 0.0, 0.0, 1.0, 0.0)  # faces the other
 AWAY = (0.0, 30.0, 0.0)
@@ -301,6 +303,36 @@ def test_a_clip_of_several_has_parts(tmp_path: Path, pair: wb.Scene, anna: wb.Fi
         wb.motion.torques(clip)
     assert wb.read_clip(part.write(tmp_path / "anna.csv"), part.figure).q == pytest.approx(part.q, abs=1e-8)
     assert wb.check(clip, pair).depth.max() <= 0.0
+
+
+@pytest.mark.parametrize("overlap", ["qp", "ccd"])
+def test_a_tracked_person_is_stopped_by_another(overlap: str, anna: wb.Figure, ben: wb.Figure) -> None:
+    scene = wb.Scene({"anna": anna, "ben": (ben, (1.0, 0.05, 0.0, 0.0, 0.0, 1.0, 0.0))})
+    figure = scene.figure
+    place = figure.model.joints[figure.joint_id("ben/root")].idx_q
+    frames = np.tile(figure.neutral, (20, 1))
+    frames[:, place] -= np.linspace(0.0, 0.85, len(frames))  # until he is inside of her
+    recording = follow(scene, Track.of(figure, frames, 1 / 30), overlap=overlap)
+    judged = judge(scene, recording)
+    assert judged.tracked_depth.max() > 0.05
+    assert judged.depth.max() < 1e-3
+    assert not judged.passed
+    assert recording.q[-1, place] < 0.75  # he came near
+
+
+def test_one_of_several_is_named_where_one_is_meant(pair: wb.Scene) -> None:
+    figure = pair.figure
+    q = wb.Problem(pair, {"anna": "sitting", "ben": pair.figure.part("ben", figure.neutral)}).start
+    assert figure.part("anna", q)[7:] == pytest.approx(figure.members["anna"].figure.posture("sitting")[7:])
+    assert figure.part("ben", q) == pytest.approx(figure.part("ben", figure.neutral))
+    eyes, face = (figure.placement(figure.neutral, f"{name}/gaze").translation for name in ("anna", "ben"))
+    beyond = face + 0.5 * (face - eyes)
+    assert wb.ergonomics.sight(pair, figure.neutral, beyond, eyes="anna/gaze").hidden_by.startswith("ben/")
+    with pytest.raises(InputError, match="has no frame 'gaze'"):
+        wb.ergonomics.sight(pair, figure.neutral, beyond)
+    with pytest.raises(InputError, match="figure 'both' is several figures"):
+        wb.Assembly().figure("both", figure)
+    assert handle_frames(figure.frames)[:2] == ["anna/left_palm", "anna/right_palm"]
 
 
 def test_each_is_put_on_the_ground(pair: wb.Scene) -> None:
