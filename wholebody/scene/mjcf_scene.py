@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations, product
 from os import PathLike
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.checks import path as as_path
-from wholebody.base.checks import text, warn
+from wholebody.base.checks import some, text, warn
 from wholebody.base.errors import FileFormatError
 from wholebody.base.files import check_file
 from wholebody.figures.link_pieces import Concavity
@@ -55,6 +56,8 @@ def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Co
         robots = {names["body"][top]: top for top in compiled.robots}
         scene = Scene({_figure_name(name): mjcf_figure(compiled, name, concavity) for name in robots})
         mine = [body for top in robots.values() for body in compiled.tree(top)]
+        if told := _untested_between(compiled, list(robots.values())):
+            warn(f"{place}: pairs of two robots that the file does not test are tested: {some(told)}")
     else:
         scene = Scene(mjcf_figure(compiled, root, concavity))
         mine = list(compiled.tree(compiled.robot(None if root in (None, "fixed", "free") else root)))
@@ -139,6 +142,24 @@ def _color(compiled: Compiled, geom: int) -> tuple[float, ...] | None:
     if np.allclose(color, (0.5, 0.5, 0.5, 1.0)):
         return None  # MuJoCo's own, where the file has none
     return tuple(float(value) for value in color)
+
+
+def _untested_between(compiled: Compiled, robots: Sequence[int]) -> list[str]:
+    """Pairs of bodies of two robots that <exclude> or their contact bits keep from touching."""
+    model, names = compiled.model, compiled.names["body"]
+    excluded = {frozenset((value >> 16, value & 0xFFFF)) for value in map(int, model.exclude_signature)}
+    found = []
+    for first, second in combinations(robots, 2):
+        for one, other in product(compiled.tree(first), compiled.tree(second)):
+            pairs = product(*(filter(compiled.collides, compiled.geoms(body)) for body in (one, other)))
+            meet = [
+                (model.geom_contype[a] & model.geom_conaffinity[b])
+                | (model.geom_contype[b] & model.geom_conaffinity[a])
+                for a, b in pairs
+            ]
+            if meet and (frozenset((one, other)) in excluded or not all(meet)):
+                found.append(f"{names[one]} and {names[other]}")
+    return found
 
 
 def _figure_name(body: str) -> str:
