@@ -62,7 +62,8 @@ def test_a_urdf_is_no_scene(tmp_path: Path) -> None:
 
 
 TWO = """<mujoco><worldbody><geom name="floor" type="plane" size="2 2 0.1"/>
-  <body name="left" pos="0 0.5 0.2"><geom size="0.05"/><body name="l1" pos="0 0 0.1"><joint name="turn_left" axis="0 1 0"/>
+  <body name="left" pos="0 0.5 0.2"><geom size="0.05"/>
+    <body name="l1" pos="0 0 0.1"><joint name="turn_left" axis="0 1 0"/>
     <geom type="capsule" fromto="0 0 0 0 0 0.3" size="0.03"/></body></body>
   <body name="right" pos="0 -0.5 0.2" euler="0 0 90"><joint name="turn_right" axis="0 1 0"/>
     <geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.03"/></body>
