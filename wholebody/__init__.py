@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from wholebody.motion.clip import Clip
     from wholebody.motion.reading import read_clip
     from wholebody.motion.retargeting import retarget
+    from wholebody.planning.solutions import solutions
     from wholebody.problem import Problem
     from wholebody.scene.matter.body import Body
     from wholebody.scene.mjcf_scene import read_scene
@@ -174,6 +175,7 @@ __all__ = [
     "read_task",
     "retarget",
     "simplify",
+    "solutions",
     "solve",
     "solve_many",
     "studies",
@@ -199,6 +201,7 @@ _MODULES = {
     "wholebody.motion.clip": "Clip",
     "wholebody.motion.reading": "read_clip",
     "wholebody.motion.retargeting": "retarget",
+    "wholebody.planning.solutions": "solutions",
     "wholebody.problem": "Problem",
     "wholebody.scene.matter.body": "Body",
     "wholebody.scene.mjcf_scene": "read_scene",

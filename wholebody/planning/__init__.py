@@ -1,0 +1,1 @@
+"""All postures that meet the goals of a problem."""
