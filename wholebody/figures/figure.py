@@ -202,6 +202,9 @@ class Figure(checks.FixedAttributes):
     def part(self, name: str, q: Array) -> Array:
         """The posture of one of the joined figures in a posture of all, (nq,) or (n, nq): a view of those numbers."""
         checks.known(name, self.members, "figure", "part")
+        q = checks.array(q, "part: q", "a posture (nq,), or postures (n, nq)")
+        if q.shape[-1:] != (self.model.nq,):
+            raise InputError(f"part: q has shape {q.shape}; give a posture of {self.model.nq} values, or several")
         joints = [self.model.joints[joint] for joint in self.bodies[f"{name}/"]]
         first = min((int(joint.idx_q) for joint in joints), default=0)
         return q[..., first : max((int(joint.idx_q) + int(joint.nq) for joint in joints), default=0)]
@@ -228,11 +231,6 @@ class Figure(checks.FixedAttributes):
         if isinstance(name, str) and name in self.roots:
             return self.roots[name]
         return self._joint_ids[checks.known(name, self._joint_ids, "joint", offered=self.joints)]
-
-    def body_of(self, frames: Iterable[str]) -> str | None:
-        """What the names of the figure begin with that all these frames belong to; None if they are of several."""
-        found = {body for body in self.bodies for frame in frames if str(frame).startswith(body)}
-        return found.pop() if len(found) == 1 else None
 
     def joint_names(self, names: str | Iterable[str]) -> tuple[str, ...]:
         """Return joint names with groups replaced by their joints, each once, in the order given."""

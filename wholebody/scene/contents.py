@@ -13,6 +13,7 @@ import pinocchio as pin
 
 from wholebody.base import checks
 from wholebody.base.errors import InputError
+from wholebody.figures.figure import Figure
 from wholebody.figures.joined import join, welded
 from wholebody.geometry.placement import placement as to_placement
 from wholebody.geometry.proximity import PairTable
@@ -24,8 +25,6 @@ from wholebody.scene.matter.materials import material as to_material
 
 if TYPE_CHECKING:
     from typing_extensions import Self
-
-    from wholebody.figures.figure import Figure
 
 WIDEST_LIKELY, THICKEST_LIKELY = 100.0, 2.0  # m: a wider thing is probably in a smaller unit, unless it is a thin floor
 SHAPES = "give wb.Box, wb.Sphere, wb.Mesh or another"
@@ -142,6 +141,8 @@ class SceneContents(checks.FixedAttributes):
             InputError: the scene was made of one figure without a name, or the figure, its name, root or placement
                 cannot be used.
         """
+        checks.text(name, "add_figure: name")
+        checks.instance(figure, Figure, "add_figure: figure", "load one with wb.load('human')")
         if not self.figure.members:
             raise InputError(
                 f"add_figure: the scene's figure has no name; make it with wb.Scene({{'anna': figure, {name!r}: ...}})"

@@ -9,6 +9,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
+from wholebody.tasks import inputs
 from wholebody.tasks.balance import Balance, convex_polygon, least_width, standing_points
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings
 from wholebody.tasks.bounds import Freeze
@@ -85,7 +86,7 @@ def standing(
 def balancing(scene: Surroundings, terms: Sequence[Constraint | Goal]) -> tuple[str, ...]:
     """The figures with feet, by what their names begin with, of which no term says how they stand."""
     figure = scene.figure
-    told = [figure.body_of(term.feet) for term in terms if isinstance(term, (Balance, Stand))]
+    told = [inputs.body_of(scene, term.feet) for term in terms if isinstance(term, (Balance, Stand))]
     return tuple(
         body
         for body in figure.bodies

@@ -54,6 +54,12 @@ def find_base(scene: Surroundings, name: str | None, moved: str, where: str) -> 
     return base
 
 
+def body_of(scene: Surroundings, frames: Sequence[str]) -> str | None:
+    """What the names of the figure begin with that all these frames belong to; None if they are of several."""
+    found = {body for body in scene.figure.bodies for frame in frames if str(frame).startswith(body)}
+    return found.pop() if len(found) == 1 else None
+
+
 def root_of(scene: Surroundings, place: Place) -> int:
     """Index of the joint of the free root that carries a frame; 0, the world, for one of a fixed figure."""
     roots = set(scene.figure.roots.values())
@@ -137,7 +143,7 @@ def joints_with_mass(scene: Surroundings, where: str, frames: Sequence[str] = ()
     """
     figure, joints = scene.figure, None
     if frames and len(figure.bodies) > 1:
-        body = figure.body_of(frames)
+        body = body_of(scene, frames)
         if body is None:
             raise InputError(f"{where}: {', '.join(frames)} are of several figures; state one {where} for each")
         joints = figure.bodies[body]

@@ -9,6 +9,8 @@ from typing import Annotated
 
 from wholebody.assessment.posture import assess
 from wholebody.base.arrays import Array
+from wholebody.base.checks import posture, shown
+from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked
 from wholebody.methods.conclusion import Ending, concluded, meets
 from wholebody.methods.control import Control, Progress
@@ -132,8 +134,13 @@ class QP(Checked):
             InputError: the scene changed after the problem was stated.
         """
         check_problem(problem, "QP.minima: problem")
+        try:
+            begins = iter(starts)
+        except TypeError:
+            raise InputError(f"QP.minima: starts is {shown(starts)}; give postures, such as [problem.start]") from None
         budget = Budget(self.tolerance, self.iterations, self.budget, 0, self.seed, self.measures)
-        for start in starts:
+        for given in begins:
+            start = posture(given, problem.scene.model.nq, "QP.minima: a start")
             began = time.perf_counter()
             with problem.borrow() as workspace, Control(self.time_limit, None, LONGEST) as control:
                 search = Multistart(problem, workspace, self._qp_solver(), budget, control)
