@@ -70,7 +70,7 @@ LONG = (
     *("tracking/test_scenes.py", "dynamics/test_scenes.py", "view/test_timeline.py"),
     *("tracking/test_dragging.py", "base/test_runner.py", "methods/newton/test_method.py"),
     *(
-        "view/surface/test_surface.py",
+        "figures/surface/test_surface.py",
         "bench/suite/stability/test_command.py",
         "bench/measure/test_motion.py",
         "test_threads.py",

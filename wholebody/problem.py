@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import fields, is_dataclass
+from functools import partial
 from operator import is_
 from typing import Any, TypeVar
 
@@ -12,12 +13,13 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.errors import InputError, TermError
 from wholebody.base.fields import Range
 from wholebody.base.pool import Loan
 from wholebody.figures.state import UNIT_TOLERANCE, State
 from wholebody.geometry.placement import FARTHEST
+from wholebody.scene.geometry_model import SceneGeometry
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace, borrowed
 from wholebody.tasks.answers import in_words, is_own
@@ -91,8 +93,7 @@ class Problem(checks.FixedAttributes):
 
         Args:
             scene: figure and things.
-            start: (nq,) posture, or the name of one of the figure's; of several figures also a posture by figure. None
-                for the first posture.
+            start: (nq,) posture, or the name of one; of several figures also one by figure; None for the first posture.
             goals: equalities that are met if possible.
             constraints: what must always hold; bounds on the displacement are given here too.
             measures: costs to minimise; None for `Effort()`, and `Rhythm()` beside it for a person.
@@ -108,7 +109,7 @@ class Problem(checks.FixedAttributes):
         self.scene = checks.instance(scene, Scene, "Problem: scene", "make one with wb.Scene(figure)")
         self._revision = scene.revision
         self.start = _start(scene, start)
-        self.clearance = _clearance(clearance)
+        self.clearance = CLEARANCE(clearance, "clearance")
         terms = [*_checked(goals, _ARGUMENTS["goals"], "goals")]
         given = [*_checked(constraints, _ARGUMENTS["constraints"], "constraints")]
         self.measures_given = measures is not None
@@ -125,40 +126,35 @@ class Problem(checks.FixedAttributes):
         self.touching = tuple(_owner_pair(scene, pair) for pair in pairs)
         self._plan: tuple[_Planned, TermPlan] | None = None
         """The terms as arrays, and the terms that they were made of; every solve begins with it."""
+        self.measures: tuple[Measure, ...] = (
+            self._usual_measures() if measured is None else tuple(m.resolve(scene, self.start) for m in measured)
+        )
         with scene.borrow() as workspace:
-            state = workspace.state.update(self.start)
-            self.measures: tuple[Measure, ...] = (
-                self._usual_measures() if measured is None else tuple(m.resolve(scene, self.start) for m in measured)
-            )
+            state = workspace.state
+            if scene.figure.root == "free" or self.bounds or any(map(is_own, (*self.goals, *stated, *self.measures))):
+                state.update(self.start)
             self.defaults, self.left_out = self._usual_constraints(state, stated)
             self.constraints: tuple[Constraint, ...] = (*stated, *self.defaults)
             self._check_frozen(state)
             _check_goals(self.goals, state)
             self._check_terms(state)
-            self.clearances = self._clearances(workspace)
+        self.clearances = self._clearances()
 
     def _usual_measures(self) -> tuple[Measure, ...]:
         scene, start, ranges = self.scene, self.start, self.range_of_motion
-        if not (ranges and scene.figure.ranges):
-            return default_measures(scene, start, ranges=False)
-        key = "measures", ranges, start.tobytes()
-        return scene.built.known(key, lambda: default_measures(scene, start, ranges=ranges))
+        make = partial(default_measures, scene, start, ranges=ranges)
+        return scene.built.known(("measures", ranges, start.tobytes()), make)
 
     def _usual_constraints(self, state: State, stated: Sequence[Constraint]) -> tuple[tuple[Constraint, ...], str]:
         scene, start, ranges, known = self.scene, self.start, self.range_of_motion, frozenset(map(type, stated))
-        required, steady = self.balance is True, tuple[str, ...]()
-        terms: list[Constraint | Goal] = [*stated, *self.goals]
-        if required:
-            steady = balancing(scene, stated)
-        elif self.balance is None:
-            steady = standing(scene, state, terms, self.bounds)
+        steady = standing(scene, state, (*stated, *self.goals), self.bounds) if self.balance is None else ()
+        steady = balancing(scene, stated) if (required := self.balance is True) else steady
         if not (steady or (ranges and scene.figure.ranges)):
             return (), ""
-        moves = scene.built.moves if steady else 0  # shoes carry too
-        return scene.built.known(
-            ("constraints", ranges, steady, required, known, moves, start.tobytes()),
-            lambda: default_constraints(scene, start, known, ranges=ranges, standing=steady, required=required),
-        )
+        moves = bool(steady) * scene.built.moves  # shoes carry too
+        key = "constraints", ranges, steady, required, known, moves, start.tobytes()
+        make = partial(default_constraints, scene, start, known, ranges=ranges, standing=steady, required=required)
+        return scene.built.known(key, make)
 
     def __repr__(self) -> str:
         asked = [*self.goals, *self.constraints, *self.bounds]
@@ -336,21 +332,29 @@ class Problem(checks.FixedAttributes):
             if is_own(measure):
                 check_measure(f"measures[{number}]", measure, state)
 
-    def _clearances(self, workspace: Workspace) -> Array:
-        pairs, owners = workspace.table.pairs, workspace.owners
-        asked = np.full(len(pairs), self.clearance)
+    def _clearances(self) -> Array:
+        built = self.scene.built
+        asked = np.full(len(built.table.pairs), self.clearance)
         brought = [pair for term in (*self.goals, *self.constraints) for pair in term.touching]
-        allowed = {*self.touching, *brought} | {(b, a) for a, b in (*self.touching, *brought)}
+        allowed = frozenset((*self.touching, *brought))
         if allowed:
-            named = [(owners[a], owners[b]) in allowed for a, b in pairs]
-            asked[np.array(named, dtype=bool)] = 0.0
-        near = workspace.near_views(self.start, self.clearance + 1e-9)
-        if not len(near.number):
-            return asked
-        kept = np.maximum(near.distance, 0.0)
-        resting = near.distance >= -1e-6
-        asked[near.number[resting]] = np.minimum(asked[near.number[resting]], kept[resting])
+            asked[built.known(("touching", allowed), partial(_between, built, allowed))] = 0.0
+        number, kept = built.known(("resting", self.clearance, built.moves, self.start.tobytes()), self._resting)
+        asked[number] = np.minimum(asked[number], kept)
         return asked
+
+    def _resting(self) -> tuple[Indices, Array]:
+        """Pairs (k,) nearer than the clearance at the start that do not penetrate, and their distances (k,)."""
+        with self.scene.borrow() as workspace:
+            near = workspace.near_views(self.start, self.clearance + 1e-9)
+            resting = near.distance >= -1e-6
+            return near.number[resting], np.maximum(near.distance[resting], 0.0)
+
+
+def _between(built: SceneGeometry, allowed: Set[tuple[str, str]]) -> Mask:
+    """Which pairs are of owners that stand in some pairs of names, in either order."""
+    pairs = ((built.owners[a], built.owners[b]) for a, b in built.table.pairs.tolist())
+    return np.array([pair in allowed or pair[::-1] in allowed for pair in pairs], dtype=bool)
 
 
 def _check_goals(goals: Sequence[Goal], state: State) -> None:
@@ -373,10 +377,6 @@ def _start(scene: Scene, start: Array | str | Mapping[str, Array | str] | None) 
     if not pin.isNormalized(scene.model, q, UNIT_TOLERANCE):
         raise InputError("the start's quaternion is not of unit length; normalise it with pin.normalize(model, q)")
     return np.array(pin.normalize(scene.model, q))
-
-
-def _clearance(value: float) -> float:
-    return CLEARANCE(value, "clearance")
 
 
 def _checked(terms: Any, kinds: tuple[type, ...], what: str) -> Sequence[Any]:

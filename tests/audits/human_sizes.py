@@ -14,8 +14,8 @@ from wholebody.base.arrays import Array
 from wholebody.figures.anthropometry import Person, design_cases
 from wholebody.figures.human.spec import human_spec
 from wholebody.figures.measuring import ansur, measure
-from wholebody.view.surface.fields import Field, union
-from wholebody.view.surface.profile import piece_field
+from wholebody.figures.surface.fields import Field, union
+from wholebody.figures.surface.profile import piece_field
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure

@@ -12,7 +12,7 @@ from tests.audits.__main__ import main
 from tests.audits.human_contacts import distance
 from tests.audits.human_sizes import _girth, dimensions, ranges
 from wholebody.figures import load
-from wholebody.view.surface.fields import ball, round_cone, union
+from wholebody.figures.surface.fields import ball, round_cone, union
 
 
 def test_a_small_run_writes_page_and_numbers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

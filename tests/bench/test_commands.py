@@ -39,10 +39,12 @@ def test_step(tmp_path: Path, docs: Path, capsys: pytest.CaptureFixture[str], mo
     words = ("--repeats", "2", "--steps", "6", "--tools", "wholebody/daqp", "placo", "--out", str(tmp_path / "out"))
     assert bench("step", *words, "--update-docs", str(docs)) == 0
     rows = csv_rows(tmp_path / "out" / "step-time.csv")
-    each = [(reach, tool) for reach in reaches for tool in ("wholebody/daqp", "placo")]
+    each = [(reach, tool) for reach in reaches for tool in ("wholebody/daqp", "placo", "Pinocchio and coal")]
     assert [(row["case"], row["tool"]) for row in rows] == each
     for row in rows:
         assert 0.0 < float(row["median µs"]) <= float(row["p95 µs"])
+        ours = row["tool"] == "wholebody/daqp"
+        assert not ours or float(row["median × Pinocchio and coal"].split()[0]) > 1.0
         assert row["tool"] != "placo" or float(row["median × placo"]) == float(row["p95 × placo"]) == 1.0
     for row in csv_rows(tmp_path / "out" / "step-result.csv"):
         assert (int(row["pairs"]) >= 700) == (row["case"] != "alone")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 import wholebody as wb
 
@@ -59,6 +60,47 @@ def test_a_urdf_is_no_scene(tmp_path: Path) -> None:
     (tmp_path / "robot.xml").write_text('<robot name="r"><link name="a"/></robot>')
     with pytest.raises(wb.FileFormatError, match="<mujoco>"):
         wb.read_scene(tmp_path / "robot.xml")
+
+
+def test_a_height_field_is_as_high_as_mujoco_has_it(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    heights = rng.random((6, 9))
+    heights[:3] = 0.4  # flat cells are joined
+    path = tmp_path / "terrain.xml"
+    path.write_text(
+        '<mujoco><asset><hfield name="h" nrow="6" ncol="9" size="1 0.8 0.3 0.1" '
+        f'elevation="{" ".join(map(str, heights.ravel()))}"/></asset><worldbody>'
+        '<geom name="terrain" type="hfield" hfield="h" pos="0.2 0.1 0.05" euler="0 0 30"/><body name="post">'
+        '<joint type="slide" axis="0 0 1"/><geom size="0.02" pos="9 0 0"/></body></worldbody></mujoco>'
+    )
+    scene, model = wb.read_scene(path), mujoco.MjModel.from_xml_path(str(path))
+    pieces = zip(scene.geometry.geometryObjects, scene.piece_owner, strict=True)
+    hulls = [
+        ConvexHull(np.array(piece.geometry.points()) @ piece.placement.rotation.T + piece.placement.translation)
+        for piece, owner in pieces
+        if owner == "terrain"
+    ]
+    assert len(hulls) == 2 + 2 * 8 * 3
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    hits = 0
+    for x, y in rng.uniform((-0.6, -0.5), (0.9, 0.7), (60, 2)):
+        start, way = np.array([x, y, 3.0]), np.array([0.0, 0.0, -1.0])
+        down = mujoco.mj_ray(model, data, start, way, None, 1, -1, np.zeros(1, np.int32))
+        tops = [top for hull in hulls if (top := _top(hull.equations, x, y)) is not None]
+        assert (down < 0.0) == (not tops)
+        hits += bool(tops)
+        assert not tops or max(tops) == pytest.approx(3.0 - down, abs=1e-9)
+    assert hits > 30
+
+
+def _top(planes: np.ndarray, x: float, y: float) -> float | None:
+    """The height of a convex solid above a place; None beside it."""
+    up, rest = planes[:, 2], planes[:, 0] * x + planes[:, 1] * y + planes[:, 3]
+    upright = np.abs(up) < 1e-12
+    low = max(-rest[~upright & (up < 0.0)] / up[~upright & (up < 0.0)])
+    high = min(-rest[~upright & (up > 0.0)] / up[~upright & (up > 0.0)])
+    return float(high) if high >= low and (rest[upright] < 1e-12).all() else None
 
 
 TWO = """<mujoco><worldbody><geom name="floor" type="plane" size="2 2 0.1"/>

@@ -10,7 +10,6 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.view.gltf import posture_glb
 
 INSIDE = 1e-4  # m: deeper than this a posture is inside something
 
@@ -137,8 +136,10 @@ def test_a_falling_body_meets_the_hulls(spheres, hulls):
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)
 
 
-def test_outer_pieces_are_not_drawn(spheres):
+def test_outer_pieces_are_not_drawn(spheres, tmp_path):
     scene = wb.Scene(spheres).add(wb.Box((0.1, 0.1, 0.1)), name="box", at=(2.0, 0.0, 0.0))
-    text = posture_glb(scene, spheres.posture(spheres.postures[0]))
+    with wb.Viewer(scene) as viewer:
+        viewer.show(spheres.posture(spheres.postures[0]), pieces=True)
+        text = viewer.save(tmp_path / "pieces.glb").read_bytes()
     assert b"left_hand" in text
     assert b"(outer)" not in text

@@ -35,6 +35,11 @@ class StandInFigure:
     def warn_of_angles(self, q: Any, what: str) -> bool:
         return False
 
+    def joint_placement(self, q: Any, joint: int) -> pin.SE3:
+        data = self.model.createData()
+        pin.forwardKinematics(self.model, data, q)
+        return data.oMi[joint]
+
     def frame_id(self, name: str) -> int:
         if not self.model.existFrame(name):
             raise UnknownNameError("frame", name, [frame.name for frame in self.model.frames])

@@ -10,11 +10,11 @@ import pytest
 from PIL import Image
 
 from wholebody.figures import load
+from wholebody.figures.surface import surface_of
 from wholebody.geometry.shapes import Box, HalfSpace, Sphere
 from wholebody.scene.scene import Scene
 from wholebody.view import Viewer
 from wholebody.view.browser import Browser
-from wholebody.view.surface import surface_of
 
 pytestmark = pytest.mark.browser
 

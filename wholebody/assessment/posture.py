@@ -90,8 +90,12 @@ class Assessment:
     def holds(self, tolerance: float) -> bool:
         """Whether limits, constraints and clearances hold to a tolerance, metres and radians."""
         tolerance = number(tolerance, "tolerance", 0.0, inf)
-        all_of_it = (self.limit_violation, self.constraint_violation, self.clearance_violation, self.penetration)
-        return all(violation <= tolerance for violation in all_of_it)  # NaN holds nothing
+        return (  # NaN holds nothing
+            self.limit_violation <= tolerance
+            and self.constraint_violation <= tolerance
+            and self.clearance_violation <= tolerance
+            and self.penetration <= tolerance
+        )
 
     def met(self, tolerance: float) -> bool:
         """Whether the goals are met to a tolerance, metres and radians."""

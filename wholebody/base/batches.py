@@ -93,6 +93,8 @@ def shared(
             if left:
                 item = left.popleft()
                 yield item, here(item), None
+            if not others:
+                continue
             busy = {child.connection: child for child in others if child.job is not None}
             for connection in wait(busy, 0.0 if left or not any(map(_works, others)) else None):
                 child = busy[connection]  # type: ignore[index]

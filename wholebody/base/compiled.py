@@ -22,7 +22,7 @@ TOGETHER = (
         "wholebody.methods.qp.step_program",
         "wholebody.methods.qp.subproblem",
     ),
-    ("wholebody.dynamics.step_program",),
+    ("wholebody.dynamics.step_program", "wholebody.methods.qp.closed_form"),
     ("wholebody.terms.linearisation", "wholebody.methods.qp.chain"),
     (
         "wholebody.geometry.contact_rows",

@@ -49,6 +49,8 @@ EXTRAS = {
     "rapier3d": "compare",
     "drake": "drake",
     "optik-py": "optik",
+    "pytracik": "tracik",
+    "EAIK": "eaik",
     "embodik": "embodik",
 }
 """Optional packages: distribution -> the extra that installs it."""

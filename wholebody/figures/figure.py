@@ -17,7 +17,7 @@ from wholebody.base.records import as_dict
 from wholebody.figures.body_spec import geometry_of
 from wholebody.figures.description import Description, followers_of, is_root, limits_of
 from wholebody.figures.grounding import grounded
-from wholebody.figures.joining import mounted_parts
+from wholebody.figures.joining import mounted_parts, posture_of_all
 from wholebody.figures.model_check import LARGEST, Turning, check_model
 from wholebody.figures.reduction import reduced_parts
 from wholebody.figures.state import free_roots, root_freedoms
@@ -177,34 +177,18 @@ class Figure(checks.FixedAttributes):
         that it leaves out have their first posture.
         """
         if isinstance(name, Mapping):
-            return self._together(name)
+            return posture_of_all(self, name)
         checks.known(name, self.postures, "posture")
         if name not in self._made:
             self._made[name] = self._description.postures[name](self)
         return np.array(self._made[name])
 
-    def _together(self, postures: Mapping[str, str | Array]) -> Array:
-        q = pin.neutral(self.model)
-        for name in postures:
-            checks.known(name, self.members, "figure", "posture")
-        for name, (figure, at) in self.members.items():
-            given = postures.get(name, figure.postures[0])
-            if isinstance(given, str):
-                own = figure.posture(given)
-                for joint in figure.roots.values():
-                    idx = int(figure.model.joints[joint].idx_q)
-                    own[idx : idx + 7] = pin.SE3ToXYZQUAT(at * pin.XYZQUATToSE3(own[idx : idx + 7]))
-            else:
-                own = checks.posture(given, figure.model.nq, f"posture of {name!r}")
-            self.part(name, q)[:] = own
-        return np.asarray(q)
-
     def part(self, name: str, q: Array) -> Array:
         """The posture of one of the joined figures in a posture of all, (nq,) or (n, nq): a view of those numbers."""
         checks.known(name, self.members, "figure", "part")
-        q = checks.array(q, "part: q", "a posture (nq,), or postures (n, nq)")
+        q = checks.array(q, "part: q", wanted := f"a posture of {self.model.nq} values, or several")
         if q.shape[-1:] != (self.model.nq,):
-            raise InputError(f"part: q has shape {q.shape}; give a posture of {self.model.nq} values, or several")
+            raise InputError(f"part: q has shape {q.shape}; give {wanted}")
         joints = [self.model.joints[joint] for joint in self.bodies[f"{name}/"]]
         first = min((int(joint.idx_q) for joint in joints), default=0)
         return q[..., first : max((int(joint.idx_q) + int(joint.nq) for joint in joints), default=0)]
@@ -225,6 +209,12 @@ class Figure(checks.FixedAttributes):
         with self._data.borrow() as data:
             pin.forwardKinematics(self.model, data, q)
             return pin.updateFramePlacement(self.model, data, frame).copy()
+
+    def joint_placement(self, q: Array, joint: int) -> pin.SE3:
+        """Return the placement in the world, at the posture q (nq,), of a joint by its index in the model."""
+        with self._data.borrow() as data:
+            pin.forwardKinematics(self.model, data, self._checked(q))
+            return data.oMi[joint].copy()
 
     def joint_id(self, name: str) -> int:
         """Return the index of a joint in the model; "root", or "anna/root", is a free root."""

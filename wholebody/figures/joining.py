@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 import pinocchio as pin
 
+from wholebody.base import checks
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
 from wholebody.base.records import with_values
@@ -237,6 +238,24 @@ def _postures(members: Mapping[str, Member]) -> dict[str, Callable[[Articulated]
         for posture in figure.postures:
             found[f"{name}/{posture}"] = partial(_joined_posture, chosen={name: posture})
     return found
+
+
+def posture_of_all(figure: Articulated, postures: Mapping[str, str | Array]) -> Array:
+    """A posture (nq,) of joined figures from one of each, by name or as an array; see `Figure.posture`."""
+    q = np.array(pin.neutral(figure.model))
+    for name in postures:
+        checks.known(name, figure.members, "figure", "posture")
+    for name, (one, at) in figure.members.items():
+        given = postures.get(name, one.postures[0])
+        if isinstance(given, str):
+            own = one.posture(given)
+            for joint in one.roots.values():
+                idx = int(one.model.joints[joint].idx_q)
+                own[idx : idx + 7] = pin.SE3ToXYZQUAT(at * pin.XYZQUATToSE3(own[idx : idx + 7]))
+        else:
+            own = checks.posture(given, one.model.nq, f"posture of {name!r}")
+        figure.part(name, q)[:] = own
+    return q
 
 
 def _joined_posture(figure: Articulated, chosen: Mapping[str, str]) -> Array:

@@ -109,11 +109,19 @@ def drawn_pieces(visual: pin.GeometryObject, link: str) -> list[tuple[Any, pin.S
     kind = type(solid).__name__.lower()
     if visual.meshPath:
         shape = LinkShape(link, visual.placement, "mesh", tuple(visual.meshScale), Path(visual.meshPath))
+    elif isinstance(solid, coal.BVHModelBase):
+        shape = LinkShape(link, visual.placement, "triangles", (), triangles=triangles_of(solid))
     elif kind in ("capsule", "cylinder"):
         shape = LinkShape(link, visual.placement, kind, (float(solid.radius), 2.0 * float(solid.halfLength)))
     else:
         return [(solid, visual.placement)]
     return [(piece, shape.placement * placement) for piece, placement in link_pieces(shape, None)[0]]
+
+
+def triangles_of(mesh: Any) -> tuple[Array, NDArray[np.int64]]:
+    """Vertices (n, 3) and faces (m, 3) of coal's mesh."""
+    faces = [[mesh.tri_indices(k)[corner] for corner in range(3)] for k in range(mesh.num_tris)]
+    return np.array(mesh.vertices(), dtype=float), np.array(faces, dtype=np.int64)
 
 
 def _solid(size: tuple[float, ...], kind: str) -> tuple[tuple[float, ...], tuple[str, ...]]:

@@ -42,6 +42,10 @@ def read_mesh(path: str | Path) -> tuple[Array, NDArray[np.int64]]:
         MissingPackageError: for a COLLADA file, pycollada is not installed.
     """
     path = Path(path)
+    if (bent := _bent(path)) is not None:
+        starts = np.cumsum([0, *(len(corners) for corners, *_ in bent)])
+        every = [start + part for start, (_, part, _) in zip(starts, bent, strict=False)]
+        return _checked(np.concatenate([corners for corners, *_ in bent]), np.concatenate(every), path)
     scene, unit = _read_scene(path)
     try:
         mesh = scene.to_mesh()
@@ -58,6 +62,8 @@ def read_parts(path: str | Path) -> list[tuple[Array, NDArray[np.int64], tuple[f
     the mean is taken.
     """
     path = Path(path)
+    if (bent := _bent(path)) is not None:
+        return [(*_checked(vertices, faces, path), color) for vertices, faces, color in bent]
     scene, unit = _read_scene(path)
     found = []
     try:
@@ -72,6 +78,21 @@ def read_parts(path: str | Path) -> list[tuple[Array, NDArray[np.int64], tuple[f
     except Exception as error:
         raise _unreadable(path, error) from error
     if not found:
+        raise EmptyMeshError(f"mesh {path}: there are no triangles in it")
+    return found
+
+
+def _bent(path: Path) -> list[tuple[Array, NDArray[np.int64], tuple[float, float, float, float]]] | None:
+    """The parts of a glTF file whose meshes bones bend, which trimesh leaves as they were bound; None of others."""
+    if path.suffix.lower() not in (".gltf", ".glb"):
+        return None
+    from wholebody.geometry.gltf_document import GltfDocument
+
+    check_file(path, "mesh")
+    _check_content(path)
+    document = GltfDocument(path)
+    found = document.meshes() if document.tree.get("skins") else None
+    if found == []:
         raise EmptyMeshError(f"mesh {path}: there are no triangles in it")
     return found
 

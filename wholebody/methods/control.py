@@ -85,10 +85,13 @@ class Control:
         self._time_limit, self._progress, self._longest = time_limit, progress, longest
         self._began, self._began_at = self._now(), time.monotonic()
         self._handler: Any = None
+        self._entered = False
 
     @property
     def over(self) -> bool:
-        """Whether the solve has to end now."""
+        """Whether the solve has to end now. From the first time this is asked on, Ctrl-C ends it."""
+        if self._entered:
+            self._listen()
         if not self.reason and self._may_be_over and self._passed > 1.0:
             limit, kind = (self._longest, " of processor time") if self._time_limit is None else (self._time_limit, "")
             self.reason = f"the time limit of {limit:g} s{kind} ended it"
@@ -131,16 +134,24 @@ class Control:
             self.reason = "progress ended it"
 
     def __enter__(self) -> Control:
+        """Begin; without progress Ctrl-C is heard from the first question on, since most solves of arms end before."""
+        self._entered = True
+        if self._progress is not None:
+            self._listen()
+        return self
+
+    def _listen(self) -> None:
         """Install the handler of Ctrl-C, if Ctrl-C would raise KeyboardInterrupt."""
+        self._entered = False
         main = threading.current_thread() is threading.main_thread()
         if main and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             self._handler = signal.signal(signal.SIGINT, self._interrupt)
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Restore the handler of Ctrl-C."""
+        self._entered = False
         if self._handler is not None:
             signal.signal(signal.SIGINT, self._handler)
             self._handler = None

@@ -13,7 +13,7 @@ from wholebody.base.errors import FileFormatError, InputError, one_line
 from wholebody.figures.figure import Figure
 from wholebody.figures.joined import one_figure
 from wholebody.motion.clip import Clip
-from wholebody.motion.files import amass, archive, bvh, columns, read_frames
+from wholebody.motion.files import FBX, amass, archive, bvh, columns, gltf_reading, read_frames
 from wholebody.motion.files.base import Frames
 from wholebody.motion.retargeting import retarget
 from wholebody.motion.roles import column_names
@@ -25,9 +25,9 @@ def read_skeleton(path: str | os.PathLike[str], *, unit: str | None = None, up: 
     """Read a skeleton that moves, in metres with z up.
 
     Args:
-        path: a BVH file, or an archive of AMASS (.npz).
+        path: a BVH file, a glTF file (.glb, .gltf), or an archive of AMASS (.npz).
         unit: "metres", "centimetres", "millimetres" or "inches"; recognised by the skeleton's size if left out.
-        up: "y" or "z", the axis of the file that points up; recognised by the rest posture if left out.
+        up: "y" or "z", the axis of the file that points up; if left out recognised by the rest posture, in glTF y.
 
     Returns:
         The motion; its notes say what was recognised.
@@ -44,7 +44,8 @@ def read_skeleton(path: str | os.PathLike[str], *, unit: str | None = None, up: 
         choice(up, UP, "read_skeleton: up")
     motion = _skeleton(path, unit, up)
     if motion is None:
-        raise FileFormatError(f"{one_line(path.name)}: is no skeleton; give a BVH file or an archive of AMASS (.npz)")
+        other = "is no skeleton; give a BVH or glTF file, or an archive of AMASS (.npz)"
+        raise FileFormatError(f"{one_line(path.name)}: {FBX if path.suffix.lower() == '.fbx' else other}")
     _say(motion, path)
     return motion
 
@@ -57,8 +58,8 @@ def read_clip(
     """Read a clip of a figure; the ending of the file's name says the format.
 
     Args:
-        path: a clip of this figure that `Clip.write` wrote (.npz, .bvh), a table (.csv), a joint profile (.txt), or the
-            motion of another skeleton (.bvh, AMASS .npz), which is retargeted.
+        path: a clip of this figure that `Clip.write` wrote (.npz, .bvh, .glb), a table (.csv), a joint profile (.txt),
+            or the motion of another skeleton (.bvh, .glb, .gltf, AMASS .npz), which is retargeted.
         figure: the figure of the postures.
         names: as for `wb.retarget`; of a table, by `columns`, the column of a joint of another name:
             ``{"columns": {"left_knee": "LKnee", "time": "t"}}``.
@@ -73,10 +74,15 @@ def read_clip(
     check_figure(figure, "read_clip")
     if path.suffix.lower() != ".npz":
         one_figure(figure, f"read_clip: {path.name} holds one figure, and the figure")
-    motion = _skeleton(path, None, None)
+    motion: SkeletonMotion | None = None
     if path.suffix.lower() == ".csv" and names is not None:
         frames: Frames | None = columns.read(path, figure, column_names(names, figure))
+    elif path.suffix.lower() in gltf_reading.ENDINGS:
+        animated = gltf_reading.Animated(path)
+        frames = gltf_reading.own(animated, figure)
+        motion = gltf_reading.skeleton_of(animated) if frames is None else None
     else:
+        motion = _skeleton(path, None, None)
         frames = read_frames(path, figure) if motion is None else bvh.own(motion, figure)
     if motion is not None and frames is None:
         _say(motion, path)
@@ -99,6 +105,8 @@ def _skeleton(path: Path, unit: str | None, up: str | None) -> SkeletonMotion | 
     """The skeleton of a file; None where the file holds none."""
     if path.suffix.lower() == ".bvh":
         return bvh.read_motion(path, unit, up)
+    if path.suffix.lower() in gltf_reading.ENDINGS:
+        return gltf_reading.skeleton_of(gltf_reading.Animated(path), unit, up)
     if path.suffix.lower() == ".npz" and amass.is_amass(archive.read_arrays(path)):
         return amass.read_motion(path)
     return None

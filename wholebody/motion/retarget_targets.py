@@ -19,6 +19,7 @@ from wholebody.figures.figure import Figure
 from wholebody.geometry.pieces import box_corners
 from wholebody.motion.roles import Roles
 from wholebody.motion.skeleton import RIGID, SkeletonMotion
+from wholebody.motion.soles import soled
 from wholebody.motion.stance import StanceFeet, speeds
 from wholebody.motion.windows import Window, long_runs, runs
 
@@ -216,7 +217,8 @@ def targets(motion: SkeletonMotion, figure: Figure, roles: Roles, steps: Footfal
     places, turned, lowest = standing_places(figure, roles)
     own = _Body(places)
     joint = {role: motion.names.index(name) for role, name in roles.joints.items()}
-    source = _Body({role: motion.positions[:, k] for role, k in joint.items()})
+    centres = {role: motion.positions[:, k] for role, k in joint.items()}
+    source = _Body(centres | soled(motion, roles, steps.stands, places))
     turns = _turns(motion, joint, own, turned, rest_axes(motion, roles))
     root, scale = turns.get("pelvis", _pelvis(source, motion)), 1.0
     if figure.root == "fixed":  # only what moves relative to the pelvis can be followed

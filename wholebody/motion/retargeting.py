@@ -15,9 +15,19 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.joined import one_figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.posture_fit import Fitter, Goals, smooth
-from wholebody.motion.retarget_targets import LIMBS, Footfalls, Targets, footfalls, has_trunk, known_bones, targets
+from wholebody.motion.retarget_targets import (
+    LIMBS,
+    Footfalls,
+    Targets,
+    footfalls,
+    has_trunk,
+    known_bones,
+    standing_places,
+    targets,
+)
 from wholebody.motion.roles import Roles, matched
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
+from wholebody.motion.soles import soled
 from wholebody.motion.stance import paths
 
 ALONE, TOGETHER = 25, 4  # most iterations of a frame alone, and of all frames at once
@@ -87,6 +97,7 @@ def bone_errors(
 
     Returns:
         Errors by names such as "left_shoulder to left_elbow"; a bone without both ends, or without a length, has none.
+        Those of feet are between soles: skeletons have ankles and toes at other heights above them.
 
     Raises:
         InputError: the clip has another number of frames, or no bones are known to belong to the figure.
@@ -104,9 +115,12 @@ def errors_of(motion: SkeletonMotion, clip: Clip, roles: Roles) -> dict[str, Arr
     """`bone_errors` with known roles."""
     ways = paths(clip.figure, clip.q, tuple(roles.frames.values())).swapaxes(0, 1)
     places = dict(zip(roles.frames, ways, strict=True))
+    centres = {role: motion.positions[:, motion.names.index(joint)] for role, joint in roles.joints.items()}
+    if clip.figure.root == "free":
+        centres |= soled(motion, roles, footfalls(motion, roles).stands, standing_places(clip.figure, roles)[0])
     found = {}
     for ends in (ends for side in ("left", "right") for limb in LIMBS for ends in known_bones(limb, side, places)):
-        start, end = (motion.positions[:, motion.names.index(roles.joints[role])] for role in ends)
+        start, end = (centres[role] for role in ends)
         theirs, ours = end - start, places[ends[1]] - places[ends[0]]
         lengths = np.linalg.norm(theirs, axis=1) * np.linalg.norm(ours, axis=1)
         if lengths.min() > 1e-9:

@@ -7,7 +7,6 @@ from itertools import combinations, product
 from os import PathLike
 from typing import Any
 
-import numpy as np
 import pinocchio as pin
 
 from wholebody.base.checks import path as as_path
@@ -15,12 +14,16 @@ from wholebody.base.checks import some, text, warn
 from wholebody.base.errors import FileFormatError
 from wholebody.base.files import check_file
 from wholebody.figures.link_pieces import Concavity
-from wholebody.figures.mjcf.compiled import Compiled, placement
-from wholebody.figures.mjcf.figure import SHAPES, mjcf_figure
-from wholebody.figures.urdf.xml_reading import read_xml
-from wholebody.geometry.shapes import Box, Capsule, Compound, Cylinder, Ellipsoid, HalfSpace, Mesh, Shape, Sphere
+from wholebody.figures.mjcf.compiled import Compiled, is_mjcf, placement
+from wholebody.figures.mjcf.figure import mjcf_figure
+from wholebody.figures.mjcf.height_fields import height_field
+from wholebody.figures.mjcf.shapes import SHAPES
+from wholebody.geometry.shapes import Box, Capsule, Compound, Cylinder, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
 from wholebody.scene.matter.body import Body
 from wholebody.scene.scene import Scene
+
+MOST_PRISMS = 10_000
+"""Convex pieces of a height field: making each takes half a millisecond."""
 
 
 def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Concavity = None) -> Scene:
@@ -29,7 +32,7 @@ def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Co
     The robot is what `wb.load` returns; several have the name of their body before their names. The geoms of the
     world, of static and of mocap bodies are fixed things, at most one for each geom; a body with a free joint alone is
     a thing that moves by itself, with the mass of the file spread evenly. Geoms that can touch nothing are markers and
-    left out; height fields are left out with a warning.
+    left out. A height field is one thing of convex prisms; one that needs too many is left out with a warning.
 
     Args:
         path: the file.
@@ -44,7 +47,7 @@ def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Co
     """
     place = as_path(path, "read_scene: path")
     check_file(place, "scene")
-    if read_xml(place, "MJCF").tag != "mujoco":
+    if not is_mjcf(place):
         raise FileFormatError(
             f"{place}: a scene is an MJCF file, whose outermost element is <mujoco>; wb.load reads a URDF"
         )
@@ -76,11 +79,11 @@ def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Co
         if parts:
             shape = parts[0][0] if len(parts) == 1 else Compound(tuple(parts))
             at = compiled.place(top) * (parts[0][1] if len(parts) == 1 else pin.SE3.Identity())
-            color = _color(compiled, compiled.geoms(top)[0])
+            color = compiled.color(compiled.geoms(top)[0])
             mass = float(model.body_subtreemass[top])
             scene.add(shape, name=_free_name(scene, names["body"][top]), at=at, body=Body(mass=mass), color=color)
     if left:
-        warn(f"{place}: height fields are not kept: {', '.join(left)}")
+        warn(f"{place}: not kept, as they need over {MOST_PRISMS} convex pieces or move: {', '.join(left)}")
     return scene
 
 
@@ -96,7 +99,7 @@ def _add_fixed(scene: Scene, compiled: Compiled, body: int, place: pin.SE3, left
         name = compiled.names["body" if body and len(geoms) == 1 else "geom"][
             body if body and len(geoms) == 1 else geom
         ]
-        scene.add(shape, name=_free_name(scene, name), at=place * at, color=_color(compiled, geom))
+        scene.add(shape, name=_free_name(scene, name), at=place * at, color=compiled.color(geom))
 
 
 def _parts(compiled: Compiled, bodies: Sequence[int], left: list[str]) -> list[tuple[Shape, pin.SE3]]:
@@ -116,13 +119,16 @@ def _parts(compiled: Compiled, bodies: Sequence[int], left: list[str]) -> list[t
 
 
 def _shape(compiled: Compiled, geom: int) -> tuple[Shape, pin.SE3] | None:
-    """A geom's shape, and its placement on its body; None for a height field."""
+    """A geom's shape, and its placement on its body; None for a height field that is too fine."""
     model = compiled.model
     at = placement(model.geom_pos[geom], model.geom_quat[geom])
     a, b, c = (float(value) for value in model.geom_size[geom])
     kind = SHAPES[int(model.geom_type[geom])]
     if kind == "hfield":
-        return None
+        prisms = height_field(compiled, geom)
+        if len(prisms) > MOST_PRISMS:
+            return None
+        return Compound(tuple((Hull(prism), pin.SE3.Identity()) for prism in prisms)), at
     if kind in ("mesh", "sdf"):
         return Mesh(compiled.mesh(geom)), at
     shapes: dict[str, Any] = {
@@ -134,14 +140,6 @@ def _shape(compiled: Compiled, geom: int) -> tuple[Shape, pin.SE3] | None:
         "box": lambda: Box((2.0 * a, 2.0 * b, 2.0 * c)),
     }
     return shapes[kind](), at
-
-
-def _color(compiled: Compiled, geom: int) -> tuple[float, ...] | None:
-    material = int(compiled.model.geom_matid[geom])
-    color = compiled.model.mat_rgba[material] if material >= 0 else compiled.model.geom_rgba[geom]
-    if np.allclose(color, (0.5, 0.5, 0.5, 1.0)):
-        return None  # MuJoCo's own, where the file has none
-    return tuple(float(value) for value in color)
 
 
 def _untested_between(compiled: Compiled, robots: Sequence[int]) -> list[str]:

@@ -18,7 +18,7 @@ from wholebody.methods.base import Method
 from wholebody.methods.inputs import check_problem
 from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
-from wholebody.studies.records import ENDED, REFUSED, Records, RecordStore, SolveRecord
+from wholebody.studies.records import ENDED, REFUSED, Records, RecordStore, SolveRecord, answer_of
 from wholebody.studies.sending import Sender, Sent
 from wholebody.tasks.answers import is_own
 from wholebody.version import __version__
@@ -309,31 +309,24 @@ def _solve_runs(runs: Sequence[Sequence[Make]], method: Method) -> list[list[dic
         q = None
         answers.append([])
         for make in run:
-            record = _solved(make, method, q)
-            q = record.q if record.solved else None
-            answers[-1].append({name: getattr(record, name) for name in _ANSWERED})
+            answers[-1].append(_solved(make, method, q))
+            q = answers[-1][-1]["q"] if answers[-1][-1]["outcome"] == "solved" else None
     return answers
 
 
-_ANSWERED = (
-    "outcome", "message", "seconds", "iterations", "goal_error", "goal_angle", "penetration", "limit_violation",
-    "constraint_violation", "measure", "q",
-)  # fmt: skip
-
-
-def _solved(make: Make, method: Method, q: Array | None) -> SolveRecord:
-    empty = SolveRecord("")
+def _solved(make: Make, method: Method, q: Array | None) -> dict[str, Any]:
     try:
         problem = check_problem(make(), "the task's answer")
         if q is not None and q.shape == problem.start.shape:
-            warm = empty.of(method.solve(problem.with_start(q)))
+            warm = method.solve(problem.with_start(q))
             if warm.solved:
-                return warm
-        return empty.of(method.solve(problem))
+                return answer_of(warm)
+        return answer_of(method.solve(problem))
     except WholebodyError as error:
-        return replace(empty, outcome=REFUSED, message=str(error))
+        told = str(error)
     except Exception as error:  # of a term or a task of the user's own
-        return replace(empty, outcome=REFUSED, message=one_line(f"{type(error).__name__}: {error}"))
+        told = one_line(f"{type(error).__name__}: {error}")
+    return {"outcome": REFUSED, "message": told, "q": None}
 
 
 def _solve_from(given: Sequence[_Start], method: Method) -> list[dict[str, Any] | None]:
@@ -341,8 +334,8 @@ def _solve_from(given: Sequence[_Start], method: Method) -> list[dict[str, Any] 
     answers: list[dict[str, Any] | None] = []
     for make, q in given:
         problem = check_problem(make(), "the task's answer")
-        record = SolveRecord("").of(_alone(method).solve(problem.with_start(q)))
-        answers.append({name: getattr(record, name) for name in _ANSWERED} if record.solved else None)
+        solution = _alone(method).solve(problem.with_start(q))
+        answers.append(answer_of(solution) if solution.solved else None)
     return answers
 
 

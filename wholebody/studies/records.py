@@ -10,7 +10,7 @@ import sqlite3
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import closing
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -68,19 +68,6 @@ class SolveRecord:
         """Whether the outcome is "solved"."""
         return self.outcome == "solved"
 
-    def of(self, solution: Solution) -> SolveRecord:
-        """The record with what a solution says."""
-        judged = solution.assessment
-        return replace(
-            self,
-            outcome=solution.status,
-            message=solution.message,
-            seconds=solution.seconds,
-            iterations=solution.iterations,
-            q=np.array(solution.q, dtype=float),
-            **{name: getattr(judged, name) for name in JUDGED},
-        )
-
     def row(self) -> dict[str, Any]:
         """The record as plain values, without the posture; the factors are columns of their own."""
         plain = {field.name: getattr(self, field.name) for field in fields(self) if field.name not in ("q", "factors")}
@@ -98,6 +85,19 @@ class SolveRecord:
         plain = json.loads(text)
         q = plain.pop("q")
         return cls(q=None if q is None else np.array(q, dtype=float), **plain)
+
+
+def answer_of(solution: Solution) -> dict[str, Any]:
+    """What a record says of a solution, by the names of its attributes."""
+    judged = solution.assessment
+    return {
+        "outcome": solution.status,
+        "message": solution.message,
+        "seconds": solution.seconds,
+        "iterations": solution.iterations,
+        "q": np.array(solution.q, dtype=float),
+        **{name: getattr(judged, name) for name in JUDGED},
+    }
 
 
 class Records(Sequence[SolveRecord]):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
-from math import hypot
+from math import dist, hypot
 from typing import Annotated, Any, TypeAlias
 
 import numpy as np
@@ -30,16 +30,16 @@ def standing_points(scene: Surroundings, q: Array, feet: Sequence[str]) -> Array
 
     Child segments of a foot, such as toes, belong to it.
     """
-    state = State(scene.model).update(q)
+    places: dict[int, pin.SE3] = {}
     points = []
     for foot in feet:
         joint = inputs.find_place(scene, foot, "Balance").joint
         pieces = [piece for piece in scene.geometry.geometryObjects if joint in scene.model.supports[piece.parentJoint]]
         if not pieces or joint == 0:
             raise InputError(f"Balance: {foot!r} has no pieces to stand on; name segments with geometry as feet")
-        lows = np.vstack(
-            [low_points(piece.geometry, state.data.oMi[piece.parentJoint] * piece.placement) for piece in pieces]
-        )
+        for carrier in {int(piece.parentJoint) for piece in pieces} - places.keys():
+            places[carrier] = scene.figure.joint_placement(q, carrier)
+        lows = np.vstack([low_points(piece.geometry, places[piece.parentJoint] * piece.placement) for piece in pieces])
         points.append(lows[lows[:, 2] <= lows[:, 2].min() + STANDING_HEIGHT])
     return np.vstack(points)
 
@@ -66,18 +66,19 @@ def hull_corners(points: Array) -> list[int]:
     Andrew's monotone chain (1979, "Another efficient algorithm for convex hulls in two dimensions"), on micrometres: an
     edge between two points that differ by rounding alone would have no direction.
     """
-    order = sorted(range(len(points)), key=lambda k: (round(float(points[k, 0]), 6), round(float(points[k, 1]), 6)))
+    places = points[:, :2].tolist()
+    order = sorted(range(len(places)), key=lambda k: (round(places[k][0], 6), round(places[k][1], 6)))
 
     def half(indices: list[int]) -> list[int]:
         chain: list[int] = []
         for k in indices:
             while len(chain) > 1:
-                (ax, ay), (bx, by), (x, y) = points[chain[-2]], points[chain[-1]], points[k]
+                (ax, ay), (bx, by), (x, y) = places[chain[-2]], places[chain[-1]], places[k]
                 # Height [m] of a corner over the line through its neighbours below which it is no corner.
                 if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 1e-6 * hypot(x - ax, y - ay):
                     break
                 chain.pop()
-            if not chain or hypot(*(points[k] - points[chain[-1]])) > NEAREST:
+            if not chain or dist(places[k], places[chain[-1]]) > NEAREST:
                 chain.append(k)
         return chain
 
@@ -144,8 +145,11 @@ class Balance(Constraint):
 
     def resolve(self, scene: Surroundings, start: Array) -> Balance:
         """Compute the support polygon at the start."""
+        return self.on_polygon(convex_polygon(standing_points(scene, start, self.feet)[:, :2]), scene)
+
+    def on_polygon(self, corners: Array, scene: Surroundings) -> Balance:
+        """Copy that is ready to be evaluated, on a support polygon with these corners (k, 2)."""
         joints = inputs.joints_with_mass(scene, "Balance", self.feet)
-        corners = convex_polygon(standing_points(scene, start, self.feet)[:, :2])
         if len(shrunk(corners, self.margin)) == 0:
             raise InputError(
                 f"Balance: a margin of {self.margin:g} m leaves nothing of the support polygon; make it smaller"

@@ -62,7 +62,7 @@ def default_constraints(
         feet = tuple(body + foot for foot in FEET)
         try:
             corners = convex_polygon(standing_points(scene, start, feet)[:, :2])
-            found.append(Balance(feet, margin=STEADY * least_width(corners)).resolve(scene, start))
+            found.append(Balance(feet, margin=STEADY * least_width(corners)).on_polygon(corners, scene))
         except InputError as error:
             if required:
                 raise

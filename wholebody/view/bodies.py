@@ -10,6 +10,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
+from wholebody.figures.surface import surface_of
 from wholebody.geometry.pieces import box_corners
 from wholebody.view import drawing, style
 from wholebody.view.crowds import crowds
@@ -17,7 +18,6 @@ from wholebody.view.link_visuals import LinkVisuals
 from wholebody.view.scene_graph import Keyframe, SceneGraph
 from wholebody.view.skin import Skin, Skinned
 from wholebody.view.style import LOOK, Color
-from wholebody.view.surface import surface_of
 from wholebody.view.viewed_scene import ViewedAssembly, ViewedScene
 
 
@@ -110,7 +110,7 @@ class Bodies:
             owner for owner in scene.piece_owner for figure in self._drawn if figure.owns(owner, numbers)
         )
         self._patches: list[tuple[str, Skinned]] = []
-        shown = [index for index, body in enumerate(self.all) if body.thing is not None and not self._hidden(index)]
+        shown = [index for index, body in enumerate(self.all) if body.thing is not None and not self.hidden(index)]
         self._things, standing = shown, [index for index in shown if self._stands(index)]
         colors = [body.color for body in self.all]
         self._crowds = crowds(LOOK.object_node, standing, list(scene.geometry.geometryObjects), colors)
@@ -167,7 +167,7 @@ class Bodies:
         ]
         for index, piece in enumerate(self.scene.geometry.geometryObjects):
             body = self.all[index]
-            if self._hidden(index) or index in self._among:
+            if self.hidden(index) or index in self._among:
                 continue
             graph.put(body.path, drawing.piece(piece.geometry, body.path, body.color))
             graph.place(body.path, piece.placement.homogeneous)
@@ -184,7 +184,7 @@ class Bodies:
         grid[:3, 3] += 0.0015 * grid[:3, 2]  # m: above the floor, otherwise the two flicker
         graph.place("/Grid", grid)
 
-    def _hidden(self, index: int) -> bool:
+    def hidden(self, index: int) -> bool:
         """Whether a piece is not drawn: the surface of its body is, or it is an outer piece, which has no opacity."""
         body = self.all[index]
         return self.scene.piece_owner[index] in self._owned or (body.thing is None and body.color[3] == 0.0)
@@ -201,7 +201,7 @@ class Bodies:
             path, number = self._among[index]
             keyframe.crowds[path] = keyframe.crowds[path].painted(number, body.state_color(state))
             return
-        if not self._hidden(index):
+        if not self.hidden(index):
             keyframe.colors[body.path] = body.state_color(state)
             return
         for owner, patch in self._patches:
@@ -219,7 +219,7 @@ class Bodies:
         for crowd in self._crowds:
             keyframe.crowds[crowd.path] = crowd.at(pieces)
         for index, body in enumerate(self.all):
-            if not self._hidden(index) and index not in self._among:
+            if not self.hidden(index) and index not in self._among:
                 keyframe.colors[body.path] = body.color
         for _, patch in self._patches:
             keyframe.colors[patch.path] = patch.color
@@ -233,7 +233,7 @@ class Bodies:
                 graph.place(f"{root}{path}", data.oMi[self.carriers[path]].homogeneous)
         for index, piece in enumerate(self.scene.geometry.geometryObjects):
             body = self.all[index]
-            if (body.joint == 0 and body.thing is not None) or self._hidden(index):
+            if (body.joint == 0 and body.thing is not None) or self.hidden(index):
                 continue
             path = f"{root}{body.path}"
             graph.put(path, drawing.piece(piece.geometry, path, color))

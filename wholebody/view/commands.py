@@ -13,7 +13,7 @@ from wholebody.view.server import Command, Op
 from wholebody.view.style import LOOK
 
 if TYPE_CHECKING:
-    from wholebody.view.surface import Patch
+    from wholebody.figures.surface import Patch
 
 
 def floats(values: Any) -> Any:

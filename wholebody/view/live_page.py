@@ -14,9 +14,9 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import WholebodyError
+from wholebody.motion.files.gltf import triangles
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.live import LiveDrag, LiveFrame
-from wholebody.view.gltf import drawn_triangles
 from wholebody.view.viser_server import viser_server
 
 STILL = 1e-5  # m, rad: what moves less is not sent
@@ -87,7 +87,7 @@ class LivePage:
             color = (214, 180, 150) if thing is None else _bytes(thing.color, number)
             # opacity of the figure, so that the handles in it are seen
             opacity = 0.7 if thing is None else None if thing.color is None else thing.color[3]
-            mesh = drawn_triangles(piece.geometry)
+            mesh = triangles(piece.geometry)
             pieces.append(
                 self.server.scene.add_mesh_simple(
                     f"/pieces/{number}", np.asarray(mesh.vertices), np.asarray(mesh.faces),

@@ -103,7 +103,7 @@ class Viewer:
         self._camera: Command | None = None
         self._seen: list[Array] = []
         self._ghosts: list[Array] = []
-        self._motion: tuple[int, float] | None = None
+        self._motion: tuple[Array, float] | None = None
         self._shown: tuple[Array, Any, Sequence[Overlap]] | None = None
 
     def show(
@@ -171,7 +171,7 @@ class Viewer:
         if ghost is not None:
             followed = checks.listed(getattr(ghost, "q", ghost), "ghost", "postures, each of shape (nq,)")
             self._ghosts = self._composition.moving_ghost(keyframes, followed, LOOK.ghost, played)
-        self._motion, self._shown = (len(postures), step), None
+        self._motion, self._shown = (np.array(postures), step), None
         # number of postures of a motion that the camera takes into account
         chosen = np.unique(np.linspace(0, len(postures) - 1, 24).astype(int))
         self._seen = [postures[index] for index in chosen]
@@ -296,16 +296,18 @@ class Viewer:
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the scene as one HTML file that opens in any browser without a network, FILE.glb as glTF.
 
-        HTML has the motion, glTF pieces and things at the posture, or at its beginning. FILE.png is `picture`, which
-        raises the same; other endings are refused. Returns the path.
+        Both have the motion that is played. glTF has the body as one skinned mesh, and all things. FILE.png is
+        `picture`, which raises the same; other endings are refused. Returns the path.
         """
         place, drawn = checked_target(path, "save: path", "a scene", SAVED), self._commands()
         if place.suffix.lower() == ".png":
             return self.picture(place)
         if place.suffix.lower() == ".glb":
-            from wholebody.view.gltf import posture_glb
+            from wholebody.view.gltf import scene_glb
 
-            return write(place, posture_glb(self._composition.scene, self._seen[0]))
+            postures, dt = self._motion or (np.array(self._seen[:1]), 1.0)
+            made = scene_glb(self._composition.scene, self._composition.bodies, postures, dt, self.title)
+            return write(place, made)
         return write(place, static_page(drawn, self.title))
 
     def _repr_html_(self) -> str:
@@ -358,8 +360,8 @@ class Viewer:
         wanted, told = self._commands(), checks.function(progress, "movie: progress")
         if self._motion is None:
             raise InputError("a movie needs a motion; call play() before movie()")
-        (count, dt), place = self._motion, check_movie(path)
-        times, fps = frame_times(place, count, dt, fps)
+        (postures, dt), place = self._motion, check_movie(path)
+        times, fps = frame_times(place, len(postures), dt, fps)
         drawn = counted(self._screenshots.pictures(wanted, size, times), len(times), told)
         return write(place, movie(place.suffix, drawn, fps))
 

@@ -11,6 +11,7 @@ import pytest
 import wholebody as wb
 from tests.figures.mjcf.random_files import mjcf
 from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
+from wholebody.figures.link_visuals import drawn_of
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo, which reads MJCF files, is not installed")
 
@@ -140,6 +141,14 @@ def test_pairs_are_those_of_the_file(tmp_path: Path) -> None:
     reasons = {frozenset((pair.a, pair.b)): pair.reason for pair in figure.excluded_pairs}
     assert reasons[frozenset(("base:0", "hand:0"))] == "their contact bits do not meet"
     assert reasons[frozenset(("upper:0", "hand:0"))] == "the file excludes them"
+    named = bits.replace('type="sphere" size', 'name="ball" type="sphere" size')
+    named = named.replace('<geom contype="2"', '<geom name="foot" contype="2"')
+    pair = '<contact><pair geom1="foot" geom2="ball"/></contact></mujoco>'
+    geometry = wb.load(written(tmp_path, named.replace("</mujoco>", pair)), samples=0).geometry
+    names = [piece.name for piece in geometry.geometryObjects]
+    tested = {frozenset((names[pair.first], names[pair.second])) for pair in geometry.collisionPairs}
+    assert frozenset(("base:0", "hand:1")) in tested  # the ball can touch nothing else
+    assert not [pair for pair in tested if "hand:1" in pair and "base:0" not in pair]
 
 
 def test_a_linear_equality_is_followed_and_others_are_told(tmp_path: Path) -> None:
@@ -177,7 +186,7 @@ WRONG = {
     "no bodies": ("<mujoco><worldbody/></mujoco>", "no bodies"),
     "an unknown joint": (ARM.replace('type="slide"', 'type="screw"'), "MuJoCo cannot read it .*screw"),
     "no mesh": (ARM.replace('vertex="0 0 0  0.1 0 0  0 0.1 0  0 0 0.1"', 'file="gone.stl"'), "gone.stl"),
-    "broken": (ARM[:-5], "XML is broken"),
+    "broken": (ARM[:-40], "MuJoCo cannot read it"),
     "another file": ("<scene/>", "<scene>, not <robot>"),
 }
 
@@ -203,3 +212,57 @@ def test_options_are_checked(arm: Path) -> None:
 
 def test_a_urdf_may_be_called_xml(tmp_path: Path) -> None:
     assert wb.load(written(tmp_path, '<robot name="r"><link name="a"/></robot>')).frames == ("a",)
+
+
+def test_what_is_drawn_is_what_mujocos_viewer_draws(tmp_path: Path) -> None:
+    """Meshes as they are, in the colours of geoms, materials and textures; geoms of contacts alone are hidden."""
+    text = ARM.replace(
+        "<asset>",
+        '<asset><texture name="chess" type="2d" builtin="checker" rgb1="1 0 0" rgb2="0 0 1" width="64" height="64"/>'
+        '<texture name="gone" type="2d" file="gone.png"/>'
+        '<material name="board" texture="chess"/><material name="green" rgba="0 1 0 1"/>'
+        '<mesh name="corner" vertex="0 0 0 .1 0 0 0 .1 0 0 0 .1 .02 .02 .02" '
+        'face="0 2 4 0 4 1 0 1 2 1 4 3 4 2 3 1 3 2"/>',
+    ).replace(
+        '<geom type="mesh" mesh="wedge"/>',
+        '<geom type="mesh" mesh="corner" material="board" contype="0" conaffinity="0" pos="0 0 .02" euler=".3 0 0"/>'
+        '<geom type="box" size=".01 .01 .01" material="green" group="1"/>'
+        '<geom type="box" size=".02 .02 .02" material="green" rgba="0 0 1 1" group="4"/>',
+    )
+    figure = wb.load(written(tmp_path, text))
+    assert any("textures are left out" in note for note in figure.notes)
+    figure = wb.load(written(tmp_path, text.replace('<texture name="gone" type="2d" file="gone.png"/>', "")))
+    assert not any("textures" in note for note in figure.notes)
+    hand = [one for one in drawn_of(figure) if one.link == "hand"]
+    kinds = {type(one.shape).__name__: one for one in hand}
+    assert sorted(kinds) == ["Box", "Sphere", "tuple"]
+    assert kinds["Box"].color == (0.0, 1.0, 0.0, 1.0)
+    assert kinds["tuple"].color == pytest.approx((0.5, 0.0, 0.5, 1.0), abs=1e-6)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "robot.xml"))
+    theirs, data = mujoco.MjData(model), figure.model.createData()
+    q = figure.with_joints(figure.neutral, {"swing": 0.4, "roll": -0.7, "slide": 0.06})
+    theirs.qpos[:] = [0.4, -0.7, 0.06]
+    mujoco.mj_forward(model, theirs)
+    pin.forwardKinematics(figure.model, data, q)
+    vertices, faces = kinds["tuple"].shape
+    place = data.oMi[figure.joint_id(kinds["tuple"].joint)].homogeneous @ kinds["tuple"].placement
+    geom = next(k for k in range(model.ngeom) if model.geom_type[k] == mujoco.mjtGeom.mjGEOM_MESH)
+    first = model.mesh_vertadr[model.geom_dataid[geom]]
+    wanted = (
+        model.mesh_vert[first : first + len(vertices)] @ theirs.geom_xmat[geom].reshape(3, 3).T + theirs.geom_xpos[geom]
+    )
+    np.testing.assert_allclose(vertices @ place[:3, :3].T + place[:3, 3], wanted, atol=1e-6)
+    assert len(faces) == 6
+    assert wb.load(written(tmp_path, ARM.replace('type="mesh" mesh="wedge"', 'size=".01"'))).visual is not None
+
+
+def test_joints_that_are_parked_without_a_shape_are_no_robot(tmp_path: Path) -> None:
+    parked = '<body name="unused" pos="0 0 20"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><joint/></body>'
+    figure = wb.load(written(tmp_path, ARM.replace("</worldbody>", f"{parked}</worldbody>")))
+    assert figure.joints == ("swing", "roll", "slide")
+    assert "bodies without a shape beside the robot (unused) are not kept" in figure.notes
+
+
+def test_what_mujoco_reads_of_files_that_are_not_quite_xml_is_read(tmp_path: Path) -> None:
+    head = "\ufeff<?xml version='1.0'?>\n<!-- <robot> -->\n"
+    assert wb.load(written(tmp_path, head + ARM + "\n</mujoco>\n")).joints == ("swing", "roll", "slide")

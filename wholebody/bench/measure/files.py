@@ -11,9 +11,10 @@ import numpy as np
 import wholebody as wb
 from wholebody.base.errors import FileFormatError, WholebodyError, one_line
 from wholebody.bench.rows import Figure, Row, measured_ms
+from wholebody.geometry.gltf_document import GltfDocument
 from wholebody.motion.files import READERS
 
-ROBOTS, MESHES, SKELETONS = (".urdf", ".xml"), (".stl", ".obj", ".ply", ".dae", ".glb"), (".bvh", ".npz")
+ROBOTS, MESHES, SKELETONS = (".urdf", ".xml"), (".stl", ".obj", ".ply", ".dae", ".glb", ".gltf"), (".bvh", ".npz")
 
 
 def read(folder: Path, frames: int) -> Iterator[Row]:
@@ -55,14 +56,19 @@ def _answer(work: Callable[[], dict[str, Figure]]) -> dict[str, Figure]:
         return {"read": "FAULT", "said": one_line(f"{type(error).__name__}: {error}", 300)}
 
 
+def _moves(path: Path) -> bool:
+    """Whether a file of a kind of meshes is glTF with an animation."""
+    return path.suffix.lower() in (".glb", ".gltf") and bool(GltfDocument(path).tree.get("animations"))
+
+
 def _read(path: Path, kind: tuple[str, ...], human: wb.Figure, frames: int) -> dict[str, Figure]:
     if kind == ROBOTS:
         figure = wb.load(path)
         return {"joints": len(figure.joints), "notes": len(figure.notes)}
-    if kind == MESHES:
+    if kind == MESHES and not _moves(path):
         return {"pieces": len(wb.Mesh(path).pieces())}
     try:
-        motion = wb.motion.read_skeleton(path) if kind == SKELETONS else None
+        motion = wb.motion.read_skeleton(path) if kind in (SKELETONS, MESHES) else None
     except FileFormatError as error:
         if path.suffix.lower() != ".npz" or "is no skeleton" not in str(error):
             raise

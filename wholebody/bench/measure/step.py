@@ -6,7 +6,9 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+import pinocchio as pin
 
+from wholebody.assessment.motion import pairs_along
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.bench.measure.track import SETTING, Track, judge
@@ -15,8 +17,10 @@ from wholebody.bench.statistics import BLOCK, quantile_ratio
 from wholebody.bench.suite.adapters.base import Tool
 from wholebody.bench.suite.adapters.registry import make_tool
 from wholebody.bench.tables import programs_text
+from wholebody.geometry.pair_distances import PairDistances
 
 REFERENCE = "placo"
+LEAST = "Pinocchio and coal"
 TURN = 50
 """Steps that a tool makes before the next one does. Fewer: nearer in time, and more steps whose data
 others evicted from the caches; these are 2 %, so that they do not make the p95."""
@@ -86,11 +90,41 @@ def _beside(track: Track, tools: Sequence[str], shift: int) -> dict[str, Run]:
     return runs
 
 
+def least_times(track: Track, runs: Sequence[Run]) -> Array:
+    """(runs, steps) microseconds that a step's postures take in Pinocchio and coal alone, without a program.
+
+    These are joint Jacobians, placements of the pieces, and distances of the pairs that a tool looks at, by calls of
+    C++ from the guesses of the step before.
+    """
+    model, scene = track.scene.model, track.scene
+    pairs = PairDistances(scene.geometry, scene.built.table.pairs)
+    data, geometry, told = model.createData(), pairs.geometry, pairs.data
+    spent = np.empty((len(runs), len(track.targets)))
+    for mine, run in zip(spent, runs, strict=True):
+        near = [np.flatnonzero(every.distance < SETTING.within) for every in pairs_along(scene, run.postures)]
+        with quiet():
+            for step, q in enumerate(run.postures):
+                numbers = near[step].tolist()
+                clock = time.perf_counter_ns()
+                pin.computeJointJacobians(model, data, q)
+                pin.updateGeometryPlacements(model, data, geometry, told)
+                for number in numbers:
+                    pin.computeDistance(geometry, told, number)
+                mine[step] = 1e-3 * (time.perf_counter_ns() - clock)
+    return spent
+
+
 def time_rows(track: Track, runs: Runs) -> list[Row]:
-    """Times of all steps of each tool, and their ratios to the reference's in the same repeat, with intervals."""
-    rows, reference = [], runs.get(REFERENCE, [])
+    """Times of all steps of each tool, and their ratios to the reference's in the same repeat, with intervals.
+
+    The first tool is compared with `least_times` of its own postures too.
+    """
+    rows, reference, least = list[Row](), runs.get(REFERENCE, []), None
     for name, mine in runs.items():
         figures: dict[str, Figure] = {}
+        if least is None:
+            least = least_times(track, mine)
+            figures[f"median × {LEAST}"] = quantile_ratio(_clock(mine, "wall"), least, 0.5)
         for clock, front in (("wall", ""), ("cpu", "CPU")):
             own = _clock(mine, clock)
             figures |= times(own, "µs", front)
@@ -99,6 +133,8 @@ def time_rows(track: Track, runs: Runs) -> list[Row]:
                 figures[f"{front} {part} × {REFERENCE}".strip()] = ratio
         figures["set-up ms"] = 1e3 * float(np.median([run.setup for run in mine]))
         rows.append(Row(track.name, name, figures))
+    if rows and least is not None:
+        rows.append(Row(track.name, LEAST, times(least, "µs")))
     return rows
 
 
@@ -183,13 +219,15 @@ def step_report(
         f"Every tool makes every repeat once, in turns of {TURN} steps and in turning order, in one process; a first "
         "round and the first step of each set-up are not counted. Distances, errors and limits are judged afterwards "
         "from the postures, every pair by coal. Brackets hold 95 % intervals of the ratios to placo's steps, by the "
-        f"bootstrap: repeats are drawn, and steps in blocks of {BLOCK}, the same for both."
+        f"bootstrap: repeats are drawn, and steps in blocks of {BLOCK}, the same for both. {LEAST!r} are calls of C++ "
+        "alone, at the postures of the first tool: joint Jacobians, placements of the pieces, and the distances of the "
+        "pairs that are looked at."
     )
     # Our method has the same answers with other QP solvers, whose times are in the CSV file.
     judged = [row for row in judged if not row.tool.startswith("wholebody/")] or judged
     met = [row for row in judged if not row.case.endswith("alone")]  # where something is in the way
-    spent = [row for row in spent if row.tool in {other.tool for other in judged}]
-    figures_of_time = "median µs", f"median × {REFERENCE}", f"p95 × {REFERENCE}"
+    spent = [row for row in spent if row.tool in {LEAST, *(other.tool for other in judged)}]
+    figures_of_time = "median µs", f"median × {REFERENCE}", f"p95 × {REFERENCE}", f"median × {LEAST}"
     figures_of_steps = (
         "least distance mm",
         "steps inside",

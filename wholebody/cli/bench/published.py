@@ -1,4 +1,4 @@
-"""`wholebody bench export` and `judge`: problems as files, and what anybody's answers to them are worth."""
+"""`wholebody bench export`, `answer` and `judge`: problems as files, answers to them, and what answers are worth."""
 
 from __future__ import annotations
 
@@ -41,6 +41,40 @@ def export(arguments: argparse.Namespace) -> None:
             sets, per_set, arguments.seed, arguments.folder, lambda name: bar.update(task, advance=1, description=name)
         )
     print(f"wrote {per_set * len(sets)} problems, listed in {index}")
+
+
+@command(
+    "answer",
+    "answer exported problems by a method",
+    """\
+Solve the problems that `wholebody bench export` wrote by one method, from both seeds, and write the file of answers
+that `wholebody bench judge` scores. What the method refuses is written with its reason.""",
+    option("folder", type=Path, metavar="DIR", help="folder of the exported problems"),
+    option("--method", default="qp", metavar="NAME", help="such as qp or my_module:MyMethod (default: qp)"),
+    listed("--sets", "problem sets (default: all of the export)"),
+    option("--out", type=Path, metavar="PATH", help="where the answers are written (default: METHOD.answers.json)"),
+)
+def answer(arguments: argparse.Namespace) -> None:
+    """Answer."""
+    from wholebody.base.files import checked_target
+    from wholebody.bench.suite.adapters.registry import adapters
+    from wholebody.bench.suite.published.answering import Answering, chosen_problems
+    from wholebody.bench.suite.published.rebuilt import dumped
+    from wholebody.cli.tables import progress_bar
+
+    found = adapters([arguments.method], starts=True)
+    if len(found) > 1:
+        raise InputError(f"--method {arguments.method} is {', '.join(one.name for one in found)}; name one of them")
+    out = arguments.out or Path(f"{found[0].name.replace('/', '-').replace(':', '-')}.answers.json")
+    checked_target(out, "--out", "a file of answers", (".json",))
+    problems, answering = chosen_problems(arguments.folder, arguments.sets), Answering(arguments.folder, found[0])
+    with progress_bar() as bar:
+        work = bar.add_task("solving", total=len(problems))
+        for family, number in problems:
+            answering.answer(family, number)
+            bar.update(work, advance=1, description=f"{family} {number}")
+    write_text(out, dumped(answering.content()))
+    print(f"wrote {out}; score it with: wholebody bench judge {out} --problems {arguments.folder}")
 
 
 @command(

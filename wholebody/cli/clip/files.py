@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from wholebody.cli.clip.arguments import JOBS, MOTIONS, ONE_MOTION, bar, clip_of, figure_of, jobs_of
 from wholebody.cli.command import command, flag, option
+
+if TYPE_CHECKING:
+    from wholebody.base.arrays import Array
 
 
 @command(
@@ -80,10 +85,10 @@ def convert(arguments: argparse.Namespace) -> int:
     "retarget",
     "skeletons' motions for a figure",
     """\
-Turn the motion of a skeleton (BVH, AMASS) into a clip of a figure of any proportions: directions of limbs as recorded,
-within joint limits and reach cones, smooth, standing feet held. The clip may collide with itself: `wholebody clip
-check` says where, `wholebody clip avoid` frees it. Several files are written into a folder; what it holds already is
-not made again.""",
+Turn the motion of a skeleton (BVH, glTF, AMASS) into a clip of a figure of any proportions: directions of limbs as
+recorded, within joint limits and reach cones, smooth, standing feet held. A table has the errors of bones. The clip may
+collide with itself: `wholebody clip check` says where, `wholebody clip avoid` frees it. Several files are written into
+a folder; what it holds already is not made again.""",
     *MOTIONS,
     option(
         "out", type=Path, metavar="OUT", help="the file to write: .npz, .bvh, .csv, .txt or .glb; of several a folder"
@@ -105,15 +110,31 @@ def retarget_motions(arguments: argparse.Namespace) -> int:
     from wholebody.base.files import check_writable
     from wholebody.motion.files import check_ending
     from wholebody.motion.reading import read_skeleton
-    from wholebody.motion.retargeting import retarget
+    from wholebody.motion.retargeting import bone_errors, retarget
 
     check_writable(check_ending(arguments.out))
     motion = read_skeleton(arguments.files[0], unit=arguments.unit, up=arguments.up)
     figure = figure_of(arguments)
     with bar("retargeting") as tell:
         clip = retarget(motion, figure, arguments.names, progress=lambda share: tell(share, "retargeting"))
+    _print_errors(bone_errors(motion, clip, arguments.names))
     print(f"wrote {clip.write(arguments.out)}: {len(clip)} frames, {clip.duration:.3f} s, of {figure.name}")
     return 0
+
+
+def _print_errors(errors: Mapping[str, Array]) -> None:
+    """Print how far the directions of bones are from the recording's; those beyond 15 degrees stand out."""
+    import numpy as np
+    from rich.console import Console
+
+    from wholebody.cli.tables import table
+
+    made = table("bones: degrees from the recording", "median", "of 95 in 100 frames", "greatest")
+    for name, values in errors.items():
+        half, most, greatest = np.degrees(np.percentile(values, (50, 95, 100)))
+        style = "bold red" if half > 15.0 else None
+        made.add_row(name, *(f"{value:.1f}" for value in (half, most, greatest)), style=style)
+    Console().print(made)
 
 
 def _many(arguments: argparse.Namespace) -> int:

@@ -17,8 +17,8 @@ PICTURES = 8
     "show a motion",
     """\
 Show a motion. Without --out a page opens in the browser and plays it; with --out it is written as a page that opens
-without a network (.html), a movie (.mp4, .gif) or a strip of pictures (.png). A second motion is its ghost. With
---equipment the body is shown with what it wears.""",
+without a network (.html), as glTF (.glb), a movie (.mp4, .gif) or a strip of pictures (.png). A second motion is its
+ghost. With --equipment the body is shown with what it wears.""",
     *ONE_MOTION,
     option("--ghost", type=Path, metavar="FILE", help="another motion of the figure, shown transparent"),
     option(
@@ -27,7 +27,7 @@ without a network (.html), a movie (.mp4, .gif) or a strip of pictures (.png). A
         metavar="WHAT",
         help="what the body wears: a ready name such as pack, names joined by +, or a mesh that is put on its back",
     ),
-    option("--out", type=Path, metavar="OUT", help=".html, .mp4, .gif or .png"),
+    option("--out", type=Path, metavar="OUT", help=".html, .glb, .mp4, .gif or .png"),
     option("--pictures", type=int, default=PICTURES, metavar="N", help="of a strip (default: 8)"),
     epilog="""\
 examples:
@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
     out: Path | None = arguments.out
     whole(arguments.pictures, "--pictures", 1, 100)
     if out is not None:
-        checked_target(out, "--out", "a clip's picture", (".htm", ".html", ".mp4", ".gif", ".png"))
+        checked_target(out, "--out", "a clip's picture", (".glb", ".htm", ".html", ".mp4", ".gif", ".png"))
     clip = clip_of(arguments)
     ghost = None if arguments.ghost is None else read_clip(arguments.ghost, clip.figure)
     if ghost is not None and len(ghost) != len(clip):
@@ -78,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
         if out is None:
             viewer.open()
             viewer.wait_until_closed()
-        elif out.suffix.lower() in (".htm", ".html"):
+        elif out.suffix.lower() in (".glb", ".htm", ".html"):
             print(f"wrote {viewer.save(out)}")
         else:
             with bar(f"drawing {out.name}") as show:  # a share: a movie may have fewer pictures than the clip frames

@@ -7,6 +7,7 @@ frames of their bodies.
 
 from __future__ import annotations
 
+import re
 import warnings
 from functools import cached_property
 from pathlib import Path
@@ -18,9 +19,21 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError, InputError, MissingPackageError
+from wholebody.base.files import read_bytes
 
 FREE, BALL, SLIDE, HINGE = range(4)
 """Types of joints, as MuJoCo numbers them."""
+
+
+RGB = 1
+"""What a texture of a material is for: its colour, as MuJoCo numbers it."""
+
+
+def is_mjcf(path: Path) -> bool:
+    """Whether the first element of a file is <mujoco>. MuJoCo also reads files that are not quite XML."""
+    text = read_bytes(path, "URDF or MJCF", 64 * 2**20).decode("utf-8-sig", "replace")
+    first = re.match(r"(?:\s|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>)*<([\w:.-]+)", text, re.DOTALL)
+    return first is not None and first[1] == "mujoco"
 
 
 class Compiled:
@@ -29,13 +42,15 @@ class Compiled:
     Attributes:
         path: of the file.
         model: `mujoco.MjModel`.
+        notes: sentences on what could not be read.
         names: "body", "joint", "geom", "site", "key" -> the name of each, made from its body and number where the file
             has none.
     """
 
     def __init__(self, path: Path) -> None:
         """Compile a file; a `FileFormatError` has what MuJoCo says, a `MissingPackageError` that it is not there."""
-        self.path, self.model = path, _compile(path)
+        self.path = path
+        self.model, self.notes = _compile(path)
         self.names = _names(self.model)
 
     @property
@@ -74,10 +89,18 @@ class Compiled:
 
     @cached_property
     def robots(self) -> tuple[int, ...]:
-        """Bodies on the world below which something turns or slides; else those that go about freely; else all."""
+        """Bodies on the world below which something turns or slides; else those that go about freely; else all.
+
+        Those without a shape are none where others have some: files of a robot's kinds park joints that one lacks.
+        """
         tops = self.children[0]
         inner = [top for top in tops if any(self._moves(body) for body in self.tree(top))]
+        inner = list(filter(self.has_shape, inner)) or inner
         return tuple(inner or [top for top in tops if self.is_free(top)] or tops)
+
+    def has_shape(self, top: int) -> bool:
+        """Whether a body or one that hangs on it has a geom."""
+        return any(len(self.geoms(body)) for body in self.tree(top))
 
     def _moves(self, body: int) -> bool:
         return any(self.model.jnt_type[joint] != FREE for joint in self.joints(body))
@@ -109,8 +132,32 @@ class Compiled:
         )
 
     def collides(self, geom: int) -> bool:
-        """Whether a geom can touch another one: its contact bits are not all zero."""
-        return bool(self.model.geom_contype[geom] or self.model.geom_conaffinity[geom])
+        """Whether a geom can touch another one: its contact bits are not all zero, or the file names a pair with it."""
+        bits = self.model.geom_contype[geom] or self.model.geom_conaffinity[geom]
+        return bool(bits) or any(geom in pair for pair in self.pairs)
+
+    @cached_property
+    def pairs(self) -> frozenset[frozenset[int]]:
+        """Pairs of geoms that the file names (<pair>); they can touch whatever their contact bits are."""
+        ends = zip(self.model.pair_geom1.tolist(), self.model.pair_geom2.tolist(), strict=True)
+        return frozenset(frozenset(pair) for pair in ends)
+
+    def color(self, geom: int) -> tuple[float, float, float, float] | None:
+        """A geom's own colour, else that of its material times the mean of its texture; None without both."""
+        model, material = self.model, int(self.model.geom_matid[geom])
+        color = model.geom_rgba[geom].astype(float)
+        if np.allclose(color, (0.5, 0.5, 0.5, 1.0)):  # MuJoCo's own, where the file has none
+            if material < 0:
+                return None
+            color = model.mat_rgba[material].astype(float)
+            texture = int(model.mat_texid[material][RGB])
+            if texture >= 0:
+                first, channels = int(model.tex_adr[texture]), int(model.tex_nchannel[texture])
+                count = int(model.tex_height[texture]) * int(model.tex_width[texture]) * channels
+                mean = model.tex_data[first : first + count].reshape(-1, channels).mean(axis=0) / 255.0
+                color[:3] *= mean[:3] if channels >= 3 else mean[0]
+        red, green, blue, alpha = (float(value) for value in color)
+        return red, green, blue, alpha
 
     def geoms(self, body: int) -> range:
         """Geoms of a body."""
@@ -124,26 +171,40 @@ def placement(position: Array, quaternion: Array) -> pin.SE3:
     return pin.SE3(pin.Quaternion(w, x, y, z).normalized().matrix(), np.array(position, dtype=float))
 
 
-def _compile(path: Path) -> Any:
+def _compile(path: Path) -> tuple[Any, tuple[str, ...]]:
+    """MuJoCo's model of a file, and sentences on what could not be read of it."""
     try:
         import mujoco
     except ImportError:
         raise MissingPackageError(
             f"{path}: MJCF files are read by MuJoCo, which is not installed; run: pip install 'wholebody[mjcf]'"
         ) from None
-    try:
-        with warnings.catch_warnings():  # they tell of simulations
-            warnings.simplefilter("ignore")
-            spec = mujoco.MjSpec.from_file(str(path))
+
+    def read(*, textures: bool) -> Any:
+        spec = mujoco.MjSpec.from_file(str(path))
+        if not textures:
             _without_textures(spec)
-            return spec.compile()
-    except (ValueError, mujoco.FatalError) as error:
-        reason = " ".join(str(error).split()).removeprefix("Error: ").removeprefix("XML Error: ")
-        raise FileFormatError(f"{path}: MuJoCo cannot read it ({reason}); correct the file") from None
+        return spec.compile()
+
+    wrong = (ValueError, mujoco.FatalError)
+    with warnings.catch_warnings():  # they tell of simulations
+        warnings.simplefilter("ignore")
+        try:
+            return read(textures=True), ()
+        except wrong as error:
+            reason = _said(error)
+        try:
+            return read(textures=False), (f"textures are left out: {reason}",)
+        except wrong as error:
+            raise FileFormatError(f"{path}: MuJoCo cannot read it ({_said(error)}); correct the file") from None
+
+
+def _said(error: Exception) -> str:
+    return " ".join(str(error).split()).removeprefix("Error: ").removeprefix("XML Error: ")
 
 
 def _without_textures(spec: Any) -> None:
-    """Leave out textures: their files are often left behind, and nothing here draws them."""
+    """Leave out textures: their files are often left behind."""
     for material in spec.materials:
         material.textures = [""] * len(material.textures)
     for texture in list(spec.textures):

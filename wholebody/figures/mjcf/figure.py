@@ -12,15 +12,13 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
 from wholebody.figures.figure import Figure
-from wholebody.figures.link_pieces import Concavity, LinkShape, check_concavity
-from wholebody.figures.mjcf.compiled import Compiled, placement
+from wholebody.figures.link_pieces import Concavity, check_concavity
+from wholebody.figures.mjcf.compiled import Compiled, is_mjcf
 from wholebody.figures.mjcf.model import RobotModel, robot_model
+from wholebody.figures.mjcf.shapes import SHAPES, geom_shape
+from wholebody.figures.mjcf.visuals import visual_of
 from wholebody.figures.robot_figure import Robot, check_size, geometry_of_links, robot_figure
 from wholebody.figures.urdf.figure import SAMPLES, urdf_figure
-from wholebody.figures.urdf.xml_reading import read_xml
-
-SHAPES = ("plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf")
-"""Kinds of geoms, as MuJoCo numbers them."""
 
 
 def xml_figure(
@@ -40,7 +38,7 @@ def xml_figure(
         MissingPackageError: an MJCF, and MuJoCo is not installed.
     """
     place = Path(path)
-    if read_xml(place, "URDF or MJCF").tag != "mujoco":
+    if not is_mjcf(place):
         return urdf_figure(path, root, package_dirs, concavity, samples, seed)
     return mjcf_figure(Compiled(place), root, concavity, samples, seed)
 
@@ -56,7 +54,7 @@ def mjcf_figure(
     names = compiled.names
     links = tuple(names["body"][body] for body in robot.bodies)
     geoms = [geom for body in robot.bodies for geom in compiled.geoms(body) if compiled.collides(geom)]
-    notes = [*robot.notes, *_left_out(compiled, robot.bodies)]
+    notes = [*compiled.notes, *robot.notes, *_left_out(compiled, robot.bodies)]
     shapes = []
     kept = []
     for geom in geoms:
@@ -74,6 +72,7 @@ def mjcf_figure(
     )
     found = Robot(
         compiled.name, robot.model, links, geometry, (*notes, *told),
+        visual=visual_of(compiled, robot),
         frames=robot.sites,
         postures=_postures(compiled, robot),
         cones=robot.cones,
@@ -83,33 +82,13 @@ def mjcf_figure(
     return robot_figure(found, samples, seed)
 
 
-def geom_shape(compiled: Compiled, geom: int) -> LinkShape | None:
-    """The shape of a geom on its body; None for planes and height fields, which only the world has."""
-    model = compiled.model
-    link = compiled.names["body"][int(model.geom_bodyid[geom])]
-    at = placement(model.geom_pos[geom], model.geom_quat[geom])
-    size = [float(value) for value in model.geom_size[geom]]
-    kind = SHAPES[int(model.geom_type[geom])]
-    if kind in ("mesh", "sdf"):
-        return LinkShape(link, at, "triangles", (), triangles=compiled.mesh(geom))
-    sizes: dict[str, tuple[float, ...]] = {
-        "sphere": (size[0],), "capsule": (size[0], 2.0 * size[1]), "cylinder": (size[0], 2.0 * size[1]),
-        "ellipsoid": tuple(size), "box": tuple(2.0 * value for value in size),
-    }  # fmt: skip
-    return LinkShape(link, at, kind, sizes[kind]) if kind in sizes else None
-
-
 def _colors(compiled: Compiled, robot: RobotModel) -> dict[str, tuple[float, float, float, float]]:
-    """The colour of a body's first geom, or of its material, where the file gives one."""
-    model, found = compiled.model, {}
+    """The colour of a body's first geom that has one."""
+    found = {}
     for body in robot.bodies:
-        for geom in compiled.geoms(body):
-            material = int(model.geom_matid[geom])
-            color = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
-            if not np.allclose(color, (0.5, 0.5, 0.5, 1.0)):  # MuJoCo's own, where the file has none
-                red, green, blue, alpha = (float(value) for value in color)
-                found[compiled.names["body"][body]] = (red, green, blue, alpha if alpha > 0.0 else 1.0)
-                break
+        color = next(filter(None, map(compiled.color, compiled.geoms(body))), None)
+        if color is not None:
+            found[compiled.names["body"][body]] = (*color[:3], color[3] if color[3] > 0.0 else 1.0)
     return found
 
 
@@ -122,13 +101,15 @@ def _postures(compiled: Compiled, robot: RobotModel) -> dict[str, Array]:
 
 
 def _untested(compiled: Compiled, geoms: Sequence[int]) -> Callable[[int, int], str | None]:
-    """Why two pieces, which belong to these geoms, are never tested: contact bits, <exclude>."""
+    """Why two pieces, which belong to these geoms, are never tested: contact bits or <exclude>, and no <pair>."""
     model = compiled.model
     types, affinities = np.array(model.geom_contype[geoms]), np.array(model.geom_conaffinity[geoms])
     bodies = np.array(model.geom_bodyid[geoms])
     excluded = {frozenset((value >> 16, value & 0xFFFF)) for value in map(int, model.exclude_signature)}
 
     def reason(first: int, second: int) -> str | None:
+        if frozenset((geoms[first], geoms[second])) in compiled.pairs:
+            return None
         if not (types[first] & affinities[second]) | (types[second] & affinities[first]):
             return "their contact bits do not meet"
         pair = frozenset((int(bodies[first]), int(bodies[second])))
@@ -142,7 +123,9 @@ def _left_out(compiled: Compiled, mine: Sequence[int]) -> list[str]:
     names, model = compiled.names["body"], compiled.model
     tops = [top for top in compiled.children[0] if top not in mine]
     robots = [names[top] for top in tops if top in compiled.robots]
-    things = [names[top] for top in tops if top not in compiled.robots]
+    others = [top for top in tops if top not in compiled.robots]
+    things = [names[top] for top in others if compiled.has_shape(top)]
+    bare = [names[top] for top in others if not compiled.has_shape(top)]
     notes = []
     if len(compiled.geoms(0)):
         notes.append(
@@ -150,8 +133,12 @@ def _left_out(compiled: Compiled, mine: Sequence[int]) -> list[str]:
         )
     if things:
         notes.append(f"things beside the robot ({', '.join(things)}) are no part of it: wb.read_scene(path) has them")
+    if bare:
+        notes.append(f"bodies without a shape beside the robot ({', '.join(bare)}) are not kept")
     if robots:
         notes.append(f"other robots of the file ({', '.join(robots)}) are not read: root='{robots[0]}' reads one")
+    if model.nflex:
+        notes.append(f"{model.nflex} soft bodies (flex) are not kept")
     if model.ntendon:
         notes.append(f"{model.ntendon} tendons are not kept")
     return notes

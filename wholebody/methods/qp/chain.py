@@ -1,9 +1,10 @@
 """Inverse kinematics of a chain of plain joints from many seeds, before anything else is tried.
 
 Where all goals are places and rotations and the joints that carry their frames have one degree of freedom each, damped
-least squares from the start and from random seeds meets the goals in tens of microseconds, and a projection leads to
-the least effort (TRAC-IK: P. Beeson, B. Ames, "TRAC-IK: An open-source library for improved solving of generic inverse
-kinematics", Humanoids 2015). An end that keeps every clearance is an answer; the others are rejected.
+least squares from seeds meets the goals in tens of microseconds, and a projection leads to the least effort (TRAC-IK:
+P. Beeson, B. Ames, "TRAC-IK: An open-source library for improved solving of generic inverse kinematics", Humanoids
+2015). Seeds are the branches of the closed form of an arm that has one, else the start and random ones. An end that
+keeps every clearance is an answer; the others are rejected.
 """
 
 from __future__ import annotations
@@ -18,16 +19,24 @@ from numpy.typing import NDArray
 
 from wholebody import tasks
 from wholebody.base.arrays import Array
+from wholebody.base.records import with_values
 from wholebody.figures.description import Limits
+from wholebody.figures.figure import Figure
 from wholebody.methods.control import Control
 from wholebody.methods.qp.chain_kernel import Chain, Goals, Room
+from wholebody.methods.qp.closed_form import Branches, closed_form
+from wholebody.methods.qp.closed_form import compiled_kernel as closed_form_kernel
+from wholebody.methods.qp.closed_form_kernel import BRANCHES
 from wholebody.methods.qp.multistart import Budget
 from wholebody.methods.qp.settings import SEEDS
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
 from wholebody.tasks.distance import SquaredDistance
-from wholebody.terms.entries import RESIDUAL, Entry, entries_of
+from wholebody.terms.entries import RESIDUAL, Entry, entries_of, placement_floats
+
+_ONE = np.zeros(1)
+_SHARES = np.linspace(0.0, 1.0, SEEDS.samples)
 
 
 class Met(NamedTuple):
@@ -83,6 +92,8 @@ class PlainChain:
         limited = np.isfinite(self.chain.upper - self.chain.lower)
         self._far = np.where(self.chain.turns.any(axis=1), np.pi, np.where(limited, np.inf, 1.0))
         self._rooms: dict[int, Room] = {}
+        self.arm = closed_form(self.chain)
+        self.held = -1 if self.arm is None or self.arm.held < 0 else int(self.arm.joints[self.arm.held])
 
     def angles(self, q: Array) -> Array:
         """Values (n,) of the joints at a posture (nq,)."""
@@ -102,12 +113,12 @@ class PlainChain:
 
     def goals(self, entries: list[Entry]) -> Goals:
         """Entries of goals with the numbers of these joints."""
-        integers, row = [], 0
-        for entry in entries:
+        integers, row = np.empty((len(entries), 6), dtype=np.int64), 0
+        for k, entry in enumerate(entries):
             joint, base, *kinds = entry.integers
-            integers.append((row, self._number[joint], self._number[base], *kinds))
+            integers[k] = row, self._number[joint], self._number[base], *kinds
             row += entry.rows
-        return Goals(np.array([entry.floats for entry in entries]), np.array(integers, dtype=np.int64))
+        return Goals(np.array([entry.floats for entry in entries]), integers)
 
     def room(self, rows: int) -> Room:
         """Room for descents with so many rows: the same for the same number."""
@@ -120,6 +131,30 @@ class PlainChain:
                 np.empty(size, dtype=np.bool_),
             )  # fmt: skip
         return self._rooms[rows]
+
+    def branches(self, goals: Goals, nearest: Array) -> Branches:
+        """The branches of the closed form for the placement of one frame; `nearest` as in `chain_kernel.reach`.
+
+        With six joints these are all postures. With seven they are samples, where one joint has values all over its
+        limits, but not farther than half a turn from the nearest posture.
+        """
+        assert self.arm is not None
+        lower, upper, held, values = self.chain.lower, self.chain.upper, self.held, _ONE
+        if held >= 0:
+            near = nearest[0, held]
+            low, high = max(lower[held], near - np.pi), min(upper[held], near + np.pi)
+            values = low + (high - low) * _SHARES
+        found, effort = self.angles_of(goals.tables[0], values), np.empty((len(values), BRANCHES))
+        order = np.empty(effort.size, dtype=np.intp)
+        count = closed_form_kernel().least(found.reshape(*effort.shape, -1), lower, upper, nearest, effort, order)
+        return Branches(found, effort.ravel(), found[order[:count]])
+
+    def angles_of(self, goal: Array, held: Array | None = None) -> Array:
+        """Values (8 v, n) of all branches for a goal (36,), NaN for none, with (v,) values of a joint that is held."""
+        values = _ONE if held is None else held
+        found = np.empty((len(values), BRANCHES, len(self.idx_v)))
+        closed_form_kernel().branches(self.arm, goal, values, found)
+        return found.reshape(-1, len(self.idx_v))
 
     def seeds(self, start: Array, seed: int, count: int) -> Iterator[Array]:
         """Batches (count, n) of values all over the limits, but not farther from a start (n,) than half a turn.
@@ -153,6 +188,31 @@ class Chains:
         return self._chains[joints]
 
 
+def branches(figure: Figure, frame: str, placement: pin.SE3, at: Array) -> Array:
+    """Postures (k, nq) with a frame at a placement in the world, by the closed form of the arm that carries it.
+
+    They are within limits, as near to a posture as whole turns allow, and sorted by how far from it. With six joints
+    they are all that there are; with seven, samples, some of them off by what limits take away. None where the arm has
+    no closed form.
+
+    Args:
+        figure: with the arm on a fixed base.
+        frame: name of a frame.
+        placement: of the frame.
+        at: (nq,) posture; other joints stay there.
+    """
+    model = figure.model
+    known = model.frames[figure.frame_id(frame)]
+    chain = Chains(model, figure.limits).of(frozenset((known.parentJoint,)))
+    if chain is None or chain.arm is None:
+        return np.zeros((0, model.nq))
+    floats = [placement_floats(known.placement), np.zeros(12), placement.translation, placement.rotation.ravel()]
+    goals = Goals(np.concatenate(floats)[None], np.zeros((1, 6), dtype=np.int64))
+    near = chain.angles(at)
+    found = chain.branches(goals, np.array([near, np.ones_like(near)]))
+    return np.array([chain.posture(values, at) for values in found.cheaper(np.inf)]).reshape(-1, model.nq)
+
+
 def goal_entries(problem: Problem) -> list[Entry] | None:
     """Entries of the goals, where they are places and rotations and nothing else must hold; None otherwise."""
     if problem.constraints or problem.bounds or not problem.goals:
@@ -184,53 +244,95 @@ def from_seeds(problem: Problem, workspace: Workspace, budget: Budget, control: 
     limits = problem.scene.figure.limits
     with built.pool(Chains, lambda: Chains(built.model, limits)).borrow() as chains:
         chain = chains.of(frozenset(joint for entry in entries for joint in entry.integers[:2]))
-        return None if chain is None else _from_seeds(problem, chain, entries, workspace, budget, control)
+        return None if chain is None else _Seeded(problem, chain, entries, workspace, budget, control).run()
 
 
-def _from_seeds(
-    problem: Problem, chain: PlainChain, entries: list[Entry], workspace: Workspace, budget: Budget,
-    control: Control,
-) -> Met | None:  # fmt: skip
-    at = problem.scene.figure.clamp(problem.start)
-    start = chain.angles(at)
-    distance = _distance(problem, chain, at) if budget.measures else None
-    nearest = np.zeros((2, len(start)))
-    nearest[0] = start
-    if distance is not None:
-        nearest[0], nearest[1] = chain.angles(distance.reference), distance.weights[chain.idx_v]
-    more = 1 + budget.restarts_for_measure
-    enough = 1 if distance is None else SEEDS.compared * more
-    asked = np.array([budget.tolerance, SEEDS.damping**2, min(budget.iterations, SEEDS.steps), enough])
-    goals, room, reach = chain.goals(entries), chain.room(sum(entry.rows for entry in entries)), compiled_kernel().reach
-    trace, least, blocked = list[TraceEntry](), np.inf, None
-    alone = [start[None].copy()]
-    for seeds in chain.seeds(start, budget.seed, SEEDS.together * more) if budget.restarts else alone:
+class _Seeded:
+    """Descents of one run from one batch of seeds after the other."""
+
+    def __init__(
+        self, problem: Problem, chain: PlainChain, entries: list[Entry], workspace: Workspace, budget: Budget,
+        control: Control,
+    ) -> None:  # fmt: skip
+        self.problem, self.chain, self.workspace, self.budget, self.control = problem, chain, workspace, budget, control
+        self.at = problem.scene.figure.clamp(problem.start)
+        self.start = chain.angles(self.at)
+        self.distance = _distance(problem, chain, self.at) if budget.measures else None
+        self.nearest = np.zeros((2, len(self.start)))
+        self.nearest[0] = self.start
+        if self.distance is not None:
+            self.nearest[0] = chain.angles(self.distance.reference)
+            self.nearest[1] = self.distance.weights[chain.idx_v]
+        self.goals, self.room = chain.goals(entries), chain.room(sum(entry.rows for entry in entries))
+        self.exact = chain.arm is not None and [entry.integers[1:] for entry in entries] == [(0, 1, 1, 0)]
+        self.finite = self.exact and chain.held < 0  # ends are isolated, and the closed form has all of them
+        self.trace: list[TraceEntry] = []
+        self.least = np.inf  # effort of an end that does not keep its clearances
+        self.blocked: Array | None = None
+
+    def run(self) -> Met | None:
+        """The answer of the batches in turn: the closed form's ends, its samples, and ends of random seeds."""
+        if not self.budget.restarts:
+            return self._ended(self.start[None].copy())
+        more = 1 + self.budget.restarts_for_measure
+        if self.exact:
+            near = self.nearest
+            if self.distance is None:
+                near = np.array([self.start, np.ones_like(self.start)])
+            branches = self.chain.branches(self.goals, near)
+            met = self._ended(branches.least, 1 if self.finite else SEEDS.compared * more)
+            if (met is not None and met.blocked is None) or self.finite or self.control.over:
+                return met
+            # What blocks an end may leave postures of its branch free. All samples meet the goals.
+            most = np.inf if met is None else SEEDS.worth * self._effort(met.q)
+            samples = (self.chain.posture(each, self.at) for each in branches.cheaper(most))
+            q = next((each for each in samples if self._is_free(each)), None)
+            if met is not None:
+                return with_values(met, blocked=q)
+            if q is not None:
+                return Met(q, tuple(self.trace), False)
+        for seeds in self.chain.seeds(self.start, self.budget.seed, SEEDS.together * more):
+            met = self._ended(seeds, SEEDS.compared * more)
+            if met is not None or self.control.over:
+                return met
+        return None
+
+    def _ended(self, seeds: Array, enough: int = 1) -> Met | None:
+        """The end of least effort that is free, of the first that meet the goals; None where none is."""
+        budget, chain = self.budget, self.chain
+        enough = enough if self.distance is not None else 1
+        asked = np.array([budget.tolerance, SEEDS.damping**2, min(budget.iterations, SEEDS.steps), enough])
+        reach = compiled_kernel().reach
         while len(seeds):
-            if control.over:
-                return None
             found = np.empty((len(seeds), 4))
-            taken = reach(chain.chain, goals, room, seeds, nearest, asked, found)
+            taken = reach(chain.chain, self.goals, self.room, seeds, self.nearest, asked, found)
             ends = found[:taken].tolist()
             for left, _, _, steps in ends:
-                if steps and not control.over:
-                    trace.append(TraceEntry(left, 0.0, 0.0, 0.0, "seed"))
-                    control.tell(trace[-1])
+                if steps and not self.control.reason:
+                    self.trace.append(TraceEntry(left, 0.0, 0.0, 0.0, "seed"))
+                    self.control.tell(self.trace[-1])
             for effort, k in sorted((end[1], k) for k, end in enumerate(ends) if end[1] < np.inf):
-                q = chain.posture(seeds[k], at)
-                if _is_free(problem, workspace, q):
-                    known = bool(ends[k][2]) and (distance is not None or not budget.measures)
+                q = chain.posture(seeds[k], self.at)
+                if self._is_free(q):
+                    known = bool(ends[k][2]) and (self.distance is not None or not budget.measures)
                     # Ends of a chain with as many joints as rows are isolated: no descent leads out of what blocks it.
-                    free = len(start) > len(room.value) and least < SEEDS.worth * effort
-                    return Met(q, tuple(trace), known, blocked if free else None)
-                least, blocked = (effort, q) if effort < least else (least, blocked)
+                    free = len(self.start) > len(self.room.value) and self.least < SEEDS.worth * effort
+                    return Met(q, tuple(self.trace), known, self.blocked if free else None)
+                self.least, self.blocked = (effort, q) if effort < self.least else (self.least, self.blocked)
             seeds = seeds[taken:]
-    return None
+            if self.control.over:
+                break
+        return None
 
+    def _effort(self, q: Array) -> float:
+        away = self.chain.angles(q) - self.nearest[0]
+        return float(self.nearest[1].dot(away * away))
 
-def _is_free(problem: Problem, workspace: Workspace, q: Array) -> bool:
-    """Whether every pair keeps its clearance at a posture (nq,)."""
-    near = workspace.near_views(q, float(np.maximum.reduce(problem.clearances, initial=0.0)))
-    return not len(near.number) or not (near.distance < problem.clearances[near.number]).any()
+    def _is_free(self, q: Array) -> bool:
+        """Whether every pair keeps its clearance at a posture (nq,)."""
+        clearances = self.problem.clearances
+        near = self.workspace.near_views(q, float(np.maximum.reduce(clearances, initial=0.0)))
+        return not len(near.number) or not (near.distance < clearances[near.number]).any()
 
 
 def _distance(problem: Problem, chain: PlainChain, at: Array) -> SquaredDistance | None:
@@ -239,10 +341,14 @@ def _distance(problem: Problem, chain: PlainChain, at: Array) -> SquaredDistance
     if len(measures) != 1 or type(measures[0]) not in (tasks.Effort, tasks.Displacement):
         return None
     distance: SquaredDistance = measures[0].distance  # type: ignore[attr-defined]
+    if not distance.weights[chain.idx_v].all():
+        return None
     weights = distance.weights.copy()
     weights[chain.idx_v] = 0.0
+    if not weights.any():
+        return distance
     rest = weights * pin.difference(problem.scene.model, distance.reference, at)
-    return distance if (distance.weights[chain.idx_v] > 0.0).all() and not rest.any() else None
+    return None if rest.any() else distance
 
 
 @lru_cache(maxsize=64)

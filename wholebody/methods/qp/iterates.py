@@ -75,6 +75,7 @@ class Step(NamedTuple):
         answer: (nv,) the program's answer.
         predicted: the reduction that the program predicts.
         multipliers: of the program; None as for the parts.
+        saves: by how much the measures decrease, to second order, with the program's answer.
     """
 
     dq: Array
@@ -83,6 +84,7 @@ class Step(NamedTuple):
     answer: Array
     predicted: PredictedReduction
     multipliers: Multipliers | None
+    saves: float
 
 
 def judge(

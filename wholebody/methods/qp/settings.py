@@ -137,6 +137,7 @@ class SeedNumbers(NamedTuple):
         together: seeds of a batch.
         batches: most. More: fewer problems are left to the slower search, which then begins later.
         compared: ends of which the one of least effort is taken. More: less effort, more time.
+        samples: values of the joint of seven that a closed form holds. More: less effort, more time.
         worth: share of the effort of an answer below which a rejected end is descended from too.
     """
 
@@ -145,6 +146,7 @@ class SeedNumbers(NamedTuple):
     together: int = 10
     batches: int = 25
     compared: int = 5
+    samples: int = 24
     worth: float = 0.9
 
 

@@ -208,7 +208,8 @@ class SQP:
             x = parts.normal if flat else x  # the residual is met at once, to second order
         violation = self.subproblem.violation(here.rows, x).total
         predicted = PredictedReduction(here.violation.total - violation, saved)
-        return Step(x, parts, flat, answer.x, predicted, multipliers)
+        saves = self.subproblem.saving(program, here.rows, answer.x)
+        return Step(x, parts, flat, answer.x, predicted, multipliers, saves)
 
     def _settled(self, here: Iterate, step: Step) -> bool:
         """Whether the predicted reductions are within the tolerance."""
@@ -223,7 +224,10 @@ class SQP:
         still = float(np.abs(step.dq).max(initial=0.0)) <= 10.0 * self.tolerance
         if still or not self.measures:
             return True
-        return not step.flat and predicted.measure / self._gain <= 1e-2 * self.tolerance * (1.0 + abs(here.at.measure))
+        if step.flat or predicted.measure / self._gain > 1e-2 * self.tolerance * (1.0 + abs(here.at.measure)):
+            return False
+        # Where everything holds, all of the step counts: rows that hold it back may not be reached yet.
+        return violation.worst > self.tolerance or step.saves <= self.tolerance * (1.0 + abs(here.at.measure))
 
     def _advance(self, here: Iterate, program: QuadraticProgram, step: Step) -> Iterate | None:
         """Go where the program says, or farther, as the last steps extrapolate; None if neither is accepted."""

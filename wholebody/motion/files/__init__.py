@@ -30,6 +30,9 @@ READERS: dict[str, Callable[[Path, Figure], Frames]] = {
 """Ending of a name to the function that reads postures of a figure."""
 
 
+FBX = "FBX is not read; Blender turns it into what is: File > Import > FBX, then File > Export > glTF 2.0 (.glb)"
+
+
 def write_motion(motion: Motion, path: str | os.PathLike[str]) -> Path:
     """Write a clip in the format that the ending of the file's name says; see `Clip.write`."""
     path = checked_path(path, "path")
@@ -49,12 +52,14 @@ def check_ending(path: str | os.PathLike[str]) -> Path:
 def read_frames(path: str | os.PathLike[str], figure: Figure) -> Frames:
     """Read postures of a figure from a file in the format that the ending of its name says; see `wb.read_clip`."""
     path = checked_path(path, "path")
-    return READERS[_ending(path, READERS, "read", (".bvh",))](path, figure)
+    return READERS[_ending(path, READERS, "read", (".bvh", ".glb", ".gltf"))](path, figure)
 
 
 def _ending(path: Path, known: Collection[str], done: str, others: Collection[str] = ()) -> str:
     """The ending of a file's name, one of some; the error names `others` too, which `wb.read_clip` takes before."""
     ending = path.suffix.lower()
+    if ending == ".fbx":
+        raise FileFormatError(f"{one_line(path.name)}: {FBX}")
     if ending not in known:
         raise FileFormatError(
             f"{one_line(path.name)}: a clip cannot be {done} as {one_line(ending) or 'a file without ending'}; "

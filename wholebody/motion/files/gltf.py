@@ -1,24 +1,38 @@
-"""Clips as glTF animations (.glb): one node a joint, with the figure's pieces below, for Blender and three.js viewers.
+"""Clips as glTF animations (.glb): one node a joint, the body's surface as one skinned mesh, for Blender and three.js.
 
-trimesh writes the meshes and the nodes. Its postprocessors add keyframes of rotations and translations.
+Robots have the visuals of their links, and where there are none the figure's pieces.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import coal
 import numpy as np
 import pinocchio as pin
+from scipy.spatial.transform import Rotation
 
 from wholebody.base.arrays import Array
-from wholebody.base.errors import InputError, MissingPackageError
+from wholebody.base.errors import InputError
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
+from wholebody.figures.link_pieces import triangles_of
+from wholebody.figures.link_visuals import Color, drawn_of
+from wholebody.figures.surface import Surface, surface_of
+from wholebody.geometry.gltf_builder import VERTICES, GltfBuilder
 from wholebody.motion.files.base import Motion
 from wholebody.motion.skeleton import UP
+
+JOINT = "joint "
+"""Before the name of a joint, in the name of its node."""
+
+UPWARD: Array = np.eye(4)
+UPWARD[:3, :3] = UP["y"].T
+
+ROUND = (coal.Sphere, coal.Capsule, coal.Ellipsoid)
+
+SKIN = (0.84, 0.74, 0.65, 1.0)  # the colour of pieces that have none
 
 
 def write(motion: Motion, path: Path) -> Path:
@@ -26,97 +40,120 @@ def write(motion: Motion, path: Path) -> Path:
 
     Raises:
         InputError: the file cannot be written.
-        MissingPackageError: trimesh is not installed.
     """
-    try:
-        from trimesh.exchange.gltf import export_glb
-    except ImportError:
-        raise MissingPackageError("writing glTF needs trimesh: pip install trimesh") from None
     figure = motion.figure
     if len(motion.q) * figure.model.njoints > 20_000_000:  # keyframes, about 600 MB
         raise InputError(f"{motion.name}: {len(motion.q)} frames are too many for one glTF file; write parts of it")
-    keys = _keys(figure, motion.q)
-    scene, names = joint_tree(
-        figure.model, [pin.XYZQUATToSE3(np.r_[at, turn]) for turn, at in zip(keys[0][0], keys[1][0], strict=True)]
-    )
+    tree = JointTree(figure.model, motion.q, motion.dt)
+    drawn = tree.draw(figure)
     for piece in figure.geometry.geometryObjects:
-        if not isinstance(piece.geometry, coal.Halfspace):  # it has no end
-            add_piece(scene, names, piece, triangles(piece.geometry), (214, 189, 165, 255))  # the colour of skin
-    animate = _Animation(motion, names, keys)
-    return write_file(path, export_glb(scene, buffer_postprocessor=animate.buffers, tree_postprocessor=animate.tree))
+        link = figure.model.frames[piece.parentFrame].name
+        if link not in drawn and not isinstance(piece.geometry, coal.Halfspace):  # it has no end
+            given = piece.meshColor if piece.overrideMaterial else SKIN
+            tree.piece(
+                f"piece {piece.name}", int(piece.parentJoint), piece.placement.homogeneous, piece.geometry, given
+            )
+    return write_file(path, tree.builder.glb(motion.name))
 
 
-def joint_tree(model: Any, placements: Sequence[pin.SE3]) -> tuple[Any, list[str]]:
-    """A trimesh.Scene with one node a joint, placed in its parent, y up, and the names of the nodes."""
-    import trimesh
+class JointTree:
+    """A file with a node for each joint of a model, placed in its parent's, that moves as postures (n, nq) say.
 
-    names = [f"joint {name}" for name in model.names]
-    scene = trimesh.Scene(base_frame="world_y_up")
-    upward = np.eye(4)
-    upward[:3, :3] = UP["y"].T
-    scene.graph.update(frame_to=names[0], frame_from="world_y_up", matrix=upward)
-    for joint in range(1, model.njoints):
-        at = placements[joint].homogeneous
-        scene.graph.update(frame_to=names[joint], frame_from=names[model.parents[joint]], matrix=at)
-    return scene, names
+    Attributes:
+        builder: of the file.
+    """
+
+    def __init__(self, model: Any, q: Array, dt: float) -> None:
+        self.builder, self._model, self._q = GltfBuilder(), model, q
+        times = dt * np.arange(len(q), dtype=np.float64)
+        self._times = self.builder.accessor(times, "<f4", bounded=True) if len(q) > 1 else None
+        turns, places = keys_of(model, q)
+        self._nodes = [self.builder.node(JOINT + model.names[0], None, UPWARD)]
+        for joint in range(1, model.njoints):
+            keys = turns[:, joint], places[:, joint]
+            parent = self._nodes[model.parents[joint]]
+            self._nodes.append(self.builder.moving_node(JOINT + model.names[joint], parent, keys, self._times))
+
+    def draw(self, figure: Figure, prefix: str = "", color: Color | None = None) -> frozenset[str]:
+        """Add a figure's surface, or its visuals; the names of the links of which pieces need not be drawn.
+
+        `prefix` stands before the names of its joints in the model; `color` is that of all of it, if there is one.
+        """
+        surface = surface_of(figure)
+        if surface is not None:
+            self._add_skin(figure, surface, prefix, color)
+            return frozenset(figure.segments)
+        drawn = drawn_of(figure)
+        for number, one in enumerate(drawn):
+            joint = self._model.getJointId(prefix + one.joint)
+            name = f"visual {prefix}{one.link}:{number}"
+            self.piece(name, joint, one.placement, one.shape, one.color if color is None else color)
+        return frozenset(one.link for one in drawn)
+
+    def piece(self, name: str, joint: int, placement: Array, shape: Any, color: Any) -> None:
+        """Add coal's shape, or vertices (n, 3) and faces (m, 3), at a placement (4, 4) in a joint."""
+        normals, sheet = None, isinstance(shape, tuple)
+        if isinstance(shape, tuple):  # faces of robots' meshes wind either way
+            vertices, faces = shape
+        else:
+            mesh = triangles(shape)
+            vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+            normals = mesh.vertex_normals if isinstance(shape, ROUND) else None
+        paint = self.builder.material(color, both_sides=sheet)
+        made = self.builder.mesh(name, [self.builder.primitive(vertices, faces, paint, normals)])
+        self.builder.node(name, self._nodes[joint], np.asarray(placement), mesh=made)
+
+    def _add_skin(self, figure: Figure, surface: Surface, prefix: str, color: Color | None) -> None:
+        """One mesh that bones bend, a primitive for each colour; a bone is a node below that of its joint."""
+        bones: list[int] = []
+        held = [(self._model.getJointId(prefix + joint), offset) for joint, offset in surface.attached(figure)]
+        whole = {number: (first, second) for number, first, second in surface.halves}
+        for number, (bone, (joint, offset)) in enumerate(zip(surface.bones, held, strict=True)):
+            name = f"{prefix}{bone.segment}"
+            if number in whole:
+                first, second = whole[number]
+                keys = self._between(held[first], held[second])
+                node = self.builder.moving_node(f"{name} half", bones[first], keys, self._times)
+            else:
+                node = self.builder.node(name, self._nodes[joint], offset)
+            bones.append(node)
+        inverses = np.linalg.inv(np.array([bone.bind for bone in surface.bones])) @ np.linalg.inv(UPWARD)
+        skin = self.builder.skin(prefix + figure.name, bones, inverses)
+        parts = dict[Color, list[Any]]()
+        for patch in surface.patches:
+            parts.setdefault((*patch.color, 1.0) if color is None else color, []).append(patch)
+        primitives = []
+        for paint, patches in parts.items():
+            starts = np.cumsum([0, *(len(patch.vertices) for patch in patches)])
+            faces = np.concatenate([start + patch.faces for start, patch in zip(starts, patches, strict=False)])
+            vertices, normals, moving, weights = (
+                np.concatenate([getattr(patch, name) for patch in patches])
+                for name in ("vertices", "normals", "bones", "weights")
+            )
+            moving = np.where(weights > 0.0, moving, 0)
+            more = {
+                "JOINTS_0": self.builder.accessor(moving, "u1", VERTICES),
+                "WEIGHTS_0": self.builder.accessor(weights / weights.sum(axis=1, keepdims=True), "<f4", VERTICES),
+            }
+            vertices, normals = (each @ UPWARD[:3, :3].T for each in (vertices, normals))  # as bound, it stands
+            normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+            primitives.append(self.builder.primitive(vertices, faces, self.builder.material(paint), normals, **more))
+        mesh = self.builder.mesh(f"body {prefix}{figure.name}", primitives)
+        self.builder.node(f"body {prefix}{figure.name}", mesh=mesh, skin=skin)
+
+    def _between(self, first: tuple[int, Array], second: tuple[int, Array]) -> tuple[Array, Array]:
+        """Half of the turn of a second part in a first, and its place there, of joints and placements in them."""
+        data, found = self._model.createData(), np.empty((len(self._q), 4, 4))
+        for k, posture in enumerate(self._q):
+            pin.forwardKinematics(self._model, data, posture)
+            ends = [data.oMi[joint].homogeneous @ offset for joint, offset in (first, second)]
+            found[k] = np.linalg.solve(*ends)
+        half = Rotation.from_rotvec(0.5 * Rotation.from_matrix(found[:, :3, :3]).as_rotvec()).as_quat()
+        return _steady(half), found[:, :3, 3]
 
 
-class _Animation:
-    """Adds keyframes to trimesh's tree and buffers."""
-
-    def __init__(self, motion: Motion, names: list[str], keys: tuple[Array, Array]) -> None:
-        self.motion, self.names = motion, names
-        self.turns, self.places = keys
-        self._channels: list[tuple[str, str, int]] = []
-        self._times = 0
-
-    def buffers(self, buffers: Any, tree: Any) -> None:
-        """Append times, rotations and translations as accessors."""
-
-        def accessor(label: str, values: Array, kind: str) -> int:
-            data = np.ascontiguousarray(values, dtype="<f4")
-            flat = data.reshape(len(data), -1)
-            buffers[label] = data.tobytes()
-            tree["accessors"][label] = {
-                "bufferView": len(buffers) - 1, "componentType": 5126, "count": len(data), "type": kind,  # float32
-                "min": flat.min(axis=0).tolist(), "max": flat.max(axis=0).tolist(),
-            }  # fmt: skip
-            return len(tree["accessors"]) - 1
-
-        self._times = accessor("times", self.motion.dt * np.arange(len(self.motion.q), dtype=np.float64), "SCALAR")
-        for joint in range(1, len(self.names)):
-            for path, keys, kind in (("rotation", self.turns, "VEC4"), ("translation", self.places, "VEC3")):
-                values = keys[:, joint]
-                if np.ptp(values, axis=0).max() > 1e-9:  # metres or parts of a quaternion
-                    index = accessor(f"{path} {joint}", values, kind)
-                    self._channels.append((self.names[joint], path, index))
-
-    def tree(self, tree: Any) -> None:
-        """Give the joints rotations and translations in place of matrices, and list the channels."""
-        times = self._times
-        nodes = {node["name"]: index for index, node in enumerate(tree["nodes"])}
-        for joint in range(1, len(self.names)):
-            node = tree["nodes"][nodes[self.names[joint]]]
-            node.pop("matrix", None)
-            node["rotation"], node["translation"] = self.turns[0, joint].tolist(), self.places[0, joint].tolist()
-        if self._channels:
-            tree["animations"] = [
-                {
-                    "name": self.motion.name,
-                    "samplers": [
-                        {"input": times, "output": index, "interpolation": "LINEAR"} for *_, index in self._channels
-                    ],
-                    "channels": [
-                        {"sampler": number, "target": {"node": nodes[name], "path": path}}
-                        for number, (name, path, _) in enumerate(self._channels)
-                    ],
-                }
-            ]
-
-
-def _keys(figure: Figure, q: Array) -> tuple[Array, Array]:
+def keys_of(model: Any, q: Array) -> tuple[Array, Array]:
     """Quaternions (n, joints, 4) and translations (n, joints, 3) of all joints in their parents, without sign flips."""
-    model = figure.model
     data = model.createData()
     turns, places = np.empty((len(q), model.njoints, 4)), np.empty((len(q), model.njoints, 3))
     for k, posture in enumerate(q):
@@ -124,38 +161,40 @@ def _keys(figure: Figure, q: Array) -> tuple[Array, Array]:
         for joint, at in enumerate(data.liMi):
             values = pin.SE3ToXYZQUAT(at)
             places[k, joint], turns[k, joint] = values[:3], values[3:]
-    flips = np.where((turns[1:] * turns[:-1]).sum(axis=2) < 0.0, -1.0, 1.0)
-    turns[1:] *= np.cumprod(flips, axis=0)[:, :, None]
-    return turns, places
+    return _steady(turns), places
 
 
-def add_piece(tree: Any, joints: Sequence[str], piece: Any, mesh: Any, color: Sequence[int]) -> None:
-    """Add the mesh of a piece to a `joint_tree`, below the node of its joint; colours from 0 to 255."""
-    from trimesh.visual import TextureVisuals
-    from trimesh.visual.material import PBRMaterial
-
-    blend = "BLEND" if color[3] < 255 else None
-    mesh.visual = TextureVisuals(
-        material=PBRMaterial(baseColorFactor=color, roughnessFactor=0.8, metallicFactor=0.0, alphaMode=blend)
-    )
-    tree.add_geometry(
-        mesh, node_name=f"piece {piece.name}", geom_name=f"mesh {piece.name}",
-        parent_node_name=joints[piece.parentJoint], transform=piece.placement.homogeneous,
-    )  # fmt: skip
+def _steady(turns: Array) -> Array:
+    """Quaternions (n, ..., 4), each on the same half of the sphere as the one before."""
+    flips = np.where((turns[1:] * turns[:-1]).sum(axis=-1) < 0.0, -1.0, 1.0)
+    turns[1:] *= np.cumprod(flips, axis=0)[..., None]
+    return turns
 
 
 def triangles(shape: Any) -> Any:
-    """A trimesh of a coal shape of finite size, about the shape's own origin."""
-    from trimesh import convex, creation
+    """A trimesh of a coal shape, about the shape's own origin; a square of a half-space."""
+    from trimesh import Trimesh, convex, creation, geometry
+
+    if isinstance(shape, coal.Halfspace):
+        wide, thin = 6.0, 1e-3  # m: of the piece of a half-space that is drawn
+        mesh, normal = creation.box((wide, wide, thin)), np.array(shape.n)
+        mesh.apply_transform(geometry.align_vectors((0.0, 0.0, 1.0), normal))
+        return mesh.apply_translation(normal * (float(shape.d) - 0.5 * thin))
 
     if isinstance(shape, coal.Box):
         return creation.box(2.0 * np.array(shape.halfSide))
     if isinstance(shape, coal.Sphere):
         return creation.icosphere(radius=shape.radius)
+    if isinstance(shape, (coal.Cylinder, coal.Cone)):
+        make = creation.cylinder if isinstance(shape, coal.Cylinder) else creation.cone
+        mesh = make(radius=shape.radius, height=2.0 * shape.halfLength)
+        return mesh.apply_translation((0.0, 0.0, -mesh.bounds[:, 2].mean()))  # a cone stands on its base
     if isinstance(shape, coal.Capsule):
         mesh = creation.capsule(2.0 * shape.halfLength, shape.radius, count=(24, 24))
         mesh.apply_translation(-mesh.bounds.mean(axis=0))  # not centred in every version
         return mesh
     if isinstance(shape, coal.Ellipsoid):
         return creation.icosphere().apply_scale(np.array(shape.radii))
+    if isinstance(shape, coal.BVHModelBase):
+        return Trimesh(*triangles_of(shape), process=False)
     return convex.convex_hull(np.array(shape.points()))

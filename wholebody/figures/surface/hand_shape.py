@@ -12,8 +12,8 @@ from wholebody.figures.anthropometry import Person
 from wholebody.figures.dimensions import FINGER_BASES, Dimensions, keyed_hand
 from wholebody.figures.figure import Figure
 from wholebody.figures.hand import FINGERS, PARTS, hand_figure_of, part_radius
-from wholebody.view.surface.fields import Field, ellipsoid, placed, round_cone, union
-from wholebody.view.surface.garments import Claim
+from wholebody.figures.surface.fields import Field, ellipsoid, placed, round_cone, union
+from wholebody.figures.surface.garments import Claim
 
 
 class HandShape(NamedTuple):

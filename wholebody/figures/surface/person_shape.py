@@ -14,7 +14,7 @@ from wholebody.figures.body_spec import Solid
 from wholebody.figures.dimensions import Dimensions
 from wholebody.figures.human.figure import figure_of
 from wholebody.figures.human.spec import human_spec
-from wholebody.view.surface.fields import (
+from wholebody.figures.surface.fields import (
     Field,
     ball,
     ellipsoid,
@@ -25,10 +25,10 @@ from wholebody.view.surface.fields import (
     round_cone,
     union,
 )
-from wholebody.view.surface.garments import Claim, Garment, bounds
-from wholebody.view.surface.hand_shape import hand_shape
-from wholebody.view.surface.head_shape import head_shape
-from wholebody.view.surface.profile import RAYS, caps, limb, piece_field, trunk
+from wholebody.figures.surface.garments import Claim, Garment, bounds
+from wholebody.figures.surface.hand_shape import hand_shape
+from wholebody.figures.surface.head_shape import head_shape
+from wholebody.figures.surface.profile import RAYS, caps, limb, piece_field, trunk
 
 Color = tuple[float, float, float]
 

@@ -13,8 +13,8 @@ import numpy as np
 from wholebody.figures.anthropometry import Person
 from wholebody.figures.figure import Figure
 from wholebody.figures.human.spec import human_spec
+from wholebody.figures.surface.garments import Bone, Patch, Surface
 from wholebody.geometry.mesh_cache import cached_entry
-from wholebody.view.surface.garments import Bone, Patch, Surface
 
 
 def surface_of(figure: Any) -> Surface | None:
@@ -34,7 +34,7 @@ def _kept(person: Person, hand: str) -> Surface:
     """The surface of a whole person, or of the hand of a side."""
 
     def make() -> Surface:
-        from wholebody.view.surface.making import hand_surface, person_surface
+        from wholebody.figures.surface.making import hand_surface, person_surface
 
         return hand_surface(person, hand) if hand else person_surface(person)
 

@@ -13,11 +13,11 @@ import pytest
 
 from wholebody.figures import load
 from wholebody.figures.anthropometry import design_cases
+from wholebody.figures.surface import Bone, Surface, making, surface_of
+from wholebody.figures.surface import surface as surfaces
+from wholebody.figures.surface.making import Part, person_parts
+from wholebody.figures.surface.person_shape import PersonShape
 from wholebody.geometry.mesh_cache import VARIABLE, cache_state
-from wholebody.view.surface import Bone, Surface, making, surface_of
-from wholebody.view.surface import surface as surfaces
-from wholebody.view.surface.making import Part, person_parts
-from wholebody.view.surface.person_shape import PersonShape
 
 PEOPLE: dict[str, dict[str, Any]] = {
     "small woman": {"sex": "female", "stature": 1.525, "mass": 51.3},

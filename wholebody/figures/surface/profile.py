@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from wholebody.base.arrays import Array
 from wholebody.figures.body_spec import Solid
-from wholebody.view.surface.fields import Field, ball, box, ellipsoid, placed, round_cone
+from wholebody.figures.surface.fields import Field, ball, box, ellipsoid, placed, round_cone
 
 LEVEL = 0.005
 """Metres between two ovals."""

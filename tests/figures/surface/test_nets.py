@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from wholebody.view.surface.fields import ball, box, ellipsoid, half_space, intersection, round_cone, union, without
-from wholebody.view.surface.nets import triangles
+from wholebody.figures.surface.fields import ball, box, ellipsoid, half_space, intersection, round_cone, union, without
+from wholebody.figures.surface.nets import triangles
 
 LOW, HIGH = np.full(3, -0.2), np.full(3, 0.2)
 

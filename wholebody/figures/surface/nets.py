@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
-from wholebody.view.surface.fields import Field, intersection
+from wholebody.figures.surface.fields import Field, intersection
 
 BLOCK = 4
 """Cells along the side of a block; blocks that the surface cannot cross are looked at in their middle alone."""

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array
 from wholebody.figures.anthropometry import Person
 from wholebody.figures.hand import FINGERS, PARTS
-from wholebody.view.surface.borders import BONES_EACH, Bound, divided, strongest
-from wholebody.view.surface.garments import Bone, Claim, Garment, Patch, Surface, bounds
-from wholebody.view.surface.hand_shape import hand_shape
-from wholebody.view.surface.nets import Triangles, coarsened, triangles
-from wholebody.view.surface.person_shape import COLORS, HALVES, PersonShape
+from wholebody.figures.surface.borders import BONES_EACH, Bound, divided, strongest
+from wholebody.figures.surface.garments import Bone, Claim, Garment, Patch, Surface, bounds
+from wholebody.figures.surface.hand_shape import hand_shape
+from wholebody.figures.surface.nets import Triangles, coarsened, triangles
+from wholebody.figures.surface.person_shape import COLORS, HALVES, PersonShape
 
 
 class Part(NamedTuple):

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
-from wholebody.view.surface.fields import Field
+from wholebody.figures.description import Articulated
+from wholebody.figures.surface.fields import Field
 
 
 class Bone(NamedTuple):
@@ -57,6 +58,27 @@ class Surface(NamedTuple):
 
     bones: tuple[Bone, ...]
     patches: tuple[Patch, ...]
+
+    def attached(self, figure: Articulated) -> list[tuple[str, Array]]:
+        """The joint of a figure that carries each bone, and the bone in it (4, 4); some figures lack segments."""
+        found = []
+        for bone in self.bones:
+            segment, extra = bone.segment, np.eye(4)
+            if segment not in figure.segments and bone.instead is not None:
+                segment, extra = bone.instead, bone.rest
+            frame = figure.model.frames[figure.frame_id(segment)]
+            found.append((str(figure.model.names[frame.parentJoint]), np.asarray(frame.placement.homogeneous) @ extra))
+        return found
+
+    @property
+    def halves(self) -> list[tuple[int, int, int]]:
+        """Bones that turn half way between two others, and are at the origin of the second: numbers of the three."""
+        whole = {bone.segment: number for number, bone in enumerate(self.bones) if bone.parent is None}
+        return [
+            (number, whole[bone.parent], whole[bone.segment])
+            for number, bone in enumerate(self.bones)
+            if bone.parent is not None
+        ]
 
 
 class Claim(NamedTuple):

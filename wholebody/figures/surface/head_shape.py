@@ -9,7 +9,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.figures.dimensions import Dimensions
-from wholebody.view.surface.fields import (
+from wholebody.figures.surface.fields import (
     Field,
     ball,
     ellipsoid,

@@ -1,0 +1,102 @@
+"""Closed forms of arms of random lengths, against Pinocchio's kinematics and against themselves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.bench.suite.problem_sets.robots import known_arm
+from wholebody.figures.description import Limits
+from wholebody.methods.qp.chain import PlainChain, branches
+
+X, Y, Z = np.eye(3)
+TILTED = np.array([0.6, 0.0, 0.8])
+# Axes at zero, and steps to each joint from the one before: 0 none, a free one, or along an axis.
+ARMS = {
+    "wrist, two parallel": ([Z, Y, Y, X, TILTED, X], ["free", "free", "free", "free", 0, 0]),
+    "wrist, shoulder crossing": ([Z, Y, X, Z, TILTED, X], ["free", 0, "free", "free", 0, 0]),
+    "three parallel": ([Z, Y, Y, -Y, Z, TILTED], ["free", "free", "free", "free", "free", Z]),
+    "wrist at the base": ([X, TILTED, Z, Y, Y, X], ["free", 0, 0, "free", "free", "free"]),
+    "shoulder, elbow and wrist": ([Z, Y, Z, -Y, Z, Y, Z], ["free", 0, Z, Z, Z, 0, 0]),
+    "elbow and end beside": ([Z, Y, Z, -Y, Z, Y, Z], ["free", 0, Z, "free", Z, 0, "free"]),
+    "no shoulder": ([Z, Y, X, Y, X, Y, X], ["free", "free", X, X, X, 0, X]),
+}
+
+
+def arm(name: str, rng: np.random.Generator, most: float = 2.0 * np.pi) -> tuple[pin.Model, PlainChain]:
+    """An arm, in a base that is turned and moved."""
+    model, parent = pin.Model(), 0
+    for axis, step in zip(*ARMS[name], strict=True):
+        free = rng.uniform(0.1, 0.5, 3)
+        shift = free if isinstance(step, str) else free[0] * np.asarray(step) * np.ones(3)
+        place = pin.SE3(pin.exp3(rng.normal(size=3)) if not parent else np.eye(3), shift)
+        parent = model.addJoint(parent, pin.JointModelRevoluteUnaligned(axis), place, f"axis{parent}")
+    index = np.arange(model.nq)
+    limits = Limits(index, index, np.full(model.nq, -most), np.full(model.nq, most))
+    return model, PlainChain(model, limits, tuple(range(1, model.nq + 1)))
+
+
+def goal_of(chain: PlainChain, place: pin.SE3, frame: pin.SE3) -> np.ndarray:
+    """The goal that a frame in the last joint is at a placement, as the loops take it."""
+    return np.array([*frame.rotation.T.ravel(), *frame.translation, *np.zeros(12), *place.translation,
+                     *place.rotation.ravel()])  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_every_branch_is_a_posture_of_the_placement_and_the_known_one_is_among_them(name):
+    rng = np.random.default_rng(7)
+    for _ in range(3):
+        model, chain = arm(name, rng)
+        assert chain.arm is not None
+        data = model.createData()
+
+        def end(q: np.ndarray, frame: pin.SE3, model=model, data=data) -> pin.SE3:
+            pin.forwardKinematics(model, data, q)
+            return data.oMi[model.nq] * frame
+
+        for _ in range(20):
+            known, frame = rng.uniform(-3.0, 3.0, model.nq), pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(size=3))
+            place = end(known, frame)
+            found = chain.angles_of(goal_of(chain, place, frame), known[[chain.held]] if chain.held >= 0 else None)
+            real = found[np.isfinite(found).all(axis=1)]
+            for q in real:
+                np.testing.assert_allclose(end(q, frame).homogeneous, place.homogeneous, atol=1e-6)
+            away = np.abs(np.angle(np.exp(1j * (real - known)))).max(axis=1)
+            assert away.min() < 1e-5
+            apart = np.abs(np.angle(np.exp(1j * (real[:, None] - real)))).max(axis=2)
+            assert (apart[~np.eye(len(real), dtype=bool)] > 1e-5).all()  # and they differ
+
+
+def test_an_arm_whose_axes_miss_each_other_has_none():
+    figure, _ = known_arm("gen3")
+    assert len(branches(figure, "tool", figure.placement(figure.neutral, "tool"), figure.neutral)) == 0
+
+
+def test_branches_of_a_figure_are_within_limits_and_near_to_a_posture():
+    figure, start = known_arm("ur5")
+    place = figure.placement(start + 0.3, "tool")
+    found = branches(figure, "tool", place, start)
+    assert len(found) == 8
+    for q in found:
+        np.testing.assert_allclose(figure.placement(q, "tool").homogeneous, place.homogeneous, atol=1e-9)
+        assert (figure.clamp(q) == q).all()
+    far = np.abs(found - start)
+    assert (far[:, [0, 1, 3, 4, 5]] <= np.pi + 1e-9).all()  # these could turn farther
+    assert (np.diff(((found - start) ** 2).sum(axis=1)) >= 0.0).all()
+
+
+def test_the_answer_of_six_joints_is_the_least_of_all_branches():
+    figure, start = known_arm("ur10")
+    rng, scene, free = np.random.default_rng(3), wb.Scene(figure), 0
+    for _ in range(8):
+        place = figure.placement(rng.uniform(-2.0, 2.0, 6), "tool")
+        problem = wb.Problem(scene, start, goals=[wb.Frame("tool", place)], measures=[wb.Displacement()])
+        judged = [wb.assess(problem, q) for q in branches(figure, "tool", place, figure.neutral)]
+        if holding := [each.measure for each in judged if each.holds(1e-6)]:
+            free += 1
+            answer = wb.solve(problem)
+            assert answer.solved
+            assert answer.assessment.measure == pytest.approx(min(holding), rel=1e-5)
+    assert free >= 4

@@ -1,0 +1,209 @@
+"""Animated skeletons of glTF files (.glb, .gltf), and clips that `gltf.write` wrote."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from scipy.interpolate import CubicHermiteSpline
+from scipy.spatial.transform import Rotation, Slerp
+
+from wholebody.base.arrays import Array
+from wholebody.base.errors import FileFormatError
+from wholebody.base.files import title_of
+from wholebody.figures.figure import Figure
+from wholebody.geometry.gltf_document import GltfDocument
+from wholebody.motion.files.base import Frames
+from wholebody.motion.files.gltf import JOINT
+from wholebody.motion.files.node_motion import NodeMotion, steps_of
+from wholebody.motion.files.nodes import wrapped
+from wholebody.motion.skeleton import SkeletonMotion
+from wholebody.tracking.tracks import MOST_FRAMES
+
+ENDINGS = (".glb", ".gltf")
+PATHS = ("translation", "rotation", "scale")
+
+
+class Animated:
+    """The first animation of a file that moves nodes, sampled at equal steps.
+
+    Attributes:
+        document: the file.
+        moved: node to translations (n, 3), rotations (n, 4) and scales (n, 3).
+        count, dt: number of frames, and seconds between them.
+        notes: sentences on what was chosen.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.document = GltfDocument(path)
+        self.notes: list[str] = []
+        self.document.decoded(self._sample)
+
+    def _sample(self) -> None:
+        document = self.document
+        animations = document.tree.get("animations", [])
+        moving = [[c for c in each["channels"] if c["target"].get("path") in PATHS] for each in animations]
+        chosen = next((k for k, channels in enumerate(moving) if channels), None)
+        if chosen is None:
+            raise FileFormatError(
+                f"{document.path.name}: there is no animation of nodes in it; export it with its motion"
+            )
+        if len(animations) > 1:
+            name = animations[chosen].get("name") or f"number {chosen + 1}"
+            self.notes.append(f"{len(animations)} animations are in the file; {name!r} is read")
+        samplers = animations[chosen]["samplers"]
+        channels = [c for c in moving[chosen] if "node" in c["target"]]
+        keys = [document.accessor(samplers[c["sampler"]]["input"])[:, 0] for c in channels]
+        times, self.dt, even = steps_of(np.concatenate(keys))
+        if not even:
+            self.notes.append("keyframes are at unequal times; the motion between them is read at 60 frames a second")
+        self.count = len(times)
+        if self.count > MOST_FRAMES:
+            raise FileFormatError(f"{document.path.name}: {self.count} frames; give at most {MOST_FRAMES}")
+        self.moved: dict[int, tuple[Array, Array, Array]] = {}
+        for channel, at in zip(channels, keys, strict=True):
+            node, sampler = channel["target"]["node"], samplers[channel["sampler"]]
+            if node not in self.moved:
+                place, turn, scale = (np.tile(part, (self.count, 1)) for part in document.parts(node))
+                self.moved[node] = place, turn, scale
+            values = document.accessor(sampler["output"]).astype(float)
+            column = PATHS.index(channel["target"]["path"])
+            self.moved[node][column][:] = _sampled(at.astype(float), values, sampler, times, turns=column == 1)
+
+    def worlds(self) -> Array:
+        """(n, k, 4, 4) placements of all nodes."""
+        return self.document.worlds(self.moved, self.count)
+
+
+def _sampled(keys: Array, values: Array, sampler: dict[str, Any], times: Array, *, turns: bool) -> Array:
+    """Values (n, k) at times, of keyframes as the sampler interpolates them."""
+    kind = sampler.get("interpolation", "LINEAR")
+    times = np.clip(times, keys[0], keys[-1])
+    if kind == "CUBICSPLINE":
+        before, values, after = (values.reshape(len(keys), 3, -1)[:, k] for k in range(3))
+        if len(keys) == 1:
+            return np.tile(values, (len(times), 1))
+        starts = np.clip(np.searchsorted(keys, times, side="right") - 1, 0, len(keys) - 2)
+        found = np.empty((len(times), values.shape[1]))
+        for k in np.unique(starts):
+            ends = [k, k + 1]
+            part = CubicHermiteSpline(keys[ends], values[ends], np.stack([after[k], before[k + 1]]))
+            found[starts == k] = part(times[starts == k])
+    elif kind == "STEP" or len(keys) == 1:
+        found = values[np.clip(np.searchsorted(keys, times + 1e-5, side="right") - 1, 0, len(keys) - 1)]
+    elif turns:
+        return np.asarray(Slerp(keys, Rotation.from_quat(values))(times).as_quat())
+    else:
+        found = np.stack([np.interp(times, keys, column) for column in values.T], axis=1)
+    return found / np.linalg.norm(found, axis=1, keepdims=True) if turns else found
+
+
+def skeleton_of(animated: Animated, unit: str | None = None, up: str | None = None) -> SkeletonMotion:
+    """The skeleton of the skin with most joints, or, without a skin, of the nodes that are animated.
+
+    Units and axes as for `wholebody.motion.reading.read_skeleton`.
+    """
+    document = animated.document
+
+    def read() -> SkeletonMotion:
+        rest = document.worlds({})[0]
+        skins = document.tree.get("skins", [])
+        notes = list(animated.notes)
+        if skins:
+            skin = max(range(len(skins)), key=lambda k: len(skins[k]["joints"]))
+            joints = set(skins[skin]["joints"])
+            bind = _bound(document, skin, rest)
+        else:
+            joints, bind = set(animated.moved), rest
+            notes.append("no body is bound to the nodes; they rest as the file places them")
+        solid = {node for node, fields in enumerate(document.tree["nodes"]) if {"mesh", "camera"} & fields.keys()}
+        for node in range(len(document.parents)):  # the ends of limbs
+            if (
+                document.parents[node] in joints
+                and node not in solid
+                and not document.tree["nodes"][node].get("children")
+            ):
+                joints.add(node)
+        motion = NodeMotion(document.names, document.parents, animated.worlds(), bind, animated.dt, tuple(notes))
+        return motion.skeleton(joints, title_of(document.path), unit, up)
+
+    return document.decoded(read)
+
+
+def _bound(document: GltfDocument, skin: int, rest: Array) -> Array:
+    """(k, 4, 4) placements of the nodes in the posture to which a skin is bound; those of no joints keep their place.
+
+    The matrices of a skin leave open where the whole body is: where it is nearest to the posture of the nodes.
+    """
+    joints = document.tree["skins"][skin]["joints"]
+    bind = np.linalg.inv(document.inverse_binds(skin))
+    theirs, ours = bind[:, :3, 3], rest[joints][:, :3, 3]
+    meshes = [node for node, fields in enumerate(document.tree["nodes"]) if fields.get("skin") == skin]
+    tops = [int(document.parents[node]) for node in joints if document.parents[node] not in joints]
+    places = [np.eye(4), *(rest[node] for node in (*meshes, *tops) if node >= 0)]
+
+    def off(place: Array) -> float:
+        moved = theirs @ place[:3, :3].T
+        return float(np.linalg.norm((moved - moved.mean(axis=0)) - (ours - ours.mean(axis=0))))
+
+    best = min(places, key=off)
+    found = np.array(rest)
+    order = sorted(range(len(rest)), key=lambda node: len(_above(document, node)))
+    for node in order:
+        if node in joints:
+            found[node] = best @ bind[joints.index(node)]
+        elif document.parents[node] >= 0:
+            above = int(document.parents[node])
+            found[node] = found[above] @ np.linalg.solve(rest[above], rest[node])
+    return found
+
+
+def _above(document: GltfDocument, node: int) -> list[int]:
+    found = []
+    while document.parents[node] >= 0:
+        node = int(document.parents[node])
+        found.append(node)
+    return found
+
+
+def own(animated: Animated, figure: Figure) -> Frames | None:
+    """Postures of a file whose nodes are the figure's joints, as `gltf.write` writes it; None for any other."""
+    document, model = animated.document, figure.model
+    place = {name.removeprefix(JOINT): node for node, name in enumerate(document.names) if name.startswith(JOINT)}
+    if set(place) != set(model.names):
+        return None
+    q = np.tile(pin.neutral(model), (animated.count, 1))
+    data = model.createData()
+    pin.forwardKinematics(model, data, q[0], np.zeros(model.nv))
+    for joint in range(1, model.njoints):
+        node, made = place[model.names[joint]], model.joints[joint]
+        if document.names[document.parents[node]] != JOINT + model.names[model.parents[joint]]:
+            return None
+        parts = animated.moved.get(node) or tuple(np.tile(part, (animated.count, 1)) for part in document.parts(node))
+        if made.shortname() == "JointModelMimic":
+            continue
+        fixed = model.jointPlacements[joint]
+        turned = Rotation.from_matrix(fixed.rotation.T) * Rotation.from_quat(parts[1])
+        moved = (parts[0] - fixed.translation) @ fixed.rotation
+        ends = [float(limit[made.idx_q]) for limit in (model.lowerPositionLimit, model.upperPositionLimit)]
+        values = _values(made, turned, moved, np.asarray(data.joints[joint].S).reshape(6, -1)[:, 0], ends)
+        if values is None:
+            return None
+        q[:, made.idx_q : made.idx_q + made.nq] = values
+    return Frames(q, animated.dt, title_of(document.path))
+
+
+def _values(made: Any, turned: Rotation, moved: Array, along: Array, ends: list[float]) -> Array | None:
+    """Values (n, nq) of a joint that turns and moves its frame; None of a kind that no own file has."""
+    if made.nv == 1:
+        if np.linalg.norm(along[3:]) < 0.5:
+            return (moved @ along[:3])[:, None]
+        angle, middle = turned.as_rotvec() @ along[3:], 0.5 * (ends[0] + ends[1])
+        within = made.nq == 1 and ends[1] - ends[0] <= 2.0 * np.pi
+        angle = middle + wrapped(angle - middle) if within else np.unwrap(angle)
+        return angle[:, None] if made.nq == 1 else np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    if made.nv == 6:
+        return np.hstack([moved, turned.as_quat()])
+    return turned.as_quat() if made.nq == 4 and made.nv == 3 else None
