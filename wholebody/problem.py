@@ -131,7 +131,7 @@ class Problem(checks.FixedAttributes):
         )
         with scene.borrow() as workspace:
             state = workspace.state
-            if scene.figure.root == "free" or self.bounds or any(map(is_own, (*self.goals, *stated, *self.measures))):
+            if scene.figure.roots or self.bounds or any(map(is_own, (*self.goals, *stated, *self.measures))):
                 state.update(self.start)
             self.defaults, self.left_out = self._usual_constraints(state, stated)
             self.constraints: tuple[Constraint, ...] = (*stated, *self.defaults)
