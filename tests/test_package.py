@@ -22,9 +22,9 @@ ROOMS = (
     *("version", "base", "geometry", "figures", "scene", "tasks", "terms", "problem", "assessment", "solution"),
     *(
         "methods",
-        "planning",
         "tracking",
         "motion",
+        "planning",
         "dynamics",
         "ergonomics",
         "taskfile",

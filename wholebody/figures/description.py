@@ -122,7 +122,7 @@ class Description(NamedTuple):
         excluded: pairs of pieces that are not tested, with the reason.
         ranges: ranges of motion that more than one joint angle decides; a problem takes them by default.
         root_effort: weight of the position [rad^2/m^2] and of the rotation of each free root in the effort.
-        notes: sentences on what had to be changed about the geometry of a file.
+        notes: sentences on what had to be changed about the geometry of a file, or about stated dimensions.
         person: sex, stature and mass of the figure or of the hand's owner; None for a figure of a file.
         members: figures that were joined, by name; empty for one figure.
         prefixes: what the names of each figure's parts begin with, such as "anna/"; "" for one figure.

@@ -16,19 +16,20 @@ class LinkVisuals:
     """The visuals of a figure. A link with a mesh that cannot be read is left out: its pieces are drawn.
 
     Attributes:
+        drawn: the objects.
         links, joints: names of the links that are drawn, and of the joints that carry them.
     """
 
     def __init__(self, figure: Any, skinned: tuple[str, ...] = ()) -> None:
         """Read the visuals, but for links whose names begin with one of `skinned`: figures that have a surface."""
-        self._drawn = [one for one in drawn_of(figure) if not one.link.startswith(skinned)]
-        self.links = frozenset(one.link for one in self._drawn)
-        self.joints = tuple(dict.fromkeys(one.joint for one in self._drawn))
+        self.drawn = [one for one in drawn_of(figure) if not one.link.startswith(skinned)]
+        self.links = frozenset(one.link for one in self.drawn)
+        self.joints = tuple(dict.fromkeys(one.joint for one in self.drawn))
 
     def build(self, graph: SceneGraph, carriers: Mapping[str, str], color: Color | None) -> list[Skinned]:
         """Put the visuals below the nodes of their joints; all in one colour if there is one."""
         found = []
-        for number, one in enumerate(self._drawn):
+        for number, one in enumerate(self.drawn):
             path = f"{carriers[one.joint]}/visual {number}"
             shown = one.color if color is None else color
             if isinstance(one.shape, tuple):

@@ -39,6 +39,7 @@ NAMED = _sets(
         "other_people": reaching.people,
         "other_clutter": reaching.clutter,
         "arms_among_things": robots.among,
+        "free_arms": robots.free,
         "robots": robots.described,
         "drivers": drivers.posed,
         "hands": grips.posed,
@@ -46,8 +47,8 @@ NAMED = _sets(
     }
 )
 """Sets that take part where they are named: distributions that nothing was tuned on, of which the robots need files
-that are not a part of this package; drivers and hands, whose contacts most other tools and files lack; and two
-figures, where most tools know one robot."""
+that are not a part of this package; free arms; drivers and hands, whose contacts most other tools and files lack; and
+two figures, where most tools know one robot."""
 
 TUNED_ON = MappingProxyType({name: numbers(name).beside for name in NAMED if numbers(name).beside})
 """Those distributions -> the set of the same question that constants were tuned on."""
