@@ -27,6 +27,7 @@ from wholebody.figures.state import State
 from wholebody.geometry.shapes import Compound
 from wholebody.motion import measures
 from wholebody.motion.sphere_filling import Spheres, fill_with_spheres
+from wholebody.planning.solutions import Solutions
 from wholebody.view import Viewer
 from wholebody.view.timeline import timeline
 
@@ -219,6 +220,15 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Figure.joint_values", Call(arm.joint_values, {"q": q})
     yield "Figure.placement", Call(arm.placement, {"q": q, "name": "link1"})
     yield "Figure.posture", Call(arm.posture, {"name": arm.postures[0]})
+    off = (1.0, 0.0, 0.0)
+    both = wb.Scene({"one": arm, "two": (arm, off)}).figure
+    mounted = {"other": arm, "on": "link4", "name": "it", "at": off}
+    yield "Figure.mounted", Call(arm.mounted, mounted, lambda made: made.neutral)
+    yield "Figure.part", Call(both.part, {"name": "one", "q": both.neutral})
+    yield "Figure.posture(several)", Call(lambda posture: both.posture({"one": posture}), {"posture": q})
+    added = {"figure": arm, "name": "two", "at": off, "root": None}
+    yield "Scene.add_figure", Call(lambda **given: wb.Scene({"one": arm}).add_figure(**given), added, repr)
+    yield "Scene(several)", Call(lambda figure: wb.Scene({"one": figure}), {"figure": (arm, off)}, repr)
     yield "Figure.reduced", Call(arm.reduced, {"joints": ["joint1"], "posture": q})
     yield "Figure.tangent_bounds", Call(arm.tangent_bounds, {"q": q})
     yield "Figure.with_joints", Call(arm.with_joints, {"q": q, "values": {"joint1": 0.1}}, arm.clamp)
@@ -568,6 +578,8 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Clip.at", Call(clip.at, {"t": 0.05})
     yield "Clip.resampled", Call(clip.resampled, {"dt": 0.05})
     yield "Clip.joined", Call(clip.joined, {"other": clip})
+    pair_of = wb.Scene({"one": arm, "two": arm}).figure
+    yield "Clip.part", Call(wb.Clip(pair_of, [pair_of.neutral], 0.1).part, {"name": "two"})
     yield "Clip.with_q", Call(clip.with_q, {"q": [q], "name": "other"})
     yield "Clip.from_track", Call(wb.Clip.from_track, {"track": track, "figure": arm})
     yield "Clip.write", Call(clip.write, {"path": path / "clip.npz"})
@@ -627,6 +639,11 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     at_once: dict[str, Any] = {"method": "qp", "jobs": 1, "seconds": 9.0, "warm_start": True}
     at_once |= {"folder": path / "records", "progress": lambda told: True}
     yield "solve_many", Call(wb.solve_many, {"problems": [], **at_once})
+    several = {"most": 2, "apart": 0.2, "method": wb.QP(), "starts": 2, "seed": 0, "time_limit": 1.0}
+    yield "solutions", Call(wb.solutions, {"problem": ask, **several}, str)
+    listed = {"answers": (), "found": 0, "descents": 0, "starts": 0, "complete": False}
+    yield "Solutions", Call(Solutions, listed)
+    yield "QP.minima", Call(wb.QP().minima, {"problem": ask, "starts": [ask.start]}, list)
     varied = {"task": path / "task.toml", "layouts": {"as it is": {}}}
     yield "study", Call(partial(wb.study, progress=lambda told: True), varied)
     anything = {"people": [arm], "targets": [places[0]], "layouts": [None], **at_once}

@@ -127,10 +127,10 @@ class Multistart:
         if least is None:
             return
         yield Attempt(self._before_contact(), lambda q: self._descend(q, full_step=True), "from before contact")
-        yield Attempt([start], self._feasibility_first, "by feasibility first")
+        yield Attempt([start], self.feasibility_first, "by feasibility first")
         hooked = [*self.lineariser.defined(hooked_hands(self.problem, state, start))]
         yield Attempt(self._while_open(hooked), self._relaxed, "from another start")
-        yield Attempt(hooked, self._feasibility_first, "from hooked hands")
+        yield Attempt(hooked, self.feasibility_first, "from hooked hands")
         near = self.best.violation.left <= SEARCH.relaxation_depth  # as far as limbs in the way keep goals off
         yield Attempt(self._while_open([start] if near else []), self._relaxed, "from another start")
         self._out_of_reach = self._known_out_of_reach(self.best.q)
@@ -172,7 +172,7 @@ class Multistart:
         self.spent += local.iterations
         return local
 
-    def _feasibility_first(self, start: Array) -> LocalSolution:
+    def feasibility_first(self, start: Array) -> LocalSolution:
         """Find a feasible posture without measures, and descend with measures from there."""
         local = self._feasibility(self.lineariser, self.budget.iterations, "feasibility").run(start)
         self.spent += local.iterations
