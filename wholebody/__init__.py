@@ -54,8 +54,9 @@ if TYPE_CHECKING:
     from wholebody.scene.mjcf_scene import read_scene
     from wholebody.scene.scene import Scene
     from wholebody.solution import Solution
-    from wholebody.studies.accommodation import accommodation, people
+    from wholebody.studies.accommodation import accommodation
     from wholebody.studies.many import solve_many
+    from wholebody.studies.populations import boundary, people
     from wholebody.studies.reach_map import reach_map
     from wholebody.studies.study import study
     from wholebody.taskfile import read_task, write_task
@@ -159,6 +160,7 @@ __all__ = [
     "accommodation",
     "assess",
     "avoid",
+    "boundary",
     "check",
     "check_derivatives",
     "dynamics",
@@ -208,7 +210,8 @@ _MODULES = {
     "wholebody.scene.mjcf_scene": "read_scene",
     "wholebody.scene.scene": "Scene",
     "wholebody.solution": "Solution",
-    "wholebody.studies.accommodation": "accommodation people",
+    "wholebody.studies.accommodation": "accommodation",
+    "wholebody.studies.populations": "boundary people",
     "wholebody.studies.many": "solve_many",
     "wholebody.studies.reach_map": "reach_map",
     "wholebody.studies.study": "study",
