@@ -648,8 +648,10 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Records.rows", Call(kept.rows, {})
     yield "Records.chart", Call(kept.chart, {"path": path / "records.png"})
     yield "Records.to_csv", Call(kept.to_csv, {"path": path / "records.csv"})
-    yield "people", Call(wb.people, {"count": 2, "sexes": ["male"]})
-    counted = {"task": path / "person.toml", "sees": (1.0, 0.0, 1.0), "count": 1, "sexes": ["male"]}
+    yield "people", Call(wb.people, {"count": 2, "sex": "male", "seed": 1})
+    yield "people of percentiles", Call(wb.people, {"percentiles": [5, 95]})
+    yield "boundary", Call(wb.boundary, {"confidence": 0.9, "dimensions": ["stature"], "sex": "male"})
+    counted = {"task": path / "person.toml", "sees": (1.0, 0.0, 1.0), "people": wb.people(1, "male")}
     yield "accommodation", Call(partial(wb.accommodation, jobs=1, progress=lambda told: True), counted)
     upright, work = person.figure.neutral, wb.ergonomics.Work(load=5.0)
     posed = {"figure": person.figure, "q": upright, "work": work}

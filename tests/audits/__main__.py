@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from wholebody.base.checks import number
-from wholebody.base.errors import InputError, WholebodyError
+from wholebody.base.errors import WholebodyError
 from wholebody.base.files import make_folder
 from wholebody.bench.rows import only, report
 from wholebody.bench.tables import machine, write_rows, write_text
@@ -93,7 +93,7 @@ def qp(arguments: argparse.Namespace) -> None:
 @measuring(
     "human",
     "compare the person with people: sizes, ranges, self-contacts, everyday tasks",
-    "Measure the dimensions, circumferences and ranges of motion of the person beside those of people, "
+    "Measure the dimensions and ranges of motion of the person beside those of people, "
     "bring parts of the body together, and solve thirteen everyday tasks. With --update-docs the page becomes "
     "docs/human.md, with a picture of each contact and task.",
 )
@@ -286,32 +286,25 @@ def pen(arguments: argparse.Namespace) -> None:
 
 
 @measuring(
-    "files",
-    "what is read of the files of a folder",
-    "Read every robot, mesh and recording below a folder; recordings are retargeted to the person. The table has what "
-    "was read, the sentence by which the rest is refused, the errors of bones, and the processor's time.",
-    option("folder", type=Path, metavar="FOLDER", help="of the files"),
-    count("--frames", 60, "frames of each recording that are retargeted"),
+    "plans",
+    "planned motions by set, beside RRT-Connect of OMPL where it is installed",
+    "Plan the motions from the starts to the goals of problem sets with several seeds.",
+    listed("--sets", "problem sets (default: arms_among_things, clutter, passage)"),
+    count("--cases", 12, "problems a set"),
+    count("--seeds", 3, "plans of each"),
 )
-def files(arguments: argparse.Namespace) -> int:
-    """Read; 1 where a file ends in anything but an answer or a sentence."""
-    from tests.audits.files import read
+def plans(arguments: argparse.Namespace) -> None:
+    """Measure plans."""
+    from tests.audits.plans import rows
 
-    if not arguments.folder.is_dir():
-        raise InputError(f"{arguments.folder}: is no folder; give one with files")
-    rows = []
-    for row in read(arguments.folder, 5 if arguments.quick else arguments.frames):
-        rows.append(row)
-        print(f"{row.case}: {', '.join(f'{name} {value}' for name, value in row.figures.items())}", flush=True)
-    facts = machine()
-    known = [row["bones median deg"] for row in rows if "bones median deg" in row.figures]
-    about = f"{sum(row['read'] == 'yes' for row in rows)} of {len(rows)} files are read; {len(known)} recordings are "
-    about += f"retargeted, {sum(error < 5.0 for error in known)} of them with a median error of bones below 5 degrees."
-    publish("files", report(about, {"": rows}, facts), arguments, facts=facts, tables={"files": rows})
-    return int(any(row["read"] == "FAULT" for row in rows))
+    sets = arguments.sets or ("arms_among_things", "clutter", "passage")
+    cases, seeds = (1, 1) if arguments.quick else (arguments.cases, arguments.seeds)
+    facts, found = machine(), rows(sets, cases, seeds)
+    text = report("Motions from starts to goals; lengths by the shortest of each problem.", {"": found}, facts)
+    publish("plans", text, arguments, facts=facts, tables={"plans": found})
 
 
-COMMANDS = (files, newton, qp, human, regress, loads, clip_constants, detail, ablation, robots, pen)
+COMMANDS = (newton, qp, human, regress, loads, clip_constants, detail, ablation, robots, pen, plans)
 
 
 def main(words: Sequence[str] | None = None) -> int:

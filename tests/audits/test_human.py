@@ -2,26 +2,16 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from tests.audits.human_contacts import distance
-from tests.audits.human_sizes import _girth, dimensions, ranges
+from tests.audits.human_sizes import dimensions, ranges
 from wholebody.figures import load
-from wholebody.figures.surface.fields import ball, round_cone, union
 
 
-def test_a_girth_is_that_of_the_hull() -> None:
-    middle = np.zeros(2)
-    assert _girth(ball((0.0, 0.0, 0.0), 0.05), middle, 0.03) == pytest.approx(2.0 * np.pi * 0.04, rel=2e-3)
-    beside = union([round_cone((x, 0.0, -1.0), (x, 0.0, 1.0), 0.02, 0.02) for x in (-0.03, 0.03)])
-    band = 2.0 * np.pi * 0.02 + 2.0 * 0.06  # a tape around two equal rods
-    assert _girth(union([beside, ball((0.0, 0.0, 0.0), 0.011)]), middle, 0.0) == pytest.approx(band, rel=0.03)
-
-
-def test_dimensions_keep_to_what_is_asked() -> None:
-    for row in dimensions(["F50", "M50"]):
-        assert abs(row.residual) < (0.025 if "overhead" in row.name else 0.015), row
+def test_dimensions_keep_to_what_is_likely() -> None:
+    for row in dimensions(["female"]):
+        assert abs(row.residual) < 0.003, row
 
 
 def test_a_straight_leg_ends_before_a_bent_one() -> None:

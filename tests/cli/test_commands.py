@@ -152,7 +152,7 @@ def require_browser() -> None:
         (["show", "human", "--save", "a.gif"], [".html", ".png"]),
         (["show", "absent.json"], ["absent.json", "no such file"]),
         (["figure", "human", "--stature", "175"], ["175", "between"]),
-        (["figure", "human", "--age", "175"], ["175", "between 20 and 69"]),
+        (["figure", "human", "--age", "175"], ["175", "between 17 and 69"]),
         (["figure", "human", "--proportion", "sitting_height"], ["'sitting_height'", "NAME=METRES"]),
         (["figure", "human", "--proportion", "sitting=0.9"], ["sitting", "sitting_height"]),
         (["figure", "avatar", "--out", "a.urdf"], ["--out", "human"]),

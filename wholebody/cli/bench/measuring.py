@@ -1,4 +1,4 @@
-"""`wholebody bench step`, `scaling`, `motion` and `world`: what things cost and achieve."""
+"""`wholebody bench step`, `scaling`, `motion`, `world` and `files`: what things cost and achieve."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from itertools import product
 from pathlib import Path
 
 from wholebody.base import checks
+from wholebody.base.errors import InputError
 from wholebody.base.files import make_folder
 from wholebody.bench.rows import Panel, Row, chart, only, report
 from wholebody.bench.tables import machine, write_rows
@@ -206,3 +207,29 @@ def _world(arguments: argparse.Namespace) -> dict[str, Iterable[Row]]:
         "throws": throws.all_throws(1 if quick else 3, quick),
         "drops": (drops.measure(known[name], tool, frames) for name, tool in product(names, tools)),
     }
+
+
+@measuring(
+    "files",
+    "what is read of the files of a folder",
+    "Read every robot, mesh and recording below a folder; recordings are retargeted to the person. The table has what "
+    "was read, the sentence by which the rest is refused, the errors of bones, and the processor's time.",
+    option("folder", type=Path, metavar="FOLDER", help="of the files"),
+    count("--frames", 60, "frames of each recording that are retargeted"),
+)
+def files(arguments: argparse.Namespace) -> int:
+    """Read; 1 where a file ends in anything but an answer or a sentence."""
+    from wholebody.bench.measure.files import read
+
+    if not arguments.folder.is_dir():
+        raise InputError(f"{arguments.folder}: is no folder; give one with files")
+    rows = []
+    for row in read(arguments.folder, 5 if arguments.quick else arguments.frames):
+        rows.append(row)
+        print(f"{row.case}: {', '.join(f'{name} {value}' for name, value in row.figures.items())}", flush=True)
+    facts = machine()
+    known = [row["bones median deg"] for row in rows if "bones median deg" in row.figures]
+    about = f"{sum(row['read'] == 'yes' for row in rows)} of {len(rows)} files are read; {len(known)} recordings are "
+    about += f"retargeted, {sum(error < 5.0 for error in known)} of them with a median error of bones below 5 degrees."
+    publish("files", report(about, {"": rows}, facts), arguments, facts=facts, tables={"files": rows})
+    return int(any(row["read"] == "FAULT" for row in rows))
