@@ -247,7 +247,7 @@ def test_other_methods_refuse_by_name(scene: wb.Scene, method: str) -> None:
         (lambda: wb.Stand("floor", feet=["left_sole"]), "no pieces"),
         (lambda: wb.Stand("floor", feet=[]), "feet is empty"),
         (lambda: wb.Grasp("middle", "box"), "'left' or 'right'"),
-        (lambda: wb.Grasp("left", "floor", "power"), "no end"),
+        (lambda: wb.Grasp("left", "floor", "power"), "endless"),
         (lambda: wb.Grasp("left", "box", "claw"), "palm"),
         (lambda: wb.Grasp("left", "bar", "pinch"), "one piece; load the person with hands='fingers'"),
         (lambda: wb.Lean("backrest", side=(0, 0, 0)), "no direction"),
