@@ -18,9 +18,9 @@ from wholebody.base.arrays import Array, Mask
 from wholebody.figures.figure import Figure
 from wholebody.geometry.pieces import swept_points
 from wholebody.motion.posture_fit import CLEARANCE
-from wholebody.motion.retarget_targets import upright
 from wholebody.motion.roles import Roles
 from wholebody.motion.standing_ground import Foothold, Ground
+from wholebody.motion.structure import upright
 from wholebody.scene.scene import Scene
 
 STRONG, NEARING, SWING = 200.0, 3.0, 0.3  # weights of what rests, nearly does, and of a sole between; 1 of a bone
