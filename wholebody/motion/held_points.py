@@ -23,7 +23,7 @@ from wholebody.motion.standing_ground import Foothold, Ground
 from wholebody.motion.structure import upright
 from wholebody.scene.scene import Scene
 
-STRONG, NEARING, SWING = 200.0, 3.0, 0.3  # weights of what rests, nearly does, and of a sole between; 1 of a bone
+STRONG, NEARING, SWING = 200.0, 10.0, 0.3  # weights of what rests, nearly does, and of a sole between; 1 of a bone
 BESIDE = np.array([0.3, 0.3, 1.0])  # shares of that weight: soles that meet come down beside each other
 STEP = 0.3  # m: a surface higher than this above the recording's ground is not what a sole comes down on
 SOLE = 0.002  # m: what is lower than this above a foot's lowest point is its sole
