@@ -199,8 +199,8 @@ class Run:
         goals = self._goals(frame, reference, BEND / self.dt * self.levers, held)
         before = found[frame - 1] if frame else None
         q = self._reached(before, reference)
-        for number in range(4 * SWEEP):  # more than the usual for reach cones, which are curved
-            if number >= SWEEP and not self.fitter.outside(q):
+        for number in range(4 * SWEEP):  # more than the usual where cones, or contacts, are curved
+            if number >= SWEEP and not (self.fitter.outside(q) or self.fitter.overlaps(q)):
                 break
             q = self.fitter.step(q, goals, most=self._room(q, before))
         return q
