@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.bench.suite.problem_sets.robots import known_arm
 
 
 @pytest.fixture
@@ -215,3 +216,17 @@ def test_defaults_follow_what_the_feet_carry():
     assert np.abs(first.offsets.sum() - again.offsets.sum()) > 1e-3 or first.normals.shape != again.normals.shape
     np.testing.assert_array_equal(again.normals, fresh.normals)
     np.testing.assert_array_equal(again.offsets, fresh.offsets)
+
+
+def test_a_start_that_was_stated_before_sees_where_things_are_now() -> None:
+    """What follows from a start is kept; a thing that was moved in between counts where it stands."""
+    figure, start = known_arm("ur5")
+    tool = figure.placement(start, "tool").translation
+    scene = wb.Scene(figure).add(wb.Box((0.1, 0.1, 0.1)), name="box", at=(2.0, 0.0, 0.0))
+    away = wb.Problem(scene, start, clearance=0.02)
+    for height in np.arange(0.3, 0.0, -0.002):  # from below until it is nearer than the clearance
+        scene.move("box", at=tool - (0.0, 0.0, height))
+        if scene.contacts(start, 0.5).distance.min() < 0.015:
+            break
+    assert 0.0 < scene.contacts(start, 0.5).distance.min() < 0.015
+    assert (wb.Problem(scene, start, clearance=0.02).clearances < away.clearances).any()

@@ -41,12 +41,15 @@ def test_convert_writes_a_file_that_is_read_again(walk: Path, ending: str, tmp_p
     assert np.degrees(values) == pytest.approx(np.linspace(10.0, 110.0, 6), abs=1e-5)
 
 
-def test_retarget_writes_a_clip_of_the_figure(walk: Path, tmp_path: Path) -> None:
+def test_retarget_writes_a_clip_of_the_figure(walk: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A small woman takes over what a man's BVH holds."""
     assert main(["clip", "convert", str(walk), str(tmp_path / "bend.bvh")]) == 0
     size = ["--sex", "female", "--stature", "1.55"]
     out = tmp_path / "woman.npz"
     assert main(["clip", "retarget", str(tmp_path / "bend.bvh"), str(out), *size]) == 0
+    table = [line.split() for line in capsys.readouterr().out.splitlines() if " to " in line]
+    assert ["left_shoulder", "to", "left_elbow"] in [row[:3] for row in table]
+    assert all(float(row[3]) < 6.0 for row in table)  # degrees
     clip = wb.read_clip(out, wb.load("human", sex="female", stature=1.55))
     values = [clip.figure.joint_values(q)["left_elbow_flexion"] for q in clip.q]
     assert np.degrees(values) == pytest.approx(np.linspace(10.0, 120.0, 12), abs=6.0)

@@ -102,6 +102,8 @@ def test_structure_tells_what_names_do_not(turn: float, human: wb.Figure) -> Non
     numbers = tuple(f"joint {number}" for number in range(len(names)))
     motion = SkeletonMotion.moved(numbers, parents, offsets, local, np.tile(places[0], (2, 1)), 0.02)
     found = matched(motion, human, None)
+    soles = _with_soles(motion, [numbers[names.index(f"{side}_ankle")] for side in ("left", "right")])
+    assert matched(soles, human, None).joints == found.joints  # a joint below an ankle is no toe
     ends = {"toe_tip": "toe", "index_tip": "hand"}
     expected = {name.replace(*next(((a, b) for a, b in ends.items() if a in name), ("", ""))): numbers[k]
                 for k, name in enumerate(names) if name != "crown"}  # fmt: skip
@@ -110,3 +112,19 @@ def test_structure_tells_what_names_do_not(turn: float, human: wb.Figure) -> Non
     with pytest.warns(UserWarning, match="by the structure of the skeleton .*left_knee is 'joint "):
         wb.retarget(motion, human)
     assert matched(motion, human, {"skeleton": {"left_elbow": "joint 3", "left_wrist": "joint 4"}}).told == ()
+
+
+def _with_soles(motion: SkeletonMotion, ankles: list[str]) -> SkeletonMotion:
+    """The motion with a joint 4 cm below each ankle, from which the foot goes on."""
+    names, parents, offsets = list(motion.names), motion.parents.tolist(), [*motion.offsets]
+    for ankle in ankles:
+        at = names.index(ankle)
+        toe = next(k for k, parent in enumerate(parents) if parent == at)
+        parents = [parent + (parent >= toe) for parent in parents]
+        parents[toe] = toe
+        parents.insert(toe, at)
+        names.insert(toe, f"below {ankle}")
+        offsets.insert(toe, np.array([0.0, 0.0, -0.04]))
+        offsets[toe + 1] = offsets[toe + 1] + (0.0, 0.0, 0.04)
+    local = np.tile(np.eye(3), (2, len(names), 1, 1))
+    return SkeletonMotion.moved(tuple(names), np.array(parents), np.array(offsets), local, motion.positions[:, 0], 0.02)

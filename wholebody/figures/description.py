@@ -110,7 +110,7 @@ class Description(NamedTuple):
         excluded: pairs of pieces that are not tested, with the reason.
         ranges: ranges of motion that more than one joint angle decides; a problem takes them by default.
         root_effort: weight of the root's position [rad^2/m^2] and of its rotation in the effort.
-        notes: sentences on what had to be changed about the geometry of a file.
+        notes: sentences on what had to be changed about the geometry of a file, or about stated dimensions.
         person: sex, stature and mass of the figure or of the hand's owner; None for a figure of a file.
         outer: makes the pieces that meet things in the world, on frames of the model, for a figure whose own are too
             coarse for it; None if its own do.

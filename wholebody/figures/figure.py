@@ -55,7 +55,7 @@ class Figure(checks.FixedAttributes):
         ranges: ranges of motion that more than one joint angle decides, by name; see `figures.motion_ranges`.
         collision_groups: segment to collision group ("torso_head", "left_arm", ...).
         excluded_pairs: pairs of pieces that are never tested, with the reason.
-        notes: sentences on what had to be changed about the geometry of a file.
+        notes: sentences on what had to be changed about the geometry of a file, or about stated dimensions.
         limits: joint limits as arrays.
         loaded_as: name or path and options by which `wb.load` made it; None for one made in another way.
         followers: joint to the law by which it follows another (mimic).

@@ -23,7 +23,7 @@ def load(spec: str | PathLike[str], **options: Any) -> Figure:
         **options: for "human" and "avatar": `sex` ("male", "female"), `stature` in metres, `mass` in kilograms,
             `percentile` (1 to 99) for those of the two that are left out, `proportions` such as ``{"sitting_height":
             0.93}`` in metres (dimensions of ANSUR II, by the names of `docs/human.md`, and `hand_length`,
-            `hand_breadth`, `foot_length`; the others follow as they go together in people), `age` in years (20 to 69;
+            `hand_breadth`, `foot_length`; the others follow as they go together in people), `age` in years (17 to 69;
             from 45 on some ranges of motion are smaller), and `detail` ("spheres", "capsules", "hulls"): with "spheres"
             the body is tested against itself and what it carries by its 39 spheres, and against things by its hulls;
             for "human": `hands` ("rigid", "fingers");

@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Callable
+from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 from urllib.parse import unquote
@@ -95,6 +96,14 @@ class GltfDocument:
                     raise ValueError("nodes are below themselves")
         return parents
 
+    @cached_property
+    def downwards(self) -> list[int]:
+        """The nodes, parents before children."""
+        order: list[int] = np.flatnonzero(self.parents < 0).tolist()
+        for node in order:
+            order += self.tree["nodes"][node].get("children", ())
+        return order
+
     def _names(self) -> list[str]:
         found: list[str] = []
         for node, fields in enumerate(self.tree.get("nodes", [])):
@@ -161,8 +170,7 @@ class GltfDocument:
     def worlds(self, moved: dict[int, tuple[Array, Array, Array]], frames: int = 1) -> Array:
         """(n, k, 4, 4) placements of all nodes in the world; of `moved` nodes the parts (n, 3), (n, 4), (n, 3)."""
         found = np.empty((frames, len(self.parents), 4, 4))
-        order = sorted(range(len(self.parents)), key=self._depth)
-        for node in order:
+        for node in self.downwards:
             place, turn, scale = moved.get(node) or (part[None] for part in self.parts(node))
             local = np.zeros((len(place), 4, 4))
             local[:, :3, :3] = Rotation.from_quat(turn).as_matrix() * scale[:, None]
@@ -170,12 +178,6 @@ class GltfDocument:
             parent = self.parents[node]
             found[:, node] = local if parent < 0 else found[:, parent] @ local
         return found
-
-    def _depth(self, node: int) -> int:
-        depth = 0
-        while self.parents[node] >= 0:
-            node, depth = int(self.parents[node]), depth + 1
-        return depth
 
     def meshes(self) -> list[tuple[Array, NDArray[np.int64], Color]]:
         """Triangles of all nodes in the world, bent by bones as these stand: vertices (n, 3), faces (m, 3), colour."""

@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from wholebody.base.checks import choice
+from wholebody.base.checks import choice, flag
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, InputError, one_line
 from wholebody.figures.figure import Figure
@@ -53,6 +53,8 @@ def read_clip(
     path: str | os.PathLike[str],
     figure: Figure,
     names: str | os.PathLike[str] | Mapping[str, Mapping[str, str]] | None = None,
+    *,
+    degrees: bool = False,
 ) -> Clip:
     """Read a clip of a figure; the ending of the file's name says the format.
 
@@ -62,6 +64,7 @@ def read_clip(
         figure: the figure of the postures.
         names: as for `wb.retarget`; of a table, by `columns`, the column of a joint of another name:
             ``{"columns": {"left_knee": "LKnee", "time": "t"}}``.
+        degrees: whether joints of a table turn by degrees; a column such as "left_knee [deg]" says so itself.
 
     Raises:
         FileFormatError: the file cannot be read, is cut off, has wrong counts or values that are no finite numbers, or
@@ -72,8 +75,9 @@ def read_clip(
     path = checked_path(path, "path")
     check_figure(figure, "read_clip")
     motion: SkeletonMotion | None = None
-    if path.suffix.lower() == ".csv" and names is not None:
-        frames: Frames | None = columns.read(path, figure, column_names(names, figure))
+    degrees = flag(degrees, "read_clip: degrees")
+    if path.suffix.lower() == ".csv":
+        frames: Frames | None = columns.read(path, figure, column_names(names, figure), degrees=degrees)
     elif path.suffix.lower() in gltf_reading.ENDINGS:
         animated = gltf_reading.Animated(path)
         frames = gltf_reading.own(animated, figure)

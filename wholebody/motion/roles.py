@@ -115,12 +115,7 @@ def _by_structure(motion: SkeletonMotion, known: Mapping[str, str]) -> dict[str,
         return found
     if sum(same) < 0.7 * len(same):
         return {}
-    parts = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist", "pelvis")
-    return {
-        role: joint
-        for role, joint in found.items()
-        if role not in known and role.endswith(parts) and joint not in known.values()
-    }
+    return {role: joint for role, joint in found.items() if role not in known and joint not in known.values()}
 
 
 def _recognised(joints: tuple[str, ...]) -> tuple[str, dict[str, str]]:

@@ -108,10 +108,15 @@ def _reach(motion: SkeletonMotion, joint: int) -> float:
 
 
 def _parts(motion: SkeletonMotion, limb: _Limb) -> list[int]:
-    """The three ends of the two longest bones, and the next joint that is apart."""
-    beyond = limb.joints[limb.first + 3 :]
-    size = SHORT * motion.length()
-    return [*limb.joints[limb.first : limb.first + 3], *[k for k in beyond if _reach(motion, k) > size][:1]]
+    """The three ends of the two longest bones, and the next joint that is apart: of a leg one that is not below it."""
+    size, rest = SHORT * motion.length(), motion.rest()
+    first, middle, last = limb.joints[limb.first : limb.first + 3]
+    beyond = [k for k in limb.joints[limb.first + 3 :] if np.linalg.norm(rest[k] - rest[last]) > size]
+    ways = rest[beyond] - rest[last]
+    down = (rest[last] - rest[middle]) / np.linalg.norm(rest[last] - rest[middle])
+    ahead = np.abs(ways @ down) < 0.9 * np.linalg.norm(ways, axis=1)  # a joint in the sole is no toe
+    straight = not ahead.any()  # an arm, or a foot that hangs
+    return [first, middle, last, *[k for k, off in zip(beyond, ahead, strict=True) if off or straight][:1]]
 
 
 def _sided(motion: SkeletonMotion, places: Array, pair: list[_Limb], legs: list[_Limb]) -> list[_Limb]:

@@ -12,8 +12,8 @@ from wholebody.base import fields
 from wholebody.base.checks import color, flag, shown, text, unit_hint
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.fields import Check, Range, Vector, check_of
+from wholebody.figures.anthropometry import DIMENSION
 from wholebody.figures.figure import Figure
-from wholebody.figures.proportions import DIMENSION
 from wholebody.geometry.placement import unit_vector
 from wholebody.scene.matter.body import BallJoint, Hinge
 from wholebody.taskfile.where import Where

@@ -10,7 +10,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
-from wholebody.tasks.balance import Balance, convex_polygon, least_width, standing_points
+from wholebody.tasks.balance import STEADY, Balance, convex_polygon, least_width, standing_points
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings
 from wholebody.tasks.bounds import Freeze
 from wholebody.tasks.distance import Effort
@@ -22,15 +22,6 @@ from wholebody.tasks.stand import Stand
 from wholebody.tasks.touch import Lean
 
 FEET = ("left_foot", "right_foot")
-
-STEADY = 0.15
-"""Least distance of the centre of mass from the edges of the support polygon, as a share of the polygon's least width:
-41 mm of the median man with his feet side by side. People under 60 who lean as far forward and back as they can use
-0.60 of the foot's length, with a standard deviation of 0.07 (King, Judge & Wolfson 1994, Journal of Gerontology 49(6):
-M258, its abstract): a share of 0.2; about 8 % lean farther than 0.15. The centre of mass of nine who leaned all around
-came 20 to 59 % less far from the middle of the stance than the edges are (Forth, Fiedler & Paloski 2011, Gait & Posture
-33: 715, its abstract); here it is 30 %."""
-
 
 _effort = Effort()
 

@@ -161,7 +161,7 @@ class LiveAssembly:
 
     def stated(self, q: Array, goals: object, held: Collection[str]) -> Problem:
         """Raise InputError."""
-        raise InputError("an assembly is no problem, so it has no task file; keep assembly.variables() instead")
+        raise InputError("an assembly is not a problem and has no task file; keep assembly.variables() instead")
 
 
 LiveSubject = LiveProblem | LiveAssembly

@@ -25,7 +25,8 @@ ROOT_COLUMNS = ("root_x", "root_y", "root_z", "root_qx", "root_qy", "root_qz", "
 LARGEST = 200_000_000  # bytes: an hour of a person at 60 frames a second
 LATEST = 1e9  # s
 TIME = "time"
-DEGREES = ("[deg]", "(deg)", "[degrees]", "(degrees)")
+DEGREES = ("deg", "degrees", "°")
+UNIT = re.compile(r"\s*[\[(](deg|degrees|°|rad|radians)[\])]$|[\s_](deg|degrees|rad|radians)$", re.IGNORECASE)
 
 
 def write_track(track: Track, path: str | os.PathLike[str]) -> Path:
@@ -69,10 +70,13 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
     return track
 
 
-def read_values(path: Path, figure: Figure, columns: Mapping[str, str] = MappingProxyType({})) -> tuple[Array, float]:
+def read_values(
+    path: Path, figure: Figure, columns: Mapping[str, str] = MappingProxyType({}), *, degrees: bool = False
+) -> tuple[Array, float]:
     """The seven values of a free root and one of each joint (n, 7 + joints) of a track, and its time step.
 
-    `columns` names the column of a joint, or of "time", where it has another name; see `read_track`.
+    `columns` names the column of a joint, or of "time", where it has another name; `degrees` says the unit of joints
+    that turn and whose columns do not say it; see `read_track`.
     """
     resting = figure.joint_values(figure.neutral)
     if len(resting) < len(figure.joints):
@@ -85,14 +89,15 @@ def read_values(path: Path, figure: Figure, columns: Mapping[str, str] = Mapping
     number, first = next(lines, (1, []))
     wanted = [TIME, *(ROOT_COLUMNS if figure.root == "free" else ()), *figure.joints]
     own = {column: joint for joint, column in columns.items()}
-    units = [name.strip().lower().endswith(DEGREES) for name in first]
-    first = [own.get(name.strip(), name) for name in first]
+    given = [name.strip() for name in first]
+    first = [own.get(name, name) for name in given]
     if first and all(map(is_number, first)):
         first, lines = _without_names(path, first, wanted, [(number, first), *lines])
     names = _columns(f"{path.name}, line {number}", first, wanted)
     table, places, decimals = _numbers(path, number, lines, names)
-    if len(units) == len(names):  # of a file with names
-        table[:, units] = np.radians(table[:, units])
+    given = given if len(given) == len(names) else names  # a file without names has no time either
+    units = [_in_degrees(*each, figure, default=degrees) for each in zip(given, names, strict=True)]
+    table[:, units] = np.radians(table[:, units])
     dt = _time_step(path, table[:, names.index(TIME)], places, decimals)
     broken = np.argwhere(~(np.abs(table) <= LARGEST_VALUE))
     if len(broken):
@@ -111,6 +116,17 @@ def read_values(path: Path, figure: Figure, columns: Mapping[str, str] = Mapping
         if name in names:
             values[:, column] = table[:, names.index(name)]
     return values, dt
+
+
+def _in_degrees(column: str, name: str, figure: Figure, *, default: bool) -> bool:
+    """Whether the column of a name is in degrees: as it says itself, and otherwise as others do, if its joint turns."""
+    unit = UNIT.search(column) if column != name else None
+    if unit is not None:
+        return (unit[1] or unit[2]).lower() in DEGREES
+    turns = name in figure.joints and not figure.model.joints[figure.joint_id(name)].shortname().startswith(
+        "JointModelP"
+    )
+    return default and turns
 
 
 def _without_names(
@@ -134,17 +150,17 @@ def _without_names(
 
 def _columns(place: str, first: list[str], wanted: list[str]) -> list[str]:
     """Names of the columns, without their units; see `read_track`."""
-    if len(first) == 1 and ";" in first[0]:
-        raise FileFormatError(
-            f"{place}: the columns are separated by semicolons; write commas between them, and points in numbers"
-        )
-    unit = re.compile(r"\s*[\[(](deg|degrees|rad|radians)[\])]$", re.IGNORECASE)
-    names = [unit.sub("", name.strip()) for name in first]
+    for mark, what in ((";", "semicolons"), ("\t", "tabs")):
+        if len(first) == 1 and mark in first[0]:
+            raise FileFormatError(
+                f"{place}: the columns are separated by {what}; write commas between them, and points in numbers"
+            )
+    names = [name if name.strip() in wanted else UNIT.sub("", name.strip()) for name in map(str.strip, first)]
     for name in names:
         known(name, wanted, "column", place)
     twice = [name for name in wanted if names.count(name) > 1]
     if twice:
-        raise FileFormatError(f"{place}: the column {twice[0]} stands there twice; leave one out")
+        raise FileFormatError(f"{place}: the column {twice[0]} occurs twice; leave one out")
     missing = [name for name in wanted if name not in names]
     root = [name for name in missing if name in ROOT_COLUMNS]
     if TIME in missing:
@@ -170,7 +186,7 @@ def _numbers(
             rows.append([float(value) for value in line])
         except ValueError:
             wrong = next(value for value in line if not is_number(value))
-            raise FileFormatError(f"{path.name}, line {number}: {shown(wrong)} is no number") from None
+            raise FileFormatError(f"{path.name}, line {number}: {shown(wrong)} is not a number") from None
         places.append(number)
         decimals = max(decimals, len(line[at].strip().partition(".")[2]) if "e" not in line[at].lower() else 17)
     if len(rows) < 2:
@@ -205,4 +221,4 @@ def _lines(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
             if line:
                 yield reader.line_num, line
     except csv.Error as error:
-        raise FileFormatError(f"{path.name}, line {reader.line_num}: is no CSV ({error})") from None
+        raise FileFormatError(f"{path.name}, line {reader.line_num}: is not CSV ({error})") from None

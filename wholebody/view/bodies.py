@@ -177,6 +177,11 @@ class Bodies:
         grid[:3, 3] += 0.0015 * grid[:3, 2]  # m: above the floor, otherwise the two flicker
         graph.place("/Grid", grid)
 
+    @property
+    def drawn(self) -> tuple[DrawnFigure, ...]:
+        """The figures of which a surface or visuals are drawn in place of pieces."""
+        return self._drawn
+
     def hidden(self, index: int) -> bool:
         """Whether a piece is not drawn: the surface of its body is, or it is an outer piece, which has no opacity."""
         body = self.all[index]

@@ -5,7 +5,8 @@ from __future__ import annotations
 from wholebody.base.arrays import Array
 from wholebody.motion.files.gltf import JointTree
 from wholebody.view.bodies import Bodies
-from wholebody.view.viewed_scene import ViewedAssembly, ViewedScene
+from wholebody.view.skin import Skin
+from wholebody.view.viewed_scene import ViewedScene
 
 
 def scene_glb(scene: ViewedScene, bodies: Bodies, postures: Array, dt: float, title: str) -> bytes:
@@ -14,11 +15,12 @@ def scene_glb(scene: ViewedScene, bodies: Bodies, postures: Array, dt: float, ti
     A node `joint NAME` is each joint, a node `piece NAME` each piece; of half-spaces a square is written.
     """
     tree = JointTree(scene.model, postures, dt)
-    if not bodies.pieces:
-        figures = scene.figures if isinstance(scene, ViewedAssembly) else {"": (scene.figure, None)}
-        for name, (figure, color) in figures.items():
-            if figure is not None:
-                tree.draw(figure, f"{name}/" if name else "", color)
+    for figure in bodies.drawn:
+        if isinstance(figure.visual, Skin):
+            name = figure.prefix.strip("/") or str(scene.figure.name)
+            tree.skin(name, figure.visual.surface, figure.visual.places, figure.prefix, figure.color)
+        else:
+            tree.visuals(figure.visual.drawn, figure.prefix, figure.color)
     for index, (piece, body) in enumerate(zip(scene.geometry.geometryObjects, bodies.all, strict=True)):
         if not bodies.hidden(index):
             tree.piece(f"piece {piece.name}", body.joint, piece.placement.homogeneous, piece.geometry, body.color)

@@ -16,18 +16,19 @@ class LinkVisuals:
     """The visuals of a figure. A link with a mesh that cannot be read is left out: its pieces are drawn.
 
     Attributes:
+        drawn: the objects.
         links, joints: names of the links that are drawn, and of the joints that carry them.
     """
 
     def __init__(self, figure: Any) -> None:
-        self._drawn = drawn_of(figure)
-        self.links = frozenset(one.link for one in self._drawn)
-        self.joints = tuple(dict.fromkeys(one.joint for one in self._drawn))
+        self.drawn = drawn_of(figure)
+        self.links = frozenset(one.link for one in self.drawn)
+        self.joints = tuple(dict.fromkeys(one.joint for one in self.drawn))
 
     def build(self, graph: SceneGraph, carriers: Mapping[str, str], color: Color | None) -> list[Skinned]:
         """Put the visuals below the nodes of their joints; all in one colour if there is one."""
         found = []
-        for number, one in enumerate(self._drawn):
+        for number, one in enumerate(self.drawn):
             path = f"{carriers[one.joint]}/visual {number}"
             shown = one.color if color is None else color
             if isinstance(one.shape, tuple):

@@ -25,27 +25,33 @@ class Skinned(NamedTuple):
 
 
 class Skin:
-    """A figure's surface, whose bones are found among the figure's joints; some figures lack segments of the body."""
+    """A figure's surface, whose bones are found among the figure's joints; some figures lack segments of the body.
+
+    Attributes:
+        surface: of the figure.
+        places: of each bone the joint that carries it, and its placement (4, 4) there.
+        joints: names of the joints that carry bones.
+    """
 
     def __init__(self, surface: Surface, figure: Any) -> None:
-        self._surface = surface
-        self._places = surface.attached(figure)
-        self.joints = tuple(dict.fromkeys(name for name, _ in self._places))
+        self.surface = surface
+        self.places = surface.attached(figure)
+        self.joints = tuple(dict.fromkeys(name for name, _ in self.places))
 
     def build(self, graph: SceneGraph, root: str, carriers: Mapping[str, str], color: Color | None) -> list[Skinned]:
         """Put the surface at a node, moved by the nodes of its joints; in a colour, or each patch in its own."""
-        bones = self._surface.bones
+        bones = self.surface.bones
         graph.do(
             commands.set_skeleton(
                 root,
-                [carriers[joint] for joint, _ in self._places],
-                np.array([offset for _, offset in self._places]),
+                [carriers[joint] for joint, _ in self.places],
+                np.array([offset for _, offset in self.places]),
                 np.linalg.inv(np.array([bone.bind for bone in bones])),
-                self._surface.halves,
+                self.surface.halves,
             )
         )
         drawn = []
-        for patch in self._surface.patches:
+        for patch in self.surface.patches:
             shown: Color = (*patch.color, 1.0) if color is None else color
             path = f"{root}/{patch.name}"
             # metres: positions are sent as whole multiples of it, in half of the bytes

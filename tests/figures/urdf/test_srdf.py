@@ -48,6 +48,11 @@ def test_groups_states_and_pairs_are_read(tmp_path: Path) -> None:
     assert reasons[frozenset(("l0:0", "l3:0"))] == "the SRDF disables them: Never"
     assert len(figure.geometry.collisionPairs) == len(plain.geometry.collisionPairs) - 1
     assert any("'elsewhere' is not in the URDF" in note for note in figure.notes)
+    more = (
+        '<virtual_joint name="v" type="floating" parent_frame="w" child_link="l0"/><passive_joint name="j4"/></robot>'
+    )
+    noted = wb.load(urdf, srdf=files(tmp_path, SRDF.replace("</robot>", more))[1]).notes
+    assert "SRDF: passive_joint, virtual_joint is not kept" in noted
 
 
 def test_a_wrong_srdf_is_one_sentence(tmp_path: Path) -> None:

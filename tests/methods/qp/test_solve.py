@@ -10,6 +10,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.bench.suite.problem_sets.registry import SETS
+from wholebody.bench.suite.problem_sets.robots import known_arm
 from wholebody.bench.suite.stability.catalogue import cases
 
 LENGTHS = (0.5, 0.4)
@@ -315,3 +316,16 @@ def test_an_arm_that_another_configuration_frees_is_not_called_out_of_reach(hone
     assert proof.goal_error < 1e-6
     solution = wb.QP(tolerance=1e-4, time_limit=inf).solve(case.problem)
     assert honest(case.problem, solution, 1e-4).status == "solved"
+
+
+def test_a_descent_goes_on_to_what_will_stop_it():
+    """Beside its own link an arm has one way to less effort, and ends where they touch, not where it begins."""
+    figure, _ = known_arm("xarm7")
+    home = np.array([-1.694, -1.72, 2.848, 1.932, -0.815, 0.738, -2.533])
+    begin = np.array([-1.021, -1.666, 3.871, 1.093, -1.124, -0.426, -0.757])
+    goal = wb.Frame("tool", figure.placement(begin, "tool"))
+    problem = wb.Problem(wb.Scene(figure), home, goals=[goal]).with_start(begin)
+    answer = wb.QP(restarts=0).solve(problem)
+    assert answer.solved
+    assert answer.assessment.measure < wb.assess(problem, begin).measure - 0.1
+    assert answer.assessment.optimality < 1e-3

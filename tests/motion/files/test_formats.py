@@ -9,6 +9,7 @@ import struct
 import warnings
 import zipfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -494,6 +495,13 @@ def test_an_unknown_ending_is_answered_with_all_that_can_be_read(human: Figure, 
         wb.read_clip(tmp_path / "walk.mocap", human)
 
 
+def test_fbx_is_answered_with_what_turns_it_into_what_is_read(human: Figure, tmp_path: Path) -> None:
+    (tmp_path / "walk.fbx").write_bytes(b"Kaydara FBX Binary  ")
+    for read in (wb.motion.read_skeleton, partial(wb.read_clip, figure=human)):
+        with pytest.raises(wb.FileFormatError, match=r"walk\.fbx: FBX is not read; Blender .*Export > glTF"):
+            read(tmp_path / "walk.fbx")
+
+
 @pytest.mark.parametrize("dtype", ["int8", "float64"])
 def test_an_archive_of_too_many_frames_is_refused_by_its_header(tmp_path: Path, dtype: str) -> None:
     """Zeros take no room in an archive: nothing of them is read."""
@@ -536,5 +544,11 @@ def test_tables_have_the_angles_of_joints_that_turn_without_end(root: str, mimic
         wb.read_clip(path, figure)
     read = wb.read_clip(path, figure, names)
     assert figure.joint_values(read.q[1])["wheel"] == pytest.approx(np.radians(angles[1]))
+    path.write_text(path.read_text().replace("Rad 1 [deg]", "wheel").replace("t,", "time,", 1))
+    read = wb.read_clip(path, figure, degrees=True)
+    assert figure.joint_values(read.q[1])["wheel"] == pytest.approx(np.radians(angles[1]))
+    path.write_text(path.read_text().replace(",", "\t"))
+    with pytest.raises(wb.WholebodyError, match="separated by tabs; write commas"):
+        wb.read_clip(path, figure)
     with pytest.raises(wb.WholebodyError, match="no joint is called 'whel'; did you mean wheel"):
         wb.read_clip(path, figure, {"columns": {"whel": "Rad 1"}})

@@ -232,3 +232,19 @@ def test_damaged_files_never_end_in_anything_but_a_sentence(tmp_path: Path) -> N
         (tmp_path / "broken.glb").write_bytes(broken)
         with suppress(wb.WholebodyError):
             read_skeleton(tmp_path / "broken.glb")
+
+
+def test_sparse_keyframes_are_read_between(tmp_path: Path) -> None:
+    """Two keyframes a second apart, of a root; its child does not turn by itself, and is a joint all the same."""
+    builder = GltfBuilder()
+    turns = Rotation.from_rotvec([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]).as_quat()
+    times = builder.accessor([0.0, 1.0], "<f4", bounded=True)
+    root = builder.moving_node("root", None, (turns, np.zeros((2, 3))), times)
+    child = builder.node("child", root, np.block([[np.eye(3), np.array([[0.0], [1.0], [0.0]])], [0.0, 0.0, 0.0, 1.0]]))
+    builder.node("tip", child, np.block([[np.eye(3), np.array([[0.0], [0.5], [0.0]])], [0.0, 0.0, 0.0, 1.0]]))
+    (tmp_path / "turn.glb").write_bytes(builder.glb("turn"))
+    motion = read_skeleton(tmp_path / "turn.glb")
+    assert (motion.names, len(motion), motion.dt) == (("root", "child", "tip"), 61, 1.0 / 60.0)
+    angle = np.linspace(0.0, 1.0, 61)
+    np.testing.assert_allclose(motion.positions[:, 2, 1], -1.5 * np.sin(angle), atol=1e-6)
+    np.testing.assert_allclose(motion.positions[:, 2, 2], 1.5 * np.cos(angle), atol=1e-6)

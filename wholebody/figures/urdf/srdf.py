@@ -15,6 +15,12 @@ from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError
 from wholebody.figures.urdf.xml_reading import numbers, read_xml
 
+READ = {
+    *("group", "group_state", "disable_collisions", "enable_collisions", "disable_default_collisions"),
+    "end_effector",  # a name for a group
+}
+"""Elements that are read."""
+
 
 class Srdf(NamedTuple):
     """What an SRDF says of a robot.
@@ -42,6 +48,9 @@ def read_srdf(path: Path, model: pin.Model, links: tuple[str, ...]) -> Srdf:
     if robot.tag != "robot":
         raise FileFormatError(f"{path}: the outermost element is <{robot.tag}>, not <robot>; give an SRDF")
     reader = _Reader(path, robot, model, links)
+    unknown = sorted({str(part.tag) for part in robot if isinstance(part.tag, str)} - READ)
+    if unknown:
+        reader.notes.append(f"SRDF: {', '.join(unknown)} is not kept")
     groups = {name: reader.joints(group, (name,)) for name, group in reader.groups.items()}
     return Srdf(groups, reader.postures(), reader.disabled(), tuple(dict.fromkeys(reader.notes)))
 

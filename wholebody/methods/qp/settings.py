@@ -230,6 +230,8 @@ class SearchNumbers(NamedTuple):
         coming_near: most programs from there to the nearest posture among things.
         inside_probes: seeded starts for goals inside of things, which only look for the nearest posture.
         staying: most programs that improve the measures at the nearest posture to goals that are not met.
+        optimal: rad: first-order optimality of a contact's answer from which on it counts as none.
+        poor: how many starts for the measures are descended from where it is none after all. More: lower, slower.
         screened: feasible postures that are looked for, for each that is descended from; more = lower measures, slower.
     """
 
@@ -251,6 +253,8 @@ class SearchNumbers(NamedTuple):
     coming_near: int = 40
     inside_probes: int = 5
     staying: int = 40
+    optimal: float = 1e-2
+    poor: int = 2
     screened: int = 4
 
 

@@ -34,10 +34,12 @@ def write(motion: Motion, path: Path) -> Path:
     return write_track(Track(q, motion.dt, figure.joints, motion.name), path)
 
 
-def read(path: Path, figure: Figure, columns: Mapping[str, str] = MappingProxyType({})) -> Frames:
-    """Read such a file, of whose joints some may have columns of other names; see `read_track`."""
+def read(
+    path: Path, figure: Figure, columns: Mapping[str, str] = MappingProxyType({}), *, degrees: bool = False
+) -> Frames:
+    """Read such a file, of whose joints some may have columns of other names, or degrees; see `read_track`."""
     try:
-        values, dt = read_values(path, figure, columns)
+        values, dt = read_values(path, figure, columns, degrees=degrees)
         root = ROOT_SIZE if figure.root == "free" else 0
         q = np.tile(figure.neutral, (len(values), 1))
         q[:, :root] = values[:, :root]

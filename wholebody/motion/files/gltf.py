@@ -5,6 +5,7 @@ Robots have the visuals of their links, and where there are none the figure's pi
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from wholebody.base.errors import InputError
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import triangles_of
-from wholebody.figures.link_visuals import Color, drawn_of
+from wholebody.figures.link_visuals import Color, Drawn, drawn_of
 from wholebody.figures.surface import Surface, surface_of
 from wholebody.geometry.gltf_builder import VERTICES, GltfBuilder
 from wholebody.motion.files.base import Motion
@@ -74,21 +75,21 @@ class JointTree:
             parent = self._nodes[model.parents[joint]]
             self._nodes.append(self.builder.moving_node(JOINT + model.names[joint], parent, keys, self._times))
 
-    def draw(self, figure: Figure, prefix: str = "", color: Color | None = None) -> frozenset[str]:
-        """Add a figure's surface, or its visuals; the names of the links of which pieces need not be drawn.
-
-        `prefix` stands before the names of its joints in the model; `color` is that of all of it, if there is one.
-        """
+    def draw(self, figure: Figure) -> frozenset[str]:
+        """Add a figure's surface, or its visuals; the names of the links of which pieces need not be drawn."""
         surface = surface_of(figure)
         if surface is not None:
-            self._add_skin(figure, surface, prefix, color)
+            self.skin(figure.name, surface, surface.attached(figure))
             return frozenset(figure.segments)
         drawn = drawn_of(figure)
-        for number, one in enumerate(drawn):
-            joint = self._model.getJointId(prefix + one.joint)
-            name = f"visual {prefix}{one.link}:{number}"
-            self.piece(name, joint, one.placement, one.shape, one.color if color is None else color)
+        self.visuals(drawn)
         return frozenset(one.link for one in drawn)
+
+    def visuals(self, drawn: Iterable[Drawn], prefix: str = "", color: Color | None = None) -> None:
+        """Add what is drawn of links; a prefix stands before their joints' names; all in a colour if there is one."""
+        for number, one in enumerate(drawn):
+            name, paint = f"visual {prefix}{one.link}:{number}", one.color if color is None else color
+            self.piece(name, self._model.getJointId(prefix + one.joint), one.placement, one.shape, paint)
 
     def piece(self, name: str, joint: int, placement: Array, shape: Any, color: Any) -> None:
         """Add coal's shape, or vertices (n, 3) and faces (m, 3), at a placement (4, 4) in a joint."""
@@ -103,22 +104,33 @@ class JointTree:
         made = self.builder.mesh(name, [self.builder.primitive(vertices, faces, paint, normals)])
         self.builder.node(name, self._nodes[joint], np.asarray(placement), mesh=made)
 
-    def _add_skin(self, figure: Figure, surface: Surface, prefix: str, color: Color | None) -> None:
-        """One mesh that bones bend, a primitive for each colour; a bone is a node below that of its joint."""
+    def skin(
+        self, name: str, surface: Surface, places: Sequence[tuple[str, Array]], prefix: str = "",
+        color: Color | None = None,
+    ) -> None:  # fmt: skip
+        """Add one mesh that bones bend, a primitive for each colour.
+
+        Args:
+            name: of the body.
+            surface: of it.
+            places: of its bones: the joint that carries each, and its placement (4, 4) there.
+            prefix: before the names of the joints in the model.
+            color: of all of it; each patch's own if None.
+        """
         bones: list[int] = []
-        held = [(self._model.getJointId(prefix + joint), offset) for joint, offset in surface.attached(figure)]
+        held = [(self._model.getJointId(prefix + joint), offset) for joint, offset in places]
         whole = {number: (first, second) for number, first, second in surface.halves}
         for number, (bone, (joint, offset)) in enumerate(zip(surface.bones, held, strict=True)):
-            name = f"{prefix}{bone.segment}"
+            called = f"{prefix}{bone.segment}"
             if number in whole:
                 first, second = whole[number]
                 keys = self._between(held[first], held[second])
-                node = self.builder.moving_node(f"{name} half", bones[first], keys, self._times)
+                node = self.builder.moving_node(f"{called} half", bones[first], keys, self._times)
             else:
-                node = self.builder.node(name, self._nodes[joint], offset)
+                node = self.builder.node(called, self._nodes[joint], offset)
             bones.append(node)
         inverses = np.linalg.inv(np.array([bone.bind for bone in surface.bones])) @ np.linalg.inv(UPWARD)
-        skin = self.builder.skin(prefix + figure.name, bones, inverses)
+        skin = self.builder.skin(name, bones, inverses)
         parts = dict[Color, list[Any]]()
         for patch in surface.patches:
             parts.setdefault((*patch.color, 1.0) if color is None else color, []).append(patch)
@@ -127,8 +139,8 @@ class JointTree:
             starts = np.cumsum([0, *(len(patch.vertices) for patch in patches)])
             faces = np.concatenate([start + patch.faces for start, patch in zip(starts, patches, strict=False)])
             vertices, normals, moving, weights = (
-                np.concatenate([getattr(patch, name) for patch in patches])
-                for name in ("vertices", "normals", "bones", "weights")
+                np.concatenate([getattr(patch, part) for patch in patches])
+                for part in ("vertices", "normals", "bones", "weights")
             )
             moving = np.where(weights > 0.0, moving, 0)
             more = {
@@ -138,8 +150,8 @@ class JointTree:
             vertices, normals = (each @ UPWARD[:3, :3].T for each in (vertices, normals))  # as bound, it stands
             normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
             primitives.append(self.builder.primitive(vertices, faces, self.builder.material(paint), normals, **more))
-        mesh = self.builder.mesh(f"body {prefix}{figure.name}", primitives)
-        self.builder.node(f"body {prefix}{figure.name}", mesh=mesh, skin=skin)
+        mesh = self.builder.mesh(f"body {name}", primitives)
+        self.builder.node(f"body {name}", mesh=mesh, skin=skin)
 
     def _between(self, first: tuple[int, Array], second: tuple[int, Array]) -> tuple[Array, Array]:
         """Half of the turn of a second part in a first, and its place there, of joints and placements in them."""

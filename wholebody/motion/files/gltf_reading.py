@@ -36,7 +36,9 @@ class Animated:
         notes: sentences on what was chosen.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, longest: float = np.inf) -> None:
+        """Read a file; between keyframes that are more than `longest` seconds apart 60 frames a second."""
+        self._longest = longest
         self.document = GltfDocument(path)
         self.notes: list[str] = []
         self.document.decoded(self._sample)
@@ -56,9 +58,9 @@ class Animated:
         samplers = animations[chosen]["samplers"]
         channels = [c for c in moving[chosen] if "node" in c["target"]]
         keys = [document.accessor(samplers[c["sampler"]]["input"])[:, 0] for c in channels]
-        times, self.dt, even = steps_of(np.concatenate(keys))
+        times, self.dt, even = steps_of(np.concatenate(keys), self._longest)
         if not even:
-            self.notes.append("keyframes are at unequal times; the motion between them is read at 60 frames a second")
+            self.notes.append("keyframes are at unequal times or far apart; 60 frames a second are read between them")
         self.count = len(times)
         if self.count > MOST_FRAMES:
             raise FileFormatError(f"{document.path.name}: {self.count} frames; give at most {MOST_FRAMES}")
@@ -105,6 +107,8 @@ def skeleton_of(animated: Animated, unit: str | None = None, up: str | None = No
 
     Units and axes as for `wholebody.motion.reading.read_skeleton`.
     """
+    if animated.dt > 0.1:
+        animated = Animated(animated.document.path, 0.1)
     document = animated.document
 
     def read() -> SkeletonMotion:
@@ -118,13 +122,10 @@ def skeleton_of(animated: Animated, unit: str | None = None, up: str | None = No
         else:
             joints, bind = set(animated.moved), rest
             notes.append("no body is bound to the nodes; they rest as the file places them")
-        solid = {node for node, fields in enumerate(document.tree["nodes"]) if {"mesh", "camera"} & fields.keys()}
-        for node in range(len(document.parents)):  # the ends of limbs
-            if (
-                document.parents[node] in joints
-                and node not in solid
-                and not document.tree["nodes"][node].get("children")
-            ):
+        nodes = document.tree["nodes"]
+        for node in document.downwards:  # the ends of limbs, and without a skin what does not turn by itself
+            bare = not {"mesh", "camera"} & nodes[node].keys() and not (skins and nodes[node].get("children"))
+            if bare and document.parents[node] in joints:
                 joints.add(node)
         motion = NodeMotion(document.names, document.parents, animated.worlds(), bind, animated.dt, tuple(notes))
         return motion.skeleton(joints, title_of(document.path), unit, up)
@@ -150,21 +151,12 @@ def _bound(document: GltfDocument, skin: int, rest: Array) -> Array:
 
     best = min(places, key=off)
     found = np.array(rest)
-    order = sorted(range(len(rest)), key=lambda node: len(_above(document, node)))
-    for node in order:
+    for node in document.downwards:
         if node in joints:
             found[node] = best @ bind[joints.index(node)]
         elif document.parents[node] >= 0:
             above = int(document.parents[node])
             found[node] = found[above] @ np.linalg.solve(rest[above], rest[node])
-    return found
-
-
-def _above(document: GltfDocument, node: int) -> list[int]:
-    found = []
-    while document.parents[node] >= 0:
-        node = int(document.parents[node])
-        found.append(node)
     return found
 
 

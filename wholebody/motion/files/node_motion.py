@@ -87,8 +87,8 @@ def rigid(matrices: Array) -> Array:
     return np.asarray(u @ vt)
 
 
-def steps_of(times: Array) -> tuple[Array, float, bool]:
-    """Times of frames, their step, and whether the keyframes are at equal steps; those of others are every 1/60 s."""
+def steps_of(times: Array, longest: float) -> tuple[Array, float, bool]:
+    """Times of frames, their step, and whether keyframes are at equal steps up to `longest`; otherwise every 1/60 s."""
     keys = np.unique(np.asarray(times, dtype=float))
     keys = keys[np.r_[True, np.diff(keys) > 1e-4]]  # s: rounding of single precision
     if len(keys) < 2:
@@ -96,7 +96,7 @@ def steps_of(times: Array) -> tuple[Array, float, bool]:
     span, step = float(keys[-1] - keys[0]), float(np.median(np.diff(keys)))
     count = round(span / step)
     even = len(keys) > 2 and bool(np.abs((keys - keys[0]) / (span / count) % 1.0 - 0.5).min() > 0.45)
-    even = even or len(keys) == 2
+    even = (even or len(keys) == 2) and step <= longest
     if not even:
         count = max(1, round(span * 60.0))
     return np.linspace(keys[0], keys[-1], count + 1), rounded_step(span / count), even

@@ -25,6 +25,15 @@ def test_the_witness_of_an_arm_is_clear_and_there(number: int) -> None:
     assert np.array_equal(case.witness, problem_set("arms_among_things").make(number, 1).witness)
 
 
+@pytest.mark.parametrize("number", range(8))
+def test_a_free_arm_begins_apart_from_where_its_tool_goes(number: int) -> None:
+    case = problem_set("free_arms").make(number, 1)
+    judged, begins = (wb.assess(case.problem, q) for q in (case.witness, case.problem.start))
+    assert judged.met(1e-9) and judged.holds(1e-9) and begins.holds(1e-9)  # noqa: PT018
+    assert not begins.met(0.01)
+    assert not case.problem.scene.objects
+
+
 def test_arms_have_the_lengths_that_their_makers_give() -> None:
     """Places of the tool at zero, in metres, as forward kinematics by Denavit and Hartenberg's parameters has them."""
     known = {

@@ -25,7 +25,7 @@ class Pink(Loop):
     """Steps of pink."""
 
     name = "pink"
-    longest = 0.0125  # twice that leaves pink no solution more often
+    longest = 0.025  # the most solved of 0.0125 to 0.1 on a seed that no comparison uses
     margin = 3.5e-4
     loose = (*((tolerance, FEASIBILITY_ONLY) for tolerance in (1e-2, 1e-3, 1e-4)), *Loop.loose)
 

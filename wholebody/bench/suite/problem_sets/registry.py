@@ -39,13 +39,15 @@ NAMED = _sets(
         "other_people": reaching.people,
         "other_clutter": reaching.clutter,
         "arms_among_things": robots.among,
+        "free_arms": robots.free,
         "robots": robots.described,
         "drivers": drivers.posed,
         "hands": grips.posed,
     }
 )
 """Sets that take part where they are named: distributions that nothing was tuned on, of which the robots need files
-that are not a part of this package; and drivers and hands, whose contacts most other tools and files lack."""
+that are not a part of this package; free arms; and drivers and hands, whose contacts most other tools and files
+lack."""
 
 TUNED_ON = MappingProxyType({name: numbers(name).beside for name in NAMED if numbers(name).beside})
 """Those distributions -> the set of the same question that constants were tuned on."""

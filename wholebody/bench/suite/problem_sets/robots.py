@@ -76,6 +76,25 @@ def among(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     return _asked(scene, start, witness, "tool", turned), witness
 
 
+def free(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
+    """The arms in turn, from a random posture to where the tool is in another, with nothing around."""
+    scene = _nothing_around(of_known.arms[number % len(of_known.arms)])
+    model = scene.model
+    lower, upper = np.maximum(model.lowerPositionLimit, -np.pi), np.minimum(model.upperPositionLimit, np.pi)
+
+    def sampled() -> Array | None:
+        q: Array = rng.uniform(lower, upper)
+        return q if is_free(scene, q) else None
+
+    start, witness = until_found(sampled), until_found(sampled)
+    return _asked(scene, start, witness, "tool", True), witness
+
+
+@lru_cache(maxsize=8)
+def _nothing_around(name: str) -> wb.Scene:
+    return wb.Scene(known_arm(name)[0])
+
+
 @lru_cache(maxsize=8)
 def known_arm(name: str) -> tuple[wb.Figure, Array]:
     """One of the arms of `sets.toml`, and the posture (nq,) that it begins in."""
