@@ -756,7 +756,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Equipment.filled", Call(bag.filled, {"count": 1, "envelope": False})
     yield "Equipment.attach", Call(lambda scene: bag.attach(scene), {"scene": wb.Scene(arm)})
     put = {"shape": wb.Sphere(0.1), "figure": hand, "name": "bag", "to": "left_hand", "side": "back"}
-    put |= {"height": 0.0, "sideways": 0.0, "color": None}
+    put |= {"middle": (0.0, 0.0), "color": None}
     yield "Equipment.worn", Call(wb.motion.Equipment.worn, put)
     yield "equipment", Call(wb.motion.equipment, {"name": "pack", "figure": hand})
     yield "fill_with_spheres", Call(fill_with_spheres, {"shape": wb.Sphere(0.1), "count": 1, "envelope": False})
