@@ -381,8 +381,7 @@ class Multistart:
         iterations = self.budget.iterations if most is None else min(most, self.budget.iterations)
         local = self._descent(iterations, None, note, measures=measures, full_step=full_step).run(start)
         self.spent += local.iterations
-        ended = most is None or local.iterations < most
-        if ended and not held(local, self.budget.tolerance):
+        if (most is None or local.iterations < most) and not held(local, self.budget.tolerance):
             stayed = self._stay(local)
             local = stayed if better(stayed, local, self.budget.tolerance) else local
         return local
@@ -391,10 +390,8 @@ class Multistart:
         self, iterations: int, offset: Array | None, note: str, *, measures: bool = True, full_step: bool = False,
         tolerance: float | None = None,
     ) -> SQP:  # fmt: skip
-        return SQP(
-            self._shared, tolerance or self.budget.tolerance, iterations, note, offset,
-            measures and self.budget.measures, full_step,
-        )  # fmt: skip
+        tolerance, measures = tolerance or self.budget.tolerance, measures and self.budget.measures
+        return SQP(self._shared, tolerance, iterations, note, offset, measures, full_step)
 
     def _accept(self, local: LocalSolution, how: str) -> bool:
         """Keep the better one; whether the problem is solved now."""
