@@ -621,6 +621,17 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "retarget", Call(wb.retarget, {"motion": skeleton, "figure": arm, "names": bones, "progress": print})
     errors = {"motion": skeleton, "clip": wb.retarget(skeleton, arm, names=bones), "names": bones}
     yield "bone_errors", Call(wb.motion.bone_errors, errors)
+    named = {"skeleton": {"left_ankle": "a"}, "figure": {"left_ankle": "link4"}}
+    yield "ground", Call(wb.motion.ground, {"motion": skeleton, "names": named}, str)
+    stood = wb.motion.ground(skeleton, named)
+    yield "Ground.below", Call(stood.below, {"frames": 3})
+    yield "Ground.chart", Call(stood.chart, {"path": path / "ground.png"})
+    paced = {"velocity": 1.0, "acceleration": 5.0, "dt": 0.1}
+    yield "Pace", Call(wb.planning.Pace, paced, lambda made: made.fastest(arm))
+    yield "Pace.fastest", Call(wb.planning.Pace().fastest, {"figure": arm})
+    planned = {"start": q, "goal": q + 0.1, "constraints": (), "clearance": 0.0, "pace": None, "seed": 0}
+    yield "plan", Call(partial(wb.plan, there, time_limit=1.0), planned)
+    yield "plan(scene)", Call(lambda **given: wb.plan(start=q, goal=q, **given), {"scene": there, "time_limit": 1.0})
     yield "read_clip", Call(wb.read_clip, {"path": path / "walk.npz", "figure": arm})
     checked = {"clip": clip, "scene": wb.Scene(arm), "depth": 1e-3, "progress": lambda done: None}
     yield "check", Call(wb.check, checked, lambda found: found.as_dict())
@@ -666,7 +677,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Records.chart", Call(kept.chart, {"path": path / "records.png"})
     yield "Records.to_csv", Call(kept.to_csv, {"path": path / "records.csv"})
     yield "people", Call(wb.people, {"count": 2, "sex": "male", "seed": 1})
-    yield "people of percentiles", Call(wb.people, {"percentiles": [5, 95]})
+    yield "people(percentiles)", Call(wb.people, {"percentiles": [5, 95]})
     yield "boundary", Call(wb.boundary, {"confidence": 0.9, "dimensions": ["stature"], "sex": "male"})
     counted = {"task": path / "person.toml", "sees": (1.0, 0.0, 1.0), "people": wb.people(1, "male")}
     yield "accommodation", Call(partial(wb.accommodation, jobs=1, progress=lambda told: True), counted)
@@ -745,7 +756,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Equipment.filled", Call(bag.filled, {"count": 1, "envelope": False})
     yield "Equipment.attach", Call(lambda scene: bag.attach(scene), {"scene": wb.Scene(arm)})
     put = {"shape": wb.Sphere(0.1), "figure": hand, "name": "bag", "to": "left_hand", "side": "back"}
-    put |= {"height": 0.0, "sideways": 0.0, "color": None}
+    put |= {"middle": (0.0, 0.0), "color": None}
     yield "Equipment.worn", Call(wb.motion.Equipment.worn, put)
     yield "equipment", Call(wb.motion.equipment, {"name": "pack", "figure": hand})
     yield "fill_with_spheres", Call(fill_with_spheres, {"shape": wb.Sphere(0.1), "count": 1, "envelope": False})
@@ -806,7 +817,7 @@ ANSWERS = (
     "AssemblyStep", "SolveRecord", "SolveRecord.of", "SolveRecord.row", "SolveRecord.as_json",
     "SolveRecord.from_json", "SolveProgress", "Records.to_parquet", "ReachMap", "Accommodation", "Ergonomics",
     "BodyAngles", "Rula", "Reba", "StaticTorques", "Sight", "Result", "Contacts.joined", "DerivativeCheck",
-    "AvoidedCase", "BatchProgress", "WorldFrame", "Overlap", "EngineFrame", "Event",
+    "AvoidedCase", "BatchProgress", "Ground", "Plan", "WorldFrame", "Overlap", "EngineFrame", "Event",
 )  # fmt: skip
 """What calls return: nobody builds it, so its constructor is not fed."""
 
@@ -817,6 +828,8 @@ AVOIDERS = ("Trajectory.avoid", "PerFrame.avoid", "Bisection.avoid")
 """Called by `avoid` alone, with a run that it set up."""
 
 DERIVATIVES = (
+    "on_polygon",
+    "joint_placement",
     "companion",
     "folded",
     "spread",

@@ -207,6 +207,10 @@ class FrameResolver:
         """A posture near q (nq,) out of what things were moved into it, and whether it is free."""
         resolver = self._resolver
         found, overlaps = resolver.resolve(q, rng, OVERRUN)
+        if overlaps:  # a link that is turned back to its tracked direction may be turned into the thing
+            resolver.tracked = None
+            found, overlaps = resolver.resolve(q, rng, resolver.counts.work + OVERRUN)
+            resolver.tracked = self._tracked
         for size in PERTURBATIONS if overlaps else ():
             perturbed, still = resolver.resolve(self._perturbed(q, size, rng), rng, resolver.counts.work + OVERRUN)
             if not still:

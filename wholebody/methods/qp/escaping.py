@@ -35,19 +35,12 @@ WAYS = (
 
 
 class ProjectionRows(NamedTuple):
-    """What a posture is projected out of: rows of near contacts and of constraints.
+    """What a posture is projected out of: rows of near contacts and of constraints."""
 
-    Attributes:
-        depth: greatest of any pair, metres.
-        rows: (k, nv) rates of what must not become negative.
-        room: (k,) how much that is, metres and radians.
-        box: (2, nv) displacements that bounds allow.
-    """
-
-    depth: float
-    rows: Array
-    room: Array
-    box: Array
+    depth: float  # greatest of any pair, metres
+    rows: Array  # (k, nv) rates of what must not become negative
+    room: Array  # (k,) how much that is, metres and radians
+    box: Array  # (2, nv) displacements that bounds allow
 
 
 def projection_rows(at: PackedLinearisation, rows: Array, room: Array) -> ProjectionRows:

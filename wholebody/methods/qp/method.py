@@ -35,9 +35,9 @@ class QP(Checked):
     Attributes:
         solver: "osqp", "active_set" (our own), "daqp" or any name that qpsolvers lists on this machine; see `wholebody
             doctor`.
-        hot_start: whether programs after the first of a solve begin with the active set of the one before, corrected,
-            and the solver is asked only where that does not settle. Otherwise every program is the solver's. The
-            answers are the same to rounding; `Solution.programs` says how many programs each closed.
+        hot_start: whether programs begin with the active set of the one before, corrected, and the solver is asked only
+            where that does not settle. Otherwise every program is the solver's. The answers are the same to rounding;
+            `Solution.programs` says how many programs each closed.
         tolerance: metres and radians to which goals and constraints are met.
         iterations: most programs for one descent.
         budget: most programs that restarts may add when no descent from the start reaches the goals; a program takes
@@ -78,8 +78,7 @@ class QP(Checked):
     def name(self) -> str:
         """Name for tables: "qp" as it comes; else what stands behind the slash is asked for every program.
 
-        "qp/active_set" begins with the active set of the program before. "+hot_start" says that so do others, and that
-        their solver is asked for the first program and where that set does not settle.
+        "qp/active_set" and "+hot_start" begin with the last active set, and ask their solver where it does not settle.
         """
         if self.hot_start:
             return {"osqp": "qp", "active_set": "qp/active_set"}.get(self.solver, f"qp/{self.solver}+hot_start")

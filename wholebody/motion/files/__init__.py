@@ -58,7 +58,7 @@ def read_frames(path: str | os.PathLike[str], figure: Figure) -> Frames:
 def _ending(path: Path, known: Collection[str], done: str, others: Collection[str] = ()) -> str:
     """The ending of a file's name, one of some; the error names `others` too, which `wb.read_clip` takes before."""
     ending = path.suffix.lower()
-    if ending == ".fbx":
+    if ending == ".fbx" and done == "read":
         raise FileFormatError(f"{one_line(path.name)}: {FBX}")
     if ending not in known:
         raise FileFormatError(
