@@ -163,9 +163,10 @@ def _answers(problem: Problem, rng: np.random.Generator) -> Iterator[_End]:
 def _drawn(problem: Problem, near: Array, spread: float, rng: np.random.Generator) -> Array:
     """A posture (nq,) that is a share of the way from another one to a random one; the root stays within metres."""
     figure, (drawn,) = problem.scene.figure, random_postures(problem.scene.model, 1, int(rng.integers(2**31)))
-    if figure.root == "free":
-        drawn[:7] = near[:7]
-        drawn[:3] += rng.uniform(-ROOM, ROOM, 3)
+    for root in figure.roots.values():
+        first = int(figure.model.joints[root].idx_q)
+        drawn[first : first + 7] = near[first : first + 7]
+        drawn[first : first + 3] += rng.uniform(-ROOM, ROOM, 3)
     return np.asarray(pin.interpolate(figure.model, near, drawn, spread))
 
 

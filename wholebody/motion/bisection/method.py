@@ -115,7 +115,7 @@ class Bisection:
         """What is frozen, and what else where a frame cannot be freed so."""
         if self.frozen is not None:
             return (self.frozen,)
-        return (("root",), ()) if figure.root == "free" else ((),)
+        return (tuple(figure.roots), ()) if figure.roots else ((),)
 
     def _points(self, figure: Figure, original: Array, frozen: tuple[str, ...]) -> tuple[int, ...]:
         """The evaluation points of a clip."""

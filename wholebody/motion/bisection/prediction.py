@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Mask
 from wholebody.figures.figure import Figure
-from wholebody.figures.state import State
+from wholebody.figures.state import State, root_freedoms
 from wholebody.methods.base import Method
 from wholebody.motion.avoider import Run
 from wholebody.motion.faults import DEPTH, depth
@@ -50,8 +50,7 @@ class RootEffort(DistanceMeasure):
 
     def resolve(self, scene: Surroundings, start: Array) -> RootEffort:
         """Store the start."""
-        weights = np.zeros(scene.model.nv)
-        weights[:6] = ROOT_WEIGHT
+        weights = np.where(root_freedoms(scene.model), ROOT_WEIGHT, 0.0)
         return filled(self, distance=SquaredDistance.build(start, weights))
 
 
@@ -70,10 +69,9 @@ class Predictor:
         self.run, self._method, self._room = run, method, room
         figure = run.scene.figure
         freezes = [term for term in run.terms.given if isinstance(term, Freeze)]
-        moves = figure.root == "free" and all("root" not in figure.joint_names(term.joints) for term in freezes)
-        self._weights = np.array(figure.effort_weights)
-        if figure.root == "free":
-            self._weights[:6] = ROOT_WEIGHT
+        frozen = {name for term in freezes for name in figure.joint_names(term.joints)}
+        moves = not set(figure.roots) <= frozen
+        self._weights = np.where(root_freedoms(figure.model), ROOT_WEIGHT, figure.effort_weights)
         self._measures = (Effort(), RootEffort()) if moves else (Effort(),)
 
     def predict(
