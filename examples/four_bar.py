@@ -6,12 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from presenting import DARK, LIGHT, OAK, STEEL, command_line
+from presenting import DARK, OAK, STEEL, command_line
 
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.bench import plot_style as style
-from wholebody.view.parts import Part, Parts
 
 GROUND, CRANK, COUPLER, ROCKER = 0.40, 0.12, 0.36, 0.28  # m: a crank-rocker, for 0.12 + 0.40 < 0.36 + 0.28
 TRACER = np.array((0.18, 0.0, 0.16))  # m: the point of the coupler whose curve is drawn
@@ -81,27 +80,21 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> list[dict[str, 
     return places
 
 
-def shapes() -> Parts:
-    """Shapes of the bars; "post" represents the ground."""
-    upright = (0.0, 0.5**0.5, 0.0, 0.5**0.5)  # the capsule's z along the bar's x
+def drawn() -> wb.Assembly:
+    """The bars as they are drawn: bodies of the same names without joints, and two posts that represent the ground."""
 
-    def rod(length: float, color: tuple[float, float, float, float], y: float) -> Part:
-        return Part(wb.Capsule(radius=0.012, length=length), (0.5 * length, y, 0.0, *upright), color)
+    def rod(end: Array, y: float, radius: float) -> tuple[wb.Shape, pin.SE3]:
+        turn = 0.5 * np.pi - np.arctan2(end[2], end[0])  # the capsule's z along the bar
+        middle = pin.SE3(pin.rpy.rpyToMatrix(0.0, turn, 0.0), 0.5 * end + (0.0, y, 0.0))
+        return wb.Capsule(radius, float(np.linalg.norm(end))), middle
 
-    long = float(np.linalg.norm(TRACER))
-    slope = 0.5 * (0.5 * np.pi - np.arctan2(TRACER[2], TRACER[0]))
-    arm = Part(wb.Capsule(radius=0.007, length=long), (*(0.5 * TRACER), 0.0, np.sin(slope), 0.0, np.cos(slope)), STEEL)
-    return Parts(
-        {
-            "crank": [rod(CRANK, DARK, -0.03)],
-            "coupler": [rod(COUPLER, STEEL, 0.0), arm, Part(wb.Sphere(0.014), tuple(TRACER), LIGHT)],
-            "rocker": [rod(ROCKER, OAK, -0.03)],
-            "ground": [
-                Part(wb.Box((0.06, 0.1, 0.03)), (0.0, 0.0, -0.03), DARK),
-                Part(wb.Box((0.06, 0.1, 0.03)), (GROUND, 0.0, -0.03), DARK),
-            ],
-        }
-    )
+    x = np.array((1.0, 0.0, 0.0))
+    coupler = [rod(COUPLER * x, 0.0, 0.012), rod(TRACER, 0.0, 0.007), (wb.Sphere(0.014), TRACER)]
+    made = wb.Assembly().body("crank", shape=[rod(CRANK * x, -0.03, 0.012)], color=DARK)
+    made.body("coupler", shape=coupler, color=STEEL).body("rocker", shape=[rod(ROCKER * x, -0.03, 0.012)], color=OAK)
+    for name, at in (("left post", 0.0), ("right post", GROUND)):
+        made.add(wb.Box((0.06, 0.1, 0.03)), name=name, at=(at, 0.0, -0.03), color=DARK)
+    return made
 
 
 def draw(
@@ -109,10 +102,11 @@ def draw(
 ) -> None:  # fmt: skip
     """Write four_bar.html, which plays the turn, and four_bar.png: the coupler's curve and the rocker's angle."""
     out.mkdir(parents=True, exist_ok=True)
-    parts = shapes()
-    with wb.Viewer(parts, title="four_bar") as viewer:
+    shown = drawn()
+    with wb.Viewer(shown, contact_distance=-1.0, title="four_bar") as viewer:  # no contacts: bars overlap at joints
         viewer.look(eye=(0.2, -1.2, 0.35), target=(0.18, 0.0, 0.12))
-        viewer.play([parts.posture(place | {"ground": pin.SE3.Identity()}) for place in places], dt=1 / 30)
+        postures = [np.concatenate([pin.SE3ToXYZQUAT(place[name]) for name in shown.bodies]) for place in places]
+        viewer.play(postures, dt=1 / 30)
         print(f"  {viewer.save(out / 'four_bar.html')}")
     try:
         chart, ((left, right),) = style.figure(1, 2, (9.6, 4.2))

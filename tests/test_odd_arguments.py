@@ -27,8 +27,8 @@ from wholebody.figures.state import State
 from wholebody.geometry.shapes import Compound
 from wholebody.motion import measures
 from wholebody.motion.sphere_filling import Spheres, fill_with_spheres
+from wholebody.planning.solutions import Solutions
 from wholebody.view import Viewer
-from wholebody.view.parts import Part, Parts
 from wholebody.view.timeline import timeline
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -48,40 +48,31 @@ ODD: dict[str, Any] = {
     "True": True,
     "zero": 0,
     "minus one": -1,
-    "a half": 0.5,
     "nan": math.nan,
     "inf": math.inf,
     "beyond int64": 2**63,
     "beyond float": 10**400,
     "beyond printing": 10**5000,
-    "smallest float": 5e-324,
     "complex": 1j,
     "text": "x",
-    "empty text": "",
     "null in text": "a\0b",
     "surrogate": "\ud800",
     "long text": "x" * 5000,
-    "markup": "[/red]{0}%s",
     "list": [],
     "dict": {},
-    "list of None": [None],
     "list in itself": CIRCLE,
     "ragged": [[1.0, 2.0], [3.0]],
     "dict of text": {"x": "y"},
-    "dict of None": {"x": None},
     "object": object(),
     "unshowable": Unshowable(),
     "function": lambda *_: None,
     "iterator": iter(()),
     "three numbers": (1.0, 2.0, 3.0),
-    "three huge": (1e300, -1e300, 1e300),
     "array 0-d": np.array(1.0),
     "array empty": np.zeros((0, 3)),
     "array 3-d": np.zeros((2, 2, 2)),
     "array of nan": np.full((4, 4), math.nan),
     "array of text": np.array(["a", "b"]),
-    "array of objects": np.array([object()]),
-    "numpy nan": np.float64("nan"),
     "SE3 of nan": pin.SE3(np.eye(3), np.full(3, math.nan)),
     "namespace": SimpleNamespace(q=None, dt=None, model=None),
 }
@@ -169,16 +160,6 @@ def solvable(path: Path, term: Any) -> None:
     wb.solve(problem(path, **{key: [term]}), wb.QP(budget=0, restarts=0))
 
 
-def falling(path: Path, body: wb.Body) -> wb.Scene:
-    """A scene with a ball that moves by itself, far from everything."""
-    made = wb.Scene(figure(path))
-    return made.add(wb.Sphere(0.1), name="faller", at=(9.0, 0.0, 0.0), body=body)
-
-
-def fall(path: Path, body: wb.Body) -> None:
-    RigidBodies(falling(path, body)).advance(0.001)
-
-
 class Level(wb.methods.AssemblyConstraint):
     """A body at the height of another."""
 
@@ -239,6 +220,15 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Figure.joint_values", Call(arm.joint_values, {"q": q})
     yield "Figure.placement", Call(arm.placement, {"q": q, "name": "link1"})
     yield "Figure.posture", Call(arm.posture, {"name": arm.postures[0]})
+    off = (1.0, 0.0, 0.0)
+    both = wb.Scene({"one": arm, "two": (arm, off)}).figure
+    mounted = {"other": arm, "on": "link4", "name": "it", "at": off}
+    yield "Figure.mounted", Call(arm.mounted, mounted, lambda made: made.neutral)
+    yield "Figure.part", Call(both.part, {"name": "one", "q": both.neutral})
+    yield "Figure.posture(several)", Call(lambda posture: both.posture({"one": posture}), {"posture": q})
+    added = {"figure": arm, "name": "two", "at": off, "root": None}
+    yield "Scene.add_figure", Call(lambda **given: wb.Scene({"one": arm}).add_figure(**given), added, repr)
+    yield "Scene(several)", Call(lambda figure: wb.Scene({"one": figure}), {"figure": (arm, off)}, repr)
     yield "Figure.reduced", Call(arm.reduced, {"joints": ["joint1"], "posture": q})
     yield "Figure.tangent_bounds", Call(arm.tangent_bounds, {"q": q})
     yield "Figure.with_joints", Call(arm.with_joints, {"q": q, "values": {"joint1": 0.1}}, arm.clamp)
@@ -309,19 +299,9 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
 
     yield "Box", Call(wb.Box, {"size": (1.0, 1.0, 1.0)}, put)
     yield "Sphere", Call(wb.Sphere, {"radius": 1.0}, put)
-    falls = {"density": 700.0, "material": "metal", "velocity": (0.1, 0.0, 0.0), "angular_velocity": (0.0, 1.0, 0.0)}
-    yield "Body", Call(wb.Body, falls, lambda made: fall(path, made))
-    yield "Body(mass)", Call(wb.Body, {"mass": 1.0}, lambda made: fall(path, made))
-    against = {"name": "rubber", "against": {"wood": (0.8, 0.9)}, "others": (0.5, 0.5)}
-    yield "Material", Call(wb.dynamics.Material, against, lambda made: fall(path, wb.Body(material=made)))
     moved = {**thing, "body": wb.Body()}
     yield "Scene.add(body)", Call(lambda **given: scene(path).add(**given), moved)
     yield "Scene.add(material)", Call(lambda **given: scene(path).add(**given), {**thing, "material": "metal"})
-    yield "RigidBodies", Call(RigidBodies, {"scene": falling(path, wb.Body()), "gravity": (0.0, 0.0, -9.81)})
-    engine = RigidBodies(falling(path, wb.Body()))
-    yield "RigidBodies.advance", Call(engine.advance, {"dt": 0.01, "kinematic": {}})
-    yield "RigidBodies.placement", Call(engine.placement, {"name": "faller"})
-    yield "RigidBodies.twist", Call(engine.twist, {"name": "faller"})
     yield "Capsule", Call(wb.Capsule, {"radius": 1.0, "length": 1.0}, put)
     yield "Ellipsoid", Call(wb.Ellipsoid, {"semi_axes": (1.0, 1.0, 1.0)}, put)
     yield "HalfSpace", Call(wb.HalfSpace, {"normal": (0.0, 0.0, 1.0), "offset": 0.0}, put)
@@ -557,14 +537,6 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Viewer.color", Call(viewer.color, {"segments": {"link1": (1.0, 0.0, 0.0)}}, lambda _: viewer.show(q))
     yield "Viewer.look", Call(viewer.look, {"eye": at, "target": (0.0, 0.0, 0.0)}, lambda _: viewer.show(q))
     yield "Viewer.save", Call(viewer.save, {"path": path / "x.html"})
-    yield "Parts", Call(Parts, {"parts": {"one": [Part(wb.Sphere(0.1))]}}, Viewer)
-    yield "Parts(part)", Call(lambda part: Parts({"one": [part]}), {"part": Part(wb.Sphere(0.1))}, Viewer)
-    part = {"shape": wb.Sphere(0.1), "at": at, "color": (1.0, 0.0, 0.0, 1.0)}
-    yield "Part", Call(Part, part, lambda made: shown(Parts({"one": [made]})))
-    one = Parts({"one": [Part(wb.Sphere(0.1))]})
-    yield "Parts.posture", Call(one.posture, {"placements": {"one": at}})
-    yield "Parts.posture(at)", Call(lambda at: one.posture({"one": at}), {"at": at})
-    yield "Parts.contacts", Call(one.contacts, {"q": one.posture({"one": at}), "within": 0.1})
 
     followed = {
         "scene": there,
@@ -606,6 +578,8 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Clip.at", Call(clip.at, {"t": 0.05})
     yield "Clip.resampled", Call(clip.resampled, {"dt": 0.05})
     yield "Clip.joined", Call(clip.joined, {"other": clip})
+    pair_of = wb.Scene({"one": arm, "two": arm}).figure
+    yield "Clip.part", Call(wb.Clip(pair_of, [pair_of.neutral], 0.1).part, {"name": "two"})
     yield "Clip.with_q", Call(clip.with_q, {"q": [q], "name": "other"})
     yield "Clip.from_track", Call(wb.Clip.from_track, {"track": track, "figure": arm})
     yield "Clip.write", Call(clip.write, {"path": path / "clip.npz"})
@@ -645,7 +619,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         "figure": {"left_wrist": "link4", "left_elbow": "link2"},
     }
     yield "retarget", Call(wb.retarget, {"motion": skeleton, "figure": arm, "names": bones, "progress": print})
-    errors = {"motion": skeleton, "clip": wb.retarget(skeleton, arm, bones), "names": bones}
+    errors = {"motion": skeleton, "clip": wb.retarget(skeleton, arm, names=bones), "names": bones}
     yield "bone_errors", Call(wb.motion.bone_errors, errors)
     yield "read_clip", Call(wb.read_clip, {"path": path / "walk.npz", "figure": arm})
     checked = {"clip": clip, "scene": wb.Scene(arm), "depth": 1e-3, "progress": lambda done: None}
@@ -665,6 +639,11 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     at_once: dict[str, Any] = {"method": "qp", "jobs": 1, "seconds": 9.0, "warm_start": True}
     at_once |= {"folder": path / "records", "progress": lambda told: True}
     yield "solve_many", Call(wb.solve_many, {"problems": [], **at_once})
+    several = {"most": 2, "apart": 0.2, "method": wb.QP(), "starts": 2, "seed": 0, "time_limit": 1.0}
+    yield "solutions", Call(wb.solutions, {"problem": ask, **several}, str)
+    listed = {"answers": (), "found": 0, "descents": 0, "starts": 0, "complete": False}
+    yield "Solutions", Call(Solutions, listed)
+    yield "QP.minima", Call(wb.QP().minima, {"problem": ask, "starts": [ask.start]}, list)
     varied = {"task": path / "task.toml", "layouts": {"as it is": {}}}
     yield "study", Call(partial(wb.study, progress=lambda told: True), varied)
     anything = {"people": [arm], "targets": [places[0]], "layouts": [None], **at_once}
@@ -686,8 +665,10 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Records.rows", Call(kept.rows, {})
     yield "Records.chart", Call(kept.chart, {"path": path / "records.png"})
     yield "Records.to_csv", Call(kept.to_csv, {"path": path / "records.csv"})
-    yield "people", Call(wb.people, {"count": 2, "sexes": ["male"]})
-    counted = {"task": path / "person.toml", "sees": (1.0, 0.0, 1.0), "count": 1, "sexes": ["male"]}
+    yield "people", Call(wb.people, {"count": 2, "sex": "male", "seed": 1})
+    yield "people of percentiles", Call(wb.people, {"percentiles": [5, 95]})
+    yield "boundary", Call(wb.boundary, {"confidence": 0.9, "dimensions": ["stature"], "sex": "male"})
+    counted = {"task": path / "person.toml", "sees": (1.0, 0.0, 1.0), "people": wb.people(1, "male")}
     yield "accommodation", Call(partial(wb.accommodation, jobs=1, progress=lambda told: True), counted)
     upright, work = person.figure.neutral, wb.ergonomics.Work(load=5.0)
     posed = {"figure": person.figure, "q": upright, "work": work}
@@ -789,11 +770,6 @@ def human() -> wb.Figure:
     return wb.load("human")
 
 
-def shown(parts: Parts) -> None:
-    with Viewer(parts) as viewer:
-        viewer.show(np.array(pin.neutral(parts.model)))
-
-
 def public() -> Iterator[tuple[str, Any]]:
     """Names and objects of the reference page, of `wholebody.__all__` and of `wholebody.tracking.__all__`."""
     for entry in re.findall(r"^::: ([\w.]+)$", (ROOT / "docs" / "reference.md").read_text(), re.MULTILINE):
@@ -824,17 +800,13 @@ def surface() -> list[str]:
 
 ANSWERS = (
     "SceneObject", "Contacts", "ObjectPenetration", "FirstContact", "Piece", "Solution", "TraceEntry", "Assessment",
-    "Task", "Step", "QPStep", "Simplified", "LeftOut",
-    "Recording", "Judgement", "Dragged", "DragJudgement", "InteractionScene", "Wrench", "Recording.of",
-    "Scene.of_parts", "ClipCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding", "Deviation",
-    "Torques", "SphereFilling", "AssemblySolution", "AssemblyStep",
-    "SolveRecord", "SolveRecord.of", "SolveRecord.row", "SolveRecord.as_json", "SolveRecord.from_json", "SolveProgress",
-    "Records.to_parquet", "ReachMap", "Accommodation", "Ergonomics", "BodyAngles", "Rula", "Reba", "StaticTorques",
-    "Sight", "Result", "Contacts.joined",
-    "Scene.of_parts", "ClipCheck", "DerivativeCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding",
-    "Deviation",
-    "Torques", "SphereFilling",
-    "Torques", "SphereFilling", "AvoidedCase", "BatchProgress", "WorldFrame", "Overlap", "EngineFrame", "Event",
+    "Task", "Step", "QPStep", "Simplified", "LeftOut", "Recording", "Judgement", "Dragged", "DragJudgement",
+    "InteractionScene", "Wrench", "Recording.of", "Scene.of_parts", "ClipCheck", "Beyond", "Avoided",
+    "AvoidanceReport", "Contact", "Sliding", "Deviation", "Torques", "SphereFilling", "AssemblySolution",
+    "AssemblyStep", "SolveRecord", "SolveRecord.of", "SolveRecord.row", "SolveRecord.as_json",
+    "SolveRecord.from_json", "SolveProgress", "Records.to_parquet", "ReachMap", "Accommodation", "Ergonomics",
+    "BodyAngles", "Rula", "Reba", "StaticTorques", "Sight", "Result", "Contacts.joined", "DerivativeCheck",
+    "AvoidedCase", "BatchProgress", "WorldFrame", "Overlap", "EngineFrame", "Event",
 )  # fmt: skip
 """What calls return: nobody builds it, so its constructor is not fed."""
 

@@ -10,7 +10,7 @@ The public names are loaded when they are first used, so that ``import wholebody
     solution = wb.solve(problem, method="qp")
 
 What fewer programs need stands in `wb.dynamics`, `wb.ergonomics`, `wb.figures`, `wb.methods`, `wb.motion`,
-`wb.studies` and `wb.taskfile`.
+`wb.planning`, `wb.studies` and `wb.taskfile`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from wholebody.base.errors import (  # noqa: E402
 from wholebody.version import __version__  # noqa: E402
 
 if TYPE_CHECKING:
-    from wholebody import dynamics, ergonomics, figures, methods, motion, studies, taskfile
+    from wholebody import dynamics, ergonomics, figures, methods, motion, planning, studies, taskfile
     from wholebody.assessment.posture import Assessment, assess
     from wholebody.dynamics.world import World
     from wholebody.figures import Figure, load
@@ -48,13 +48,15 @@ if TYPE_CHECKING:
     from wholebody.motion.clip import Clip
     from wholebody.motion.reading import read_clip
     from wholebody.motion.retargeting import retarget
+    from wholebody.planning import plan, solutions
     from wholebody.problem import Problem
     from wholebody.scene.matter.body import Body
     from wholebody.scene.mjcf_scene import read_scene
     from wholebody.scene.scene import Scene
     from wholebody.solution import Solution
-    from wholebody.studies.accommodation import accommodation, people
+    from wholebody.studies.accommodation import accommodation
     from wholebody.studies.many import solve_many
+    from wholebody.studies.populations import boundary, people
     from wholebody.studies.reach_map import reach_map
     from wholebody.studies.study import study
     from wholebody.taskfile import read_task, write_task
@@ -158,6 +160,7 @@ __all__ = [
     "accommodation",
     "assess",
     "avoid",
+    "boundary",
     "check",
     "check_derivatives",
     "dynamics",
@@ -168,12 +171,15 @@ __all__ = [
     "methods",
     "motion",
     "people",
+    "plan",
+    "planning",
     "reach_map",
     "read_clip",
     "read_scene",
     "read_task",
     "retarget",
     "simplify",
+    "solutions",
     "solve",
     "solve_many",
     "studies",
@@ -182,7 +188,7 @@ __all__ = [
     "write_task",
 ]
 
-_ROOMS = ("dynamics", "ergonomics", "figures", "methods", "motion", "studies", "taskfile")
+_ROOMS = ("dynamics", "ergonomics", "figures", "methods", "motion", "planning", "studies", "taskfile")
 _MODULES = {
     "wholebody.assessment.posture": "Assessment assess",
     "wholebody.dynamics.world": "World",
@@ -199,12 +205,14 @@ _MODULES = {
     "wholebody.motion.clip": "Clip",
     "wholebody.motion.reading": "read_clip",
     "wholebody.motion.retargeting": "retarget",
+    "wholebody.planning": "plan solutions",
     "wholebody.problem": "Problem",
     "wholebody.scene.matter.body": "Body",
     "wholebody.scene.mjcf_scene": "read_scene",
     "wholebody.scene.scene": "Scene",
     "wholebody.solution": "Solution",
-    "wholebody.studies.accommodation": "accommodation people",
+    "wholebody.studies.accommodation": "accommodation",
+    "wholebody.studies.populations": "boundary people",
     "wholebody.studies.many": "solve_many",
     "wholebody.studies.reach_map": "reach_map",
     "wholebody.studies.study": "study",

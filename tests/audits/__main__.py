@@ -93,7 +93,7 @@ def qp(arguments: argparse.Namespace) -> None:
 @measuring(
     "human",
     "compare the person with people: sizes, ranges, self-contacts, everyday tasks",
-    "Measure the dimensions, circumferences and ranges of motion of the person beside those of people, "
+    "Measure the dimensions and ranges of motion of the person beside those of people, "
     "bring parts of the body together, and solve thirteen everyday tasks. With --update-docs the page becomes "
     "docs/human.md, with a picture of each contact and task.",
 )
@@ -285,7 +285,26 @@ def pen(arguments: argparse.Namespace) -> None:
     publish("pen", text, arguments, facts=facts, tables={"pen": [row]})
 
 
-COMMANDS = (newton, qp, human, regress, loads, clip_constants, detail, ablation, robots, pen)
+@measuring(
+    "plans",
+    "planned motions by set, beside RRT-Connect of OMPL where it is installed",
+    "Plan the motions from the starts to the goals of problem sets with several seeds.",
+    listed("--sets", "problem sets (default: arms_among_things, clutter, passage)"),
+    count("--cases", 12, "problems a set"),
+    count("--seeds", 3, "plans of each"),
+)
+def plans(arguments: argparse.Namespace) -> None:
+    """Measure plans."""
+    from tests.audits.plans import rows
+
+    sets = arguments.sets or ("arms_among_things", "clutter", "passage")
+    cases, seeds = (1, 1) if arguments.quick else (arguments.cases, arguments.seeds)
+    facts, found = machine(), rows(sets, cases, seeds)
+    text = report("Motions from starts to goals; lengths by the shortest of each problem.", {"": found}, facts)
+    publish("plans", text, arguments, facts=facts, tables={"plans": found})
+
+
+COMMANDS = (newton, qp, human, regress, loads, clip_constants, detail, ablation, robots, pen, plans)
 
 
 def main(words: Sequence[str] | None = None) -> int:

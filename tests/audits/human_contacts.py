@@ -13,6 +13,7 @@ import pinocchio as pin
 from tests.audits.human_tasks import add_seat, draw
 from wholebody.base.arrays import Array
 from wholebody.bench.suite.problem_sets.things import coal_distance
+from wholebody.figures.human.capsules import SPREAD
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
@@ -180,7 +181,9 @@ def _placed(figure: Figure, q: Array) -> list[tuple[Any, Any]]:
 
 
 def _of(pieces: Sequence[tuple[Any, Any]], segments: Collection[str]) -> list[tuple[Any, Any]]:
-    return [(piece, place) for piece, place in pieces if piece.name.partition(":")[0] in segments]
+    """The pieces of segments, but for the flesh that meets things only."""
+    own = [(piece, place) for piece, place in pieces if piece.name.partition(":")[0] in segments]
+    return [(piece, place) for piece, place in own if not piece.name.endswith(f"_thigh:{SPREAD}")]
 
 
 def _origin(figure: Figure, segment: str) -> Array:

@@ -1,21 +1,17 @@
-"""The person's dimensions, circumferences and ranges of motion beside those of people."""
+"""The person's dimensions and ranges of motion beside those of people."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
-from scipy.spatial import ConvexHull
 
-from wholebody.base.arrays import Array
-from wholebody.figures.anthropometry import Person, design_cases
-from wholebody.figures.human.spec import human_spec
-from wholebody.figures.measuring import ansur, measure
-from wholebody.figures.surface.fields import Field, union
-from wholebody.figures.surface.profile import piece_field
+from wholebody.figures.measuring import measure
+from wholebody.figures.population import population
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
@@ -23,17 +19,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class DimensionRow:
-    """One dimension of one design case, metres."""
+    """One dimension of one sex, metres.
+
+    Attributes:
+        name: of the dimension.
+        sex: "male" or "female".
+        percentiles: (3,) 5th, 50th and 95th of the people.
+        residual: of the bodies of nine builds, 5th, 50th and 95th percentile of stature and of mass, the one that
+            differs most from what is likely for the build.
+    """
 
     name: str
-    case: str
-    model: float
-    ansur: float
-
-    @property
-    def residual(self) -> float:
-        """Model less ANSUR, metres."""
-        return self.model - self.ansur
+    sex: str
+    percentiles: tuple[float, ...]
+    residual: float
 
 
 @dataclass(frozen=True)
@@ -53,71 +52,27 @@ class RangeRow:
     source: str
 
 
-def dimensions(cases: Sequence[str]) -> list[DimensionRow]:
-    """Measure the fifteen dimensions of design cases, such as "M50"."""
+PERCENTILES = (5, 50, 95)
+
+
+def dimensions(sexes: Sequence[str], percentiles: Sequence[int] = PERCENTILES) -> list[DimensionRow]:
+    """Measure the bodies of builds: all pairs of percentiles of stature and of mass."""
     from wholebody.figures import load
 
     rows = []
-    for case in cases:
-        person = design_cases()[case]
-        figure = load("human", sex=person.sex, stature=person.stature, mass=person.mass)
-        people = ansur(person.sex, int(case[1:]))
-        rows += [DimensionRow(name, case, value, people[name]) for name, value in measure(figure).items()]
+    for sex in sexes:
+        people = population(sex)
+        off: dict[str, float] = {}
+        for stature, mass in product(percentiles, repeat=2):
+            size = {"stature": people.quantile("stature", 0.01 * stature), "mass": people.quantile("mass", 0.01 * mass)}
+            found, wanted = measure(load("human", sex=sex, **size)), people.likely(size)
+            for name, value in found.items():
+                off[name] = max(off.get(name, 0.0), value - wanted[name], key=abs)
+        rows += [
+            DimensionRow(name, sex, tuple(people.quantile(name, 0.01 * share) for share in PERCENTILES), far)
+            for name, far in off.items()
+        ]
     return rows
-
-
-GIRTHS = {
-    "neck": ("neck", "neck", "least"),
-    "upper arm, flexed": ("left_upper_arm", "upper_arm", "most"),
-    "forearm, flexed": ("left_forearm", "forearm", "most"),
-    "wrist": ("left_forearm", "wrist", "least"),
-    "thigh": ("left_thigh", "thigh", "most"),
-    "lower thigh": ("left_thigh", "thigh_low", "least"),
-    "calf": ("left_shank", "calf", "most"),
-    "ankle": ("left_shank", "ankle", "least"),
-}
-"""Circumference to segment, row of ANSUR's radii, and whether it is the segment's greatest or least."""
-
-AROUND = np.linspace(0.0, 2.0 * np.pi, 73)[:-1]
-
-
-def circumferences(cases: Sequence[str]) -> list[DimensionRow]:
-    """Measure circumferences as a tape does, around the pieces; ANSUR's are its fit at the case's stature and mass."""
-    rows = []
-    for case in cases:
-        person = design_cases()[case]
-        for name, (segment, part, which) in GIRTHS.items():
-            girths = _girths(person, segment)
-            model = max(girths) if which == "most" else min(girths)
-            rows.append(DimensionRow(name, case, model, 2.0 * np.pi * person.radius(part)))
-    return rows
-
-
-def _girths(person: Person, segment: str) -> list[float]:
-    """Circumferences of a segment's pieces, metres, at levels along its pieces."""
-    solids = [solid for solid in human_spec(person).solids if solid.segment == segment]
-    whole = union([piece_field(solid) for solid in solids])
-    ends = [
-        float(solid.placement.act(np.array([0.0, 0.0, s * float(solid.geometry.halfLength)]))[2])
-        for solid in solids
-        for s in (-1.0, 1.0)
-    ]
-    low, high = min(ends), max(ends)
-    levels = np.linspace(low + 0.05 * (high - low), high - 0.05 * (high - low), 25)
-    middle = np.mean([solid.placement.translation[:2] for solid in solids], axis=0)
-    return [_girth(whole, middle, float(level)) for level in levels]
-
-
-def _girth(field: Field, middle: Array, level: float) -> float:
-    """Perimeter of the hull of a level section."""
-    ways = np.column_stack([np.cos(AROUND), np.sin(AROUND)])
-    near, far = np.zeros(len(ways)), np.full(len(ways), 0.3)
-    for _ in range(24):
-        half = 0.5 * (near + far)
-        inside = field(np.column_stack([middle + half[:, None] * ways, np.full(len(ways), level)])) < 0.0
-        near, far = np.where(inside, half, near), np.where(inside, far, half)
-    hull = ConvexHull(middle + near[:, None] * ways)
-    return float(hull.area)  # of a plane set it is the perimeter
 
 
 AAOS = "AAOS"

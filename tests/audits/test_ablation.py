@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
-
 import pytest
 
 import wholebody as wb
 from tests.audits import ablation
-from tests.audits.__main__ import ablation as command
 from tests.audits.ablation import Constant, report
 from wholebody.bench.rows import Row
 from wholebody.bench.suite.problem_sets.registry import SETS
@@ -88,24 +85,6 @@ def test_what_is_switched_off_is_counted_and_switched_on_again(given, monkeypatc
     text = report("qp", len(given), whole, [row, Row("x.Y", "halved", row.figures)], ["a.kernel"], {})
     assert "changed no answer: x.Y" in text
     assert "a.kernel" in text
-
-
-@pytest.mark.parametrize(("words", "asked"), [((), 1), (("--count", "3"), 3)])
-def test_a_quick_run_has_one_problem_of_every_set_where_no_count_is_given(
-    words: tuple[str, ...], asked: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    class AskedError(Exception):
-        pass
-
-    def problems(count: int, method: str) -> None:
-        raise AskedError(f"{count} of {method}")
-
-    monkeypatch.setattr(ablation, "problems", problems)
-    parser = argparse.ArgumentParser()
-    command.add_to(parser.add_subparsers())
-    arguments = parser.parse_args(["ablation", "--quick", *words])
-    with pytest.raises(AskedError, match=f"^{asked} of qp$"):
-        arguments.run(arguments)
 
 
 def test_every_mechanism_that_is_switched_off_is_there() -> None:

@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
-import pytest
 
 import wholebody as wb
-from tests.audits import __main__ as audits
-from tests.audits import detail
 from tests.audits.detail import LEVELS, detail_summary, levels, of_figure
-from tests.csv_rows import csv_rows
 from wholebody.bench.measure.scaling import TIP, chain, task
 from wholebody.bench.rows import Row
 from wholebody.bench.suite.problem_sets.registry import SETS
@@ -58,17 +52,3 @@ def test_a_person_is_asked_the_same_in_another_detail() -> None:
     for one, other in zip([*made.goals, *made.measures], [*given.goals, *given.measures], strict=True):
         assert type(one) is type(other)
     np.testing.assert_allclose(made.goals[0].error(here), given.goals[0].error(there), atol=1e-9)
-
-
-def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def rows(cases: int, seed: int, say: object) -> list[Row]:
-        say("whole body, spheres: not asked")  # type: ignore[operator]
-        figures = {"status": "solved", "deepest mm": 0.0, "effort above %": 0.0, "a solve ms": 5.0}
-        return [Row("clutter", f"hulls, {level}", {**figures, **SIZES, **ERRORS}) for level in LEVELS]
-
-    monkeypatch.setattr(detail, "detail_rows", rows)
-    (tmp_path / "results.md").write_text("<!-- bench:detail -->\n<!-- /bench:detail -->")
-    words = ["--count", "1", "--out", str(tmp_path / "out"), "--update-docs", str(tmp_path)]
-    assert audits.main(["detail", *words]) == 0
-    assert len(csv_rows(tmp_path / "out" / "detail.csv")) == len(LEVELS)
-    assert "whole body, spheres: not asked" in (tmp_path / "results.md").read_text()

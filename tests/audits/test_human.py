@@ -2,47 +2,16 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
-import numpy as np
 import pytest
 
-from tests.audits.__main__ import main
 from tests.audits.human_contacts import distance
-from tests.audits.human_sizes import _girth, dimensions, ranges
+from tests.audits.human_sizes import dimensions, ranges
 from wholebody.figures import load
-from wholebody.figures.surface.fields import ball, round_cone, union
 
 
-def test_a_small_run_writes_page_and_numbers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    docs = tmp_path / "docs"
-    docs.mkdir()
-    assert main(["human", "--quick", "--out", str(tmp_path / "out"), "--update-docs", str(docs)]) == 0
-    found = json.loads((tmp_path / "out" / "human.json").read_text())
-    assert len(found["dimensions"]) == 15
-    assert [row["status"] for row in found["tasks"]] == ["solved"] * 3
-    assert all(row["plausible"] for row in found["tasks"])
-    reached = {row["contact"] for row in found["contacts"] if row["reached"]}
-    assert reached >= {"palms together", "palm flat on a table", "thighs on the seat"}
-    text = (docs / "human.md").read_text()
-    assert text.startswith("# The person, measured")
-    assert "| sitting height |" in text
-    assert "![" not in text  # a short run draws nothing
-    assert "reach high: solved" in capsys.readouterr().out
-
-
-def test_a_girth_is_that_of_the_hull() -> None:
-    middle = np.zeros(2)
-    assert _girth(ball((0.0, 0.0, 0.0), 0.05), middle, 0.03) == pytest.approx(2.0 * np.pi * 0.04, rel=2e-3)
-    beside = union([round_cone((x, 0.0, -1.0), (x, 0.0, 1.0), 0.02, 0.02) for x in (-0.03, 0.03)])
-    band = 2.0 * np.pi * 0.02 + 2.0 * 0.06  # a tape around two equal rods
-    assert _girth(union([beside, ball((0.0, 0.0, 0.0), 0.011)]), middle, 0.0) == pytest.approx(band, rel=0.03)
-
-
-def test_dimensions_keep_to_what_is_asked() -> None:
-    for row in dimensions(["F50", "M50"]):
-        assert abs(row.residual) < (0.025 if "overhead" in row.name else 0.015), row
+def test_dimensions_keep_to_what_is_likely() -> None:
+    for row in dimensions(["female"]):
+        assert abs(row.residual) < 0.003, row
 
 
 def test_a_straight_leg_ends_before_a_bent_one() -> None:

@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
-import pytest
 
 from tests.audits import newton
-from tests.audits.__main__ import main
-from tests.audits.newton_shapes import median_us
-from wholebody.bench.tables import read_rows
 
 
 def test_the_shapes_are_assembled() -> None:
@@ -37,12 +31,3 @@ def test_a_move_of_a_drag_is_of_the_papers_size() -> None:
 def test_exponents_are_slopes() -> None:
     rows = [newton.LinearRow("ring", n, "kkt", 0, 0, 0, 0, 0.0, 3.0 * n**1.1) for n in (10, 100, 300, 1000)]
     assert np.isclose(newton.exponent(rows, "ring", "kkt"), 1.1)
-
-
-def test_the_command_writes_tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(newton, "median_us", lambda call, repeats: median_us(call, 1))
-    assert main(["newton", "--quick", "--out", str(tmp_path)]) == 0
-    assert "the paper's size" in (tmp_path / "newton.md").read_text()
-    _, rows = read_rows(tmp_path / "newton-linear.csv", newton.LinearRow)
-    assert {row.shape for row in rows} == set(newton.SHAPES)
-    assert all(row.fill > 0 for row in rows)

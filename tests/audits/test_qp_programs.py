@@ -10,13 +10,11 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from tests.audits.__main__ import main
 from tests.audits.qp_programs import files
 from tests.audits.qp_programs.measuring import measure, residuals, summaries
 from tests.audits.qp_programs.recording import Recorded, record
 from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
 from wholebody.base.records import with_values
-from wholebody.bench.tables import read_rows
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.registry import make_solver, solver_names
 
@@ -134,26 +132,3 @@ def test_every_solver_is_given_every_program(recorded: list[Recorded]) -> None:
     daqp = next(total for total in totals if total.solver == "daqp")
     assert daqp.closed == daqp.programs
     assert daqp.own_error < 1e-6
-
-
-def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from tests.audits.qp_programs.measuring import QPRow, QPSummary
-
-    docs = tmp_path / "docs"
-    docs.mkdir()
-    (docs / "results.md").write_text("# Results\n\n<!-- bench:qp -->\n<!-- /bench:qp -->\n")
-    words = ["qp", "--count", "2", "--sets", "robot_arm", "--solvers", "osqp", "daqp"]
-    assert main([*words, "--out", str(tmp_path / "a"), "--update-docs", str(docs)]) == 0
-    facts, rows = read_rows(tmp_path / "a" / "qp-programs.csv", QPRow)
-    assert facts["seed"] == "0"
-    assert len(rows) == 4
-    _, totals = read_rows(tmp_path / "a" / "qp.csv", QPSummary)
-    assert [total.solver for total in totals] == ["osqp", "daqp"]
-    page = (docs / "results.md").read_text()
-    assert "| osqp | " in page
-    assert len(list((tmp_path / "a" / "qp-programs").glob("*.npz"))) == 2
-    again = ["--programs", str(tmp_path / "a" / "qp-programs"), "--out", str(tmp_path / "b")]
-    assert main([*words, *again]) == 0
-    _, kept = read_rows(tmp_path / "b" / "qp-programs.csv", QPRow)
-    assert {row.name for row in kept} == {row.name for row in rows}
-    assert "2 programs of 1 problem sets" in capsys.readouterr().out

@@ -86,7 +86,7 @@ def test_nan_comes_back(tmp_path: Path) -> None:
         ("name,count,value,good\nx,one,1.0,True\n", "row 1"),
         ("", "columns"),
         ("name,count,value,good\nx,1\n", "row 1"),
-        ("name,count,value,good\n" + "x" * 200_000, "no CSV"),
+        ("name,count,value,good\n" + "x" * 200_000, "is not CSV"),
     ],
 )
 def test_files_of_another_kind_are_refused(tmp_path: Path, content: str, said: str) -> None:

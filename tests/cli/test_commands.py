@@ -152,7 +152,7 @@ def require_browser() -> None:
         (["show", "human", "--save", "a.gif"], [".html", ".png"]),
         (["show", "absent.json"], ["absent.json", "no such file"]),
         (["figure", "human", "--stature", "175"], ["175", "between"]),
-        (["figure", "human", "--age", "175"], ["175", "between 20 and 69"]),
+        (["figure", "human", "--age", "175"], ["175", "between 17 and 69"]),
         (["figure", "human", "--proportion", "sitting_height"], ["'sitting_height'", "NAME=METRES"]),
         (["figure", "human", "--proportion", "sitting=0.9"], ["sitting", "sitting_height"]),
         (["figure", "avatar", "--out", "a.urdf"], ["--out", "human"]),
@@ -262,17 +262,18 @@ def test_demo_tasks_can_all_be_read(capsys: pytest.CaptureFixture[str]) -> None:
         assert wb.read_task(path).problem.goals
 
 
-@pytest.mark.parametrize("command", [[], ["pose"], ["show"], ["figure"], ["demo"], ["doctor"]])
-def test_help_is_there_and_light(command: list[str]) -> None:
+def test_help_is_there_and_light() -> None:
+    commands = [[], ["pose"], ["show"], ["figure"], ["demo"], ["doctor"]]
     code = (
         "import sys; from wholebody.cli import main\n"
-        f"try: main({[*command, '--help']!r})\n"
-        "except SystemExit as end: assert end.code == 0\n"
+        f"for command in {commands}:\n"
+        "    try: main([*command, '--help'])\n"
+        "    except SystemExit as end: assert end.code == 0\n"
         "assert 'pinocchio' not in sys.modules and 'rich' not in sys.modules"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert "usage: wholebody" in done.stdout
+    assert done.stdout.count("usage: wholebody") == len(commands)
 
 
 UNUSED = (

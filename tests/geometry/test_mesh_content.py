@@ -35,7 +35,7 @@ def test_a_cut_stl_is_refused(tmp_path: Path) -> None:
     (tmp_path / "ball.stl").write_bytes(whole)
     assert len(wb.Mesh(tmp_path / "ball.stl").faces) == 80
     (tmp_path / "ball.stl").write_bytes(whole[:-70])
-    with pytest.raises(FileFormatError, match="it is cut"):
+    with pytest.raises(FileFormatError, match="it is truncated"):
         wb.Mesh(tmp_path / "ball.stl")
 
 

@@ -48,7 +48,7 @@ def test_the_angle_of_a_turned_bone_is_found(turn: float, human: wb.Figure) -> N
 def test_a_figure_that_cannot_follow_is_told(human: wb.Figure) -> None:
     motion, clip = arm(human, -1.2)  # the elbow does not bend backwards
     with pytest.warns(UserWarning, match=r"retarget: motion: bones differ .*left_elbow to left_wrist by \d+ degrees"):
-        wb.retarget(motion, human, NAMES)
+        wb.retarget(motion, human, names=NAMES)
     with pytest.raises(wb.InputError, match="2 frames and the motion 3"):
         wb.motion.bone_errors(motion, wb.Clip(human, clip.q[:2], 0.02), NAMES)
     with warnings.catch_warnings():

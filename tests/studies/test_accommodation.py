@@ -1,4 +1,4 @@
-"""Accommodation: who reaches a shelf follows from the statures."""
+"""Accommodation: who reaches and fits follows from the dimensions of ANSUR II."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.special import ndtr
 
 import wholebody as wb
+from wholebody.figures.measuring import measure
 
 
 def upright(figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:
@@ -18,24 +18,86 @@ def upright(figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:
     return wb.Problem(scene, goals=goals, constraints=[wb.Freeze("root", *figure.joints)])
 
 
-def test_statures_stand_for_equal_shares() -> None:
-    found = wb.people(4, ["male"])
-    statures = np.array([one["stature"] for one in found.values()])
-    np.testing.assert_allclose(ndtr((statures - 1.7562) / 0.0686), [0.125, 0.375, 0.625, 0.875], atol=1e-6)
-
-
 def test_only_those_of_the_right_height_are_counted() -> None:
-    found = wb.accommodation(upright, count=2, sees=(2.0, 0.0, 1.2))
+    people = wb.people(2)
+    found = wb.accommodation(upright, people, sees=(2.0, 0.0, 1.2))
     assert found.share == 0.0
     assert all(found.fits)
     assert found.sees is not None
     left = [one.goal_error for one in found.records]
-    statures = [one["stature"] for one in wb.people(2).values()]
+    statures = [one["stature"] for one in sorted(people.values(), key=lambda one: (one["sex"], one["stature"]))]
     np.testing.assert_allclose(left, np.abs(np.array(statures) - 1.70), atol=0.02)
+
+
+def upright_under(height: float) -> Any:
+    """Somebody who stands still, and is to fit under a beam."""
+
+    def task(figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:
+        scene = wb.Scene(figure)
+        scene.add(wb.Box((0.5, 0.5, 0.1)), name="beam", at=(0.0, 0.0, height + 0.05))
+        return wb.Problem(scene, constraints=[wb.Freeze("root", *figure.joints)])
+
+    return task
+
+
+def test_those_who_do_not_fit_are_told_by_their_dimension() -> None:
+    found = wb.accommodation(upright_under(1.81), wb.people(50, "male"))
+    # The 80th percentile of stature is 1.814 m.
+    assert found.by_sex["male"].share == pytest.approx(0.79, abs=0.04)
+    assert found.by_sex["male"].low < found.share < found.by_sex["male"].high
+    (one,) = found.exclusions
+    assert (one.sex, one.verdict, one.dimension, one.side) == ("male", "fit", "stature", "over")
+    assert one.value == pytest.approx(1.81, abs=0.01)
+    assert one.told == 1.0
+    assert "men do not fit: stature over 1.8" in repr(found)
+
+
+SITTING = {  # dimension, sex, share of ANSUR II's people at or below a value, metres
+    ("thigh_clearance", "male", 0.185): 0.65, ("thigh_clearance", "female", 0.185): 0.89,
+    ("hip_breadth_sitting", "male", 0.440): 0.97, ("hip_breadth_sitting", "female", 0.440): 0.90,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("sex", ["male", "female"])
+def test_shares_of_built_bodies_are_those_of_people(sex: str) -> None:
+    bodies = [measure(wb.load("human", **one)) for one in wb.people(50, sex).values()]
+    for (name, own, value), share in SITTING.items():
+        if own == sex:
+            assert np.mean([body[name] <= value for body in bodies]) == pytest.approx(share, abs=0.03), name
+
+
+def test_people_are_the_same_for_the_same_seed_and_load_as_drawn() -> None:
+    first, again, other = (wb.people(3, "female", seed=seed) for seed in (4, 4, 5))
+    assert first == again
+    assert first != other
+    for one in first.values():
+        figure = wb.load("human", **one)
+        assert figure.notes == ()
+        assert dict(figure.describe().person.dimensions) == pytest.approx(one["proportions"])
+
+
+def test_percentiles_are_of_the_stature() -> None:
+    found = wb.people(percentiles=[5, 95], sex="male")
+    assert [round(one["stature"], 2) for one in found.values()] == [1.65, 1.87]
+    assert list(found) == ["male P5", "male P95"]
+
+
+def test_boundary_manikins_are_people() -> None:
+    found = wb.boundary(0.9, ["stature", "mass"], "female")
+    assert len(found) == 1 + 4 + 4
+    assert all(wb.load("human", **one).model.nv == 55 for one in found.values())
 
 
 def test_odd_populations_are_refused() -> None:
     with pytest.raises(wb.InputError, match="count"):
         wb.people(0)
     with pytest.raises(wb.InputError, match="sex"):
-        wb.people(3, ["tall"])
+        wb.people(3, "tall")
+    with pytest.raises(wb.InputError, match="leave one out"):
+        wb.people(3, percentiles=[5])
+    with pytest.raises(wb.UnknownNameError, match="sitting_height"):
+        wb.boundary(0.95, ["siting_height"])
+    with pytest.raises(wb.InputError, match="confidence"):
+        wb.boundary(float("nan"))
+    with pytest.raises(wb.InputError, match="people is"):
+        wb.accommodation(upright, ["F5"])  # type: ignore[arg-type]

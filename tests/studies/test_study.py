@@ -160,7 +160,7 @@ def test_a_function_of_the_figure_alone_is_refused() -> None:
     with pytest.raises(wb.InputError, match=r"takes \(figure.*\).*def task\(figure, target, layout\)"):
         wb.study(task, people=["F5"])  # type: ignore[arg-type]
     with pytest.raises(wb.InputError, match="a figure, a target and a layout"):
-        wb.accommodation(task, count=1)  # type: ignore[arg-type]
+        wb.accommodation(task, wb.people(1))  # type: ignore[arg-type]
 
 
 def test_what_was_refused_is_told_with_its_reason() -> None:
@@ -170,7 +170,7 @@ def test_what_was_refused_is_told_with_its_reason() -> None:
     told = repr(wb.study(task, people=["F5"]))
     assert "first refused: F5, Point: no frame is called 'no such frame'" in told
     assert "goal missed most: none" in told
-    told = repr(wb.accommodation(task, count=1))
+    told = repr(wb.accommodation(task, wb.people(1)))
     assert told.startswith("Accommodation of 2 people: 0%")
     assert "first refused: " in told
 

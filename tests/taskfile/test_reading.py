@@ -48,7 +48,7 @@ def test_the_good_file_is_good(write: Callable[[str], Path]) -> None:
         ("clearance = 0.01", "clearance = nan", ["task.toml:1", "key clearance", "nan"]),
         ("radius = 0.01", "radius = true", ["attach 1, key radius", "True is not a number"]),
         ('detail = "spheres"', "stature = 175", ["task.toml:5", "key stature", "write 1.75 if it is in centimetres"]),
-        ('detail = "spheres"', "age = 12", ["task.toml:5", "key age", "20 to 69"]),
+        ('detail = "spheres"', "age = 12", ["task.toml:5", "key age", "17 to 69"]),
         ('detail = "spheres"', "proportions = 0.9", ["task.toml:5", "key proportions", "table of dimensions"]),
         ('detail = "spheres"', "proportions = { siting_height = 0.9 }", ["sitting_height"]),
         ('detail = "spheres"', "mass = 70000", ["key mass", "write 70 if it is in grams"]),
@@ -94,7 +94,7 @@ def test_the_good_file_is_good(write: Callable[[str], Path]) -> None:
         ("[[goal]]", "[[gaol]]", ["no key or table is called 'gaol'", "goal"]),
         # a wrong structure
         ("[[goal]]", "[goal]", ["goal", "write [[goal]]"]),
-        ("[figure]", "[[figure]]", ["figure", "write [figure]"]),
+        ("[figure]", "[[figure]]", ["figure 1", 'write called = "anna"']),
         ('name = "human"\n', "", ["figure", "key name is missing", "human, avatar, hand, urdf"]),
         ('frame = "right_index_tip"\n', "", ["goal 1", "key frame is missing"]),
         ('type = "point"\n', "", ["goal 1", "key type is missing", "point, frame"]),

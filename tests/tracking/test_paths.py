@@ -43,10 +43,10 @@ def test_a_file_of_places(tmp_path: Path) -> None:
         ("0 0 0\n0 0\n", "way.csv, line 2: '0 0' is not a place; give x y z"),
         ("0 0 up\n", "line 1: '0 0 up' is not a place"),
         ("0 0 0\n\n# that\nx y z\n", "line 4: 'x y z' is not a place"),
-        ("0 0 nan\n", "line 1: '0 0 nan' is no place"),
-        ("450 0 900\n", "line 1: '450 0 900' is no place within 100 m; give metres"),
-        ("x y z\n", "there is no place in it"),
-        ("", "there is no place in it"),
+        ("0 0 nan\n", "line 1: '0 0 nan' is not within 100 m"),
+        ("450 0 900\n", "line 1: '450 0 900' is not within 100 m of the origin; give metres"),
+        ("x y z\n", "it holds no places"),
+        ("", "it holds no places"),
     ],
 )
 def test_a_bad_file_is_named_with_its_line(text: str, message: str, tmp_path: Path) -> None:
@@ -58,10 +58,10 @@ def test_a_bad_file_is_named_with_its_line(text: str, message: str, tmp_path: Pa
 
 
 def test_other_mistakes_are_named(tmp_path: Path) -> None:
-    with pytest.raises(wb.FileFormatError, match=r"there is no such file|no UTF-8 text"):
+    with pytest.raises(wb.FileFormatError, match=r"there is no such file|not UTF-8 text"):
         read_path(tmp_path / "none.csv")
     (tmp_path / "binary").write_bytes(bytes(range(256)))
-    with pytest.raises(wb.FileFormatError, match=r"there is no such file|no UTF-8 text"):
+    with pytest.raises(wb.FileFormatError, match=r"there is no such file|not UTF-8 text"):
         read_path(tmp_path / "binary")
     with pytest.raises(wb.InputError, match="radius"):
         circle((0, 0, 0), 0.0)

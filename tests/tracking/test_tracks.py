@@ -106,7 +106,7 @@ def test_files_give_back_what_was_written(hand: wb.Figure, tmp_path: Path) -> No
         ),
         (lambda lines: [line.replace(".", "\0").replace(",", ";").replace("\0", ",") for line in lines], "semicolons"),
         (lambda lines: [*lines[:3], lines[3] + ",1.0", *lines[4:]], "line 4: 27 values for 26 columns"),
-        (lambda lines: [*lines[:2], lines[2].replace("0.5", "x", 1), *lines[3:]], "line 3: 'x' is no number"),
+        (lambda lines: [*lines[:2], lines[2].replace("0.5", "x", 1), *lines[3:]], "line 3: 'x' is not a number"),
         (lambda lines: [*lines[:3], "9" + lines[3], *lines[4:]], "line 4: the time step changes"),
         (lambda lines: lines[:2], "line 2: .*at least two frames"),
         (lambda lines: [*lines[:2], *lines[1:]], "line 3: the time step changes"),
@@ -121,10 +121,10 @@ def test_files_give_back_what_was_written(hand: wb.Figure, tmp_path: Path) -> No
         ),
         (
             lambda lines: [lines[0].replace("right_thumb_ip_flexion", "root_x"), *lines[1:]],
-            "line 1: the column root_x stands there twice",
+            "line 1: the column root_x occurs twice",
         ),
-        (lambda lines: [*lines[:2], "9" * 140_000 + lines[2], *lines[3:]], "line 3: is no CSV .*field larger"),
-        (lambda lines: [*lines[:2], "", "inf" + lines[2], *lines[3:]], "line 4: '?inf.* no number|line 4: the time"),
+        (lambda lines: [*lines[:2], "9" * 140_000 + lines[2], *lines[3:]], "line 3: is not CSV .*field larger"),
+        (lambda lines: [*lines[:2], "", "inf" + lines[2], *lines[3:]], "line 4: '?inf.* not a number|line 4: the time"),
         (
             lambda lines: [*lines[:2], *(f"1e999,{line.partition(',')[2]}" for line in lines[2:])],
             "line 3: the time is inf",

@@ -9,7 +9,6 @@ import pytest
 import wholebody as wb
 from wholebody.dynamics.overlaps import overlaps
 from wholebody.view.composition import Composition
-from wholebody.view.parts import Part, Parts
 from wholebody.view.scene_graph import SceneGraph
 
 ARM = Path(__file__).resolve().parents[2] / "examples" / "tasks" / "arm.urdf"
@@ -43,8 +42,8 @@ def test_a_colour_leaves_the_rest_of_the_picture_as_it_was_asked_for() -> None:
         assert set(viewer._graph.store.nodes) == before
 
 
-def test_parts_without_a_figure_have_no_segments_to_colour() -> None:
-    viewer = wb.Viewer(Parts({"board": [Part(wb.Box((0.8, 0.3, 0.02)))]}))
+def test_an_assembly_without_a_figure_has_no_segments_to_colour() -> None:
+    viewer = wb.Viewer(wb.Assembly().body("board", shape=wb.Box((0.8, 0.3, 0.02))))
     with pytest.raises(wb.InputError, match="no segments to color"):
         viewer.color({"board": BLUE})
 

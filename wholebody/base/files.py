@@ -65,7 +65,7 @@ def read_text(path: str | PathLike[str], kind: str = "file", largest: int = LARG
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
-        raise FileFormatError(f"{kind} {_named(path)}, line {line}: is no UTF-8 text; save it in UTF-8") from None
+        raise FileFormatError(f"{kind} {_named(path)}, line {line}: this is not UTF-8 text; save it in UTF-8") from None
 
 
 def read_foreign_text(path: str | PathLike[str], kind: str = "file", largest: int = LARGEST_TEXT) -> str:
@@ -77,7 +77,7 @@ def read_foreign_text(path: str | PathLike[str], kind: str = "file", largest: in
         return data.decode("utf-8-sig").rstrip("\x1a\0")
     except UnicodeDecodeError:
         if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-            raise FileFormatError(f"{kind} {_named(path)}: its text in UTF-16 is cut; get it whole") from None
+            raise FileFormatError(f"{kind} {_named(path)}: its UTF-16 text is truncated; fetch it again") from None
         return data.decode("latin-1").rstrip("\x1a\0")
 
 
@@ -103,7 +103,7 @@ def parsed_toml(text: str, name: str) -> dict[str, Any]:
         # Largest number of characters of a message of the TOML reader that our message quotes.
         raise FileFormatError(f"{name}: is not TOML: {one_line(str(error), 300)}") from None
     except RecursionError:
-        raise FileFormatError(f"{name}: tables or lists stand in each other too deeply; three are enough") from None
+        raise FileFormatError(f"{name}: tables or lists are nested too deeply; use at most three levels") from None
     except ValueError:  # Python reads no whole number of more than 4300 digits
         line = next((n for n, said in enumerate(text.splitlines(), 1) if _LONG_NUMBER.search(said)), 1)
         raise FileFormatError(f"{name}:{line}: a number has thousands of digits; write fewer") from None
@@ -222,7 +222,7 @@ def check_writable(path: Path) -> Path:
     if not is_folder(path.parent):
         raise _unwritable(path, FileNotFoundError())
     if not os.access(path.parent, os.W_OK | os.X_OK):
-        raise InputError(f"{_named(path)} cannot be written: its folder may not be written to; give another place")
+        raise InputError(f"{_named(path)} cannot be written: its folder is not writable; give another place")
     return path
 
 

@@ -63,7 +63,7 @@ class OneAtATime:
 
     def __enter__(self) -> None:
         if not self._lock.acquire(blocking=False):
-            raise InputError(f"this {self._what} is within another call; make one {self._what} for each thread")
+            raise InputError(f"this {self._what} is in use by another call; make one {self._what} for each thread")
 
     def __exit__(self, *_: object) -> None:
         self._lock.release()

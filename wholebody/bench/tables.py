@@ -114,7 +114,7 @@ def read_rows(path: Path, kind: type[_R]) -> tuple[dict[str, str], list[_R]]:
     try:
         given = list(csv.reader(io.StringIO(rest, newline="")))  # cells may have line breaks
     except csv.Error as error:
-        raise FileFormatError(f"{path}: is no CSV ({error}); measure again") from None
+        raise FileFormatError(f"{path}: is not CSV ({error}); measure again") from None
     types = get_type_hints(kind)
     parts = {field.name: _parts(field.name, types[field.name]) for field in dataclasses.fields(kind)}  # type: ignore[arg-type]
     for name in parts:

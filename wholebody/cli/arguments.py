@@ -64,7 +64,7 @@ def add_person(parser: Any) -> None:
         "--proportion", action="append", dest="proportions", metavar="NAME=M",
         help="a dimension of a person, m, such as sitting_height=0.93; the others follow; repeated",
     )  # fmt: skip
-    parser.add_argument("--age", type=float, metavar="YEARS", help="of a person, 20 to 69, for the ranges of motion")
+    parser.add_argument("--age", type=float, metavar="YEARS", help="of a person, 17 to 69: ranges of motion, size")
     parser.add_argument(
         "--detail", choices=("spheres", "capsules", "hulls"), help="detail of the geometry (default: capsules)"
     )

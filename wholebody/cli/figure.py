@@ -47,13 +47,11 @@ def _write(name: str, options: dict[str, Any], out: Path) -> int:
     from wholebody.base.files import checked_ending
     from wholebody.figures.anthropometry import make_person
     from wholebody.figures.packaged_urdf import write_human
-    from wholebody.figures.proportions import proportioned
 
     if name != "human" or "detail" in options:
         raise InputError("--out writes the person in capsules; write: wholebody figure human --out FILE.urdf")
     checked_ending(out, "--out", "a person", (".urdf",))
-    size = {name: value for name, value in options.items() if name not in ("proportions", "hands")}
-    person = proportioned(make_person(**size), options.get("proportions"))
+    person = make_person(**{name: value for name, value in options.items() if name != "hands"})
     write_human(out, person, options.get("hands", "rigid"))
     print(f"wrote {out}: {person.sex}, {person.stature:.3f} m, {person.mass:.1f} kg")
     return 0

@@ -220,7 +220,7 @@ class World(NotCopyable):
 
     def _check_fresh(self) -> None:
         if self.scene.revision != self._revision:
-            raise InputError("objects came to or left the scene after the world was made; make the world anew")
+            raise InputError("objects of the scene were added or removed; make a new world")
 
 
 def _scene_instead(given: object) -> str:

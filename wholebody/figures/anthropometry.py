@@ -1,9 +1,8 @@
-"""Lengths, masses and radii of a body from sex, stature and mass.
+"""Lengths, masses and radii of a person, from sex, stature, mass and other dimensions.
 
-Masses are fractions (de Leva 1996). Radii are linear fits to ANSUR II, ``c0 + cq sqrt(mass / stature) + cH stature``.
-Lengths of limbs, joint centres and some thicknesses are of the same form; `tests.audits.sizes` chooses their
-coefficients so that the dimensions of the model are those of ANSUR II. The tables in ``figures/data`` name the source
-of every column.
+What is not stated is likely for what is, by the joint distribution of all dimensions (`population`). Joint centres and
+thicknesses follow from the dimensions (`sizes`); masses are fractions (de Leva 1996). The tables in ``figures/data``
+name the source of every column.
 """
 
 from __future__ import annotations
@@ -11,37 +10,36 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache
-from pathlib import Path
-from statistics import NormalDist
+from functools import cache, cached_property, lru_cache
 
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import shown
-from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.base.checks import known, shown
+from wholebody.base.errors import InputError
 from wholebody.base.fields import Range
-from wholebody.base.files import packaged_table
+from wholebody.figures.population import SEXES, UNITS, population
+from wholebody.figures.sizes import TRUNK, Skeleton, arm_sizes, leg_sizes
+from wholebody.figures.tables import named_row, table
 
 STATURE = Range(1.3, 2.2, "m")
-"""The fits come from adults of 1.4 to 2.0 m; beyond this range they are invalid."""
+"""The distribution comes from adults of 1.4 to 2.0 m; beyond this range it is invalid."""
 
 MASS = Range(25.0, 250.0, "kg")
 PERCENTILE = Range(1.0, 99.0, "percent, such as 95")
+DIMENSION = Range(0.0, 3.0, "m")
 
-AGE = Range(20.0, 69.0, "years")
-"""Of the adults whose ranges of motion were measured (table "age_ranges")."""
-
-_SEXES = {"male": "M", "female": "F"}
+AGE = Range(17.0, 69.0, "years")
+"""Of the adults that were measured: 17 to 58 years the dimensions, 20 to 69 the ranges of motion."""
 
 _ENDS = {
     "elbow_flexion": "upper_arm", "wrist_flexion": "forearm", "knee_flexion": "thigh", "ankle_dorsiflexion": "shank",
 }  # fmt: skip
-"""Joints at the ends of segments with a fitted length."""
+"""Joints at the ends of segments whose length is a size."""
 
-FOLDER = Path(__file__).parent / "data"
 
-Row = dict[str, str]
+OVERHEAD = "overhead_reach_sitting"
+"""The dimension that says how far the shoulder rises; one man in seven stretches farther than the model can."""
 
 
 @dataclass(frozen=True)
@@ -52,60 +50,83 @@ class Person:
         sex: "male" or "female".
         stature: metres.
         mass: kilograms.
-        deviations: how much larger fitted sizes (see `fitted`) are than those of most people of this build: name and
-            metres.
-        age: years, for the ranges of motion; None for those of all adults. The size does not depend on it.
+        dimensions: name and metres of all others, in the order of `dimension_names`.
+        stated: names of those that were given; the others are likely for them.
+        age: years, for the ranges of motion; None for those of all adults.
     """
 
     sex: str
     stature: float
     mass: float
-    deviations: tuple[tuple[str, float], ...] = ()
+    dimensions: tuple[tuple[str, float], ...] = field(repr=False)
+    stated: tuple[str, ...] = ()
     age: float | None = field(default=None, repr=False)
 
     @property
     def column(self) -> str:
         """Suffix of the tables' columns for this sex: "M" or "F"."""
-        return _SEXES[self.sex]
+        return "M" if self.sex == "male" else "F"
 
     def segment(self, name: str, quantity: str) -> float:
         """Return a number of the segment table for this sex, without conversion (mostly a fraction of the stature)."""
-        return float(_row("segments", "name", name)[f"{quantity}_{self.column}"])
+        return float(named_row("segments", name, "segment")[f"{quantity}_{self.column}"])
 
-    def fitted(self, name: str) -> float:
-        """Return a size of the table "fit", metres: a length of a limb, a joint centre or a thickness."""
-        return self._linear(_row("fit", "name", name), f"{self.column}_") + sum(
-            more for which, more in self.deviations if which == name
-        )
+    def size(self, name: str) -> float:
+        """Return a dimension or a size of the body, see `sizes`, metres."""
+        return self.built[0][name]
+
+    @cached_property
+    def built(self) -> tuple[dict[str, float], dict[str, float]]:
+        """All sizes and dimensions, metres, and the dimensions of the arms that the body has."""
+        of = dict(self.dimensions) | {"stature": self.stature}
+        toe = self._offset("left_toe_extension")[2]
+        legs = leg_sizes(of, ankle=self.segment("left_toes", "radius_b") * self.stature - toe)
+        of |= legs
+        hip = self.stature - of["sitting_height"] + legs["seat"]
+        upright = ("spine1_flexion", "spine2_flexion", "spine3_flexion", "spine4_flexion")
+        offsets = [self._offset(joint) for joint in (*upright, "left_clavicle_protraction")]
+        share = self._trunk_scale(of)
+        ahead, backs = 0.0, [legs["buttock"]]
+        for x, part in zip((x for x, _, _ in offsets), TRUNK, strict=False):
+            ahead += x
+            backs.append(part.back(of) - ahead)
+        girdle = (ahead + offsets[-1][0], offsets[-1][1], share * sum(z for _, _, z in offsets))
+        frame = Skeleton(hip, self._offset("left_hip_flexion")[1], girdle, max(backs))
+        arms, dimensions = arm_sizes(self.sex, of, self.stated, frame)
+        return of | arms, dimensions
 
     def length(self, segment: str) -> float:
         """Length of a segment, metres."""
         part = segment.removeprefix("left_").removeprefix("right_")
-        if part in ("thigh", "shank", "upper_arm", "forearm", "hand"):
-            return self.fitted(part)
+        if part in ("thigh", "shank", "upper_arm", "forearm"):
+            return self.size(part)
+        if part == "hand":
+            return self.size("hand_length")
         length = self.segment(segment, "length") * self.stature
-        return length if part in ("foot", "toes", "clavicle") else length * self._trunk_scale()
+        return length if part in ("foot", "toes", "clavicle") else length * self._trunk_scale(self.built[0])
 
     def origin(self, joint: str) -> tuple[float, float, float]:
         """Position of a joint in the frame of its parent, metres."""
-        row = _row("joints", "name", joint)
-        x, y, z = (float(row[f"o{axis}_{self.column}"]) * self.stature for axis in "xyz")
+        x, y, z = self._offset(joint)
         side, _, rest = joint.partition("_")
-        if side not in ("left", "right"):
-            return x, y, z * self._trunk_scale()
-        if rest == "clavicle_protraction":
-            return x, y, z * self._trunk_scale()
+        if side not in ("left", "right") or rest == "clavicle_protraction":
+            return x, y, z * self._trunk_scale(self.built[0])
         if rest == "shoulder_flexion":
-            return self.fitted("shoulder_x"), math.copysign(self.fitted("shoulder_y"), y), self.fitted("shoulder_z")
-        if rest in _ENDS:
-            return x, y, -self.fitted(_ENDS[rest])
+            inner = self._offset("left_clavicle_protraction")[1]
+            beside = self.size("shoulder_y") - inner
+            return self.size("shoulder_x"), math.copysign(beside, y), self.size("shoulder_z")
+        return (x, y, -self.size(_ENDS[rest])) if rest in _ENDS else (x, y, z)
+
+    def _offset(self, joint: str) -> tuple[float, float, float]:
+        """The table's position of a joint, metres."""
+        row = named_row("joints", joint, "joint")
+        x, y, z = (float(row[f"o{axis}_{self.column}"]) * self.stature for axis in "xyz")
         return x, y, z
 
-    def _trunk_scale(self) -> float:
+    def _trunk_scale(self, sizes: Mapping[str, float]) -> float:
         """How much longer the trunk and head are than their shares of the stature, because the legs are shorter."""
-        toe = float(_row("joints", "name", "left_toe_extension")[f"oz_{self.column}"])
-        ankle = (self.segment("left_toes", "radius_b") - toe) * self.stature
-        leg = ankle + self.fitted("thigh") + self.fitted("shank")
+        ankle = self.segment("left_toes", "radius_b") * self.stature - self._offset("left_toe_extension")[2]
+        leg = ankle + sizes["thigh"] + sizes["shank"]
         shares = self.segment("left_thigh", "length") + self.segment("left_shank", "length")
         return (self.stature - leg) / (self.stature * (1.0 - shares) - ankle)
 
@@ -119,7 +140,7 @@ class Person:
 
         The landmarks of de Leva's segments differ from those of the model's, most for the thighs of women.
         """
-        fraction = _row("segments", "name", segment)[f"source_length_{self.column}"]
+        fraction = named_row("segments", segment, "segment")[f"source_length_{self.column}"]
         return float(fraction) * self.stature if fraction else self.length(segment)
 
     def center_of_mass(self, segment: str) -> Array:
@@ -131,13 +152,22 @@ class Person:
         gyration = np.array([self.segment(segment, f"k{axis}") for axis in "xyz"])
         return self.segment_mass(segment) * (gyration * self.source_length(segment)) ** 2
 
-    def radius(self, part: str) -> float:
-        """Radius of a body part, metres: circumference / 2 pi, or half a breadth (``*_y``) or depth (``*_x``)."""
-        return self._linear(_row("radii_ansur", "part", part), f"{self.column}_fit_")
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on stated dimensions that the body does not have."""
+        wanted, own = dict(self.dimensions)[OVERHEAD], self.built[1][OVERHEAD]
+        if OVERHEAD not in self.stated or abs(wanted - own) <= 0.001:
+            return ()
+        return (f"{OVERHEAD} is {own:.3f} m, not {wanted:.3f} m: the shoulder rises as far as it can",)
 
-    def _linear(self, row: Mapping[str, str], start: str) -> float:
-        c0, cq, ch = (float(row[start + name]) for name in ("c0", "cq", "cH"))
-        return c0 + cq * math.sqrt(self.mass / self.stature) + ch * self.stature
+    def radius(self, part: str) -> float:
+        """Radius of a part with a circumference, metres."""
+        return self.size(f"{part}_circumference") / (2.0 * math.pi)
+
+
+def dimension_names() -> tuple[str, ...]:
+    """Return the names of the dimensions that can be stated as proportions, metres."""
+    return tuple(name for name in population("male").names if name != "stature" and name not in UNITS)
 
 
 def make_person(
@@ -146,103 +176,102 @@ def make_person(
     mass: float | None = None,
     percentile: float | None = None,
     age: float | None = None,
+    proportions: Mapping[str, float] | None = None,
 ) -> Person:
     """Return a checked `Person`.
 
     Args:
         sex: "male" or "female".
         stature: metres; the median of the sex if left out.
-        mass: kilograms; if left out, the median of the sex, or the mass expected at the stature that was given.
-        percentile: 1 to 99: stature and mass, unless one of them is given, are this percentile of the sex in ANSUR II,
-            between the percentiles of the table on a line in the normal deviate.
-        age: years, 20 to 69, for the ranges of motion; those of all adults if left out.
+        mass: kilograms; if left out, the median of the sex, or the mass that is likely for the stature and proportions
+            that were given.
+        percentile: 1 to 99: stature and mass, unless one of them is given, are this percentile of the sex; the other
+            dimensions are likely for them, and not of this percentile.
+        age: years, 17 to 69, for the ranges of motion, and for dimensions that change with it; those of all adults if
+            left out.
+        proportions: other dimensions, metres by the names of `dimension_names`; those left out are likely for them.
 
     Raises:
-        InputError: an unknown sex, a number out of the range of people, or a percentile of nothing.
+        InputError: an unknown sex, a number out of the range of people, a percentile of nothing, or dimensions that
+            nobody has together.
+        UnknownNameError: an unknown dimension.
     """
-    if not isinstance(sex, str) or sex.lower() not in _SEXES:
+    if not isinstance(sex, str) or sex.lower() not in SEXES:
         raise InputError(f"sex is {shown(sex)}; give 'male' or 'female'")
-    sex = sex.lower()
-    column = _SEXES[sex]
-    median = keyed("design_cases", "case")[f"{column}50"]
+    people = population(sex.lower())
+    stated = _stated(proportions)
     if percentile is not None:
         if stature is not None and mass is not None:
             raise InputError("stature and mass are given, which leaves nothing to percentile; leave one out")
-        share = PERCENTILE(percentile, "percentile")
-        stature = 0.01 * _percentile(column, "stature", share) if stature is None else stature
-        mass = _percentile(column, "mass", share) if mass is None else mass
-    if mass is None and stature is not None:
-        # log-log fit to ANSUR II
-        factor, exponent = {"M": (27.41, 1.999), "F": (23.00, 2.192)}[column]
-        mass = factor * STATURE(stature, "stature") ** exponent
-    height = STATURE(float(median["stature_m"]) if stature is None else stature, "stature")
-    weight = MASS(float(median["mass_kg_same_percentile"]) if mass is None else mass, "mass")
+        share = 0.01 * PERCENTILE(percentile, "percentile")
+        stature = people.quantile("stature", share) if stature is None else stature
+        mass = people.quantile("mass", share) if mass is None else mass
+    years = {} if age is None else {"age": AGE(age, "age")}
+    follows = mass is None and (stature is not None or stated)
+    height = STATURE(people.quantile("stature", 0.5) if stature is None else stature, "stature")
+    if follows:
+        mass = people.likely({"stature": height, **years, **stated})["mass"]
+    weight = MASS(people.quantile("mass", 0.5) if mass is None else mass, "mass")
     # kg of body mass indices, kg / m^2, outside of which nobody lives; most likely a unit is wrong
     low, high = 13.0 * height**2, 50.0 * height**2
     if not low <= weight <= high:
         raise InputError(
             f"mass {weight:g} kg does not go with stature {height:g} m; give a mass between {low:.0f} and {high:.0f} kg"
         )
-    return Person(sex, height, weight, age=None if age is None else AGE(age, "age"))
+    return _made(people.sex, height, weight, years.get("age"), tuple(sorted(stated.items())))
 
 
-def _percentile(column: str, dimension: str, percentile: float) -> float:
-    row = next(row for row in table("percentiles") if row["sex"] == column and row["dim"] == dimension)
-    known = [int(name[1:]) for name in row if name[0] == "p" and name[1:].isdigit()]
-    deviate = [NormalDist().inv_cdf(0.01 * share) for share in (percentile, *known)]
-    return float(np.interp(deviate[0], deviate[1:], [float(row[f"p{share:02d}"]) for share in known]))
+@lru_cache(maxsize=256)
+def _made(sex: str, stature: float, mass: float, age: float | None, stated: tuple[tuple[str, float], ...]) -> Person:
+    size = {"stature": stature, "mass": mass}
+    values = dict(stated)
+    if values and (odd := population(sex).unlikely(values, size)):
+        name, deviation, low, high = odd
+        people = f"{SEXES[sex]} of {stature:g} m and {mass:.3g} kg" + (" with the others" if len(values) > 1 else "")
+        raise InputError(
+            f"proportions: {name} {values[name]:g} m is {deviation:.1f} standard deviations from that of {people}; "
+            f"give {low:.3f} to {high:.3f} m, or change another one"
+        )
+    known_years = {} if age is None else {"age": age}
+    all_of = population(sex).likely({**size, **known_years, **values})
+    person = Person(sex, stature, mass, tuple((name, all_of[name]) for name in dimension_names()), tuple(values), age)
+    for name, value in person.built[1].items():
+        # metres within which a stated dimension must be met; an overhead reach is told by `notes`
+        if name in values and name != OVERHEAD and abs(value - values[name]) > 0.001:
+            raise InputError(
+                f"proportions: {name} {values[name]:g} m is out of the model's reach with the other dimensions and "
+                f"stature {stature:g} m, it comes to {value:.3f} m; give that or leave one dimension out"
+            )
+    return person
+
+
+def _stated(proportions: Mapping[str, float] | None) -> dict[str, float]:
+    """Proportions, checked."""
+    if proportions is None:
+        return {}
+    if not isinstance(proportions, Mapping):
+        raise InputError(f"proportions is {shown(proportions)}; give metres by dimension: {{'sitting_height': 0.93}}")
+    names = dimension_names()
+    return {
+        known(name, names, "dimension", "proportions"): DIMENSION(value, f"proportions: {name}")
+        for name, value in proportions.items()
+    }
 
 
 def describe(person: Person) -> str:
     """Return one line on a person for the head of a file."""
     own = "" if person.age is None else f", {person.age:g} years"
-    if person.deviations:
+    if person.stated:
         own += ", proportions of their own"
-    size = f"stature {person.stature:g} m, mass {person.mass:g} kg"
+    size = f"stature {person.stature:.4g} m, mass {person.mass:.4g} kg"
     return f"{person.sex}, {size}{own}; written by wholebody from its tables"
 
 
+@cache
 def design_cases() -> Mapping[str, Person]:
     """Small, median and large women and men (5th, 50th, 95th percentile of stature and mass): "F5" ... "M95"."""
     return {
-        row["case"]: make_person(
-            "male" if row["sex"] == "M" else "female", float(row["stature_m"]), float(row["mass_kg_same_percentile"])
-        )
-        for row in table("design_cases")
+        f"{sex[0].upper()}{percentile}": make_person(sex, percentile=percentile)
+        for sex in SEXES
+        for percentile in (5, 50, 95)
     }
-
-
-def _row(name: str, column: str, key: str) -> Mapping[str, str]:
-    rows = keyed(name, column)
-    if key not in rows:
-        raise UnknownNameError("segment" if name == "segments" else "body part", key, rows)
-    return rows[key]
-
-
-@cache
-def table(name: str) -> tuple[Row, ...]:
-    """Return the rows of a table in `figures/data`, each a mapping from column to text.
-
-    Raises:
-        UnknownNameError: there is no such table.
-    """
-    path = FOLDER / f"{name}.csv"
-    if not path.is_file():
-        raise UnknownNameError("table", name, [file.stem for file in FOLDER.glob("*.csv")])
-    return packaged_table(path)
-
-
-@cache
-def named_angles(of: str) -> dict[str, dict[str, float]]:
-    """Return the angles of the table "postures", degrees by joint, of each posture of "human", "hand" or "fingers"."""
-    found: dict[str, dict[str, float]] = {}
-    for row in table("postures"):
-        if row["of"] == of:
-            found.setdefault(row["name"], {}).update({row["joint"]: float(row["degrees"])} if row["joint"] else {})
-    return found
-
-
-@cache
-def keyed(name: str, column: str) -> dict[str, Row]:
-    """Return the rows of a table by the text in one column."""
-    return {row[column]: row for row in table(name)}

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from wholebody.figures.anthropometry import Person, keyed
+from wholebody.figures.anthropometry import Person
+from wholebody.figures.sizes import THUMB_TIP
+from wholebody.figures.tables import keyed
 
 RELAXED = 0.93
 """The arm's circumferences were measured flexed; relaxed they are 5 to 8 % less (estimate)."""
-
-MIDDLE_TIP = 0.991
-"""End of the stretched middle finger, in hand lengths from the wrist: the sum of its parts in the table "hand"."""
 
 
 class Finger(NamedTuple):
@@ -35,12 +34,12 @@ class Dimensions:
         self.toe_half_height = person.segment("left_toes", "radius_b") * height
         self.toe_length = person.segment("left_toes", "length") * height
         self.sole = toe[2] - self.toe_half_height
-        self.heel_x = toe[0] + self.toe_length - person.fitted("foot_length")
-        self.foot_half_width = person.segment("left_foot", "radius_a") * height
+        self.heel_x = toe[0] + self.toe_length - person.size("foot_length")
+        self.foot_half_width = 0.5 * person.size("foot_breadth")
         self.hip_height = -self.sole + person.length("left_thigh") + person.length("left_shank")
 
         self.hand_length = person.length("left_hand")
-        self.hand_breadth = person.fitted("hand_breadth")
+        self.hand_breadth = person.size("hand_breadth")
         self.palm_length = {"M": 0.603, "F": 0.600}[person.column] * self.hand_length  # ANSUR II
         self.palm_half_thickness = keyed_hand("palm", "depth") * self.hand_breadth
         lateral, distal = FINGER_BASES["index"]
@@ -51,12 +50,10 @@ class Dimensions:
             (distal + length) * self.hand_length,
             keyed_hand("index_mp", "width") * self.hand_breadth,
         )
-        # End of the thumb, which lies beside the index finger, in hand lengths from the wrist: 0.26 behind that
-        # finger's (estimate).
         self.thumb = Finger(
             0.58 * self.hand_breadth,
             0.22 * self.hand_length,
-            0.675 * self.hand_length,
+            THUMB_TIP * self.hand_length,
             keyed_hand("thumb_dp", "width") * self.hand_breadth,
         )
         # Centre of a rod in the hand, in hand lengths from the wrist: what forearm-hand length leaves of forearm to
@@ -66,12 +63,12 @@ class Dimensions:
         upward = ("spine1", "spine2", "spine3", "spine4", "neck1", "neck2")
         above = sum(self.joint(f"{name}_flexion")[2] for name in upward)
         self.head_top = height - self.hip_height - above
-        self.head_half_breadth = person.radius("head_y")
-        self.head_half_length = person.radius("head_x")
+        self.head_half_breadth = 0.5 * person.size("head_breadth")
+        self.head_half_length = 0.5 * person.size("head_length")
         # Fraction of stature (Drillis & Contini, in Winter 2009).
         self.head_bottom = self.head_top - (1.0 - 0.870) * height
         self.head_x = person.center_of_mass("head")[0]
-        self.eye_z = self.head_top - person.fitted("eye")
+        self.eye_z = self.head_top - person.size("eye")
         # The skull is a capsule from front to back; its front at the height of the eyes.
         below = self.head_top - self.head_half_breadth - self.eye_z
         front = self.head_half_length - self.head_half_breadth

@@ -1,35 +1,33 @@
-"""The person measured as an anthropometrist measures people: fifteen dimensions of ANSUR II, in metres.
+"""The person measured as an anthropometrist measures people, in metres.
 
 Lengths are taken between the skin, which is the surface of the collision pieces, and landmarks. Standing means upright
 with hanging arms; sitting means upright with thighs horizontal, shanks vertical and the seat's plane under buttocks and
-thighs.
+thighs. Circumferences are those of round pieces; of arms, as far as they are more when flexed.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
-from functools import cache
-from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.figures.anthropometry import Person, table
-from wholebody.figures.body_spec import geometry_of, model_of
-from wholebody.figures.dimensions import Dimensions
-from wholebody.figures.human import capsules
-from wholebody.figures.human.spec import human_spec
+from wholebody.figures.dimensions import RELAXED
+from wholebody.figures.human.capsules import SPREAD
 from wholebody.figures.postures import support
+from wholebody.figures.sizes import MIDDLE_TIP
+
+if TYPE_CHECKING:
+    from wholebody.figures.figure import Figure
 
 
 class _Pose:
     """A figure at one posture: frames and the extent of its pieces along the axes."""
 
-    def __init__(self, figure: Any, degrees: Mapping[str, float]) -> None:
+    def __init__(self, figure: Figure, degrees: Mapping[str, float]) -> None:
         self.figure = figure
         names = set(figure.model.names)
         values = {
@@ -56,67 +54,81 @@ class _Pose:
             if piece.name.partition(":")[0] in chosen or piece.name in chosen
         )
 
+    def across(self, axis: tuple[float, float, float], *segments: str) -> float:
+        """How far the pieces of some segments reach along both directions of an axis, metres."""
+        x, y, z = axis
+        return self.extent(axis, segments) + self.extent((-x, -y, -z), segments)
+
 
 UP, DOWN, FRONT, BACK, LEFT = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 THIGHS = ("left_thigh", "right_thigh")
+TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax")
 
-TOLERANCE = 0.005
-"""Metres: a dimension that is off by this counts as one unit of a fit."""
+GIRTHS = {
+    "neck": ("neck", 1.0),
+    "upper_arm": ("left_upper_arm:0", RELAXED),
+    "forearm": ("left_forearm:0", RELAXED),
+    "wrist": ("left_forearm:1", 1.0),
+    "calf": ("left_shank:0", 1.0),
+    "ankle": ("left_shank:1", 1.0),
+}
+"""Piece whose circumference is that of a part, and share of it when the muscles are relaxed."""
 
 
-def measure(figure: Any) -> dict[str, float]:
-    """Return the fifteen dimensions of a person in any detail, metres, by the names of the table "dimensions".
+def measure(figure: Figure) -> dict[str, float]:
+    """Return the dimensions of a person, metres, by the names of `anthropometry.dimension_names`.
 
-    The arm that reaches overhead is straight and vertical, with the clavicle raised as far as it goes.
+    The arm that reaches overhead is straight and vertical, with the clavicle raised as far as it goes. Circumferences
+    are measured in the detail "capsules" only.
     """
+    clavicle = figure.model.joints[figure.model.getJointId("left_clavicle_elevation")].idx_q
+    elevation = math.degrees(figure.model.upperPositionLimit[clavicle])
     stand = _Pose(figure, {})
     sit = _Pose(figure, {"hip_flexion": 90.0, "knee_flexion": 90.0})
     cross = _Pose(figure, {"shoulder_abduction": 90.0})
     reach = _Pose(figure, {"shoulder_flexion": 90.0})
-    # Degrees of elevation of the clavicle in the overhead reach: people stretch as far as they can, so its limit.
-    raised = _Pose(figure, {"clavicle_elevation": 45.0})
+    raised = _Pose(figure, {"clavicle_elevation": elevation})
     bent = _Pose(figure, {"elbow_flexion": 90.0})
     floor, vertex = stand.frame("left_sole")[2], stand.frame("head_top")[2]
-    seat, rest = -sit.extent(DOWN, ("pelvis", *THIGHS)), sit.frame("left_sole")[2]
-    arm = np.linalg.norm(stand.frame("left_middle_tip") - stand.frame("left_shoulder"))
-    knee = ("left_thigh", "left_shank")
-    return {
-        "eye_below_vertex": vertex - stand.frame("gaze")[2],
-        "wrist_height": stand.frame("left_wrist")[2] - floor,
-        "acromial_height": stand.extent(UP, ("left_clavicle", "left_upper_arm")) - floor,
-        "bideltoid_breadth": 2.0 * stand.extent(LEFT, ("left_clavicle", "left_upper_arm")),
-        "span": 2.0 * cross.frame("left_middle_tip")[1],
-        "thumb_tip_reach": reach.frame("left_thumb_tip")[0]
-        + reach.extent(BACK, ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax")),
-        "overhead_reach_sitting": raised.frame("left_shoulder")[2] + float(arm) - seat,
+    seat, rest = -sit.extent(DOWN, ("pelvis", "left_thigh:0")), sit.frame("left_sole")[2]
+    arm = float(np.linalg.norm(stand.frame("left_middle_tip") - stand.frame("left_shoulder")))
+    knee, buttock = sit.extent(FRONT, ("left_thigh", "left_shank")), sit.extent(BACK, ("pelvis", *THIGHS))
+    found = {
         "sitting_height": vertex - seat,
         "eye_height_sitting": sit.frame("gaze")[2] - seat,
-        "buttock_knee_length": sit.extent(FRONT, knee) + sit.extent(BACK, ("pelvis", *THIGHS)),
-        "popliteal_height": seat - rest,
-        "knee_height_sitting": sit.extent(UP, ("left_thigh:1",)) - rest,
-        "thigh_clearance": sit.extent(UP, THIGHS) - seat,
+        "acromial_height": stand.extent(UP, ("left_clavicle", "left_upper_arm")) - floor,
+        "wrist_height": stand.frame("left_wrist")[2] - floor,
+        "elbow_rest_height": -bent.extent(DOWN, ("left_upper_arm", "left_forearm:0")) - seat,
+        "bideltoid_breadth": 2.0 * stand.extent(LEFT, ("left_clavicle", "left_upper_arm")),
+        "span": 2.0 * cross.frame("left_middle_tip")[1],
+        "thumb_tip_reach": reach.frame("left_thumb_tip")[0] + reach.extent(BACK, TRUNK),
+        "overhead_reach_sitting": raised.frame("left_shoulder")[2] + arm - seat,
         "forearm_hand_length": bent.frame("left_middle_tip")[0] + bent.extent(BACK, ("left_forearm",)),
+        "buttock_knee_length": knee + buttock,
+        # Behind its centre the knee ends as far as before it.
+        "buttock_popliteal_length": 2.0 * sit.frame("left_knee")[0] - knee + buttock,
+        "popliteal_height": seat - rest,
+        # As high over its centre too.
+        "knee_height_sitting": sit.frame("left_knee")[2] + knee - sit.frame("left_knee")[0] - rest,
+        "thigh_clearance": sit.extent(UP, THIGHS) - seat,
         "hip_breadth_sitting": 2.0 * sit.extent(LEFT, ("pelvis", *THIGHS)),
+        "hip_breadth": 2.0 * stand.extent(LEFT, ("pelvis", *(f"left_thigh:{k}" for k in range(SPREAD)))),
+        "chest_breadth": stand.across(LEFT, "lower_thorax", "thorax"),
+        "chest_depth": stand.across(FRONT, "lower_thorax"),
+        "waist_breadth": stand.across(LEFT, "lower_lumbar"),
+        "waist_depth": stand.across(FRONT, "lower_lumbar"),
+        "buttock_depth": stand.across(FRONT, "pelvis"),
+        "head_length": stand.across(FRONT, "head:0"),
+        "head_breadth": stand.across(LEFT, "head"),
+        "hand_length": float(stand.frame("left_wrist")[2] - stand.frame("left_middle_tip")[2]) / MIDDLE_TIP,
+        "hand_breadth": stand.across(FRONT, "left_hand:0"),
+        "foot_length": stand.across(FRONT, "left_foot", "left_toes"),
+        "foot_breadth": stand.across(LEFT, "left_foot"),
     }
-
-
-def measured(person: Person, deviations: tuple[tuple[str, float], ...] = ()) -> dict[str, float]:
-    """Return the dimensions of a person, metres, with some of the fitted sizes changed."""
-    person = replace(person, deviations=deviations, age=None)
-    model = model_of(human_spec(person))
-    geometry = geometry_of(model, capsules.solids(Dimensions(person)), ())
-
-    def with_joints(q: Array, values: Mapping[str, float]) -> Array:
-        q = q.copy()
-        for name, value in values.items():
-            q[model.joints[model.getJointId(name)].idx_q] = value
-        return q
-
-    return measure(SimpleNamespace(model=model, geometry=geometry, with_joints=with_joints))
-
-
-@cache
-def ansur(sex: str, percentile: int) -> dict[str, float]:
-    """Return ANSUR II's value of each dimension at a percentile of 5, 50 or 95, metres."""
-    column = f"{'M' if sex == 'male' else 'F'}{percentile}"
-    return {row["name"]: float(row[column]) for row in table("dimensions")}
+    if figure.detail == "capsules":
+        pieces = {piece.name: piece.geometry for piece in figure.geometry.geometryObjects}
+        found |= {
+            f"{part}_circumference": 2.0 * math.pi * float(pieces[name].radius) / share
+            for part, (name, share) in GIRTHS.items()
+        }
+    return found

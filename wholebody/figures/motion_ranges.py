@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.figures.anthropometry import table
+from wholebody.figures.tables import table
 
 
 class CoupledRange(NamedTuple):

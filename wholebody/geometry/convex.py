@@ -111,7 +111,7 @@ def check_mesh(vertices: ArrayLike, faces: ArrayLike, what: str) -> tuple[Array,
             f"{what}: vertices and faces have shapes {cloud.shape} and {triangles.shape}; give (n, 3) and (m, 3)"
         )
     if not len(triangles) or not len(cloud):
-        raise InputError(f"{what}: there are no triangles in it")
+        raise InputError(f"{what}: it has no triangles")
     bad = np.flatnonzero(~np.isfinite(cloud).all(axis=1))
     if len(bad):
         raise InputError(f"{what}: vertex {bad[0]} is {cloud[bad[0]].tolist()}; give finite numbers")
@@ -164,7 +164,7 @@ def _decompose(vertices: bytes, faces: bytes, max_vertices: int, threshold: floa
     finally:
         child.close()
     if not pieces:
-        raise InputError(f"{what}: nothing in it is larger than {SMALLEST} m; is the scale right?")
+        raise InputError(f"{what}: it has no part larger than {SMALLEST} m; is the scale right?")
     return ConvexPieces(tuple(pieces), after / before - 1.0 if before > 0 else 0.0, tuple(notes))
 
 

@@ -78,7 +78,7 @@ def read_parts(path: str | Path) -> list[tuple[Array, NDArray[np.int64], tuple[f
     except Exception as error:
         raise _unreadable(path, error) from error
     if not found:
-        raise EmptyMeshError(f"mesh {path}: there are no triangles in it")
+        raise EmptyMeshError(f"mesh {path}: it has no triangles")
     return found
 
 
@@ -148,7 +148,9 @@ def _check_content(path: Path) -> None:
     if path.suffix.lower() == ".stl" and len(head) >= 84 and not text:
         wanted = 84 + 50 * int.from_bytes(head[80:84], "little")
         if size < wanted:
-            raise FileFormatError(f"mesh {path}: the file has {size} bytes of {wanted}; it is cut: get it whole")
+            raise FileFormatError(
+                f"mesh {path}: the file has {size} bytes of {wanted}; it is truncated; fetch it again"
+            )
 
 
 def _unreadable(path: Path, error: Exception) -> FileFormatError:
@@ -159,7 +161,7 @@ def _unreadable(path: Path, error: Exception) -> FileFormatError:
 
 def _checked(vertices: Array, faces: NDArray[np.int64], path: Path) -> tuple[Array, NDArray[np.int64]]:
     if not len(faces):
-        raise EmptyMeshError(f"mesh {path}: there are no triangles in it")
+        raise EmptyMeshError(f"mesh {path}: it has no triangles")
     try:
         return check_mesh(vertices, faces, f"mesh {path}")
     except InputError as error:

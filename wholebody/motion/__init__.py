@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from wholebody.motion.retargeting import bone_errors
     from wholebody.motion.skeleton import SkeletonMotion
     from wholebody.motion.stance import StanceFeet
+    from wholebody.motion.standing_ground import Ground, ground
     from wholebody.motion.strength import Strength
     from wholebody.motion.trajectory.method import Trajectory
     from wholebody.motion.worn_equipment import Equipment, equipment
@@ -31,6 +32,7 @@ __all__ = [
     "Bisection",
     "ClipCheck",
     "Equipment",
+    "Ground",
     "MotionBounds",
     "PerFrame",
     "SkeletonMotion",
@@ -41,6 +43,7 @@ __all__ = [
     "avoid_many",
     "bone_errors",
     "equipment",
+    "ground",
     "read_many",
     "read_skeleton",
     "torques",
@@ -55,6 +58,7 @@ __getattr__, __dir__ = exported(
         "wholebody.motion.bisection.method": "Bisection",
         "wholebody.motion.checking": "ClipCheck",
         "wholebody.motion.clip_torques": "Torques torques",
+        "wholebody.motion.standing_ground": "Ground ground",
         "wholebody.motion.measures": "MotionBounds",
         "wholebody.motion.per_frame": "PerFrame",
         "wholebody.motion.reading": "read_skeleton",

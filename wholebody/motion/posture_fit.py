@@ -1,75 +1,105 @@
-"""Postures that bring points and frames of a figure nearest to given ones: Levenberg-Marquardt within hard limits.
+"""Postures that bring bones, frames and points of a figure to given ones, among things: one quadratic program a step.
 
-`Fitter.fit` does so for one frame, `smooth` for all frames of a motion with their accelerations. A step of a frame is a
-quadratic program: least squares of the linearised errors, subject to joint limits and to reach cones to first order.
-Limits hold exactly, cones to second order of the last step; a step that leaves a cone further than before is refused.
+A step dq minimises, over joint limits, the greatest motion of a frame, reach cones and contacts,
+
+    |W_b (B J dq + B (p - p*))|^2 + |W_t (J_t dq + log R R*')|^2 + |W_h (J_h dq + h - h*)|^2 + |W_q (dq + q - q*)|^2
+
+with p the points and B their differences along bones, so that a body is moved as a whole at no cost to its bones; R
+orientations; h points that are held; q* a posture to stay near to. Contacts are rows ``gap + J dq >= clearance`` of all
+pairs that are near, relaxed at a high price. Joint limits hold exactly, cones to second order of the last step.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import daqp
 import numpy as np
 import pinocchio as pin
-from scipy.linalg import LinAlgError, solveh_banded
 
-from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices
 from wholebody.figures.figure import Figure
-from wholebody.figures.state import State
+from wholebody.scene.workspace import Workspace
 
-STEP = 0.6  # rad: largest change of a joint in one iteration; beyond it the linearisation says little
+STEP = 0.6  # rad: largest change of a joint in one step; beyond it the linearisation says little
 CONE_MARGIN, CONE_SLACK = 2e-3, 1e-6  # rad: inside of a cone that rows aim at, as they are curved; outside, of rounding
+DAMPING = 1e-4  # m²/rad² of every joint, so that the program has one answer
+WITHIN, CLEARANCE = 0.06, 5e-4  # m: nearer pairs have rows; distance that they keep
+PUSH = 0.03  # m: by which a step brings an overlap out at most
+SOFT = 8  # daqp's flag of a row that may be broken at a price
+RELAXED = 1e-10  # of the price: less holds contacts more exactly, and costs the program digits
 
 
 class Goals(NamedTuple):
     """What one frame is to reach.
 
     Attributes:
-        points: (p, 3) where the points are to be, metres.
-        point_weights: (p,) weight of each distance.
+        points: (p, 3) where the points are to be, metres, to a common shift but for the anchor's weight.
         turns: (t, 3, 3) orientations that frames are to have.
-        turn_weights: (t,) weight of each angle, metres per radian.
+        held: (h, 3) where held points are to be, metres.
+        held_weights: (h, 3) weight of each, along the axes of the world; 0 for none.
         posture: (nq,) a posture to stay near to.
         posture_weights: (nv,) weight of each difference from it, metres per radian.
     """
 
     points: Array
-    point_weights: Array
     turns: Array
-    turn_weights: Array
+    held: Array
+    held_weights: Array
     posture: Array
     posture_weights: Array
 
 
+class Layout(NamedTuple):
+    """What goals are of.
+
+    Attributes:
+        points, turns: frames of the figure.
+        bones: (b, p) combinations of points: a row has 1 and -1 for a bone, or positive shares for the anchor.
+        bone_weights: (b,) weight of each.
+        turn_weights: (t,) weight of each angle, metres per radian.
+        held: joint and place (3,) in it of each point that may be held.
+    """
+
+    points: list[str]
+    turns: list[str]
+    bones: Array
+    bone_weights: Array
+    turn_weights: Array
+    held: list[tuple[int, Array]]
+
+
 class Fitter:
-    """Fits postures of a figure; it has a workspace of its own, so each thread needs one.
+    """Fits postures of a figure in a workspace, which is its own; so each thread needs one.
 
     Attributes:
         figure: the figure.
     """
 
-    def __init__(self, figure: Figure, points: list[str], turns: list[str]) -> None:
-        """Choose the frames whose origins are the points, and those that have goals of orientation."""
-        self.figure, self.model = figure, figure.model
-        self._state = State(figure.model)
-        self._point_joints, self._point_parts = self._carried(points)
-        self._turn_joints, self._turn_parts = self._carried(turns)
-        self._joints = np.concatenate([np.repeat(self._point_joints, 3), np.repeat(self._turn_joints, 3)])
+    def __init__(self, figure: Figure, layout: Layout, workspace: Workspace) -> None:
+        """Choose what goals are of."""
+        self.figure, self.model, self.layout, self._workspace = figure, figure.model, layout, workspace
+        self._state = workspace.state
+        self._point_joints, self._point_parts = self._carried(layout.points)
+        self._turn_joints, self._turn_parts = self._carried(layout.turns)
+        self._held_joints = np.array([joint for joint, _ in layout.held], dtype=np.intp)
+        self._held_places = np.array([place for _, place in layout.held]).reshape(-1, 3)
+        joints = (self._point_joints, self._held_joints, self._turn_joints)
+        self._joints = np.concatenate([np.repeat(each, 3) for each in joints])
         self._world = np.zeros(len(self._joints), dtype=np.intp)
-        count = len(points)
+        places = 3 * (len(layout.points) + len(layout.held))
         self._wrenches = np.zeros((len(self._joints), 6))
         for axis in range(3):
-            self._wrenches[axis : 3 * count : 3, axis] = 1.0
-            self._wrenches[3 * count + axis :: 3, 3 + axis] = 1.0
+            self._wrenches[axis:places:3, axis] = 1.0
+            self._wrenches[places + axis :: 3, 3 + axis] = 1.0
+        self._bones = np.kron(layout.bone_weights[:, None] * layout.bones, np.eye(3))
+        self._turn_weights = np.repeat(layout.turn_weights, 3)
         self._cones = list(figure.cones.values())
         self._limb_joints, limb_parts = self._carried([cone.limb for cone in self._cones])
         self._base_joints, base_parts = self._carried([cone.reference for cone in self._cones])
         self._base_turns = base_parts[:, :3]
         self._axes = np.array([part[:3] @ cone.axis for part, cone in zip(limb_parts, self._cones, strict=True)])
         self._free = 6 if figure.root == "free" else 0
-        self._identity = np.eye(self.model.nv)
 
     def _carried(self, frames: list[str]) -> tuple[Indices, Array]:
         """The joint that carries each frame, and in it the frame's rotation (3, 3) over its place: (k, 4, 3)."""
@@ -77,33 +107,119 @@ class Fitter:
         parts = [np.vstack([frame.placement.rotation, frame.placement.translation]) for frame in found]
         return np.array([frame.parentJoint for frame in found], dtype=np.intp), np.array(parts).reshape(-1, 4, 3)
 
-    def places(self, q: Array) -> Array:
-        """(p, 3) where the points are."""
+    def held(self, q: Array) -> Array:
+        """(h, 3) where the points are at a posture (nq,) that may be held."""
         self._state.update(q)
-        return self._places()
+        return self._placed(self._held_joints, self._held_places)
 
-    def turns(self, q: Array) -> Array:
-        """(t, 3, 3) orientations of the frames."""
+    def outside(self, q: Array) -> bool:
+        """Whether a posture (nq,) has a limb outside of its reach cone."""
         self._state.update(q)
-        return self._orientations()
+        return bool((self._angles() < -CONE_SLACK).any())
 
-    def _places(self) -> Array:
-        at = self._state.joints[self._point_joints]
-        return np.asarray(np.einsum("pki,pk->pi", at[:, :3], self._point_parts[:, 3]) + at[:, 3])
+    def cost(self, q: Array, goals: Goals) -> float:
+        """Half the sum of the squared weighted errors."""
+        self._state.update(q)
+        errors = self._errors(q, goals)
+        posture = goals.posture_weights * pin.difference(self.model, goals.posture, q)
+        return 0.5 * float(errors @ errors + posture @ posture)
 
-    def _orientations(self) -> Array:
+    def step(
+        self, q: Array, goals: Goals, *, damping: float = DAMPING, among: bool = True, most: Array | None = None
+    ) -> Array:
+        """The posture (nq,) after one program from q.
+
+        Args:
+            q: (nq,) within the limits.
+            goals: what is to be reached.
+            damping: m²/rad² of every joint.
+            among: whether contacts count.
+            most: (2, nv) least and greatest displacement; None for any.
+        """
+        near = self._workspace.near(q, WITHIN) if among else None
+        self._state.update(q)
+        rows, errors = self._rows(goals), self._errors(q, goals)
+        posture = np.asarray(pin.difference(self.model, goals.posture, q))
+        square = goals.posture_weights**2
+        gradient = rows.T @ errors + square * posture
+        hessian = rows.T @ rows
+        hessian[np.diag_indices(len(hessian))] += square + damping
+        lower, upper = self.figure.tangent_bounds(q)
+        lower, upper = np.maximum(lower, -STEP), np.minimum(upper, STEP)
+        lower[: self._free], upper[: self._free] = -10.0, 10.0  # m, rad
+        if most is not None:
+            lower, upper = np.clip(most[0], lower, upper), np.clip(most[1], lower, upper)
+        limits, least = [np.zeros((0, self.model.nv))], [np.zeros(0)]
+        if self._cones:
+            # a limb outside of its cone returns by half a step at a time; nearer to the edge it stays inside
+            angles, cones = self._cone_rows()
+            limits.append(cones)
+            least.append(np.minimum(CONE_MARGIN - angles, 0.5 * STEP))
+        if near is not None and len(near.distance):
+            found = self._workspace.rows.rows(near, CLEARANCE)
+            limits.append(self._state.rows(found.wrench, found.second, found.first))
+            least.append(np.minimum(CLEARANCE - found.gap, PUSH))
+        among_rows, low = np.concatenate(limits), np.concatenate(least)
+        sense = np.zeros(len(lower) + len(low), dtype=np.int32)
+        sense[len(lower) :] = SOFT
+        x, _, flag, _ = daqp.solve(
+            hessian, gradient, among_rows, np.concatenate([upper, np.full(len(low), 1e30)]),
+            np.concatenate([lower, low]), sense, rho_soft=RELAXED,
+        )  # fmt: skip
+        if flag <= 0:
+            return q
+        return self.figure.clamp(np.asarray(pin.integrate(self.model, q, np.asarray(x))))
+
+    def descend(self, q: Array, goals: Goals, iterations: int) -> tuple[Array, float]:
+        """The posture (nq,) of least cost that a descent from q finds, without regard to contacts, and its cost."""
+        q, damping = self.figure.clamp(q), DAMPING
+        cost = self.cost(q, goals)
+        for _ in range(iterations):
+            trial = self.step(q, goals, damping=damping, among=False)
+            tried = self.cost(trial, goals)
+            if tried > cost:
+                damping *= 8.0
+                if damping > 1e3:
+                    break
+                continue
+            done = cost - tried < 1e-4 * cost
+            q, cost, damping = trial, tried, max(DAMPING, damping / 8.0)
+            if done:
+                break
+        return q, cost
+
+    def _placed(self, joints: Indices, places: Array) -> Array:
+        at = self._state.joints[joints]
+        return np.asarray(np.einsum("pki,pk->pi", at[:, :3], places) + at[:, 3])
+
+    def _errors(self, q: Array, goals: Goals) -> Array:
+        """Weighted errors of bones, held points and orientations."""
+        points = self._placed(self._point_joints, self._point_parts[:, 3]) - goals.points
+        held = goals.held_weights * (self._placed(self._held_joints, self._held_places) - goals.held)
         at = self._state.joints[self._turn_joints]
-        return np.asarray(np.swapaxes(at[:, :3], 1, 2) @ self._turn_parts[:, :3])
+        turned = np.swapaxes(at[:, :3], 1, 2) @ self._turn_parts[:, :3] @ np.swapaxes(goals.turns, 1, 2)
+        angles = self._turn_weights * np.array([pin.log3(turn) for turn in turned]).reshape(-1)
+        return np.concatenate([self._bones @ points.ravel(), held.ravel(), angles])
 
-    def outside(self, q: Array) -> Mask:
-        """(n,) which postures (n, nq) have a limb outside of its reach cone."""
-        found = np.zeros(len(q), dtype=bool)
-        if not self._cones:
-            return found
-        directions = np.array([self._directions() for posture in q if self._state.update(posture)])
-        for row, cone in enumerate(self._cones):
-            found |= np.array([cone.cone.signed_angle(each)[0] for each in directions[:, row]]) < -CONE_SLACK
-        return found
+    def _rows(self, goals: Goals) -> Array:
+        """Derivatives (m, nv) of the weighted errors."""
+        places = [
+            self._placed(self._point_joints, self._point_parts[:, 3]),
+            self._placed(self._held_joints, self._held_places),
+        ]
+        x, y, z = np.concatenate(places).T
+        count = 3 * len(x)
+        wrenches = self._wrenches  # rows of a point p along n are [n, p x n]
+        wrenches[0:count:3, 4], wrenches[0:count:3, 5] = z, -y
+        wrenches[1:count:3, 3], wrenches[1:count:3, 5] = -z, x
+        wrenches[2:count:3, 3], wrenches[2:count:3, 4] = y, -x
+        rows = self._state.rows(wrenches, self._joints, self._world)
+        points = 3 * len(places[0])
+        return np.concatenate([
+            self._bones @ rows[:points],
+            goals.held_weights.reshape(-1, 1) * rows[points:count],
+            self._turn_weights[:, None] * rows[count:],
+        ])  # fmt: skip
 
     def _directions(self) -> Array:
         """(c, 3) directions of the limbs in the axes of their cones."""
@@ -112,240 +228,23 @@ class Fitter:
         found: Array = np.einsum("cki,ci->ck", joints[self._base_joints][:, :3], worlds)
         return np.asarray(np.einsum("ckj,ck->cj", self._base_turns, found))
 
-    def cost(self, q: Array, goals: Goals, cones: float = 0.0) -> float:
-        """Half the sum of the squared weighted errors; `cones` weighs angles outside of reach cones, m/rad."""
-        self._state.update(q)
-        errors, posture = self._errors(q, goals)
-        cost = 0.5 * float(errors @ errors + posture @ posture)
-        if cones and self._cones:
-            cost += 0.5 * float(((cones * np.minimum(self._angles() - CONE_MARGIN, 0.0)) ** 2).sum())
-        return cost
-
-    def quadratic(self, q: Array, goals: Goals, cones: float = 0.0) -> tuple[Array, Array, float]:
-        """Gradient (nv,) and Gauss-Newton matrix (nv, nv) of the cost, and the cost."""
-        gradient, hessian = self._quadratic(q, goals)
-        errors, posture = self._errors(q, goals)
-        cost = 0.5 * float(errors @ errors + posture @ posture)
-        if cones and self._cones:
-            short = cones * np.minimum(self._angles() - CONE_MARGIN, 0.0)
-            if short.any():
-                rows = cones * self._cone_rows()[short < 0.0]
-                short = short[short < 0.0]
-                gradient, hessian = gradient + rows.T @ short, hessian + rows.T @ rows
-                cost += 0.5 * float(short @ short)
-        return gradient, hessian, cost
-
-    def bounds(self, q: Array) -> tuple[Array, Array]:
-        """Least and greatest step (nv,) within the limits, and not too long for the linearisation."""
-        lower, upper = self.figure.tangent_bounds(q)
-        lower, upper = np.maximum(lower, -STEP), np.minimum(upper, STEP)
-        lower[: self._free], upper[: self._free] = -10.0, 10.0  # m, rad
-        return lower, upper
-
-    def fit(
-        self, q: Array, goals: Goals, iterations: int, cones: bool = True, tolerance: float = 1e-3
-    ) -> tuple[Array, float]:
-        """The posture of least cost that a descent from q finds; q is moved within its limits first.
-
-        Args:
-            q: (nq,) where the descent begins.
-            goals: what is to be reached.
-            iterations: at most.
-            cones: whether reach cones are kept; without them a fit takes half of the time.
-            tolerance: radians; the descent ends at a step that is smaller.
-
-        Returns:
-            The posture, and its cost.
-        """
-        q = self.figure.clamp(q)
-        cost, damping = self.cost(q, goals), 1e-4  # m²/rad², the least
-        cones = cones and bool(self._cones)
-        inside = self._angles() if cones else np.zeros(0)
-        for _ in range(iterations):
-            gradient, hessian = self._quadratic(q, goals)
-            rows = self._cone_rows() if cones else np.zeros((0, self.model.nv))
-            while True:
-                step = self._program(q, gradient, hessian + damping * self._identity, rows, inside)
-                if step is None:
-                    return q, cost
-                trial = self.figure.clamp(pin.integrate(self.model, q, step))
-                tried = self.cost(trial, goals)
-                left = self._angles() if cones else inside
-                kept = bool((left >= np.minimum(inside, 0.0) - CONE_SLACK).all())
-                if kept and (tried <= cost or (inside < 0.0).any()):
-                    break
-                damping *= 8.0
-                if damping > 1e3:
-                    return q, cost
-            done = (cost - tried < 1e-4 * cost or np.abs(step).max() < tolerance) and not (left < -CONE_SLACK).any()
-            q, cost, inside, damping = trial, tried, left, max(1e-4, damping / 8.0)
-            if done:
-                break
-        return q, cost
-
-    def _errors(self, q: Array, goals: Goals) -> tuple[Array, Array]:
-        """Weighted errors of points and orientations (3 p + 3 t,), and of the posture (nv,)."""
-        errors = np.empty(len(self._joints))
-        points = 3 * len(self._point_joints)
-        errors[:points] = (goals.point_weights[:, None] * (self._places() - goals.points)).ravel()
-        left = self._orientations() @ np.swapaxes(goals.turns, 1, 2)
-        for k, turn in enumerate(left):
-            errors[points + 3 * k : points + 3 * k + 3] = goals.turn_weights[k] * pin.log3(turn)
-        return errors, goals.posture_weights * pin.difference(self.model, goals.posture, q)
-
-    def _quadratic(self, q: Array, goals: Goals) -> tuple[Array, Array]:
-        """Gradient (nv,) and Gauss-Newton matrix (nv, nv) of the cost."""
-        self._state.update(q)
-        errors, posture = self._errors(q, goals)
-        x, y, z = self._places().T
-        count = 3 * len(x)
-        wrenches = self._wrenches  # rows of a point p along n are [n, p x n]
-        wrenches[0:count:3, 4], wrenches[0:count:3, 5] = z, -y
-        wrenches[1:count:3, 3], wrenches[1:count:3, 5] = -z, x
-        wrenches[2:count:3, 3], wrenches[2:count:3, 4] = y, -x
-        rows = self._state.rows(wrenches, self._joints, self._world)
-        weights = np.repeat(np.concatenate([goals.point_weights, goals.turn_weights]), 3)
-        rows = rows * weights[:, None]
-        gradient: Array = rows.T @ errors + goals.posture_weights * posture
-        hessian: Array = rows.T @ rows
-        hessian[np.diag_indices(len(hessian))] += goals.posture_weights**2
-        return gradient, hessian
-
     def _angles(self) -> Array:
         """(c,) angle of each limb to the edge of its cone, radians, positive inside."""
+        if not self._cones:
+            return np.zeros(0)
         directions = self._directions()
         return np.array([cone.cone.signed_angle(along)[0] for cone, along in zip(self._cones, directions, strict=True)])
 
-    def _cone_rows(self) -> Array:
-        """(c, nv) rows of these angles."""
-        wrenches = np.zeros((len(self._cones), 6))
+    def _cone_rows(self) -> tuple[Array, Array]:
+        """Angles (k,) of the limbs that are near to the edges of their cones, and their rows (k, nv)."""
+        near, angles, wrenches = list[int](), list[float](), list[list[float]]()
         for row, (cone, along) in enumerate(zip(self._cones, self._directions(), strict=True)):
-            turn = self._state.joints[self._base_joints[row], :3].T @ self._base_turns[row]
-            wrenches[row, 3:] = np.cross(turn @ along, turn @ cone.cone.signed_angle(along)[1])
-        return self._state.rows(wrenches, self._limb_joints, self._base_joints)
-
-    def _program(self, q: Array, gradient: Array, hessian: Array, rows: Array, inside: Array) -> Array | None:
-        """The step within the limits; None where there is none."""
-        lower, upper = self.bounds(q)
-        low, high = np.empty(len(lower) + len(rows)), np.full(len(lower) + len(rows), 1e30)
-        low[: len(lower)], high[: len(lower)] = lower, upper
-        # A limb outside of its cone returns by half a step at a time; nearer to the edge it stays inside.
-        low[len(lower) :] = np.minimum(CONE_MARGIN - inside, 0.5 * STEP)
-        x, _, flag, _ = daqp.solve(hessian, gradient, rows, high, low, np.zeros(len(low), dtype=np.int32))
-        return np.asarray(x) if flag > 0 else None
-
-
-def smooth(
-    fitter: Fitter, q: Array, goals: Callable[[int], Goals], dt: float, iterations: int, told: Callable[[], None]
-) -> Array:
-    """The postures (n, nq) of least sum of costs and squared accelerations, by descent from q within the limits."""
-    if len(q) < 3:
-        return q
-    # m²/rad²: where errors are left, their curvature is about the error times a limb's length, which Gauss-Newton omits
-    damping = 3e-3
-    for _ in range(iterations):
-        q, damping = _iteration(fitter, q, goals, dt, damping)
-        told()
-    return q
-
-
-def _iteration(
-    fitter: Fitter, q: Array, goals: Callable[[int], Goals], dt: float, damping: float
-) -> tuple[Array, float]:
-    """Better postures, and the damping for the next iteration."""
-    model, count, size = fitter.model, len(q), fitter.model.nv
-    cones = 3.0  # m/rad: weight of an angle outside of a reach cone
-    # 1e-4 m for each rad/s², and m/s² of the root: 900 rad/s² weigh as much as 90 mm
-    weights = np.full(size, (1e-4 / dt**2) ** 2)
-    gradients, blocks = np.empty((count, size)), np.empty((count, size, size))
-    before = np.empty(count)
-    for k in range(count):
-        gradients[k], blocks[k], before[k] = fitter.quadratic(q[k], goals(k), cones)
-    a = _second_differences(model, q)
-    pulled = weights * a
-    gradients[:-2] += pulled
-    gradients[1:-1] -= 2.0 * pulled
-    gradients[2:] += pulled
-    lower, upper = (np.array(ends) for ends in zip(*(fitter.bounds(posture) for posture in q), strict=True))
-    least = before.sum() + 0.5 * float((weights * a * a).sum())
-    for _ in range(4):
-        step = _bounded(blocks, gradients, weights, lower, upper, damping)
-        trial = np.array([fitter.figure.clamp(pin.integrate(model, *pair)) for pair in zip(q, step, strict=True)])
-        a = _second_differences(model, trial)
-        cost = sum(fitter.cost(trial[k], goals(k), cones) for k in range(count))
-        if cost + 0.5 * float((weights * a * a).sum()) <= least:
-            return trial, damping / 10.0
-        damping *= 10.0
-    return q, damping
-
-
-def _second_differences(model: pin.Model, q: Array) -> Array:
-    """(n - 2, nv) displacement to the next frame plus that to the one before."""
-    found = np.empty((len(q) - 2, model.nv))
-    for k in range(1, len(q) - 1):
-        found[k - 1] = pin.difference(model, q[k], q[k + 1]) + pin.difference(model, q[k], q[k - 1])
-    return found
-
-
-def _bounded(blocks: Array, gradients: Array, weights: Array, lower: Array, upper: Array, damping: float) -> Array:
-    """The step (n, nv) within bounds; those that it would exceed are met, and the rest is solved again."""
-    fixed: Mask = np.zeros(gradients.shape, dtype=bool)
-    at = np.zeros_like(gradients)
-    step = at
-    for _ in range(3):  # in each more joints are kept at their limits
-        step = _in_parts(blocks, gradients, weights, fixed, at, damping)
-        beyond = ((step < lower) | (step > upper)) & ~fixed
-        if not beyond.any():
-            break
-        fixed |= beyond
-        at = np.where(fixed, np.clip(step, lower, upper), at)
-    clipped: Array = np.clip(step, lower, upper)
-    return clipped
-
-
-def _in_parts(blocks: Array, gradients: Array, weights: Array, fixed: Mask, at: Array, damping: float) -> Array:
-    """The step of all frames, from parts that overlap; in the middle of an overlap they are joined smoothly."""
-    count, overlap = len(gradients), 60
-    step, total = np.zeros_like(gradients), np.zeros(count)
-    first = 0
-    while True:
-        last = min(count, first + 600)  # memory grows with it
-        frames = slice(first, last)
-        share = np.ones(last - first)
-        if first:
-            share[:overlap] = np.linspace(0.0, 1.0, overlap)
-        if last < count:
-            share[-overlap:] = np.minimum(share[-overlap:], np.linspace(1.0, 0.0, overlap))
-        part = _solved(blocks[frames], gradients[frames], weights, fixed[frames], at[frames], damping)
-        step[frames] += share[:, None] * part
-        total[frames] += share
-        if last == count:
-            return step / total[:, None]
-        first = last - overlap
-
-
-def _solved(blocks: Array, gradients: Array, weights: Array, fixed: Mask, at: Array, damping: float) -> Array:
-    """Solution of the banded system; what is fixed is held at its value."""
-    count, size = gradients.shape
-    stiff = np.where(fixed, 1e6, 0.0)  # m²/rad²
-    band = np.zeros((2 * size + 1, count * size))  # row d has the entries (i + d, i), as scipy's lower form
-    for offset in range(size):
-        diagonal = np.zeros((count, size))
-        diagonal[:, : size - offset] = np.diagonal(blocks, offset, axis1=1, axis2=2)
-        band[offset] = diagonal.ravel()
-    own, one, two = np.zeros(count), np.zeros(count), np.zeros(count)
-    own[:-2] += 1.0
-    own[1:-1] += 4.0
-    own[2:] += 1.0
-    one[:-2] -= 2.0
-    one[1:-1] -= 2.0
-    two[:-2] = 1.0
-    band[0] += (own[:, None] * weights + stiff + damping).ravel()
-    band[size] += (one[:, None] * weights).ravel()
-    band[2 * size] += (two[:, None] * weights).ravel()
-    right = (stiff * at - gradients).ravel()
-    try:
-        found: Array = solveh_banded(band, right, lower=True, overwrite_ab=True, check_finite=False)
-    except LinAlgError:  # never where weights are finite and the damping is positive
-        return np.zeros_like(gradients)
-    return found.reshape(count, size)
+            angle, gradient = cone.cone.signed_angle(along)
+            if angle < STEP:
+                turn = self._state.joints[self._base_joints[row], :3].T @ self._base_turns[row]
+                (x, y, z), (u, v, w) = (turn @ along).tolist(), (turn @ gradient).tolist()
+                near.append(row)
+                angles.append(angle)
+                wrenches.append([0.0, 0.0, 0.0, y * w - z * v, z * u - x * w, x * v - y * u])
+        rows = self._state.rows(np.array(wrenches).reshape(-1, 6), self._limb_joints[near], self._base_joints[near])
+        return np.array(angles), rows

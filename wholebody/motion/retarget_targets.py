@@ -1,9 +1,4 @@
-"""Feet of a recorded skeleton that stand: when, and where the floor is.
-
-They are slow and low by the measures of `StanceFeet`, as the feet of a clip are. But the joints of a skeleton are above
-its soles, and a recording drifts: both feet have one floor, a low percentile of what they do while they are slow, and a
-foot that stands at several places made steps between them.
-"""
+"""Goals of all frames: the directions of a skeleton's bones at a figure's lengths, and orientations of its parts."""
 
 from __future__ import annotations
 
@@ -14,117 +9,16 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.geometry.pieces import box_corners
 from wholebody.motion.roles import Roles
 from wholebody.motion.skeleton import RIGID, SkeletonMotion
 from wholebody.motion.soles import soled
-from wholebody.motion.stance import StanceFeet, speeds
-from wholebody.motion.windows import Window, long_runs, runs
+from wholebody.motion.standing_ground import Ground
 
 SMALL = 1e-9
 """Metres: shorter ways have no direction."""
-
-
-class Footfalls(NamedTuple):
-    """When parts of the feet stand.
-
-    Attributes:
-        stands: role to (n,) whether it stands.
-        heights: role to its height while it stands, metres.
-    """
-
-    stands: dict[str, Mask]
-    heights: dict[str, float]
-
-
-def footfalls(motion: SkeletonMotion, roles: Roles) -> Footfalls:
-    """When the ankles and toes of a skeleton stand."""
-    stands, heights, limits = {}, {}, StanceFeet()
-    for part in ("ankle", "toe"):
-        pair = {
-            f"{side}_{part}": motion.names.index(roles.joints[f"{side}_{part}"])
-            for side in ("left", "right")
-            if f"{side}_{part}" in roles.joints
-        }
-        places = {role: motion.positions[:, joint] for role, joint in pair.items()}
-        speed = {role: speeds(at, motion.dt) for role, at in places.items()}
-        slow = [at[speed[role] <= limits.speed, 2] for role, at in places.items()]
-        low = np.concatenate(slow) if slow else np.zeros(0)
-        if not len(low):
-            continue
-        height = float(np.percentile(low, 10.0))  # some are lower by error
-        for role, at in places.items():
-            heights[role] = height
-            still = _apart(at, (speed[role] <= limits.speed) & (at[:, 2] <= height + limits.height))
-            stands[role] = long_runs(still, round(limits.least / motion.dt))
-    for side in ("left", "right"):  # a heel stands only while the toes do, so that both keep the length of the foot
-        if {f"{side}_toe", f"{side}_ankle"} <= stands.keys():
-            stands[f"{side}_ankle"] &= stands[f"{side}_toe"]
-    return Footfalls(stands, heights)
-
-
-def held(
-    points: dict[str, Array], steps: Footfalls, places: dict[str, Array], lowest: float, dt: float
-) -> dict[str, Array]:
-    """The goals of points with feet that stand at one place each, at the height at which the figure's stand.
-
-    Before and after it stands, a foot goes over from its own way to that place and back. Places (3,) and the lowest
-    height are those of the figure's neutral posture, which stands.
-    """
-    found = dict(points)
-    for part in ("toe", "ankle"):
-        for side in ("left", "right"):
-            role, toe = f"{side}_{part}", f"{side}_toe"
-            if role not in steps.stands or role not in points:
-                continue
-            corrections = []
-            for first, last in runs(steps.stands[role]):
-                frames = slice(first, last)
-                place = points[role][frames].mean(axis=0)
-                if part == "ankle" and toe in steps.stands and steps.stands[toe][frames].all():
-                    ahead = found[toe][frames].mean(axis=0)  # the toes stand already: keep the length of the foot
-                    place = ahead + (points[role][frames] - points[toe][frames]).mean(axis=0)
-                    flat = place[:2] - ahead[:2]
-                    rise = places[role][2] - places[toe][2]
-                    length = np.linalg.norm(places[role] - places[toe])
-                    place[:2] = ahead[:2] + flat / max(float(np.linalg.norm(flat)), SMALL) * np.sqrt(
-                        max(length**2 - rise**2, 0.0)
-                    )
-                place[2] = places[role][2] - lowest
-                corrections.append((first, last, place))
-            found[role] = _blended(points[role], corrections, max(1, round(0.15 / dt)))  # over 0.15 s
-    return found
-
-
-def _blended(way: Array, places: list[tuple[int, int, Array]], over: int) -> Array:
-    """A way (n, 3) that rests at places over some frames each, and goes over to and from them."""
-    frames = np.arange(len(way))
-    total, weights = np.zeros_like(way), np.zeros(len(way))
-    for first, last, place in places:
-        away = np.maximum(first - frames, frames - (last - 1))
-        share = 0.5 + 0.5 * np.cos(np.pi * np.clip(away / over, 0.0, 1.0))
-        near = np.clip(frames, first, last - 1)
-        total += share[:, None] * np.where((away > 0)[:, None], place - way[near], place - way)
-        weights += share
-    found: Array = way + total / np.maximum(weights, 1.0)[:, None]
-    return found
-
-
-def _apart(places: Array, mask: Mask) -> Mask:
-    """The mask without the fastest frame of each run over which a foot goes on, so that it stands at several places."""
-    kept: Mask = np.array(mask)
-    waiting = runs(kept)
-    moved = speeds(places, 1.0)
-    while waiting:
-        first, last = waiting.pop()
-        # a foot that moves by more than 3 cm has made a step
-        if last - first > 2 and np.linalg.norm(np.ptp(places[first:last], axis=0)) > 0.03:
-            cut = first + 1 + int(moved[first + 1 : last - 1].argmax())
-            kept[cut] = False
-            waiting += [Window(first, cut), Window(cut + 1, last)]
-    return kept
 
 
 UPRIGHT = 0.7
@@ -141,13 +35,13 @@ class Targets(NamedTuple):
         points: role to (n, 3), metres in the figure's world.
         turns: role to (n, 3, 3): orientations of the figure's frames.
         root: (n, 3, 3) orientation of the pelvis, from which the descent begins.
-        scale: metres of the figure for each metre of the skeleton's way over the floor.
+        path: metres of the figure for each metre of the skeleton's way over the ground.
     """
 
     points: dict[str, Array]
     turns: dict[str, Array]
     root: Array
-    scale: float
+    path: float
 
 
 class _Body:
@@ -172,10 +66,15 @@ class _Body:
         return float(np.percentile(np.linalg.norm(self.way(first, second), axis=-1), 95))
 
 
+def upright(figure: Figure) -> Array:
+    """(nq,) the posture in which a figure stands with flat soles and straight limbs: a robot's zero, if it has one."""
+    return np.asarray(figure.posture("zero") if "zero" in figure.postures else figure.neutral)
+
+
 def standing_places(figure: Figure, roles: Roles) -> tuple[dict[str, Array], dict[str, Array], float]:
-    """Places (3,) and orientations (3, 3) of a figure's roles in its neutral posture, and its lowest height."""
+    """Places (3,) and orientations (3, 3) of a figure's roles where it stands upright, and its lowest height."""
     data, geometry = figure.model.createData(), figure.geometry.createData()
-    q = figure.neutral
+    q = upright(figure)
     pin.framesForwardKinematics(figure.model, data, q)
     found = {role: data.oMf[figure.frame_id(frame)] for role, frame in roles.frames.items()}
     pin.updateGeometryPlacements(figure.model, data, figure.geometry, geometry)
@@ -212,13 +111,17 @@ def rest_axes(motion: SkeletonMotion, roles: Roles) -> Array | None:
     return np.stack([np.cross(left, up), left, up], axis=1)
 
 
-def targets(motion: SkeletonMotion, figure: Figure, roles: Roles, steps: Footfalls) -> Targets:
-    """Goals of all frames; where the skeleton's feet stand, the figure's are on the plane z = 0."""
+def targets(motion: SkeletonMotion, figure: Figure, roles: Roles, ground: Ground, path: float | None) -> Targets:
+    """Goals of all frames; where the skeleton's feet stand on the lowest level, the figure's are near the plane z = 0.
+
+    `path` is the metres of the figure for each metre of the way and of the ground's heights; None for as many as its
+    legs have for each metre of the skeleton's.
+    """
     places, turned, lowest = standing_places(figure, roles)
     own = _Body(places)
     joint = {role: motion.names.index(name) for role, name in roles.joints.items()}
     centres = {role: motion.positions[:, k] for role, k in joint.items()}
-    source = _Body(centres | soled(motion, roles, steps.stands, places))
+    source = _Body(centres | soled(motion, roles, ground.rests, places))
     turns = _turns(motion, joint, own, turned, rest_axes(motion, roles))
     root, scale = turns.get("pelvis", _pelvis(source, motion)), 1.0
     if figure.root == "fixed":  # only what moves relative to the pelvis can be followed
@@ -230,14 +133,18 @@ def targets(motion: SkeletonMotion, figure: Figure, roles: Roles, steps: Footfal
         hips = np.tile(own.places.get("hips", np.zeros(3)), (len(motion), 1))
     else:
         scale = _leg(own) / max(_leg(source), SMALL) if _leg(own) and _leg(source) else 1.0
-        hips = scale * source.places["hips"]
-        foot = next((part for part in ("left_ankle", "left_toe") if part in steps.heights and own.has(part)), None)
+        path = scale if path is None else path
+        under = ground.below(len(motion))
+        hips = np.array([path, path, scale]) * source.places["hips"]
+        hips[:, 2] += (path - scale) * under
+        lows = ground.lowest
+        foot = next((part for part in ("left_ankle", "left_toe") if part in lows and own.has(part)), None)
         if foot is not None:
-            hips[:, 2] += own.places[foot][2] - lowest - scale * steps.heights[foot]
+            hips[:, 2] += own.places[foot][2] - lowest - scale * lows[foot]
         else:
             hips[:, 2] -= scale * float(np.percentile(motion.positions[:, :, 2].min(axis=1), 2))
     points = _points(own, source, hips, figure.root == "fixed" or not has_trunk(joint))
-    return Targets(held(points, steps, places, lowest, motion.dt), turns, root, scale)
+    return Targets(points, turns, root, path or 1.0)
 
 
 def _turns(

@@ -6,38 +6,33 @@ import os
 from collections.abc import Callable, Mapping
 
 import numpy as np
-import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.checks import function, instance, warn
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
+from wholebody.figures.joined import one_figure
+from wholebody.geometry.shapes import HalfSpace
 from wholebody.motion.clip import Clip
-from wholebody.motion.posture_fit import Fitter, Goals, smooth
-from wholebody.motion.retarget_targets import (
-    LIMBS,
-    Footfalls,
-    Targets,
-    footfalls,
-    has_trunk,
-    known_bones,
-    standing_places,
-    targets,
-)
+from wholebody.motion.held_points import Holds, held_points, surface_of
+from wholebody.motion.retarget_run import Run
+from wholebody.motion.retarget_targets import LIMBS, known_bones, standing_places, targets
 from wholebody.motion.roles import Roles, matched
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
 from wholebody.motion.soles import soled
 from wholebody.motion.stance import paths
-from wholebody.tracking.tracks import check_figure
-
-ALONE, TOGETHER = 25, 4  # most iterations of a frame alone, and of all frames at once
+from wholebody.motion.standing_ground import NOTHING, Ground
+from wholebody.motion.standing_ground import ground as find_ground
+from wholebody.scene.scene import Scene
 
 
 def retarget(
     motion: SkeletonMotion,
     figure: Figure,
-    names: str | os.PathLike[str] | Mapping[str, Mapping[str, str]] | None = None,
+    scene: Scene | None = None,
+    ground: str | Ground | None = "auto",
     *,
+    names: str | os.PathLike[str] | Mapping[str, Mapping[str, str]] | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Clip:
     """The motion of a skeleton as a clip of a figure.
@@ -45,22 +40,31 @@ def retarget(
     Args:
         motion: the skeleton, from `wb.motion.read_skeleton`.
         figure: the figure.
+        scene: the figure among things, where they were in the recording; None for a level floor. Things do not change
+            their size with the figure, so a way among them keeps its length.
+        ground: "auto" to find what the person stands on, as `wb.motion.ground(motion)` does; that, or one that was
+            changed; None to hold nothing, and without a scene to follow the skeleton alone.
         names: which joint of the skeleton and which frame of the figure are which part of a body: a TOML file or a
             mapping; see docs/motion.md. Names of CMU, Mixamo, LAFAN1, SMPL, DeepMimic, Bandai-Namco, Biovision, Xsens,
             Poser, Daz, 3ds Max (biped), Unreal, VRM, VRoid, Rokoko and Motive are known.
         progress: called now and then with the share of the work that is done.
 
     Returns:
-        A clip within the figure's joint limits and reach cones. It may collide with itself.
+        A clip within the figure's joint limits, reach cones and speed limits. Feet, hands and knees that rest are held
+        where they came down, soles on the ground. The figure is free of itself, of the ground and of things where the
+        holds and limits leave room for it: `wb.check` says where not. With `ground=None` and no scene it may collide.
 
     Raises:
         UnknownNameError: a name that does not exist.
         FileFormatError: the TOML file cannot be read.
-        InputError: no bones are known to belong to the figure, or two ends of none.
+        InputError: no bones are known to belong to the figure, or two ends of none; the scene is of another figure; the
+            ground is none, or of a recording of another length.
     """
     motion = checked_motion(motion, "retarget: motion")
-    check_figure(figure, "retarget")
+    one_figure(figure, "retarget: figure")
     function(progress, "progress")
+    if scene is not None:
+        same_figure(instance(scene, Scene, "retarget: scene", "make one with wb.Scene(figure)"), figure)
     roles = matched(motion, figure, names)
     if roles.told:
         told = ", ".join(f"{role} is {roles.joints[role]!r}" for role in roles.told)
@@ -70,17 +74,55 @@ def retarget(
             f"retarget: no joint of {motion.name} is known for {', '.join(roles.missing)}, so these follow nothing; "
             'name them with names={"skeleton": {"left_wrist": "hand.L"}}'
         )
-    steps = footfalls(motion, roles) if figure.root == "free" else Footfalls({}, {})  # no floor moves with a pelvis
-    wanted = targets(motion, figure, roles, steps)
+    found = _ground(motion, figure, ground, names)
+    wanted = targets(motion, figure, roles, found, path=None if scene is None else 1.0)
     if not wanted.points:
         raise InputError(
             f"the roles that {motion.name} and {figure.name} have in common ({', '.join(roles.joints)}) make no bone; "
             "name both ends of one"
         )
-    clip = Clip(figure, _Retargeting(motion, figure, roles, wanted, steps, progress).run(), motion.dt, motion.name)
+    world = Scene(figure) if scene is None else scene
+    if scene is None and ground is not None and figure.root == "free":
+        world.add(HalfSpace(), name="floor")
+    holds = None
+    if ground is not None or scene is not None:
+        held = NOTHING if ground is None else found
+        surface = None if scene is None else surface_of(scene)
+        holds = Holds(held_points(figure, roles, held), held, wanted.path, motion.dt, surface)
+    with world.borrow() as workspace:
+        clip = Clip(
+            figure, Run(figure, wanted, roles, motion.dt, holds, workspace).run(progress), motion.dt, motion.name
+        )
     if told := said_of(errors_of(motion, clip, roles)):
         warn(f"retarget: {motion.name}: {told}; see wb.motion.bone_errors(motion, clip)")
     return clip
+
+
+def same_figure(scene: Scene, figure: Figure) -> None:
+    """Refuse a scene of another figure."""
+    if scene.figure.joints != figure.joints or scene.model.nq != figure.model.nq:
+        raise InputError(f"retarget: the scene has the figure {scene.figure.name}, not {figure.name}; give its own")
+
+
+def _ground(
+    motion: SkeletonMotion,
+    figure: Figure,
+    given: object,
+    names: str | os.PathLike[str] | Mapping[str, Mapping[str, str]] | None,
+) -> Ground:
+    """The ground of a recording, stated or found."""
+    if figure.root != "free":  # no ground moves with a pelvis
+        return NOTHING
+    if given is None or (isinstance(given, str) and given == "auto"):
+        return find_ground(motion, names)
+    found = instance(given, Ground, "retarget: ground", 'give "auto", wb.motion.ground(motion) or None')
+    if any(len(mask) != len(motion) for mask in found.rests.values()) or any(
+        not 0 <= each.first < each.end <= len(motion) for each in found.footholds
+    ):
+        raise InputError(
+            f"retarget: the ground is of another recording than {motion.name}; give wb.motion.ground of it"
+        )
+    return found
 
 
 def bone_errors(
@@ -117,7 +159,8 @@ def errors_of(motion: SkeletonMotion, clip: Clip, roles: Roles) -> dict[str, Arr
     places = dict(zip(roles.frames, ways, strict=True))
     centres = {role: motion.positions[:, motion.names.index(joint)] for role, joint in roles.joints.items()}
     if clip.figure.root == "free":
-        centres |= soled(motion, roles, footfalls(motion, roles).stands, standing_places(clip.figure, roles)[0])
+        named = {"skeleton": roles.joints}
+        centres |= soled(motion, roles, find_ground(motion, named).rests, standing_places(clip.figure, roles)[0])
     found = {}
     for ends in (ends for side in ("left", "right") for limb in LIMBS for ends in known_bones(limb, side, places)):
         start, end = (centres[role] for role in ends)
@@ -137,128 +180,3 @@ def said_of(errors: Mapping[str, Array]) -> str:
         f"{name} by {angle:.0f} degrees" for name, angle in sorted(loud.items(), key=lambda one: -one[1])
     )
     return f"bones differ from the recording's (median): {listed}" if loud else ""
-
-
-class _Retargeting:
-    """The search for the postures of all frames."""
-
-    def __init__(
-        self,
-        motion: SkeletonMotion,
-        figure: Figure,
-        roles: Roles,
-        wanted: Targets,
-        steps: Footfalls,
-        progress: Callable[[float], object] | None,
-    ) -> None:
-        self.figure, self.model, self.dt = figure, figure.model, motion.dt
-        self.points = [role for role in wanted.points if role in roles.frames]
-        self.turns = [role for role in wanted.turns if role in roles.frames]
-        self.fitter = Fitter(
-            figure, [roles.frames[role] for role in self.points], [roles.turns[role] for role in self.turns]
-        )
-        self.places = np.stack([wanted.points[role] for role in self.points], axis=1)
-        self.angles = (
-            np.stack([wanted.turns[role] for role in self.turns], axis=1)
-            if self.turns
-            else np.zeros((len(motion), 0, 3, 3))
-        )
-        self.root = wanted.root
-        far = {"ankle": 2.0, "wrist": 1.5, "hand": 0.5, "neck": 0.5, "head": 0.7}  # weights of distances
-        # a hand stands for a wrist that is not known
-        ends = [
-            role if role.replace("hand", "wrist") in self.points else role.replace("hand", "wrist")
-            for role in self.points
-        ]
-        self.point_weights = np.tile([far.get(role.split("_")[-1], 1.0) for role in ends], (len(motion), 1))
-        for column, role in enumerate(self.points):
-            if role in steps.stands:
-                self.point_weights[steps.stands[role], column] = 30.0
-        turned = {"pelvis": 0.3, "head": 0.15, "ankle": 0.15, "hand": 0.08}  # m/rad, weights of angles
-        self.turn_weights = np.array([turned[role.split("_")[-1]] for role in self.turns])
-        self.count = len(motion)
-        self.neutral = figure.neutral
-        # metres per radian from the neutral posture, for what no goal determines
-        self.stay = 0.03 * figure.neutral_weights
-        self.led = figure.root == "free" and has_trunk(roles.joints)
-        if figure.root == "free" and not self.led:
-            self.stay[:6] = 1.0  # nothing says where the figure is, so it stays
-        self._progress, self._done = progress, 0
-
-    def run(self) -> Array:
-        """Postures (n, nq)."""
-        own = self._kept(
-            [self.fitter.fit(self._start(k), self._goals(k), ALONE, cones=False) for k in self._told(range(self.count))]
-        )
-        forward, backward = self._chain(own, 1), self._chain(own, -1)
-        q = self._chosen([own, forward, backward])
-        q = smooth(self.fitter, q, self._goals, self.dt, TOGETHER, self._tell)
-        found = self._kept([(posture, 0.0) for posture in q], q)
-        return np.array([posture for posture, _ in found])
-
-    def _kept(self, found: list[tuple[Array, float]], near: Array | None = None) -> list[tuple[Array, float]]:
-        """The postures within reach cones: those outside are fitted again with them."""
-        for k in np.flatnonzero(self.fitter.outside(np.array([posture for posture, _ in found]))):
-            goals = self._goals(k, None if near is None else near[k])
-            found[k] = self.fitter.fit(found[k][0], goals, ALONE)
-        return found
-
-    def _told(self, frames: range) -> range:
-        self._tell()
-        return frames
-
-    def _tell(self) -> None:
-        if self._progress is not None:
-            self._done += 1
-            self._progress(self._done / (TOGETHER + 3))
-
-    def _start(self, frame: int) -> Array:
-        """Where the descent of a frame alone begins: the neutral posture, with the pelvis as it is wanted."""
-        q = np.array(self.neutral)
-        if self.led:
-            hips = [k for k, role in enumerate(self.points) if role.endswith("hip")] or [0]
-            at = self.places[frame, hips].mean(axis=0)
-            q[:7] = pin.SE3ToXYZQUAT(pin.SE3(self.root[frame], at))
-        return q
-
-    def _goals(self, frame: int, near: Array | None = None) -> Goals:
-        posture, weights = self.neutral, self.stay
-        if near is not None:
-            posture, weights = near, np.full(self.model.nv, 0.3)
-        return Goals(
-            self.places[frame], self.point_weights[frame], self.angles[frame], self.turn_weights, posture, weights
-        )
-
-    def _chain(self, own: list[tuple[Array, float]], direction: int) -> list[tuple[Array, float]]:
-        """Each frame from the posture of the frame before it, in one direction of time."""
-        frames = self._told(range(self.count))
-        found = list(own)
-        for k in frames[::direction][1:]:
-            found[k] = self.fitter.fit(found[k - direction][0], self._goals(k), 6, cones=False)
-        return self._kept(found)
-
-    def _chosen(self, candidates: list[list[tuple[Array, float]]]) -> Array:
-        """The postures of least cost and least difference between neighbours, by dynamic programming."""
-        q = np.array([[posture for posture, _ in of_kind] for of_kind in candidates])
-        cost = np.array([[value for _, value in of_kind] for of_kind in candidates])
-        kinds = len(candidates)
-        best, came = cost[:, 0].copy(), np.zeros((self.count, kinds), dtype=int)
-        for k in range(1, self.count):
-            # beside the costs of both frames, 0.05 m² for a difference of one radian between them
-            jump = np.array(
-                [[0.05 * _squared(self.model, q[a, k - 1], q[b, k]) for b in range(kinds)] for a in range(kinds)]
-            )
-            through = best[:, None] + jump
-            came[k] = through.argmin(axis=0)
-            best = through.min(axis=0) + cost[:, k]
-        kind = int(best.argmin())
-        chosen = np.empty((self.count, self.model.nq))
-        for k in range(self.count - 1, -1, -1):
-            chosen[k] = q[kind, k]
-            kind = int(came[k, kind])
-        return chosen
-
-
-def _squared(model: pin.Model, first: Array, second: Array) -> float:
-    step = pin.difference(model, first, second)
-    return float(step @ step)

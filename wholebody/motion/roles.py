@@ -58,12 +58,8 @@ def matched(
         FileFormatError: the file cannot be read.
         InputError: less than two roles are common to both.
     """
-    given, joints = _given(names), motion.names
-    table, found = _recognised(joints)
-    said = _checked(given.get("skeleton", {}), joints, "joint of the skeleton")
-    found = {role: joint for role, joint in found.items() if joint not in said.values()} | said
-    more = {} if said or set(ROLES) <= found.keys() else _by_structure(motion, found)
-    found |= more
+    given = _given(names)
+    table, found, more, said = _joints(motion, given)
     frames = _frames(figure)
     frames |= {
         role: frame
@@ -72,12 +68,15 @@ def matched(
     }
     common = [role for role in ROLES if role in found and role in frames]
     if len(common) < 2:
-        what = f"the skeleton has {', '.join(joints[:5])}, ..." if not found else f"{figure.name} names none of them"
+        what = (
+            f"the skeleton has {', '.join(motion.names[:5])}, ..." if not found else f"{figure.name} names none of them"
+        )
         raise InputError(
             f"no bones of the skeleton are known to belong to {figure.name} ({what}); name them in a TOML file with "
             "the tables [skeleton] and [figure]"
         )
-    asked = () if said and set(joints) <= set(found.values()) else ROLES  # else no joint is left that could be named
+    # no joint is left that could be named
+    asked = () if said and set(motion.names) <= set(found.values()) else ROLES
     segments = _column("person_turn")
     segments = segments if set(segments.values()) <= set(figure.segments) else {}
     return Roles(
@@ -88,6 +87,24 @@ def matched(
         tuple(role for role in asked if role in frames and role not in found),
         tuple(role for role in common if role in more),
     )
+
+
+def skeleton_roles(
+    motion: SkeletonMotion, names: str | os.PathLike[str] | Mapping[str, Mapping[str, str]] | None = None
+) -> dict[str, str]:
+    """Role to joint of a skeleton, of all roles that are known; `names` and errors as for `matched`."""
+    return _joints(motion, _given(names))[1]
+
+
+def _joints(
+    motion: SkeletonMotion, given: Mapping[str, Mapping[str, str]]
+) -> tuple[str, dict[str, str], dict[str, str], dict[str, str]]:
+    """The table that matched, role to joint of all that are known, of those by structure, and of those given."""
+    table, found = _recognised(motion.names)
+    said = _checked(given.get("skeleton", {}), motion.names, "joint of the skeleton")
+    found = {role: joint for role, joint in found.items() if joint not in said.values()} | said
+    more = {} if said or set(ROLES) <= found.keys() else _by_structure(motion, found)
+    return table, found | more, more, said
 
 
 def _by_structure(motion: SkeletonMotion, known: Mapping[str, str]) -> dict[str, str]:

@@ -11,8 +11,8 @@ import numpy as np
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array
-from wholebody.figures.anthropometry import table
 from wholebody.figures.figure import Figure
+from wholebody.figures.tables import table
 
 PERCENTILES = (5.0, 50.0, 95.0)
 

@@ -1,28 +1,74 @@
-"""`wb.accommodation`: the share of a population that reaches, fits and sees."""
+"""`wb.accommodation`: the share of a population that reaches, fits and sees, and who does not."""
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.special import ndtri
 
 from wholebody.base import checks
+from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.ergonomics.vision import sight
-from wholebody.figures.anthropometry import STATURE, table
 from wholebody.methods.base import Method
 from wholebody.studies.many import SolveProgress
+from wholebody.studies.populations import people as sampled
 from wholebody.studies.records import Records
-from wholebody.studies.study import TaskFunction, Variant, study
+from wholebody.studies.study import TaskFunction, Variant, loaded_person, study
 from wholebody.studies.study_files import TaskFile
 from wholebody.tasks import inputs
 
-SEXES = {"male": "M", "female": "F"}
 REACHED = 1e-3  # m, rad: by which a goal may be missed by somebody who reaches it
+
+
+class Share(NamedTuple):
+    """Share of some people.
+
+    Attributes:
+        share: of those that were tried.
+        low, high: between which the share of all such people is, at 95 % confidence, were they drawn at random
+            (Wilson 1927). Those of `wb.people` stand for all more closely than that.
+        tried: how many were tried.
+    """
+
+    share: float
+    low: float
+    high: float
+    tried: int
+
+    def __str__(self) -> str:
+        return f"{self.share:.0%} ({self.low:.0%} to {self.high:.0%})"
+
+
+class Exclusion(NamedTuple):
+    """A dimension that tells who is left out.
+
+    Attributes:
+        sex: "male" or "female".
+        verdict: "reach", "fit" or "see": what they do not.
+        dimension: its name, see `wb.people`.
+        side: "over" or "under".
+        value: metres (mass: kilograms) over or under which they are.
+        excluded: how many are left out for it.
+        told: share of these that are on that side, less the share of those that are accommodated.
+    """
+
+    sex: str
+    verdict: str
+    dimension: str
+    side: str
+    value: float
+    excluded: int
+    told: float
+
+    def __str__(self) -> str:
+        unit = "kg" if self.dimension == "mass" else "m"
+        words = f"{self.dimension.replace('_', ' ')} {self.side} {self.value:.3f} {unit}"
+        return f"{self.excluded} {'men' if self.sex == 'male' else 'women'} do not {self.verdict}: {words}"
 
 
 @dataclass(frozen=True)
@@ -30,78 +76,104 @@ class Accommodation:
     """How much of a population a task accommodates.
 
     Attributes:
-        records: one for each person, by sex and percentile of stature.
+        records: one for each person.
+        sexes: "male" or "female" for each; "" for figures that are no people.
+        dimensions: for each person, name to metres (mass: kilograms); empty for figures that are no people.
         reaches: whether each person meets the goals.
         fits: whether each person does so without overlap and with all constraints.
         sees: whether each person sees the point; None where none was given.
     """
 
     records: Records
+    sexes: tuple[str, ...]
+    dimensions: tuple[Mapping[str, float], ...]
     reaches: tuple[bool, ...]
     fits: tuple[bool, ...]
     sees: tuple[bool, ...] | None
 
     @property
+    def accommodated(self) -> tuple[bool, ...]:
+        """Whether each person reaches, fits and, if asked, sees."""
+        seen = (True,) * len(self.fits) if self.sees is None else self.sees
+        return tuple(map(all, zip(self.reaches, self.fits, seen, strict=True)))
+
+    @property
     def share(self) -> float:
         """Share of the people that reach, fit and, if asked, see."""
-        good = np.array(self.reaches) & np.array(self.fits)
-        return float((good if self.sees is None else good & np.array(self.sees)).mean())
+        return float(np.mean(self.accommodated))
+
+    @property
+    def by_sex(self) -> dict[str, Share]:
+        """The share of each sex."""
+        sexes = dict.fromkeys(self.sexes)
+        return {sex: _share([good for good, own in zip(self.accommodated, self.sexes, strict=True) if own == sex])
+                for sex in sexes}  # fmt: skip
+
+    @property
+    def exclusions(self) -> tuple[Exclusion, ...]:
+        """The dimension that best tells those left out from the others, of each sex and verdict, the most first."""
+        found = []
+        for sex in dict.fromkeys(self.sexes):
+            for verdict, good in (("reach", self.reaches), ("fit", self.fits), ("see", self.sees or ())):
+                own = [k for k, one in enumerate(self.sexes) if one == sex and self.dimensions[k]]
+                out = [k for k in own if good and not good[k]]
+                rest = [k for k in own if self.accommodated[k]]
+                if out and rest:
+                    found.append(self._told(sex, verdict, out, rest))
+        return tuple(sorted(found, key=lambda one: -one.excluded))
+
+    def _told(self, sex: str, verdict: str, out: list[int], rest: list[int]) -> Exclusion:
+        """The dimension and the bound with the greatest difference of shares beyond it (Youden 1950)."""
+        best = Exclusion(sex, verdict, "", "over", math.nan, len(out), -1.0)
+        for name in self.dimensions[out[0]]:
+            left, kept = (np.sort([self.dimensions[k][name] for k in who]) for who in (out, rest))
+            values = np.unique(np.concatenate([left, kept]))
+            bounds = 0.5 * (values[1:] + values[:-1])
+            if not len(bounds):
+                continue
+            below = np.searchsorted(left, bounds) / len(left) - np.searchsorted(kept, bounds) / len(kept)
+            for side, gain in (("under", below), ("over", -below)):
+                k = int(gain.argmax())
+                if gain[k] > best.told:
+                    best = Exclusion(sex, verdict, name, side, float(bounds[k]), len(out), float(gain[k]))
+        return best
 
     def __repr__(self) -> str:
         parts = [("reach", self.reaches), ("fit", self.fits), *([("see", self.sees)] if self.sees is not None else [])]
         words = ", ".join(f"{np.mean(values):.0%} {name}" for name, values in parts)
-        return f"Accommodation of {len(self.records)} people: {self.share:.0%}\n  {words}{self.records.remarks()}"
+        shares = ", ".join(f"{sex} {share}" for sex, share in self.by_sex.items() if sex)
+        lines = [f"Accommodation of {len(self.records)} people: {self.share:.0%}" + (f"; {shares}" if shares else "")]
+        lines += [f"  {words}{self.records.remarks()}", *(f"  {one}" for one in self.exclusions)]
+        return "\n".join(lines)
 
 
-def people(count: int = 9, sexes: Sequence[str] = ("male", "female")) -> dict[str, dict[str, Any]]:
-    """People who stand for a population: for each sex, equally many of equal shares of the statures.
+def _share(good: list[bool]) -> Share:
+    """Share with Wilson's interval."""
+    from scipy.stats import binomtest
 
-    The statures are the middles of equal shares of a normal distribution with mean and deviation of ANSUR II.
-
-    Args:
-        count: for each sex.
-        sexes: "male", "female" or both.
-
-    Returns:
-        Name such as "female P25" to options of `wb.load("human")`.
-
-    Raises:
-        InputError: a value of the wrong kind or range.
-    """
-    count = checks.whole(count, "people: count", 1, 10_000)  # most people
-    found = {}
-    for sex in checks.listed(sexes, "people: sexes", "['male', 'female']"):
-        checks.choice(sex, SEXES, "people: a sex")
-        mean, deviation = _statures(sex)
-        for k in range(count):
-            part = (k + 0.5) / count
-            stature = float(np.clip(mean + deviation * ndtri(part), STATURE.low, STATURE.high))
-            found[f"{sex} P{100.0 * part:.3g}"] = {"sex": sex, "stature": stature}
-    if not found:
-        raise InputError("people: sexes is empty; give 'male', 'female' or both")
-    return found
+    found = binomtest(sum(good), len(good)).proportion_ci(0.95, method="wilson")
+    return Share(sum(good) / len(good), float(found.low), float(found.high), len(good))
 
 
 def accommodation(
     task: TaskFunction | str | os.PathLike[str],
+    people: Mapping[str, Any] | None = None,
     *,
     sees: Any = None,
-    count: int = 9,
-    sexes: Sequence[str] = ("male", "female"),
     method: str | Method | None = None,
     jobs: int = 1,
     folder: str | os.PathLike[str] | None = None,
     progress: Callable[[SolveProgress], Any] | None = None,
 ) -> Accommodation:
-    """Solve a task for people of all statures, and count who reaches, fits and sees.
+    """Solve a task for many people, and count who reaches, fits and sees.
 
-    Who is not solved from the task's start is tried from the answers of people of neighbouring statures, see `study`.
+    Each begins at the answer of the one of nearest stature before, and who is not solved from there at the task's
+    start, see `study`.
 
     Args:
         task: a task file, or a function, see `study`; its target and layout are None.
+        people: by name, as `wb.people` and `wb.boundary` make them; `wb.people(100)` if left out.
         sees: (3,) a point that has to be seen without turning the head, metres; None for none.
-        count: people of each sex; their statures stand for equal shares of the population.
-        sexes: of the population, in equal shares.
         method: name or settings, see `study`.
         jobs: people at a time.
         folder: keeps the records, see `solve_many`.
@@ -113,8 +185,17 @@ def accommodation(
         FileFormatError: the task file cannot be read.
     """
     point = None if sees is None else inputs.point(sees, "accommodation: sees")
-    population = people(count, sexes)
-    records = study(task, people=population, method=method, jobs=jobs, folder=folder, progress=progress)
+    given = sampled(100) if people is None else people
+    if not isinstance(given, Mapping) or not given:
+        raise InputError(
+            f"accommodation: people is {checks.shown(people)}; give people by name, such as wb.people(100)"
+        )
+    who = {name: loaded_person(one) for name, one in given.items()}
+    order = sorted(who, key=lambda name: ("", 0.0) if (one := who[name]) is None else (one.sex, one.stature))
+    population = {name: given[name] for name in order}
+    records = study(
+        task, people=population, method=method, jobs=jobs, warm_start=True, folder=folder, progress=progress
+    )
     reaches = tuple(one.q is not None and one.goal_error <= REACHED and one.goal_angle <= REACHED for one in records)
     # m, rad: by which limits, constraints and distances may be violated by somebody who fits
     fits = tuple(
@@ -127,16 +208,15 @@ def accommodation(
         make = TaskFile(checks.path(task, "task")) if isinstance(task, (str, os.PathLike)) else task
         variants = [Variant(make, person, None, None) for person in population.values()]
         seen = tuple(  # a problem that failed is not made again
-            one.q is not None and sight(variant().scene, one.q, point).seen
-            for variant, one in zip(variants, records, strict=True)
+            one.q is not None and _sees(variant, one.q, point) for variant, one in zip(variants, records, strict=True)
         )
-    return Accommodation(records, reaches, fits, seen)
+    persons = [who[name] for name in order]
+    sizes = tuple(
+        {} if one is None else {"stature": one.stature, "mass": one.mass, **dict(one.dimensions), **one.built[1]}
+        for one in persons
+    )
+    return Accommodation(records, tuple("" if one is None else one.sex for one in persons), sizes, reaches, fits, seen)
 
 
-def _statures(sex: str) -> tuple[float, float]:
-    """Mean and standard deviation of the stature, metres."""
-    for row in table("percentiles"):
-        values = list(row.values())
-        if values[0].startswith("ANSUR") and values[1] == SEXES[sex] and values[2] == "stature":
-            return 0.01 * float(values[5]), 0.01 * float(values[6])
-    raise InputError("people: the tables have no statures")
+def _sees(variant: Variant, q: Array, point: Array) -> bool:
+    return sight(variant().scene, q, point).seen

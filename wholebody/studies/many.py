@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, is_dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
@@ -20,6 +20,7 @@ from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
 from wholebody.studies.records import ENDED, REFUSED, Records, RecordStore, SolveRecord, answer_of
 from wholebody.studies.sending import Sender, Sent
+from wholebody.studies.starting import begun_at, warmed
 from wholebody.tasks.answers import is_own
 from wholebody.version import __version__
 
@@ -35,6 +36,9 @@ T = TypeVar("T")
 
 _Start = tuple[Make, Any]
 """A problem, and the posture (nq,) from which it is solved."""
+
+_Run = tuple[Any, Sequence[Make]]
+"""The posture (nq,) from which the first of some problems is tried, None for its own start; and the problems."""
 
 
 class SolveProgress(NamedTuple):
@@ -123,7 +127,8 @@ def solve_many(
         cluster: address of a dask scheduler that runs them; None for this machine.
         warm_start: begin each problem at the answer of the one before it, if that is solved and of the same figure.
             One that is not solved from there is solved from its own start. Runs of 16 problems in the order given are
-            linked so, whatever `jobs` is. An answer may then be another local solution than without.
+            linked so, and their first ones, whatever `jobs` is. An answer may then be another local solution than
+            without.
         seconds: deadline of each problem, by the clock; its record's outcome is then "ended". None for none.
         folder: keeps the records (`records.sqlite`). What it holds already of the same problem and method is not solved
             again: a run that was ended goes on. Made if it does not exist.
@@ -183,10 +188,15 @@ def run_cases(runs: Sequence[Sequence[Case]], running: Running, store: RecordSto
 
     over = tell is not None and tell(SolveProgress(len(done), len(order), None)) is True
     waiting = [run for run in numbered if any(k not in done for k in run)]
-    alone: list[range] = []
-    for work in (waiting, alone):  # the cases of a run whose process ended are done again, one by one
+    # The first of each run begin at each other's answers, one after the other, and the rest of a run at its first: so
+    # all runs are of one family of postures, whatever `jobs` is.
+    linked = [run for run in waiting if len(run) > 1]
+    heads, alone = [[run[0] for run in linked]] if len(linked) > 1 else [], list[Sequence[int]]()
+    tails = [run[1:] if heads else run for run in linked] + [run for run in waiting if len(run) == 1]
+    for work in (heads, tails, alone):  # the cases of a run whose process ended are done again, one by one
         if not over and work:
-            over = _run(work, order, running, keep, alone)
+            begun = {k: done[k - 1].q for run in tails for k in run[:1] if heads and work is tails and k - 1 in done}
+            over = _run(work, order, running, keep, alone, begun)
     if not over and waiting:
         _from_neighbours(order, done, running, keep)
     return Records([done.get(k, order[k].record) for k in range(len(order))])
@@ -245,23 +255,29 @@ def _nearest(
 
 
 def _run(
-    work: Sequence[range], order: Sequence[Case], running: Running, keep: Callable[[int, SolveRecord], bool],
-    alone: list[range],
+    work: Sequence[Sequence[int]], order: Sequence[Case], running: Running, keep: Callable[[int, SolveRecord], bool],
+    alone: list[Sequence[int]], begun: Mapping[int, Any],
 ) -> bool:  # fmt: skip
-    """Do runs; whether the caller ended them. Runs of several cases whose process ended are left in `alone`."""
+    """Do runs; whether the caller ended them. Runs of several cases whose process ended are left in `alone`.
+
+    `begun` has the posture (nq,), or None, from which the first case of a run is tried before its own start.
+    """
     sender = Sender()
 
-    def here(run: range) -> Any:
-        return _solve_runs([[order[k].make for k in run]], running.method)[0]
+    def made(run: Sequence[int]) -> _Run:
+        return begun.get(run[0]), [order[k].make for k in run]
 
-    def there(runs: list[range], full: bool) -> Job:
-        given = sender.sent([[order[k].make for k in run] for run in runs], full)
+    def here(run: Sequence[int]) -> Any:
+        return _solve_runs([made(run)], running.method)[0]
+
+    def there(runs: list[Sequence[int]], full: bool) -> Job:
+        given = sender.sent([made(run) for run in runs], full)
         return Job(runs, _sent_to, (_solve_runs, given, running.method), (running.seconds or 0.0) * len(runs[0]))
 
     with closing(_done(work, [order[k] for run in work for k in run], running, (here, there))) as outcomes:
         for run, answers, error in outcomes:
             if error is not None and len(run) > 1:
-                alone.extend(range(k, k + 1) for k in run)
+                alone.extend([k] for k in run)
                 continue
             found = [{"outcome": ENDED, "message": str(error)}] if error is not None else answers
             for k, answer in zip(run, found, strict=True):
@@ -302,11 +318,10 @@ def _sent_to(function: Callable[[Any, Method], Any], given: Sent, method: Method
     return function(value, method)
 
 
-def _solve_runs(runs: Sequence[Sequence[Make]], method: Method) -> list[list[dict[str, Any]]]:
+def _solve_runs(runs: Sequence[_Run], method: Method) -> list[list[dict[str, Any]]]:
     """Solve the problems of runs: what their records say."""
     answers: list[list[dict[str, Any]]] = []
-    for run in runs:
-        q = None
+    for q, run in runs:
         answers.append([])
         for make in run:
             answers[-1].append(_solved(make, method, q))
@@ -318,7 +333,7 @@ def _solved(make: Make, method: Method, q: Array | None) -> dict[str, Any]:
     try:
         problem = check_problem(make(), "the task's answer")
         if q is not None and q.shape == problem.start.shape:
-            warm = method.solve(problem.with_start(q))
+            warm = method.solve(begun_at(problem, q))
             if warm.solved:
                 return answer_of(warm)
         return answer_of(method.solve(problem))
@@ -334,14 +349,9 @@ def _solve_from(given: Sequence[_Start], method: Method) -> list[dict[str, Any] 
     answers: list[dict[str, Any] | None] = []
     for make, q in given:
         problem = check_problem(make(), "the task's answer")
-        solution = _alone(method).solve(problem.with_start(q))
+        solution = warmed(method).solve(begun_at(problem, q))
         answers.append(answer_of(solution) if solution.solved else None)
     return answers
-
-
-def _alone(method: Any) -> Any:
-    """The method without starts of its own, where it has such: those of the first solve led to nothing."""
-    return replace(method, restarts=0) if hasattr(method, "restarts") and is_dataclass(type(method)) else method
 
 
 def fingerprint(*asked: Any) -> str:

@@ -6,7 +6,7 @@ import inspect
 import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from itertools import product
 from math import prod
 from typing import Any
@@ -16,12 +16,12 @@ from wholebody.base.errors import InputError
 from wholebody.base.files import read_bytes
 from wholebody.base.runner import packed
 from wholebody.figures import Figure, load
-from wholebody.figures.anthropometry import design_cases
+from wholebody.figures.anthropometry import Person, design_cases, make_person
 from wholebody.methods.base import Method
 from wholebody.problem import Problem
 from wholebody.studies.many import RUN, Case, Running, SolveProgress, fingerprint, run_cases, runs_of
 from wholebody.studies.records import Records, RecordStore, SolveRecord
-from wholebody.studies.study_files import TaskFile
+from wholebody.studies.study_files import SIZE, TaskFile
 
 MOST_CASES = 1_000_000
 
@@ -61,7 +61,8 @@ def study(
         method: name or settings; None for the file's, and for "qp" with functions.
         jobs: problems at a time.
         cluster: address of a dask scheduler that runs them; None for this machine.
-        warm_start: begin each target at the answer of the one before it, see `solve_many`.
+        warm_start: begin each target at the answer of the one before it, and the first of a person at that of the
+            person before, see `solve_many`.
         seconds: deadline of each problem, by the clock; None for none.
         folder: keeps the records, so that a run that was ended goes on; see `solve_many`.
         progress: called with a `SolveProgress` after each case; if it returns True, the run ends.
@@ -101,10 +102,9 @@ def study(
     if file is not None:
         file.check(*(values.values() for values in factors))
     store = None if folder is None else RecordStore(checks.path(folder, f"{what}: folder"))
-    runs = []
+    cases = []
     persons, aims, places = (list(enumerate(values.items() or [("", None)])) for values in factors)
     for (i, (who, person)), (j, (where, layout)) in product(persons, places):
-        cases = []
         for k, (aim, target) in aims:
             named = {"person": who, "target": aim, "layout": where}
             named = {factor: name for factor, name in named.items() if name}
@@ -112,8 +112,7 @@ def study(
             asked = fingerprint(mark, person, target, layout, running.method, warm_start) if store else ""
             record = SolveRecord(", ".join(named.values()), factors=named)
             cases.append(Case(record, variant, asked, (i, j, k)))
-        runs += runs_of(cases, RUN if warm_start else 1)
-    return run_cases(runs, running, store)
+    return run_cases(runs_of(cases, RUN if warm_start else 1), running, store)
 
 
 def _check_takes_three(task: Any, what: str) -> None:
@@ -150,7 +149,7 @@ class Variant:
         return made
 
 
-@cache
+@lru_cache(maxsize=64)
 def loaded(options: tuple[tuple[str, Any], ...]) -> Figure:
     """A person by options of `load`, made once a process."""
     return load("human", **{name: dict(value) if name == "proportions" else value for name, value in options})
@@ -180,6 +179,14 @@ def _person(given: Any) -> Any:
         except TypeError:  # of options that no dictionary of arguments has
             pass
     raise InputError(f"study: a person is {checks.shown(given)}; give 'F5', {{'sex': 'female'}} or a figure")
+
+
+def loaded_person(given: Any) -> Person | None:
+    """Whose body a person of a study is; None of a figure that is no person."""
+    if isinstance(given, Figure):
+        return given.describe().person
+    options = _person(given)
+    return make_person(**{name: options[name] for name in SIZE if name in options})
 
 
 def _named(given: Any, what: str) -> dict[str, Any]:

@@ -1,8 +1,8 @@
-"""What terms of one's own answer, checked at every call: numbers of the right kind and shape, and finite.
+"""Checks of what users' terms return, at every call: finite numbers of the right shape.
 
-A class that derives from a base class of terms gets its methods checked when it is made, so whoever asks a term, a
-method, a tracker or the assessment, gets numbers or one sentence with the term's name. Terms of this package are not
-checked: their constructors refuse what would make them infinite.
+The methods of a class that derives from a base class of terms are wrapped when the class is made. A wrapped method
+returns numbers or raises a TermError that names the term. Terms of this package are not wrapped: their constructors
+refuse what would make them infinite.
 """
 
 from __future__ import annotations
@@ -55,13 +55,14 @@ def check_answers(kind: type, table: Mapping[str, Check]) -> None:
         if isinstance(found, property):
             if found.fget is not None and not hasattr(found.fget, _MARK):
                 setattr(kind, name, property(_checked(found.fget, name, check), doc=found.__doc__))
-        elif hasattr(found, "__get__") and not hasattr(found, _MARK):
+        elif callable(found) and not hasattr(found, _MARK):
             setattr(kind, name, _checked(found, name, check))
 
 
 def _checked(found: Any, what: str, check: Check) -> Any:
     def answer(self: object, *arguments: Any, **named: Any) -> Any:
-        return Checked(self, what, found.__get__(self, type(self)), check)(*arguments, **named)
+        method = found.__get__(self, type(self)) if hasattr(found, "__get__") else found
+        return Checked(self, what, method, check)(*arguments, **named)
 
     setattr(answer, _MARK, True)
     return wraps(found)(answer) if hasattr(found, "__name__") else answer

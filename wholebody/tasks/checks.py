@@ -1,4 +1,4 @@
-"""Checks of users' terms: shapes of rows that fit together, and finite numbers."""
+"""Checks of terms when a problem is stated: weights, bounds, and counts of rows that fit together."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _ASKED = (("error", 1), ("value", 1), ("jacobian", 1), ("gradient", 1), ("curvat
 
 @contextmanager
 def named(where: str, term: object) -> Iterator[None]:
-    """Inside it, what is told of a term's answers begins with the term's place, such as "goals[1] (Mine)"."""
+    """A context in which a TermError names the term's place, such as "goals[1] (Mine)"."""
     try:
         yield
     except TermError as error:
@@ -47,9 +47,8 @@ def check_rows(where: str, term: Any, evaluate: Callable[[State], Array], state:
 
 
 def values_and_rows(term: Any, evaluate: Callable[[State], Array], state: State) -> tuple[Array, Array]:
-    """Values (m,) of a goal or constraint at a state, and their derivatives (m, nv)."""
-    values = answers.values(term, evaluate.__name__, evaluate(state))
-    jacobian = answers.rows(term, "jacobian", term.jacobian(state), (state,))
+    """Values (m,) of a goal or constraint at a state, and their derivatives (m, nv); TermError where counts differ."""
+    values, jacobian = evaluate(state), term.jacobian(state)
     count = len(jacobian.rows if isinstance(jacobian, Wrench) else jacobian)
     if count != len(values):
         wanted = (len(values), state.model.nv)
@@ -77,10 +76,8 @@ def defined(term: Term, states: Iterable[State]) -> Iterator[State]:
 
 
 def check_measure(where: str, measure: Measure, state: State) -> None:
-    """Check the value, gradient, curvature and squares of a measure at a state."""
+    """Check the weight of a measure, and what its methods return at a state."""
     with named(where, measure):
         answers.weight(measure, "weight", measure.weight)
-        answers.one(measure, "value", measure.value(state))
-        answers.freedoms(measure, "gradient", measure.gradient(state), (state,))
-        answers.diagonal(measure, "curvature", measure.curvature(state), (state,))
-        answers.squares(measure, "squares", measure.squares(state), (state,))
+        for evaluate in (measure.value, measure.gradient, measure.curvature, measure.squares):
+            evaluate(state)

@@ -40,7 +40,7 @@ def bar_of(thing: Surface, state: State, where: str) -> Face:
     at = thing.placed(0, state)
     bounded = [(shape, thing.placed(k, state)) for k, shape in enumerate(thing.shapes) if np.isfinite(thing.reach[k])]
     if not bounded:
-        raise InputError(f"{where}: {thing.name!r} has no end, so no hand closes around it; take it by the palm")
+        raise InputError(f"{where}: {thing.name!r} is endless, so no hand closes around it; take it with the palm")
     center, half = np.zeros(3), np.zeros(3)
     for axis, along in enumerate(at.rotation.T):
         ends = [outermost(shape, placed, sign * along) @ along for shape, placed in bounded for sign in (1.0, -1.0)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +13,7 @@ from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
-from wholebody.tasks.balance import STANDING_HEIGHT, Feet, Margin, hull_corners, low_points
+from wholebody.tasks.balance import STANDING_HEIGHT, STEADY, Feet, Margin, hull_corners, least_width, low_points
 from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.contact_parts import Facing, Gap, Over, Part, TermOfParts, owner_pairs
 from wholebody.tasks.sit import UP, upright
@@ -33,7 +33,8 @@ class Stand(TermOfParts):
         on: what it stands on.
         feet: segments whose soles stand.
         balance: whether the centre of mass stays over the soles; False for who also sits, leans or holds on.
-        margin: distance of the centre of mass from the edges of the polygon [m].
+        margin: distance of the centre of mass from the edges of the polygon [m]; None for 0.15 of its least width where
+            the feet are at the start, as people keep it; that is in `keeps` once resolved.
         parts: of each foot the distance, two angles, and two rows over the face, which are zero; then, with balance,
             the distances of the centre of mass inside the edges [m]; once resolved.
     """
@@ -42,7 +43,8 @@ class Stand(TermOfParts):
     _: KW_ONLY
     feet: Feet = ("left_foot", "right_foot")
     balance: bool = True
-    margin: Margin = 0.0
+    margin: Margin | None = None
+    keeps: float = field(init=False, repr=False, default=0.0)
 
     def resolve(self, scene: Surroundings, start: Array) -> Stand:
         """Find the soles and the face that they stand on."""
@@ -50,6 +52,7 @@ class Stand(TermOfParts):
         state = State(scene.model).update(start)
         ground, thing = face(scene, self.on, UP, state, where), surface(scene, self.on, where)
         parts: list[Part] = []
+        keeps = 0.0
         touches: tuple[tuple[str, str], ...] = ()
         corners, joints = [], []
         rest = upright(scene)
@@ -71,17 +74,18 @@ class Stand(TermOfParts):
             corners += [np.asarray(inside.act(point)) for point in lows]
             joints += [place.joint] * len(lows)
         if self.balance:
-            inputs.check_mass(scene, where)
-            polygon = SolePolygon(np.array(corners), np.array(joints, dtype=np.intp))
+            mass = inputs.joints_with_mass(scene, where, self.feet)
+            polygon = SolePolygon(np.array(corners), np.array(joints, dtype=np.intp), mass)
             if not (polygon.rows(state)[0] < FAR_INSIDE).any():
                 raise InputError(f"{where}: the soles are a line, not an area; name more feet, or leave balance out")
             parts.append(polygon)
-        return filled(self, parts=tuple(parts), touches=touches)
+            keeps = STEADY * least_width(polygon.corners(state)) if self.margin is None else self.margin
+        return filled(self, parts=tuple(parts), touches=touches, keeps=keeps)
 
     @property
     def lower(self) -> Array:
         """(m,) zeros, and the margin for the rows of the balance."""
-        return np.where(self._balanced(), self.margin, 0.0)
+        return np.where(self._balanced(), self.keeps, 0.0)
 
     @property
     def upper(self) -> Array:
@@ -101,17 +105,27 @@ class SolePolygon(NamedTuple):
 
     points: Array  # (m, 3) in the axes of their joints [m]
     joints: Indices  # (m,) joint that carries each
+    mass: range | None  # joints of the figure whose centre of mass it is; None for all
 
     @property
     def in_radians(self) -> tuple[bool, ...]:
         """None is."""
         return (False,) * len(self.joints)
 
+    def corners(self, state: State) -> Array:
+        """Corners (k, 2) of the polygon, anticlockwise."""
+        points = self._placed(state)[:, :2]
+        return points[hull_corners(points)]
+
+    def _placed(self, state: State) -> Array:
+        """The points (m, 3) in the world."""
+        placed = [state.data.oMi[joint] for joint in self.joints.tolist()]
+        return np.array([place.act(point) for place, point in zip(placed, self.points, strict=True)])
+
     def rows(self, state: State) -> tuple[Array, Array]:
         """Distances (m,) inside the edges and their derivative (m, nv); `FAR_INSIDE` and zero for no corner."""
-        placed = [state.data.oMi[joint] for joint in self.joints.tolist()]
-        points = np.array([place.act(point) for place, point in zip(placed, self.points, strict=True)])
-        center, moves = state.center_of_mass(), state.center_of_mass_jacobian()
+        points = self._placed(state)
+        center, moves = state.center_of_mass(self.mass), state.center_of_mass_jacobian(self.mass)
         values, rows = np.full(len(points), FAR_INSIDE), np.zeros((len(points), state.model.nv))
         begin = np.array(hull_corners(points[:, :2]), dtype=np.intp)
         if not len(begin):

@@ -55,7 +55,7 @@ def read_path(path: str | os.PathLike[str]) -> Array:
         told = told[1:]
     places = [_place(*line) for line in told]
     if not places:
-        raise FileFormatError(f"{path}: there is no place in it; give x y z in metres, one place a line")
+        raise FileFormatError(f"{path}: it holds no places; give x y z in metres, one place a line")
     return np.array(places)
 
 
@@ -95,5 +95,5 @@ def _place(where: str, text: str) -> list[float]:
         raise FileFormatError(f"{where}: {shown(text)} is not a place; give x y z in metres")
     values = [float(word) for word in words]
     if not all(abs(value) <= LARGEST for value in values):
-        raise FileFormatError(f"{where}: {shown(text)} is no place within {LARGEST:g} m; give metres")
+        raise FileFormatError(f"{where}: {shown(text)} is not within {LARGEST:g} m of the origin; give metres")
     return values

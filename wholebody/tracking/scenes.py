@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 import pinocchio as pin
@@ -17,11 +16,12 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import known
 from wholebody.figures.figure import Figure
-from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Sphere
+from wholebody.figures.joined import one_figure
+from wholebody.geometry.shapes import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Sphere, Torus
 from wholebody.scene.scene import Scene
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.scripts import Keys, Place, ScenePlan, standing_at
-from wholebody.tracking.tracks import Track, check_figure
+from wholebody.tracking.tracks import Track
 
 Color = tuple[float, float, float, float]
 
@@ -87,9 +87,9 @@ def gallery(figure: Figure) -> Scene:
     """A scene with a figure in a gallery: a west room (x from -5 to 0), an east room (0 to 5), and a door between them.
 
     Walls, a door with a lintel, a niche in the east room, tables, a bench, pedestals, and sculptures on them: a torus,
-    split into convex pieces, a sphere, an egg, an obelisk and a figure of capsules. All of them are fixed.
+    a sphere, an egg, an obelisk and a column. All of them are fixed.
     """
-    scene = Scene(check_figure(figure, "gallery"))
+    scene = Scene(one_figure(figure, "gallery: figure"))
     scene.add(HalfSpace(), name="floor")
     _walls(scene)
     _furniture(scene)
@@ -120,8 +120,8 @@ def _furniture(scene: Scene) -> None:
     for name, sign in (("table's west leg", -1.0), ("table's east leg", 1.0)):
         at = (x + sign * (0.5 * length - 0.1), y, 0.5 * leg)
         scene.add(Box((0.06, 0.8 * width, leg)), name=name, at=at, color=OAK)
-    scene.add(_cylinder(0.45, 0.03), name="round table", at=(2.2, 1.4, 0.735), color=OAK)
-    scene.add(_cylinder(0.06, 0.72), name="round table's foot", at=(2.2, 1.4, 0.36), color=OAK)
+    scene.add(Cylinder(0.45, 0.03), name="round table", at=(2.2, 1.4, 0.735), color=OAK)
+    scene.add(Cylinder(0.06, 0.72), name="round table's foot", at=(2.2, 1.4, 0.36), color=OAK)
     scene.add(Box((1.4, 0.4, 0.45)), name="bench", at=(-2.5, -1.4, 0.225), color=OAK)
 
 
@@ -133,28 +133,12 @@ def _sculptures(scene: Scene) -> None:
     ):
         scene.add(Box((0.4, 0.4, height)), name=name, at=(x, y, 0.5 * height), color=STONE)
     upright = (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
-    scene.add(_torus(), name="torus", at=(-0.9, 1.9, 0.9 + 0.37, *upright), color=BRONZE)
+    scene.add(Torus(0.28, 0.09), name="torus", at=(-0.9, 1.9, 0.9 + 0.37, *upright), color=BRONZE)
     scene.add(Sphere(0.2), name="sphere", at=(-4.3, -1.8, 1.2), color=BLUE)
     scene.add(Ellipsoid((0.14, 0.14, 0.24)), name="egg", at=(1.2, -1.8, 1.24), color=BLUE)
     obelisk = [(s * a, t * a, z) for a, z in ((0.2, 0.0), (0.12, 1.7)) for s in (-1, 1) for t in (-1, 1)]
     scene.add(Hull(np.array([*obelisk, (0.0, 0.0, 1.9)])), name="obelisk", at=(3.2, -1.8, 0.0), color=STONE)
     scene.add(Capsule(radius=0.12, length=1.2), name="column", at=(4.4, 1.9, 0.72), color=STONE)
-
-
-def _cylinder(radius: float, height: float) -> Hull:
-    angle = np.linspace(0.0, 2.0 * math.pi, 25)[:-1]
-    ring = radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(len(angle))])
-    half = np.array([0.0, 0.0, 0.5 * height])
-    return Hull(np.vstack([ring - half, ring + half]))
-
-
-@cache
-def _torus() -> Mesh:
-    """A ring of 37 cm radius; splitting it takes seconds, so every gallery shares it."""
-    import trimesh
-
-    ring = trimesh.creation.torus(0.28, 0.09, major_sections=24, minor_sections=12)
-    return Mesh((ring.vertices, ring.faces))
 
 
 # ---- the hand: position of the wrist, and the glove

@@ -18,8 +18,9 @@ from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, InputError
 from wholebody.base.files import checked_target, read_text, write
 from wholebody.figures.figure import Figure
+from wholebody.figures.joined import one_figure
 from wholebody.tracking.tracks import LARGEST as LARGEST_VALUE
-from wholebody.tracking.tracks import Track, check_figure
+from wholebody.tracking.tracks import Track
 
 ROOT_COLUMNS = ("root_x", "root_y", "root_z", "root_qx", "root_qy", "root_qz", "root_qw")
 LARGEST = 200_000_000  # bytes: an hour of a person at 60 frames a second
@@ -63,7 +64,7 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
             length; the frame is named.
     """
     path = checked_path(path, "path")
-    check_figure(figure, "read_track")
+    one_figure(figure, "read_track: figure")
     values, dt = read_values(path, figure)
     track = Track.of(figure, values, dt, path.name)
     track.check(figure)
@@ -160,7 +161,7 @@ def _columns(place: str, first: list[str], wanted: list[str]) -> list[str]:
         known(name, wanted, "column", place)
     twice = [name for name in wanted if names.count(name) > 1]
     if twice:
-        raise FileFormatError(f"{place}: the column {twice[0]} stands there twice; leave one out")
+        raise FileFormatError(f"{place}: the column {twice[0]} occurs twice; leave one out")
     missing = [name for name in wanted if name not in names]
     root = [name for name in missing if name in ROOT_COLUMNS]
     if TIME in missing:
@@ -186,7 +187,7 @@ def _numbers(
             rows.append([float(value) for value in line])
         except ValueError:
             wrong = next(value for value in line if not is_number(value))
-            raise FileFormatError(f"{path.name}, line {number}: {shown(wrong)} is no number") from None
+            raise FileFormatError(f"{path.name}, line {number}: {shown(wrong)} is not a number") from None
         places.append(number)
         decimals = max(decimals, len(line[at].strip().partition(".")[2]) if "e" not in line[at].lower() else 17)
     if len(rows) < 2:
@@ -221,4 +222,4 @@ def _lines(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
             if line:
                 yield reader.line_num, line
     except csv.Error as error:
-        raise FileFormatError(f"{path.name}, line {reader.line_num}: is no CSV ({error})") from None
+        raise FileFormatError(f"{path.name}, line {reader.line_num}: is not CSV ({error})") from None

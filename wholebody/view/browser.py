@@ -161,7 +161,7 @@ class Browser:
             if self.errors:
                 raise BrowserError(f"the page failed: {self.errors[0]}")
             if time.monotonic() > end:
-                raise BrowserError(f"the page did not come to `{condition}` within {self.timeout:g} s")
+                raise BrowserError(f"the page did not reach `{condition}` within {self.timeout:g} s")
             time.sleep(0.02)
 
     def evaluate(self, expression: str) -> Any:

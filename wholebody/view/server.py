@@ -102,7 +102,7 @@ class Store:
             return node.properties.get(command.key) == command.payload
         return command.op == Op.OBJECT and node.object == command.payload
 
-    def commands(self, *, motion: bool = True) -> list[Command]:
+    def commands(self) -> list[Command]:
         """Commands that build the picture in an empty page; the animation last, when all its nodes exist."""
         commands: list[Command] = []
         for path, node in self.nodes.items():
@@ -113,7 +113,7 @@ class Store:
                 commands.append(Command(Op.TRANSFORM, path, "", node.transform))
         if self.camera is not None:
             commands.append(Command(Op.CAMERA, "", "", self.camera))
-        if motion and self.animation is not None:
+        if self.animation is not None:
             commands.append(Command(Op.ANIMATION, "", "", self.animation))
         return commands
 

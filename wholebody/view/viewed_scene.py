@@ -73,9 +73,7 @@ def checked_scene(scene: Any) -> Any:
     if isinstance(getattr(scene, "model", None), pin.Model) and callable(getattr(scene, "contacts", None)):
         return scene
     if isinstance(scene, Assembly):
-        correction = (
-            "none of its bodies has a shape; give some with body(name, shape=...), or use wholebody.view.parts.Parts"
-        )
+        correction = "none of its bodies has a shape; give some with body(name, shape=...)"
     elif hasattr(scene, "scene"):  # a problem
         correction = f"give the scene of the {type(scene).__name__}"
     else:

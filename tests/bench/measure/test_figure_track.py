@@ -85,7 +85,7 @@ def test_the_command_writes_the_same_tables(tmp_path: Path, root: Path) -> None:
     words = ("--figure", file, "--repeats", "1", "--steps", "8", "--tools", "wholebody", "--out", out)
     assert main(["bench", "step", *words, "--update-docs", str(tmp_path)]) == 0
     rows = csv_rows(tmp_path / "out" / "step-figures-time.csv")
-    assert [row["case"] for row in rows] == ["arm, free", "arm, contact", "arm, alone"]
+    assert list(dict.fromkeys(row["case"] for row in rows)) == ["arm, free", "arm, contact", "arm, alone"]
     page = (tmp_path / "results.md").read_text()
     assert "| arm, contact | wholebody |" in page
     assert "standing human" not in page

@@ -1,8 +1,8 @@
-"""`wholebody bench motion`: its clips, what it keeps, and its report."""
+"""`wholebody bench motion`: its clips, its summary, and the command."""
 
 from __future__ import annotations
 
-import dataclasses
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,14 +10,10 @@ import pytest
 
 import wholebody as wb
 from wholebody.bench.measure import clips, motion
-from wholebody.bench.measure.motion import CHECKED
-from wholebody.bench.rows import Row, chart
-from wholebody.bench.tables import read_rows
+from wholebody.bench.rows import chart
 from wholebody.cli import main
-from wholebody.motion import avoidance, judging
+from wholebody.motion.batch_table import AvoidedCase
 from wholebody.motion.worn_equipment import dressed
-
-NAME = "sword cut"
 
 
 @pytest.mark.parametrize("name", clips.SYNTHETIC)
@@ -39,82 +35,39 @@ def test_equipment_is_attached(worn: str) -> None:
     assert bool(scene.objects) == (worn != "nothing")
 
 
-def test_a_run_goes_on_where_it_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    told: list[str] = []
-
-    def run(*worn: str) -> list[Row]:
-        return motion.run({NAME: None}, [(NAME, each, CHECKED) for each in worn], tmp_path, {}, tell=told.append)
-
-    (first,) = run("nothing")
-    clip = clips.synthetic(NAME, wb.load("human"))
-    found = wb.check(clip)
-    assert [first[name] for name in ("frames", "collide before", "dips")] == [len(clip), found.colliding, found.dips]
-    assert first["deepest mm"] == pytest.approx(1e3 * found.deepest)
-    assert [first[name] for name in ("deviation rad", "jerk", "outcome")] == [0.0, 1.0, "left"]
-    (kept,) = read_rows(tmp_path / "motion.csv", Row)[1]
-    assert {"said": "", **kept.figures} == first.figures
-    told.clear()
-    again, other = run("nothing", "pack")
-    assert again == kept  # its times too: it was not measured again
-    assert other.case == f"{NAME}, pack"
-    assert told == [f"{NAME}, pack, check: {other['outcome']}"]
-    monkeypatch.setattr(motion, "measured", None)
-    (same,) = run("pack")
-    assert {"said": "", **same.figures} == other.figures
-
-
-def test_a_case_that_ends_is_told_and_the_others_go_on(tmp_path: Path) -> None:
-    (row,) = motion.run(
-        {NAME: None}, [(NAME, "nothing", CHECKED)], tmp_path, {}, slowest=lambda duration: 1e-3
-    )  # fmt: skip
-    assert row["outcome"] == "overtime"
-    assert "sword cut, nothing, check: overtime" in motion.motion_report([row], {"wholebody": "0"})
-
-
-def test_a_recording_that_cannot_be_read_is_told(tmp_path: Path) -> None:
-    (tmp_path / "broken.bvh").write_text("HIERARCHY\n")
-    cases = [("broken", "nothing", CHECKED)]
-    rows = motion.run({"broken": tmp_path / "broken.bvh"}, cases, tmp_path / "out", {})
-    assert rows[0]["outcome"] == "no clip"
-    assert "broken.bvh" in rows[0]["said"]
-
-
-def test_a_clip_that_misses_what_is_held_is_not_free(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nothing collides before or after, but a hand or a foot has left its place."""
-    figure = wb.load("human")
-    path = tmp_path / "still.npz"
-    wb.Clip(figure, np.array([figure.posture("standing")] * 8), 1 / 30, "still").write(path)
-    missed, freed = 0.0, avoidance.avoid
-
-    def avoid(*given: object, **more: object) -> judging.Avoided:
-        found = freed(*given, **more)  # type: ignore[arg-type]
-        return dataclasses.replace(found, report=dataclasses.replace(found.report, missed=missed))
-
-    monkeypatch.setattr(avoidance, "avoid", avoid)
-    assert motion.measured("nothing", "trajectory", str(path), 600.0)["outcome"] == "free"
-    missed = 5e-3
-    assert motion.measured("nothing", "trajectory", str(path), 600.0)["outcome"] == "left"
-
-
-def test_the_report_has_every_method_and_every_case(tmp_path: Path) -> None:
-    base = {"frames": 60, "outcome": "free", "collide before": 20, "after": 0, "deepest mm": 0.01, "between mm": 0.05,
-            "deviation rad": 0.1, "mm": 9.0, "jerk": 2.0, "feet slide mm": 0.5, "s a second": 0.5}  # fmt: skip
-    rows = [
-        Row("walk, pack", "bisection", base),
-        Row("walk, pack", "trajectory", base | {"deviation rad": 0.06, "jerk": 1.1, "s a second": 1.5}),
-        Row("walk, pack", "frames", base | {"outcome": "left", "after": 3, "deepest mm": 2.0}),
-        Row("walk, pack", CHECKED, base | {"outcome": "left"}),
-    ]
-    one, other = (next(row for row in motion.summary(rows) if row.tool == name) for name in ("trajectory", "frames"))
-    assert (one["free"], one["deviation rad, median"], one["s a second of motion, median"]) == ("1 of 1", 0.06, 1.5)
-    assert (other["free"], other["deepest, most mm"]) == ("0 of 1", 2.0)
-    text = motion.motion_report(rows, {"wholebody": "0"})
-    assert "| all clips | trajectory | 1 of 1 |" in text
+def test_a_summary_has_every_method_and_the_report_every_case_without_a_clip(tmp_path: Path) -> None:
+    done = AvoidedCase("walk", "pack", "bisection", "free", frames=61, duration=2.0, seconds=1.0, deepest=1e-5)
+    done = replace(done, deepest_between=5e-5, angle=0.1, distance=9e-3, jerk=2.0, sliding=5e-4)
+    better = replace(done, method="trajectory", angle=0.06, jerk=None, seconds=3.0)
+    worse = replace(done, method="frames", outcome="left", deepest=2e-3)
+    refused = AvoidedCase("walk", "pack", "mine", "refused", "it has one frame")
+    cases = [done, better, replace(better, clip="run", angle=0.08), worse, refused]
+    rows = {row.tool: row for row in motion.summary(cases)}
+    assert [row["free"] for row in rows.values()] == ["1 of 1", "2 of 2", "0 of 1", "0 of 1"]
+    assert rows["trajectory"]["deviation rad, median"] == pytest.approx(0.07)
+    assert rows["trajectory"]["s a second of motion, median"] == 1.5
+    assert rows["frames"]["deepest, most mm"] == 2.0
+    text = motion.motion_report(cases, {"wholebody": "0"})
+    assert "| all clips | trajectory | 2 of 2 |" in text
+    assert "walk, pack, mine: refused (it has one frame)" in text
     assert "nan" not in text
-    drawn = motion.panels(rows)
+    drawn = motion.panels(cases)
     assert {label for panel in drawn for label in panel.lines} == {"bisection", "trajectory"}
     for path in chart(drawn, tmp_path / "motion"):
         assert path.stat().st_size > 1000
+
+
+def test_the_command_frees_and_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    short = clips.synthetic("squat", wb.load("human"))[:8]
+    monkeypatch.setattr(clips, "synthetic", lambda name, figure: short)
+    words = ["bench", "motion", "--only", "squat", "--equipment", "nothing", "--methods", "frames", "--out"]
+    for said in ("squat, nothing, frames: free\n", ""):
+        assert main([*words, str(tmp_path)]) == 0
+        assert capsys.readouterr().out.startswith(said + "Clips of a person")
+    assert "| all clips | frames | 1 of 1 |" in (tmp_path / "motion.md").read_text()
+    assert (tmp_path / "motion" / "cases.csv").is_file()
 
 
 def test_an_unknown_name_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,4 +1,4 @@
-"""`wholebody bench step`, `solve`, `scaling`, `motion`, `world` and `files`: what things cost and achieve."""
+"""`wholebody bench step`, `scaling`, `motion`, `world` and `files`: what things cost and achieve."""
 
 from __future__ import annotations
 
@@ -67,29 +67,6 @@ def step(arguments: argparse.Namespace) -> None:
 
 
 @measuring(
-    "solve",
-    "whole solves of a task, and their memory",
-    "Solve the shelf, or a task of your own, in new processes and in used ones, and measure the memory of "
-    "`wholebody pose`. `wholebody bench compare` solves the problem sets.",
-    option("--task", type=Path, metavar="TASK.toml", help="(default: the shelf)"),
-    listed("--methods", "such as qp, newton (default: qp qp/osqp)"),
-)
-def solve(arguments: argparse.Namespace) -> None:
-    """Measure; --quick takes one method."""
-    from wholebody.bench.measure.solve import memory
-    from wholebody.bench.suite.adapters.registry import adapters
-    from wholebody.bench.suite.compare import own_task
-    from wholebody.cli.demo import packaged_tasks
-
-    task, facts = arguments.task or packaged_tasks()["shelf"], machine()
-    methods = adapters(arguments.methods or ["qp", "qp/osqp"][: 1 if arguments.quick else None])
-    rows = [Row(task.stem, row.tool, row.figures) for row in own_task.compared(task, methods, tell=print)]
-    peak = memory(task)
-    text = report(own_task.about(), {"Solves": rows, "Memory": [peak]}, facts)
-    publish("solve", text, arguments, facts=facts, tables={"solve": rows, "memory": [peak]})
-
-
-@measuring(
     "scaling",
     "time of a step and a solve against joints, pieces and things, with exponents",
     "Chains of 5 to 200 joints (500 bodies without a model of joints), 1 to 32 pieces a segment, 10 to "
@@ -143,28 +120,36 @@ def clips(arguments: argparse.Namespace, most: int | None) -> dict[str, Path | N
 @measuring(
     "motion",
     "clips freed of collisions by each method, with each piece of equipment",
-    "Free clips of collisions by each method, with each piece of equipment, and judge every frame and "
-    "every motion between frames; clips that need no recordings, and the recordings of a folder. Each case runs in "
-    "a process of its own. A run that was ended goes on where its folder holds what was measured.",
+    "Free clips of collisions by each method, with each piece of equipment, as `wholebody clip avoid` does, and sum up "
+    "deviation, jerk, sliding and time: clips that need no recordings, and the recordings of a folder. A run that was "
+    "ended goes on where its folder holds what was done.",
     *CLIPS,
     listed("--equipment", "what is worn (default: all)"),
-    listed("--methods", "methods, and check (default: all)"),
+    listed("--methods", "methods (default: all)"),
     count("--jobs", 1, "cases at a time"),
 )
 def motion(arguments: argparse.Namespace) -> None:
-    """Measure, or go on; --quick takes two clips with two pieces of equipment."""
+    """Free, or go on; --quick takes two clips with two pieces of equipment."""
     from wholebody.bench.measure import motion
-    from wholebody.bench.measure.clips import EQUIPMENT
+    from wholebody.bench.measure.clips import EQUIPMENT, recorded, synthetic
+    from wholebody.figures import load
     from wholebody.motion.avoidance import METHODS
+    from wholebody.motion.batch import BatchProgress, avoid_many
 
-    few = 2 if arguments.quick else None
+    def tell(told: BatchProgress) -> None:
+        if told.case is not None:
+            print(f"{told.case.clip}, {told.case.equipment}, {told.case.method}: {told.case.outcome}", flush=True)
+
+    few, figure = 2 if arguments.quick else None, load("human")
     recordings = clips(arguments, few)
     worn = chosen(arguments.equipment, EQUIPMENT, "--equipment")[:few]
-    methods = chosen(arguments.methods, (motion.CHECKED, *METHODS), "--methods")
-    facts, cases = machine(), list(product(recordings, worn, methods))
-    rows = motion.run(recordings, cases, arguments.out, facts, arguments.jobs, partial(print, flush=True))
-    charts = _charts("motion", motion.panels(rows), "Share of the cases freed within a deviation, a jerk and a time")
-    publish("motion", motion.motion_report(rows, facts), arguments, charts=charts)
+    methods = chosen(arguments.methods, METHODS, "--methods")
+    facts = machine()
+    given = [recorded(path, figure) if path else synthetic(name, figure) for name, path in recordings.items()]
+    folder = arguments.out / "motion"
+    cases = avoid_many(given, folder, equipment=worn, methods=methods, jobs=arguments.jobs, progress=tell)
+    charts = _charts("motion", motion.panels(cases), "Share of the cases freed within a deviation, a jerk and a time")
+    publish("motion", motion.motion_report(cases, facts), arguments, charts=charts)
 
 
 WORLD = {"throws": "Thrown at a person", "drops": "The same drops in three engines"}

@@ -86,14 +86,17 @@ def convert(arguments: argparse.Namespace) -> int:
     "skeletons' motions for a figure",
     """\
 Turn the motion of a skeleton (BVH, glTF, AMASS) into a clip of a figure of any proportions: directions of limbs as
-recorded, within joint limits and reach cones, smooth, standing feet held. A table has the errors of bones. The clip may
-collide with itself: `wholebody clip check` says where, `wholebody clip avoid` frees it. Several files are written into
-a folder; what it holds already is not made again.""",
+recorded, within joint limits, speed limits and reach cones, smooth, what rests held on the ground, free of itself and
+the floor. A table has the errors of bones; `wholebody clip check` says what is left. Several files are written into a
+folder; what it holds already is not made again.""",
     *MOTIONS,
     option(
         "out", type=Path, metavar="OUT", help="the file to write: .npz, .bvh, .csv, .txt or .glb; of several a folder"
     ),
     option("--names", type=Path, metavar="FILE.toml", help="which bone is which part"),
+    option(
+        "--ground", choices=("auto", "none"), default="auto", help="find where feet rest, or follow the skeleton alone"
+    ),
     option("--unit", metavar="UNIT", help="of lengths, such as centimetres (default: recognised)"),
     option("--up", choices=("y", "z"), help="the axis that points up (default: recognised)"),
     *JOBS,
@@ -116,7 +119,10 @@ def retarget_motions(arguments: argparse.Namespace) -> int:
     motion = read_skeleton(arguments.files[0], unit=arguments.unit, up=arguments.up)
     figure = figure_of(arguments)
     with bar("retargeting") as tell:
-        clip = retarget(motion, figure, arguments.names, progress=lambda share: tell(share, "retargeting"))
+        clip = retarget(
+            motion, figure, ground=None if arguments.ground == "none" else "auto", names=arguments.names,
+            progress=lambda share: tell(share, "retargeting"),
+        )  # fmt: skip
     _print_errors(bone_errors(motion, clip, arguments.names))
     print(f"wrote {clip.write(arguments.out)}: {len(clip)} frames, {clip.duration:.3f} s, of {figure.name}")
     return 0

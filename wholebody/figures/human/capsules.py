@@ -12,9 +12,15 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.figures.body_spec import Solid, place
 from wholebody.figures.dimensions import RELAXED, Dimensions
+from wholebody.figures.sizes import TRUNK
 
-# Turns a capsule's own axis z into y.
+# Turn a capsule's own axis z into y, and into x.
 _ACROSS = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+_AHEAD = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+
+
+SPREAD = 3
+"""Number of the piece of the thigh that is the flesh that spreads on a seat."""
 
 
 def solids(size: Dimensions) -> tuple[Solid, ...]:
@@ -23,11 +29,11 @@ def solids(size: Dimensions) -> tuple[Solid, ...]:
 
 
 def _trunk(size: Dimensions) -> Iterator[Solid]:
-    for part in trunk_parts(size):
-        half = max(part.half_breadth - part.half_depth, 1e-3)
-        yield Solid(
-            part.segment, part.segment, coal.Capsule(part.half_depth, 2.0 * half), place(part.x, 0.0, part.z, _ACROSS)
-        )
+    for part in trunk_slices(size):
+        radius, other = sorted((part.half_depth, part.half_breadth))
+        axis = _ACROSS if part.half_breadth > part.half_depth else _AHEAD
+        capsule = coal.Capsule(radius, max(2.0 * (other - radius), 2e-3))
+        yield Solid(part.segment, part.segment, capsule, place(part.x, 0.0, part.z, axis))
     neck = size.body.radius("neck")
     length = size.body.length("neck")
     yield _between("neck", "neck", neck, (0.0, 0.0, 0.1 * length), (0.0, 0.0, 0.9 * length))
@@ -53,14 +59,16 @@ def _arm(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
     """Deltoid and upper arm, elbow, forearm, wrist."""
     person, radius = size.body, size.body.radius
     upper, fore = person.length("left_upper_arm"), person.length("left_forearm")
-    arm, elbow = RELAXED * radius("upper_arm"), person.fitted("elbow_back")
-    out, top = sign * (person.fitted("deltoid") - arm), person.fitted("shoulder_top") - arm
+    arm, elbow = RELAXED * radius("upper_arm"), person.size("elbow_back")
+    out, top = sign * (person.size("deltoid") - arm), person.size("shoulder_top") - arm
     name = f"{side}_upper_arm"
     yield _between(f"{name}:0", name, arm, (0.0, out, min(top, 0.0)), (0.0, 0.3 * out, -0.45 * upper))
-    low = 0.88 * arm
-    yield _between(f"{name}:1", name, low, (0.0, 0.0, -0.55 * upper), (low - elbow, 0.0, -0.95 * upper))
+    low, below = 0.88 * arm, person.size("elbow_below")
+    yield _between(f"{name}:1", name, low, (0.0, 0.0, -0.55 * upper), (low - elbow, 0.0, low - below - upper))
     thick, wrist = RELAXED * radius("forearm"), radius("wrist")
-    yield _down(f"{side}_forearm:0", f"{side}_forearm", thick, thick - elbow, 0.40 * fore)
+    # The underside of the bent forearm is level with the elbow's.
+    up, name = thick - below, f"{side}_forearm"
+    yield _between(f"{name}:0", name, thick, (up, 0.0, elbow - thick), (up, 0.0, -0.40 * fore))
     yield _down(f"{side}_forearm:1", f"{side}_forearm", wrist, 0.45 * fore, fore - wrist)
 
 
@@ -68,19 +76,32 @@ def _leg(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
     """Thigh with its hip, knee, calf, ankle. On a seat the underside of the thigh is level with the pelvis'."""
     person, radius = size.body, size.body.radius
     thigh, shank = person.length("left_thigh"), person.length("left_shank")
-    high = 0.5 * (person.fitted("seat") + person.fitted("thigh_top"))
-    front, out = high - person.fitted("seat"), sign * (person.fitted("hip_side") - high)
+    high, hip = 0.5 * person.size("thigh_clearance"), size.joint("left_hip_flexion")[1]
+    front, out = high - person.size("seat"), sign * (0.5 * person.size("hip_breadth") - hip - high)
     name = f"{side}_thigh"
-    yield _between(f"{name}:0", name, high, (front, out, -0.12 * thigh), (front, 0.3 * out, -0.42 * thigh))
+
+    def inwards(beside: float) -> float:
+        """Place of the lower end: nearer to the thigh's axis where the hip is wider than the thigh."""
+        return 0.3 * beside if sign * beside > 0.0 else beside
+
+    yield _between(f"{name}:0", name, high, (front, out, -0.12 * thigh), (front, inwards(out), -0.42 * thigh))
+    # Flesh that spreads on a seat. It meets things only, so that arms hang and passages are as wide as for who stands.
+    # It is thinner than the thigh by 2 mm, so that not both lie on the seat.
+    flesh = high - 0.002
+    wide = sign * (0.5 * person.size("hip_breadth_sitting") - hip - flesh)
+    yield _between(f"{name}:{SPREAD}", name, flesh, (front, wide, -0.12 * thigh), (front, inwards(wide), -0.42 * thigh))
     # Share of the thigh's radius by which flesh gives way where the thigh presses on the belly or the other thigh: 29
     # to 41 mm from the small woman to the large man (estimate). These are tested against the core that is left.
     core = (1.0 - 0.4) * high
-    yield _between(f"{name}:2", name, core, (front, 0.3 * out, -0.3 * thigh), (front, 0.3 * out, -0.42 * thigh))
-    knee = person.fitted("knee_front")
-    yield _down(f"{name}:1", name, knee, 0.6 * thigh, 0.98 * thigh)
-    calf, ankle = 0.96 * radius("calf"), 1.04 * radius("ankle")
-    name = f"{side}_shank"
-    yield _between(f"{name}:0", name, calf, (-0.1 * calf, 0.0, -0.1 * shank), (-0.25 * calf, 0.0, -0.42 * shank))
+    yield _between(f"{name}:2", name, core, (front, inwards(out), -0.3 * thigh), (front, inwards(out), -0.42 * thigh))
+    knee = person.size("knee")
+    # Where the knee is thicker than the thigh below its axis, it is that in front of the seat.
+    over = max(knee - person.size("seat"), 0.0)
+    yield _between(f"{name}:1", name, knee, (over, 0.0, -0.6 * thigh), (0.0, 0.0, -thigh))
+    calf, ankle = radius("calf"), radius("ankle")
+    name, shin = f"{side}_shank", 0.95 * knee - calf  # the shin is not before the knee
+    top, low = (min(back * calf, shin) for back in (-0.15, -0.25))
+    yield _between(f"{name}:0", name, calf, (top, 0.0, -0.1 * shank), (low, 0.0, -0.42 * shank))
     yield _down(f"{name}:1", name, ankle, 0.55 * shank, 0.94 * shank)
 
 
@@ -88,7 +109,7 @@ def clavicle(size: Dimensions, side: str) -> Solid:
     """Shoulder girdle: a level capsule from beside the breastbone to the shoulder joint, as high as the acromion."""
     x, y, z = size.joint(f"{side}_shoulder_flexion")
     radius = 0.017 * size.stature  # Radius of the shoulder girdle as a fraction of stature (estimate).
-    height = z + size.body.fitted("shoulder_top") - radius
+    height = z + size.body.size("shoulder_top") - radius
     return _between(
         f"{side}_clavicle", f"{side}_clavicle", radius, (0.25 * x, 0.25 * y, height), (0.9 * x, 0.9 * y, height)
     )
@@ -124,7 +145,7 @@ def foot(size: Dimensions, side: str) -> Iterator[Solid]:
     yield Solid(f"{side}_toes", f"{side}_toes", toes, place(0.5 * size.toe_length, 0.0, 0.0))
 
 
-class TrunkPart(NamedTuple):
+class Slice(NamedTuple):
     """A slice of the trunk, in its segment's frame; the centre is at (x, 0, z)."""
 
     segment: str
@@ -135,19 +156,15 @@ class TrunkPart(NamedTuple):
     half_height: float
 
 
-def trunk_parts(size: Dimensions) -> tuple[TrunkPart, ...]:
-    """Return positions and half sizes of the parts from the pelvis to the thorax."""
-    radius, height, length = size.body.radius, size.stature, size.body.length
-    waist_x, waist_y, chest_x, chest_y = radius("waist_x"), radius("waist_y"), radius("chest_x"), radius("chest_y")
-    rear, seat = 0.95 * radius("hip_x"), size.body.fitted("seat")
-    low, up, ribs, chest = (length(name) for name in ("lower_lumbar", "upper_lumbar", "lower_thorax", "thorax"))
-    return (
-        TrunkPart("pelvis", rear - size.body.fitted("buttock"), rear - seat, rear, 0.97 * radius("hip_y"), rear),
-        TrunkPart("lower_lumbar", 0.010 * height, 0.5 * low, 0.95 * waist_x, 0.95 * waist_y, 1.3 * low),
-        TrunkPart("upper_lumbar", 0.004 * height, 0.5 * up, 0.95 * waist_x, 0.93 * waist_y, 1.1 * up),
-        TrunkPart("lower_thorax", 0.014 * height, 0.5 * ribs, 0.95 * chest_x, 0.95 * chest_y, 1.2 * ribs),
-        TrunkPart("thorax", 0.012 * height, 0.42 * chest, 0.80 * chest_x, 0.95 * chest_y, 0.75 * chest),
-    )
+def trunk_slices(size: Dimensions) -> Iterator[Slice]:
+    """Return positions and half sizes of the slices from the pelvis to the thorax."""
+    person = size.body
+    rear, seat, wide = 0.5 * person.size("buttock_depth"), person.size("seat"), 0.5 * person.size("hip_breadth")
+    yield Slice("pelvis", rear - person.size("buttock"), rear - seat, rear, wide, rear)
+    for part, (z, high) in zip(TRUNK, ((0.5, 1.3), (0.5, 1.1), (0.5, 1.2), (0.42, 0.75)), strict=True):
+        half, length = 0.5 * part.share * person.size(part.depth), person.length(part.segment)
+        ahead = half - part.back(person.built[0])
+        yield Slice(part.segment, ahead, z * length, half, 0.5 * person.size(part.breadth), high * length)
 
 
 def _down(name: str, segment: str, radius: float, start: float, end: float) -> Solid:

@@ -18,10 +18,10 @@ import pinocchio as pin
 
 from wholebody.base.records import with_values
 from wholebody.figures import hulls
-from wholebody.figures.anthropometry import table
 from wholebody.figures.body_spec import Solid, place
 from wholebody.figures.dimensions import Dimensions
 from wholebody.figures.human import capsules
+from wholebody.figures.tables import table
 
 
 def polyhedra(size: Dimensions) -> tuple[Solid, ...]:
@@ -35,7 +35,7 @@ def polyhedra(size: Dimensions) -> tuple[Solid, ...]:
 
 
 def _trunk(size: Dimensions) -> Iterator[Solid]:
-    for part in capsules.trunk_parts(size):
+    for part in capsules.trunk_slices(size):
         radii = (part.half_depth, part.half_breadth, part.half_height)
         yield _solid(part.segment, hulls.ellipsoid(radii, part.segment), part.x, part.z)
     neck, length = size.body.radius("neck"), size.body.length("neck")

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from wholebody.base.records import with_values
-from wholebody.figures.anthropometry import Person, make_person, named_angles, table
+from wholebody.figures.anthropometry import Person, make_person
 from wholebody.figures.body_spec import BodySpec, geometry_of, model_of
 from wholebody.figures.description import Chain, Description, JointCone
 from wholebody.figures.figure import Figure
@@ -19,9 +19,9 @@ from wholebody.figures.human.pairs import body_pairs, collision_group, sphere_pa
 from wholebody.figures.human.spec import human_solids, human_spec
 from wholebody.figures.motion_ranges import human_ranges
 from wholebody.figures.postures import stand
-from wholebody.figures.proportions import proportioned
 from wholebody.figures.reach_cones import ReachCone
 from wholebody.figures.reduction import drop_rigid_pairs
+from wholebody.figures.tables import named_angles, table
 
 
 def human_figure(
@@ -35,7 +35,7 @@ def human_figure(
     hands: str = "rigid",
 ) -> Figure:
     """Return the person; arguments and errors as for `wholebody.load`."""
-    person = proportioned(make_person(sex, stature, mass, percentile, age), proportions)
+    person = make_person(sex, stature, mass, percentile, age, proportions)
     return figure_of(human_spec(person, detail, hands), detail, person.sex)
 
 
@@ -62,6 +62,7 @@ def figure_of(spec: BodySpec, detail: str, sex: str | None = None) -> Figure:
         effort={row["name"]: float(row["effort_weight"]) for row in table("joints")} | dict.fromkeys(fingers, EFFORT),
         excluded=(*excluded, *rigid),
         person=spec.person,
+        notes=() if spec.person is None else spec.person.notes,
         outer=partial(human_solids, spec.person, "hulls") if detail == "spheres" and spec.person else None,
         ranges={} if sex is None else human_ranges(sex, joints),
         root_effort=(0.0, 0.0) if sex is None else (5.0, 2.0),
@@ -141,5 +142,5 @@ def avatar_figure(
     Two arms and two legs of seven joints and a neck of three, on a rigid torso (Schmidl & Lin): the person with spine,
     shoulder girdle and upper neck fixed.
     """
-    person = proportioned(make_person(sex, stature, mass, percentile, age), proportions)
+    person = make_person(sex, stature, mass, percentile, age, proportions)
     return figure_of(avatar_spec(person, detail), detail)

@@ -15,7 +15,6 @@ import coal
 import pinocchio as pin
 
 from wholebody.base.checks import choice, known
-from wholebody.figures.anthropometry import named_angles
 from wholebody.figures.body_spec import BodySpec, Landmark, Link, Solid, place
 from wholebody.figures.dimensions import FINGER_BASES, Dimensions, keyed_hand
 from wholebody.figures.hand import (
@@ -31,6 +30,7 @@ from wholebody.figures.hand import (
     thumb_metacarpal,
 )
 from wholebody.figures.human.details import hull_of
+from wholebody.figures.tables import named_angles
 
 HANDS = ("rigid", "fingers")
 """What a person's hands can be: one segment each, or palms with fingers."""

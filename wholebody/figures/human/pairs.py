@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from wholebody.figures.anthropometry import table
 from wholebody.figures.body_spec import Solid
 from wholebody.figures.description import ExcludedPair, chosen_pairs
 from wholebody.figures.hand import finger_pair, is_finger
+from wholebody.figures.human.capsules import SPREAD
 from wholebody.figures.human.details import sphere_names
+from wholebody.figures.tables import table
 
 TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "neck", "head")
 
@@ -42,6 +43,8 @@ def _reason(a: Solid, b: Solid) -> str | None:
     """Why the pair (a, b), in this order, is not tested; None if it is."""
     if a.segment == b.segment:
         return "same segment"
+    if a.name.endswith(f"_thigh:{SPREAD}"):
+        return "flesh that spreads on a seat meets things only"
     if a.segment in TRUNK and b.segment in TRUNK:
         return "parts of the trunk and head meet along the spine"
     side_a, _, part_a = a.segment.partition("_")

@@ -12,11 +12,13 @@ from collections.abc import Callable, Mapping
 
 from wholebody.base.checks import known
 from wholebody.base.errors import InputError
-from wholebody.figures.anthropometry import Person, describe, keyed, make_person, table
+from wholebody.figures.anthropometry import Person, describe, make_person
 from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, place
-from wholebody.figures.dimensions import MIDDLE_TIP, Dimensions
+from wholebody.figures.dimensions import Dimensions
 from wholebody.figures.hand import palm_axes
 from wholebody.figures.human import capsules, details, fingers
+from wholebody.figures.sizes import MIDDLE_TIP
+from wholebody.figures.tables import keyed, table
 
 DETAILS: dict[str, Callable[[Dimensions], tuple[Solid, ...]]] = {
     "spheres": details.spheres,
@@ -75,13 +77,15 @@ def _joints(person: Person) -> tuple[Joint, ...]:
 
 
 def joint_limits(person: Person, row: Mapping[str, str]) -> tuple[float, float]:
-    """Return the least and greatest angle of a joint, degrees.
+    """Return the least and greatest angle of a joint, degrees. How far the clavicle rises follows from overhead reach.
 
     From 45 years on they are scaled by the means of people of 45 to 69 over those of 20 to 44 (Soucie et al. 2011),
     where both are known; else they are at most the older people's mean. Younger people have those of the table
     "joints", of which the joint is a row.
     """
     limits = {"lower": float(row["lower_deg"]), "upper": float(row["upper_deg"])}
+    if row["name"].endswith("_clavicle_elevation"):
+        limits["upper"] = person.size("elevation")
     # Years from which on the ranges of motion are those of older people: the bands of Soucie et al. (2011).
     if person.age is None or person.age < 45.0:
         return limits["lower"], limits["upper"]

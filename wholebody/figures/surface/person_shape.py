@@ -12,6 +12,7 @@ from wholebody.base.arrays import Array
 from wholebody.figures.anthropometry import Person
 from wholebody.figures.body_spec import Solid
 from wholebody.figures.dimensions import Dimensions
+from wholebody.figures.human.capsules import SPREAD
 from wholebody.figures.human.figure import figure_of
 from wholebody.figures.human.spec import human_spec
 from wholebody.figures.surface.fields import (
@@ -70,7 +71,7 @@ class PersonShape:
         data = figure.model.createData()
         pin.framesForwardKinematics(figure.model, data, q)
         self.person, self.size = person, Dimensions(person)
-        self.solids: tuple[Solid, ...] = spec.solids
+        self.solids: tuple[Solid, ...] = tuple(one for one in spec.solids if not one.name.endswith(f"_thigh:{SPREAD}"))
         self.bind = {name: np.array(data.oMf[figure.frame_id(name)].homogeneous) for name in figure.segments}
         self._marks = {name: np.array(data.oMf[figure.frame_id(name)].translation) for name in figure.frames}
         pieces = [

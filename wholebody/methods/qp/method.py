@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Annotated
 
 from wholebody.assessment.posture import assess
+from wholebody.base.arrays import Array
+from wholebody.base.checks import posture, shown
+from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked
 from wholebody.methods.conclusion import Ending, concluded, meets
 from wholebody.methods.control import Control, Progress
@@ -121,6 +125,30 @@ class QP(Checked):
                     contradictions=search.contradictions, programs=search.solver.counted(),
                 )  # fmt: skip
         return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
+
+    def minima(self, problem: Problem, starts: Iterable[Array]) -> Iterator[Solution]:
+        """For each start (nq,) the minimum of the measures that one descent from it leads to, without other starts.
+
+        Raises:
+            InputError: the scene changed after the problem was stated.
+        """
+        check_problem(problem, "QP.minima: problem")
+        try:
+            begins = iter(starts)
+        except TypeError:
+            raise InputError(f"QP.minima: starts is {shown(starts)}; give postures, such as [problem.start]") from None
+        budget = Budget(self.tolerance, self.iterations, self.budget, 0, self.seed, self.measures)
+        for given in begins:
+            start = posture(given, problem.scene.model.nq, "QP.minima: a start")
+            began = time.perf_counter()
+            with problem.borrow() as workspace, Control(self.time_limit, None, LONGEST) as control:
+                search = Multistart(problem, workspace, self._qp_solver(), budget, control)
+                end = search.feasibility_first(start)
+            ending = Ending(
+                end.q, end.converged, search.spent, tuple(search.trace), search.how,
+                programs=search.solver.counted(),
+            )  # fmt: skip
+            yield concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
 
     def _qp_solver(self) -> QPSolver:
         """A QP solver of the name in the settings, for one run."""

@@ -12,6 +12,7 @@ from itertools import chain, takewhile
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.assessment.posture import assess
 from wholebody.base.arrays import Array
@@ -99,8 +100,8 @@ class Multistart:
         if other is not None:
             self._accept(self._directly(other), "directly")
         self._find_closest()
-        self._descend_again()
-        self._restart_for_measure()
+        poor = self._descend_again()
+        self._restart_for_measure(max(self.budget.restarts_for_measure, SEARCH.poor if poor else 0))
         if self.best.violation.worst <= self.budget.tolerance:
             self.contradictions = ()  # by less than the tolerance
         if self._out_of_reach:  # although a closer posture may be near
@@ -126,10 +127,10 @@ class Multistart:
         if least is None:
             return
         yield Attempt(self._before_contact(), lambda q: self._descend(q, full_step=True), "from before contact")
-        yield Attempt([start], self._feasibility_first, "by feasibility first")
+        yield Attempt([start], self.feasibility_first, "by feasibility first")
         hooked = [*self.lineariser.defined(hooked_hands(self.problem, state, start))]
         yield Attempt(self._while_open(hooked), self._relaxed, "from another start")
-        yield Attempt(hooked, self._feasibility_first, "from hooked hands")
+        yield Attempt(hooked, self.feasibility_first, "from hooked hands")
         near = self.best.violation.left <= SEARCH.relaxation_depth  # as far as limbs in the way keep goals off
         yield Attempt(self._while_open([start] if near else []), self._relaxed, "from another start")
         self._out_of_reach = self._known_out_of_reach(self.best.q)
@@ -171,7 +172,7 @@ class Multistart:
         self.spent += local.iterations
         return local
 
-    def _feasibility_first(self, start: Array) -> LocalSolution:
+    def feasibility_first(self, start: Array) -> LocalSolution:
         """Find a feasible posture without measures, and descend with measures from there."""
         local = self._feasibility(self.lineariser, self.budget.iterations, "feasibility").run(start)
         self.spent += local.iterations
@@ -201,25 +202,40 @@ class Multistart:
             return probe
         return self._descend(probe.q, "restart", most=max(self._left, 1))
 
-    def _descend_again(self) -> None:
-        """Where contacts are met by an end that is no local minimum of the measures, descend from it once more.
+    def _descend_again(self) -> bool:
+        """Where contacts are met by an end that is no local minimum of the measures, descend from beside it once more.
 
-        Steps along a curved surface or over a kink can end early. Only contacts are tested: the test takes a quarter
-        of the time of a reach to a point.
+        The answer is whether it is none even then.
+
+        Steps along a curved surface can end early, and so they do at a kink: two points touch at once, and the one that
+        counts as the contact is that which should leave. Beside the kink, along the gradient that nothing balances, the
+        other one is nearest. Only contacts are tested: the test takes a quarter of the time of a reach to a point.
         """
-        problem, met = self.problem, self.best.violation.worst <= self.budget.tolerance
+        problem, tolerance = self.problem, self.budget.tolerance
         touches = any(hasattr(term, "touches") for term in (*problem.goals, *problem.constraints))
-        if not (met and touches and self.budget.measures) or self.control.over:
-            return
-        if assess(problem, self.best.q).optimality > 1e-2:  # rad: good answers are nearer to a local minimum
-            self._accept(self._directly(self.best.q), self.how)
+        if not (touches and self.budget.measures and self.best.violation.worst <= tolerance):
+            return False
+        for share in (0.3, 1.0, 0.1):  # of that step: more leaves more kinks, and comes to other minima
+            judged = assess(problem, self.best.q)
+            if judged.optimality <= SEARCH.optimal or self.control.over:
+                return False
+            way = -share * judged.first_order.residual
+            start = problem.scene.figure.clamp(np.asarray(pin.integrate(problem.scene.model, self.best.q, way)))
+            local = self._descent(self.budget.iterations, None, "", tolerance=0.1 * tolerance).run(start)
+            self.spent += local.iterations
+            alike = local.violation.worst <= tolerance and local.measure <= 1.005 * self.best.measure
+            if alike and assess(problem, local.q).optimality < judged.optimality:
+                self._best = local  # what it costs more was bought with the tolerance
+            else:
+                self._accept(local, self.how)
+        return assess(problem, self.best.q).optimality > SEARCH.optimal
 
-    def _restart_for_measure(self) -> None:
+    def _restart_for_measure(self, count: int) -> None:
         """Where all is met, search for a lower minimum of the measures from other starts, which are screened first.
 
         A feasible posture costs a few programs, and its measure tells which minimum it is near; a descent costs many.
         """
-        count, tolerance = self.budget.restarts_for_measure, self.budget.tolerance
+        tolerance = self.budget.tolerance
         if not (count and self.budget.measures and self.best.violation.worst <= tolerance):
             return
         rng, screened = np.random.default_rng([self.budget.seed, count]), SEARCH.screened * count
@@ -372,11 +388,13 @@ class Multistart:
         return local
 
     def _descent(
-        self, iterations: int, offset: Array | None, note: str, *, measures: bool = True, full_step: bool = False
-    ) -> SQP:
+        self, iterations: int, offset: Array | None, note: str, *, measures: bool = True, full_step: bool = False,
+        tolerance: float | None = None,
+    ) -> SQP:  # fmt: skip
         return SQP(
-            self._shared, self.budget.tolerance, iterations, note, offset, measures and self.budget.measures, full_step
-        )
+            self._shared, tolerance or self.budget.tolerance, iterations, note, offset,
+            measures and self.budget.measures, full_step,
+        )  # fmt: skip
 
     def _accept(self, local: LocalSolution, how: str) -> bool:
         """Keep the better one; whether the problem is solved now."""

@@ -175,6 +175,9 @@ class SearchNumbers(NamedTuple):
     coming_near: int = 40  # most programs from there to the nearest posture among things
     inside_probes: int = 5  # seeded starts for goals inside of things, which only look for the nearest posture
     staying: int = 40  # most programs that improve the measures at the nearest posture to goals that are not met
+    optimal: float = 1e-2  # rad: first-order optimality of a contact's answer from which on it counts as none
+    # how many starts for the measures are descended from where it is none after all. More: lower, slower.
+    poor: int = 2
     # feasible postures that are looked for, for each that is descended from; more = lower measures, slower
     screened: int = 4
 

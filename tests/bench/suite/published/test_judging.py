@@ -93,7 +93,7 @@ def mangled(content: dict[str, Any], **changes: Any) -> dict[str, Any]:
 def malformed(content: dict[str, Any]) -> list[tuple[Any, str]]:
     posture = content["answers"][0]["posture"]
     return [
-        ("{", "line 1: is no JSON"),
+        ("{", "line 1: is not JSON"),
         ('{"format": NaN}', "has the number NaN"),
         ([1], "holds a list"),
         ({**content, "version": "2.0"}, 'version is \'2.0\'; write "version": "1.0"'),

@@ -37,12 +37,12 @@ def compared(
         tell(adapter.name)
         child = Child(ONE_THREAD)  # a new one each: what another method has imported does not shorten the first solve
         try:
-            cold, records = child.call(_solved, path, adapter, cap, seconds=BUILDING)
-            rows.append(_row(adapter.name, cold, records))
+            first, records = child.call(_solved, path, adapter, cap, seconds=BUILDING)
+            rows.append(_row(adapter.name, first, records))
         except EndedError as error:
             outcome = OVERTIME if error.overtime else FAILED
             said = f"ended after {cap:g} s" if error.overtime else str(error)
-            rows.append(_row(adapter.name, inf, [Record("task", 0, adapter.name, DEFAULT[0], 0, outcome, said=said)]))
+            rows.append(_row(adapter.name, {}, [Record("task", 0, adapter.name, DEFAULT[0], 0, outcome, said=said)]))
         finally:
             child.close()
     return sorted(rows, key=_order)
@@ -53,19 +53,23 @@ def _order(row: Row) -> tuple[bool, float, str]:
     return not solved, float(row["warm ms"] if solved else row["worst"] if "worst" in row.figures else inf), row.tool
 
 
-def _solved(path: Path, adapter: Adapter, cap: float) -> tuple[float, list[Record]]:
-    """Seconds of the first solve, set-up and imports included, and all records; a job of a process of its own."""
+def _solved(path: Path, adapter: Adapter, cap: float) -> tuple[dict[str, Figure], list[Record]]:
+    """Time of the first solve, set-up and imports included, and peak memory; all records. A job of its own process."""
     allow(BUILDING)
     compile_all()
     made = _ready(read_task(path).problem)
     allow_processor(cap)
     began = time.perf_counter()
     records = [solve(adapter, DEFAULT, made)]
-    cold = time.perf_counter() - began
+    first: dict[str, Figure] = {"cold ms": 1e3 * (time.perf_counter() - began)}
     for _ in range(REPEATS if records[0].outcome == ANSWERED else 0):
         allow_processor(cap)
         records.append(solve(adapter, DEFAULT, made))
-    return cold, records
+    status = Path("/proc/self/status")
+    if status.is_file():  # Linux
+        peak = next(line for line in status.read_text().splitlines() if line.startswith("VmHWM"))
+        first["peak MB"] = float(peak.split()[1]) * 1024.0 / 1e6
+    return first, records
 
 
 def _ready(problem: Problem) -> Ready:
@@ -76,7 +80,7 @@ def _ready(problem: Problem) -> Ready:
     return Ready(Case("task", 0, problem, problem.start), inf)
 
 
-def _row(name: str, cold: float, records: Sequence[Record]) -> Row:
+def _row(name: str, first: Mapping[str, Figure], records: Sequence[Record]) -> Row:
     """One method: what came of it, its times, and what is left, as judged; no figures where there is no answer."""
     last, warm = records[-1], [1e3 * record.seconds for record in records[1:]]
     if last.outcome != ANSWERED:
@@ -88,7 +92,7 @@ def _row(name: str, cold: float, records: Sequence[Record]) -> Row:
         "warm ms": float(np.median(warm)),
         "least ms": min(warm),
         "most ms": max(warm),
-        "cold ms": 1e3 * cold,
+        **first,
         "set-up ms": 1e3 * float(np.median([record.setup_seconds for record in records])),
         "goals mm": 1e3 * last.goal_error,
         "goals mrad": 1e3 * last.goal_angle,
@@ -101,22 +105,19 @@ def _row(name: str, cold: float, records: Sequence[Record]) -> Row:
     return Row("task", name, figures)
 
 
-def about(cap: float = 20.0) -> str:
-    """What the table of such rows shows."""
-    return (
+def report(rows: Sequence[Row], title: str, facts: Mapping[str, str], cap: float = 20.0) -> str:
+    """The table as Markdown, refusals and failures below it; `cap` is that of `compared`."""
+    about = (
         "Each method has a process of its own. *Cold* is its first solve, imports and "
         f"set-up included; *warm* the median of {REPEATS} later ones, with the least and the greatest. *Set-up* builds "
-        f"a model of the tool's own and is in cold alone. Answers at a tolerance of {DEFAULT[0]:g} are judged from the "
+        "a model of the tool's own and is in cold alone. *Peak* is the greatest resident memory of the process. "
+        f"Answers at a tolerance of {DEFAULT[0]:g} are judged from the "
         f"posture: solved where goals are met and everything holds to {COARSE:g} m and rad. A solve is ended after "
         f"{cap:g} s of the processor's time. One problem says nothing of others."
     )
-
-
-def report(rows: Sequence[Row], title: str, facts: Mapping[str, str]) -> str:
-    """The table as Markdown, refusals and failures below it."""
     answered = [Row(title, row.tool, row.figures) for row in rows if "worst" in row.figures]
     silent = [f"`{row.tool}`, {row['outcome']}: {row['said']}" for row in rows if "worst" not in row.figures]
-    return tables.report(f"# {title[:1].upper()}{title[1:]}\n\n{about()}", {"": answered}, facts, silent)
+    return tables.report(f"# {title[:1].upper()}{title[1:]}\n\n{about}", {"": answered}, facts, silent)
 
 
 def panels(rows: Sequence[Row], title: str) -> list[Panel]:

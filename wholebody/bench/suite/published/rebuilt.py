@@ -41,10 +41,10 @@ def loaded(path: Path, kind: str) -> Any:
         return json.loads(text, parse_constant=_refused)
     except json.JSONDecodeError as error:
         raise FileFormatError(
-            f"{path}, line {error.lineno}: is no JSON ({error.msg}); write it with a library"
+            f"{path}, line {error.lineno}: is not JSON ({error.msg}); write it with a library"
         ) from None
     except (ValueError, RecursionError) as error:
-        raise FileFormatError(f"{path}: is no JSON ({error}); write it with a library") from None
+        raise FileFormatError(f"{path}: is not JSON ({error}); write it with a library") from None
 
 
 def _refused(name: str) -> None:

@@ -36,10 +36,10 @@ def names() -> tuple[str, ...]:
     return tuple(_data())
 
 
-def cases(chosen: Iterable[str] | None = None, where: str = "") -> tuple[HardCase, ...]:
+def cases(chosen: Iterable[str] | None = None) -> tuple[HardCase, ...]:
     """The cases of these names, all of them where None; UnknownNameError where there is no such case."""
     listed = _data()
-    wanted = listed if chosen is None else [known(name, listed, "case", where) for name in chosen]
+    wanted = listed if chosen is None else [known(name, listed, "case") for name in chosen]
     return tuple(_case(name, given) for name, given in listed.items() if name in wanted)
 
 

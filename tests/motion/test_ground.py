@@ -1,0 +1,205 @@
+"""What a recorded person stands on, and figures that stand there: a made-up walker whose footholds are known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.motion.skeleton import SkeletonMotion
+
+DT, STRIDE, STEP = 1 / 60, 0.9, 0.5  # s; s from a step of a foot to its next; m from foot to foot
+THIGH, SHANK, ANKLE, TOE = 0.43, 0.42, 0.08, 0.16  # m
+Terrain = Callable[[float], float]
+
+
+@pytest.fixture(scope="module")
+def human() -> wb.Figure:
+    return wb.load("human")
+
+
+def flat(x: float) -> float:
+    return 0.0
+
+
+def stairs(x: float) -> float:
+    return 0.15 * float(np.clip(np.floor((x + 0.25) / STEP), 0, 3))
+
+
+def rocks(x: float) -> float:
+    return float(0.05 * np.sin(9.0 * x) + 0.04 * np.cos(23.0 * x))
+
+
+def walker(height: Terrain, seconds: float = 3.0, raised: float = 0.0) -> tuple[SkeletonMotion, dict[str, np.ndarray]]:
+    """A walk along x with level soles, and in which frames each foot stands; `raised`: or the right foot is held up."""
+    count = round(seconds / DT)
+    names = [
+        "pelvis", "left_hip", "left_knee", "left_ankle", "left_foot", "right_hip", "right_knee", "right_ankle",
+        "right_foot", "spine3", "neck", "head", "left_shoulder", "left_elbow", "left_wrist", "right_shoulder",
+        "right_elbow", "right_wrist",
+    ]  # fmt: skip
+    parents = np.array([-1, 0, 1, 2, 3, 0, 5, 6, 7, 0, 9, 10, 9, 12, 13, 9, 15, 16])
+    offsets = np.array([
+        [0, 0, 0], *leg_offsets(1.0), *leg_offsets(-1.0), [0, 0, 0.3], [0, 0, 0.2], [0.02, 0, 0.12],
+        [0, 0.2, 0.15], [0, 0.06, -0.28], [0, 0.02, -0.26], [0, -0.2, 0.15], [0, -0.06, -0.28], [0, -0.02, -0.26],
+    ])  # fmt: skip
+    at = np.zeros((count, len(names), 3))
+    stands = {side: np.zeros(count, dtype=bool) for side in ("left", "right")}
+    for k in range(count):
+        feet = {}
+        for side, sign in (("left", 1.0), ("right", -1.0)):
+            phase = k * DT / STRIDE + (0.0 if sign > 0 else 0.5)
+            number, share = int(np.floor(phase)), phase % 1.0
+            x = 2 * STEP * number + (STEP if sign < 0 else 0.0) - STEP
+            swing = np.clip((share - 0.6) / 0.4, 0.0, 1.0)  # a foot stands for 60 % of a stride
+            smooth = swing * swing * swing * (10.0 - 15.0 * swing + 6.0 * swing * swing)
+            z = height(x) + (height(x + 2 * STEP) - height(x)) * smooth + 0.12 * np.sin(np.pi * smooth)
+            feet[side] = np.array([x + 2 * STEP * smooth, 0.1 * sign, z])
+            stands[side][k] = swing == 0.0
+            if raised:
+                lift = raised * min(1.0, k / 30) if sign < 0 else 0.0
+                feet[side] = np.array([0.0, 0.1 * sign, lift])
+                stands[side][k] = sign > 0 or k == 0
+        under = 0.5 * (feet["left"] + feet["right"])
+        low = min(feet["left"][2], feet["right"][2])
+        at[k, 0] = [under[0], 0.0, 0.86 + 0.7 * low + 0.3 * under[2]]
+        for side, first in (("left", 1), ("right", 5)):
+            hip = at[k, 0] + offsets[first]
+            ankle = feet[side] + [0.0, 0.0, ANKLE]
+            at[k, first : first + 4] = [hip, knee(hip, ankle), ankle, ankle + [TOE, 0.0, 0.03 - ANKLE]]
+        for joint in range(9, len(names)):
+            at[k, joint] = at[k, parents[joint]] + offsets[joint]
+    rotations = np.tile(np.eye(3), (count, len(names), 1, 1))
+    return SkeletonMotion(tuple(names), parents, offsets, rotations, at, DT, "walker"), stands
+
+
+def leg_offsets(sign: float) -> list[list[float]]:
+    return [[0, 0.09 * sign, -0.05], [0, 0, -THIGH], [0, 0, -SHANK], [TOE, 0, 0.03 - ANKLE]]
+
+
+def knee(hip: np.ndarray, ankle: np.ndarray) -> np.ndarray:
+    """The knee, forward of the line from hip to ankle."""
+    way = ankle - hip
+    length = min(float(np.linalg.norm(way)), THIGH + SHANK - 1e-6)
+    along = way / np.linalg.norm(way)
+    first = (THIGH**2 - SHANK**2 + length**2) / (2 * length)
+    ahead = np.array([1.0, 0.0, 0.0]) - along[0] * along
+    return hip + first * along + np.sqrt(max(THIGH**2 - first**2, 0.0)) * ahead / np.linalg.norm(ahead)
+
+
+def sole(clip: wb.Clip, frame: str) -> np.ndarray:
+    """Places (n, 3) of a frame of the figure."""
+    model, data = clip.figure.model, clip.figure.model.createData()
+    found = []
+    for q in clip.q:
+        pin.framesForwardKinematics(model, data, q)
+        found.append(np.array(data.oMf[clip.figure.frame_id(frame)].translation))
+    return np.array(found)
+
+
+def slides(clip: wb.Clip, stands: dict[str, np.ndarray]) -> np.ndarray:
+    """Speeds of heels and balls of the feet in the middle of their stands, m/s."""
+    found = []
+    for side, mask in stands.items():
+        inner = mask.copy()
+        for shift in range(1, 5):
+            inner &= np.roll(mask, shift) & np.roll(mask, -shift)
+        for point in ("heel", "ball"):
+            speed = np.linalg.norm(np.diff(sole(clip, f"{side}_{point}"), axis=0), axis=1) / clip.dt
+            found.append(speed[inner[1:] & inner[:-1]])
+    return np.concatenate(found)
+
+
+@pytest.mark.parametrize("height", [flat, stairs, rocks])
+def test_feet_rest_where_they_do(height: Terrain) -> None:
+    motion, stands = walker(height)
+    found = wb.motion.ground(motion)
+    for side, mask in stands.items():
+        for part in ("ankle", "toe"):
+            assert (found.rests[f"{side}_{part}"] == mask).mean() > 0.9
+    for each in found.footholds:
+        lowest = min(height(STEP * step) for step in range(-1, 6))
+        foot = each.place[0] - (TOE if each.role.endswith("toe") else 0.0)
+        assert each.height == pytest.approx(height(round(foot / STEP) * STEP) - lowest, abs=0.02)
+
+
+def test_levels_are_found() -> None:
+    assert wb.motion.ground(walker(flat)[0]).levels == (0.0,)
+    found = wb.motion.ground(walker(stairs)[0])
+    assert found.levels == pytest.approx((0.0, 0.15, 0.3, 0.45), abs=0.01)
+    assert "0.15" in str(found)
+
+
+def test_a_foot_that_is_held_up_does_not_rest() -> None:
+    found = wb.motion.ground(walker(flat, 2.0, raised=0.25)[0])
+    assert found.rests["left_ankle"].all()
+    assert not found.rests["right_ankle"][20:].any()
+
+
+def test_a_person_stands_on_the_floor_and_does_not_slide(human: wb.Figure) -> None:
+    motion, stands = walker(flat)
+    clip = wb.retarget(motion, human)
+    scene = wb.Scene(human).add(wb.HalfSpace(), name="floor")
+    assert max(-scene.contacts(q, 0.01).distance.min(initial=0.0) for q in clip.q) < 5e-4
+    assert slides(clip, stands).mean() < 2e-3
+    for side, mask in stands.items():
+        assert np.abs(sole(clip, f"{side}_heel")[mask, 2]).mean() < 1.5e-3
+    loose = wb.retarget(motion, human, ground=None)
+    assert slides(loose, stands).mean() > 2e-2  # legs are of other lengths
+    errors = [np.median(np.concatenate(list(wb.motion.bone_errors(motion, each).values()))) for each in (clip, loose)]
+    assert errors[0] - errors[1] < np.radians(1.5)
+
+
+def test_a_person_climbs_stairs_that_stand_there(human: wb.Figure) -> None:
+    motion, stands = walker(stairs)
+    scene = wb.Scene(human).add(wb.HalfSpace(), name="floor")
+    for step in (1, 2, 3):  # each from its edge, half a step before its foothold, to x = 5 m
+        edge = STEP * step - 0.25
+        scene.add(wb.Box((5.0 - edge, 2.0, 0.15 * step)), name=f"step {step}", at=(0.5 * (5.0 + edge), 0, 0.075 * step))
+    clip = wb.retarget(motion, human, scene)
+    assert max(-scene.contacts(q, 0.01).distance.min(initial=0.0) for q in clip.q) < 1e-3
+    assert slides(clip, stands).mean() < 2e-3
+
+
+def test_arms_that_were_recorded_inside_the_trunk_are_outside(human: wb.Figure) -> None:
+    motion, _ = walker(flat, 1.0)
+    at = np.array(motion.positions)
+    for joint, inside in ((13, (0.0, 0.12, 1.0)), (14, (0.05, 0.02, 0.85))):
+        at[:, joint] = at[:, 0] * [1.0, 0.0, 0.0] + inside
+    inside = SkeletonMotion(motion.names, motion.parents, motion.offsets, motion.rotations, at, DT, "inside")
+    scene = wb.Scene(human)
+    depths = [
+        max(-scene.contacts(q, 0.01).distance.min(initial=0.0) for q in wb.retarget(inside, human, ground=ground).q)
+        for ground in (None, "auto")
+    ]
+    assert depths[0] > 0.02
+    assert depths[1] < 1e-3
+
+
+def test_speed_limits_hold() -> None:
+    """Feet that go twice as fast, of a person whose knees turn at 3 rad/s at most."""
+    motion, _ = walker(flat, 1.5)
+    slow = wb.load("human")
+    limit = np.array(slow.model.velocityLimit)
+    limit[6:] = 3.0
+    slow.model.velocityLimit = limit
+    clip = wb.retarget(motion, slow)
+    assert np.abs(clip.velocities()[:, 6:]).max() < 3.0 * (1.0 + 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"), [("floor", "retarget: ground"), ("other", "the ground is of another recording")]
+)
+def test_wrong_grounds_are_one_sentence(human: wb.Figure, given: str, sentence: str) -> None:
+    ground = wb.motion.ground(walker(flat)[0]) if given == "other" else given
+    with pytest.raises(wb.InputError, match=sentence):
+        wb.retarget(walker(flat, 0.5)[0], human, ground=ground)
+
+
+def test_a_chart_is_drawn(tmp_path: Path) -> None:
+    wb.motion.ground(walker(stairs, 2.0)[0]).chart(tmp_path / "ground.png")
+    assert (tmp_path / "ground.png").stat().st_size > 5000

@@ -1,0 +1,122 @@
+"""Planned motions, judged by coal at many postures between the frames, and from the frames alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.base.arrays import Array
+from wholebody.bench.suite.problem_sets.registry import problem_set
+from wholebody.planning import Pace, Plan
+from wholebody.planning.rrt_connect import Tree
+
+
+def shelf(number: int) -> tuple[wb.Problem, Array]:
+    """An arm among things, and a posture that answers its problem."""
+    problem = problem_set("arms_among_things").make(number, 0).problem
+    return problem, wb.solve(problem).q
+
+
+Distance = Callable[[wb.Scene, Array], float]
+
+
+def least_along(scene: wb.Scene, q: Array, distance: Distance) -> float:
+    """Least distance of any pair along a motion through postures (n, nq), at three places between two of them."""
+    ways = (pin.interpolate(scene.model, *pair, share) for pair in pairwise(q) for share in (0.0, 1.0 / 3.0, 2.0 / 3.0))
+    return min(distance(scene, at) for at in ways)
+
+
+def check(plan: Plan, start: Array, end: Array, pace: Pace) -> None:
+    """The ends are pinned, and differences of the frames keep the limits."""
+    assert plan.solved, plan.message
+    model, q = plan.clip.figure.model, plan.clip.q
+    np.testing.assert_allclose(q[0], start, atol=1e-12)
+    np.testing.assert_allclose(q[-1], end, atol=1e-12)
+    speed = np.array([pin.difference(model, *pair) for pair in pairwise(q)]) / pace.dt
+    assert (np.abs(speed) <= 1.001 * pace.fastest(plan.clip.figure)).all()
+    rest = np.zeros((1, model.nv))
+    assert np.abs(np.diff(np.vstack([rest, speed, rest]), axis=0)).max() / pace.dt <= 1.001 * pace.acceleration
+
+
+@pytest.mark.parametrize("number", [8, 9])
+def test_an_arm_goes_round_what_is_in_the_way(number: int, least_distance: Distance) -> None:
+    problem, end = shelf(number)
+    scene, pace = problem.scene, Pace(velocity=2.0, acceleration=8.0)
+    blocked = scene.sweep(problem.start, end) is not None
+    found = wb.plan(scene, problem.start, end, pace=pace)
+    check(found, problem.start, end, pace)
+    assert (found.message == "the straight motion") == (not blocked)
+    assert least_along(scene, found.clip.q, least_distance) >= -1e-6
+
+
+def test_a_clearance_is_kept_where_the_ends_keep_it(least_distance: Distance) -> None:
+    problem, end = shelf(9)
+    ends = min(least_distance(problem.scene, q) for q in (problem.start, end))
+    asked = min(0.5 * ends, 0.01)
+    found = wb.plan(problem.scene, problem.start, end, clearance=asked)
+    assert found.solved, found.message
+    assert least_along(problem.scene, found.clip.q, least_distance) >= asked - 1e-6
+
+
+def test_a_person_reaches_through_a_hole_on_its_feet(least_distance: Distance) -> None:
+    problem = problem_set("passage").make(3, 0).problem
+    scene, figure = problem.scene, problem.scene.figure
+    found = wb.plan(scene, problem.start, list(problem.goals), constraints=problem.stated)
+    assert found.solved, found.message
+    goal = problem.goals[0]
+    assert np.linalg.norm(goal.error(scene.state(found.clip.q[-1]))) < 1e-4
+    for foot in ("left_foot", "right_foot"):
+        places = np.array([figure.placement(q, foot).translation for q in found.clip.q])
+        assert np.abs(places - places[0]).max() < 1e-4
+    assert least_along(scene, found.clip.q, least_distance) >= -5e-4
+
+
+def test_the_same_seed_plans_the_same_motion() -> None:
+    problem, end = shelf(9)
+    first, second = (wb.plan(problem.scene, problem.start, end, seed=4).clip.q for _ in range(2))
+    np.testing.assert_array_equal(first, second)
+
+
+def test_no_motion_leads_past_a_wall_that_limits_close_in(planar_arm: Callable[..., wb.Figure]) -> None:
+    """A bar turns about one joint, with a post on its circle; limits keep it from going round the other way."""
+    scene = wb.Scene(planar_arm((1.0,), limit=3.0))
+    scene.add(wb.Sphere(0.2), name="post", at=(0.0, 0.9, 0.0))
+    found = wb.plan(scene, np.zeros(1), np.array([2.8]), time_limit=0.3)
+    assert not found.solved
+    assert found.message == "no motion was found within the time limit"
+    assert len(found.clip) == 1
+    scene.remove("post")
+    assert wb.plan(scene, np.zeros(1), np.array([2.8])).solved
+
+
+def test_goals_out_of_reach_and_wrong_ends_are_told() -> None:
+    problem, end = shelf(8)
+    scene = problem.scene
+    far = wb.plan(scene, problem.start, wb.Point("tool", (9.0, 0.0, 0.0)))
+    assert not far.solved
+    assert far.message.startswith("no posture meets the goals")
+    beyond = np.array(end)
+    beyond[0] = scene.figure.limits.upper[0] + 0.1
+    with pytest.raises(wb.InputError, match=r"plan: the goal is .* beyond limits"):
+        wb.plan(scene, problem.start, beyond)
+    scene.add(wb.Sphere(0.2), name="ball", at=scene.figure.placement(problem.start, "tool").translation)
+    with pytest.raises(wb.InputError, match=r"plan: the start is .* beyond things"):
+        wb.plan(scene, problem.start, end)
+
+
+def test_the_nearest_posture_of_a_tree_is_that_of_all_differences() -> None:
+    rng = np.random.default_rng(0)
+    problem, _ = shelf(8)
+    figure = problem.scene.figure
+    tree = Tree(figure.model, problem.start)
+    drawn = rng.uniform(figure.limits.lower, figure.limits.upper, (200, figure.model.nq))
+    for number, q in enumerate(drawn):
+        tree.add(q, number - 1)
+    at = rng.uniform(figure.limits.lower, figure.limits.upper)
+    assert tree.nearest(at) == int(np.argmin(np.linalg.norm(drawn - at, axis=1)))
+    np.testing.assert_array_equal(tree.path(5), drawn[:6])

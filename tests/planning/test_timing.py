@@ -1,0 +1,65 @@
+"""The fastest timing: against the closed form of one joint, and the limits by differences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+import wholebody as wb
+from wholebody.planning.timing import Pace, Timing, squared_rates, used
+
+
+@pytest.mark.parametrize("length", [0.1, 2.0])
+def test_one_joint_takes_the_time_of_a_trapezium(length: float, planar_arm: Callable[..., wb.Figure]) -> None:
+    """It accelerates, goes at full speed if there is room, and brakes."""
+    figure, pace = planar_arm((1.0,)), Pace(velocity=1.5, acceleration=4.0, dt=1e-3)
+    path = np.linspace(0.0, length, 300)[:, None]
+    q, use = Timing(figure, path, pace).within()
+    expected = length / 1.5 + 1.5 / 4.0 if length > 1.5**2 / 4.0 else 2.0 * np.sqrt(length / 4.0)
+    assert (len(q) - 1) * 1e-3 == pytest.approx(expected, rel=0.03)
+    assert max(use) <= 1.001
+    assert (q[0], q[-1]) == (0.0, length)
+
+
+def test_rates_are_the_largest_that_a_linear_program_finds() -> None:
+    """The sum of b is largest where b keeps all rows, as all of them grow together (Verscheure and others 2009)."""
+    rng = np.random.default_rng(0)
+    count, knots = 30, np.linspace(0.0, 1.0, 30)
+    waves = np.array([np.sin((1.0 + k) * 2.0 * knots + k) for k in range(3)]).T
+    first, second = (np.gradient(waves, axis=0), np.gradient(np.gradient(waves, axis=0), axis=0))
+    speed, push = rng.uniform(1.0, 2.0, 3), rng.uniform(5.0, 9.0, 3)
+    b = squared_rates(first, second, speed, push)
+    rows, ends = [], []
+    for k in range(count - 1):
+        for joint in range(3):
+            row = np.zeros(count)
+            row[k + 1], row[k] = 0.5 * first[k, joint], second[k, joint] - 0.5 * first[k, joint]
+            rows += [row, -row]
+            ends += [push[joint], push[joint]]
+    most = np.minimum((speed / np.abs(first)).min(axis=1) ** 2, (push / np.abs(second)).min(axis=1))
+    most[[0, -1]] = 0.0
+    best = linprog(-np.ones(count), np.array(rows), np.array(ends), bounds=[(0.0, end) for end in most])
+    np.testing.assert_allclose(b, best.x, rtol=1e-6, atol=1e-6)
+
+
+def test_frames_of_a_path_with_a_corner_keep_the_limits(planar_arm: Callable[..., wb.Figure]) -> None:
+    """One joint stops where the other begins."""
+    arm, path = planar_arm((0.5, 0.4)), np.zeros((41, 2))
+    path[:21, 0], path[21:, 0], path[20:, 1] = np.linspace(0.0, 1.0, 21), 1.0, np.linspace(0.0, 1.0, 21)
+    pace = Pace(velocity=3.0, acceleration=8.0)
+    q, use = Timing(arm, path, pace).within()
+    assert max(use) <= 1.001
+    assert used(arm, q, pace) == use
+    speed = np.diff(q, axis=0) / pace.dt
+    assert np.abs(speed).max() <= 3.0 * 1.001
+    assert np.abs(np.diff(speed, axis=0)).max() / pace.dt <= 8.0 * 1.001
+
+
+def test_a_pace_refuses_what_no_motion_has() -> None:
+    with pytest.raises(wb.InputError, match="Pace: acceleration"):
+        Pace(acceleration=0.0)
+    with pytest.raises(wb.InputError, match="Pace: velocity"):
+        Pace(velocity=float("nan"))

@@ -1,0 +1,55 @@
+"""The tables of the folder "data", each with the source of every column."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+
+from wholebody.base.errors import UnknownNameError
+from wholebody.base.files import packaged_table
+
+FOLDER = Path(__file__).parent / "data"
+
+Row = dict[str, str]
+
+
+@cache
+def table(name: str) -> tuple[Row, ...]:
+    """Return the rows of a table in `figures/data`, each a mapping from column to text.
+
+    Raises:
+        UnknownNameError: there is no such table.
+    """
+    path = FOLDER / f"{name}.csv"
+    if not path.is_file():
+        raise UnknownNameError("table", name, [file.stem for file in FOLDER.glob("*.csv")])
+    return packaged_table(path)
+
+
+@cache
+def named_angles(of: str) -> dict[str, dict[str, float]]:
+    """Return the angles of the table "postures", degrees by joint, of each posture of "human", "hand" or "fingers"."""
+    found: dict[str, dict[str, float]] = {}
+    for row in table("postures"):
+        if row["of"] == of:
+            found.setdefault(row["name"], {}).update({row["joint"]: float(row["degrees"])} if row["joint"] else {})
+    return found
+
+
+@cache
+def keyed(name: str, column: str) -> dict[str, Row]:
+    """Return the rows of a table by the text in one column."""
+    return {row[column]: row for row in table(name)}
+
+
+def named_row(name: str, key: str, what: str) -> Mapping[str, str]:
+    """Return the row of a table that has a name in its column "name".
+
+    Raises:
+        UnknownNameError: there is no such row.
+    """
+    rows = keyed(name, "name")
+    if key not in rows:
+        raise UnknownNameError(what, key, rows)
+    return rows[key]

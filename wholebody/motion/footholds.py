@@ -1,0 +1,111 @@
+"""Where points of a moving body rest on the ground: found by their speed and their height above what is below them.
+
+A point rests while it is slow (with hysteresis) and low. Low means: not higher than the lowest rest nearby by more than
+a few centimetres; or the body came down onto it, or was borne by nothing else. So it is found on stairs, chairs and
+uneven ground too, and a foot that is held up in the air, which is reached from below, does not rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from wholebody.base.arrays import Array, Mask
+from wholebody.motion.windows import Window, long_runs, runs
+
+NEARBY = 0.8  # m: ground farther away than a step says nothing of the height here
+BEFORE = 0.4  # s: how long before and after a rest a point is looked at: half of a swing
+CAME_DOWN = 0.006  # m: by which a point that rests on higher ground was above it before and after
+SLID = 0.03  # m: a point that moves farther has made a step
+WAITED = 0.25  # s: a body that nothing lower bears for longer is borne by what rests higher
+
+
+class RestLimits(NamedTuple):
+    """What counts as rest.
+
+    Attributes:
+        speed: m/s, largest speed; a rest begins where the speed falls below two thirds of it.
+        height: m, largest height above the lowest rest nearby.
+        least: s, shortest rest.
+    """
+
+    speed: float = 0.15
+    height: float = 0.05
+    least: float = 0.1
+
+
+def speeds(places: Array, dt: float) -> Array:
+    """(n, ...) speeds of places (n, ..., 3), `dt` seconds apart; central inside."""
+    if len(places) < 2:
+        return np.zeros(places.shape[:-1])
+    return np.asarray(np.linalg.norm(np.gradient(places, dt, axis=0), axis=-1))
+
+
+def resting(places: Array, dt: float, limits: RestLimits, kinds: Sequence[int]) -> Mask:
+    """(n, p) when points (n, p, 3) rest, `dt` seconds apart; points of one kind are equally high on level ground."""
+    fast, found = speeds(places, dt), np.zeros(places.shape[:2], dtype=bool)
+    slow = [_slow(places[:, k], fast[:, k], dt, limits) for k in range(places.shape[1])]
+    if not slow:
+        return found
+    marks = np.stack(slow, axis=1)
+    stands = [(k, run, _lowest(places[run.first : run.end, k, 2])) for k, mask in enumerate(slow) for run in runs(mask)]
+    kind = np.array(kinds, dtype=int)
+    lows = _level_of_kinds(stands, kind)
+    base = np.array([low - lows[kind[k]] for k, _, low in stands])
+    middles = np.array([places[run.first : run.end, k, :2].mean(axis=0) for k, run, _ in stands]).reshape(-1, 2)
+    accepted = np.zeros(len(stands), dtype=bool)
+    for number in np.argsort(base, kind="stable").tolist():
+        k, run, low = stands[number]
+        near = accepted & (np.linalg.norm(middles - middles[number], axis=1) < NEARBY)
+        floor = float(base[near].max(initial=-np.inf)) if near.any() else float(base.min())
+        lone = not near.any() and not accepted.any()
+        if lone or base[number] <= floor + limits.height or _bears(places[:, k, 2], run, low, dt, found, marks):
+            accepted[number] = True
+            frames = np.arange(run.first, run.end)
+            found[frames[places[frames, k, 2] <= low + limits.height], k] = True
+    return np.stack([long_runs(column, max(1, round(limits.least / dt))) for column in found.T], axis=1)
+
+
+def _slow(places: Array, speed: Array, dt: float, limits: RestLimits) -> Mask:
+    """(n,) frames of rests by speed alone; where a point goes on slowly, its fastest frames part them."""
+    low, high = speed <= 2.0 / 3.0 * limits.speed, speed <= limits.speed
+    kept = np.zeros(len(speed), dtype=bool)
+    for run in runs(high):
+        kept[run.first : run.end] = bool(low[run.first : run.end].any())
+    waiting = runs(kept)
+    while waiting:
+        first, last = waiting.pop()
+        if last - first > 2 and np.linalg.norm(np.ptp(places[first:last], axis=0)) > SLID:
+            cut = first + 1 + int(speed[first + 1 : last - 1].argmax())
+            kept[cut] = False
+            waiting += [Window(first, cut), Window(cut + 1, last)]
+    return long_runs(kept, max(1, round(limits.least / dt)))
+
+
+def _lowest(heights: Array) -> float:
+    return float(np.percentile(heights, 20.0))
+
+
+def _level_of_kinds(stands: Sequence[tuple[int, Window, float]], kind: Array) -> dict[int, float]:
+    """How high points of each kind are above the ground, by what is lowest of each; metres, to a common constant."""
+    found = {}
+    for each in set(kind.tolist()):
+        lows = [(low, len(run)) for k, run, low in stands if kind[k] == each]
+        if lows:
+            heights = np.repeat([low for low, _ in lows], [count for _, count in lows])
+            found[each] = float(np.percentile(heights, 10.0))
+    return found
+
+
+def _bears(heights: Array, run: Window, low: float, dt: float, found: Mask, slow: Mask) -> bool:
+    """Whether a point came down to a rest and goes up from it, or the body has nothing else that may bear it."""
+    far = max(1, round(BEFORE / dt))
+    before, after = heights[max(0, run.first - far) : run.first], heights[run.end : run.end + far]
+    if len(before) + len(after) and all(
+        not len(part) or float(part.max()) > low + CAME_DOWN for part in (before, after)
+    ):
+        return True
+    alone = ~(found[run.first : run.end].any(axis=1)) & (slow[run.first : run.end].sum(axis=1) <= 1)
+    return bool(alone.sum() * dt > WAITED)

@@ -1,0 +1,264 @@
+"""Points of a figure that rest where those of a skeleton rest: heels, toes, hands and knees, frame by frame.
+
+A point goes over to the place where it rests before it does, and away from it afterwards. The sole of a rigid foot
+keeps its length: of heel and toes, what rests first says where the other one comes down.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array, Mask
+from wholebody.figures.figure import Figure
+from wholebody.geometry.pieces import swept_points
+from wholebody.motion.posture_fit import CLEARANCE
+from wholebody.motion.retarget_targets import upright
+from wholebody.motion.roles import Roles
+from wholebody.motion.standing_ground import Foothold, Ground
+from wholebody.scene.scene import Scene
+
+STRONG, NEARING, SWING = 200.0, 3.0, 0.3  # weights of what rests, nearly does, and of a sole between; 1 of a bone
+BESIDE = np.array([0.3, 0.3, 1.0])  # shares of that weight: soles that meet come down beside each other
+STEP = 0.3  # m: a surface higher than this above the recording's ground is not what a sole comes down on
+SOLE = 0.002  # m: what is lower than this above a foot's lowest point is its sole
+FACING = 0.3  # least cosine of the angle from up to the normal of a sole that faces the ground
+FOLLOW = 0.8  # share of the body's shift that a new place keeps; the rest goes back with time
+OVER = 0.2  # s: in which a point goes over to where it rests
+
+
+@dataclass(frozen=True, eq=False)
+class HeldPoint:
+    """A point of a figure that may rest.
+
+    Attributes:
+        role: of the skeleton's joint by which it rests.
+        foot: "left" or "right" for a point of a sole, which comes down to the ground; else "".
+        joint: index of the joint that carries it.
+        place: (3,) in the joint's frame, metres.
+        edge: whether it is on the edge of a sole, so that its height alone counts: soles come down flat.
+    """
+
+    role: str
+    foot: str
+    joint: int
+    place: Array
+    edge: bool = False
+
+
+def held_points(figure: Figure, roles: Roles, ground: Ground) -> list[HeldPoint]:
+    """The points of a figure that rest at some time."""
+    found, resting = [], {role for role, mask in ground.rests.items() if mask.any()}
+    data = figure.model.createData()
+    pin.framesForwardKinematics(figure.model, data, upright(figure))
+    for side in ("left", "right"):
+        heel, toe = f"{side}_ankle", f"{side}_toe"
+        if heel in roles.frames:
+            soles = _sole(figure, data, side, roles.frames[heel])
+            told = toe if toe in ground.rests else heel  # without toes the sole rests as the ankle does
+            for role, (joint, *places) in zip((heel, told), soles, strict=True):
+                if {heel, told} & resting:
+                    found += [HeldPoint(role, side, joint, place, edge=k > 0) for k, place in enumerate(places)]
+        for role in (f"{side}_{part}" for part in ("hand", "wrist", "knee")):
+            if role in resting and role in roles.frames:
+                frame = figure.model.frames[figure.frame_id(roles.frames[role])]
+                found.append(HeldPoint(role, "", int(frame.parentJoint), np.array(frame.placement.translation)))
+    return found
+
+
+def _sole(figure: Figure, data: pin.Data, side: str, ankle: str) -> list[tuple[int, Array, Array, Array]]:
+    """Joint, and in it the middle, left and right place of the heel and of the front of a sole."""
+    joint = int(figure.model.frames[figure.frame_id(ankle)].parentJoint)
+    joint = next(
+        (
+            int(figure.model.frames[figure.frame_id(name)].parentJoint)
+            for name in (f"{side}_heel",)
+            if name in figure.frames
+        ),
+        joint,
+    )
+    corners = [np.array(data.oMi[joint].translation)[None]]
+    for piece in figure.geometry.geometryObjects:
+        if piece.parentJoint == joint:
+            swept, at = swept_points(piece.geometry), data.oMi[joint] * piece.placement
+            if len(swept.points):
+                corners.append(swept.points @ at.rotation.T + at.translation - [0.0, 0.0, swept.radius])
+    every = np.concatenate(corners)
+    low = every[every[:, 2] <= every[:, 2].min() + SOLE]
+    (back, right), (front, left) = low[:, :2].min(axis=0), low[:, :2].max(axis=0)
+    found = []
+    for x in (back, front):
+        places = np.array([[x, 0.5 * (left + right)], [x, left], [x, right]])
+        found.append((joint, *(data.oMi[joint].actInv(np.array([*place, every[:, 2].min()])) for place in places)))
+    return found
+
+
+class Holds:
+    """Where each point is to be in each frame, and with which weight.
+
+    Attributes:
+        points: the points.
+    """
+
+    def __init__(
+        self,
+        points: list[HeldPoint],
+        ground: Ground,
+        scale: float,
+        dt: float,
+        surface: Callable[[Array], float | None] | None,
+    ) -> None:
+        """Take the points.
+
+        Args:
+            points: those that rest at some time.
+            ground: when they do.
+            scale: metres of the figure for each metre of height of the recording's ground.
+            dt: seconds from frame to frame.
+            surface: height of the highest surface below a place (3,), metres; None for that of the recording.
+        """
+        self.points, self._scale, self._surface = points, scale, surface
+        self.over = max(1, round(OVER / dt))
+        self._stands = [[each for each in ground.footholds if each.role == point.role] for point in points]
+        self._down: Mask | None = None
+        self._places: dict[tuple[int, int], Array] = {}
+
+    def goals(self, frame: int, paths: Array, shift: Array, again: bool = False) -> tuple[Array, Array]:
+        """Goals (h, 3) and weights (h, 3) of a frame.
+
+        Args:
+            frame: number of the frame.
+            paths: (n, h, 3) where the points would be in each frame.
+            shift: (3,) by how much the body is beside its free fit, metres.
+            again: whether it is known where points come down.
+        """
+        if self._down is None:
+            self._down = self._facing_down(paths)
+        goals, weights = np.array(paths[frame]), np.zeros((len(self.points), 3))
+        for number, stands in enumerate(self._stands):
+            after = bisect_right([stand.first for stand in stands], frame)
+            around = stands[max(0, after - 1) : after + 1] if after else stands[:1]
+            if not around:
+                continue
+            places = [self._place(number, stand, paths, shift) for stand in around]
+            if around[0].first <= frame < around[0].end:
+                goals[number] = places[0]
+                weights[number] = NEARING * BESIDE if frame == around[0].first and not again else STRONG
+            else:
+                goals[number], share = self._swing(number, frame, around, places, paths)
+                weights[number] = (
+                    BESIDE * (SWING + (NEARING - SWING) * share) if self.points[number].foot else NEARING * share
+                )
+            if self.points[number].edge:
+                weights[number, :2] = 0.0
+            if not self._down[frame, number]:
+                weights[number, 2] = 0.0  # contact says how high
+        return goals, weights
+
+    def _swing(
+        self, number: int, frame: int, around: list[Foothold], places: list[Array], paths: Array
+    ) -> tuple[Array, float]:
+        """Where a point (3,) is to be between rests, and how near in time it is to one, from 0 to 1.
+
+        Its way is led from one rest to the next; it comes to rest, and starts, slowly.
+        """
+        nearest = [min(max(frame, stand.first), stand.end - 1) for stand in around]
+        beside = [place - paths[near][number] for place, near in zip(places, nearest, strict=True)]
+        gone = 0.0
+        if len(around) == 2:
+            part = (frame - nearest[0]) / (nearest[1] - nearest[0])
+            gone = part * part * (3.0 - 2.0 * part)
+        way = paths[frame][number]
+        goal, most = way + (1.0 - gone) * beside[0] + gone * beside[-1], 0.0
+        for near in nearest:
+            share = 0.5 + 0.5 * np.cos(np.pi * min(abs(frame - near) / self.over, 1.0))
+            goal, most = goal - share * (way - paths[near][number]), max(most, share)
+        return goal, most
+
+    def _facing_down(self, paths: Array) -> Mask:
+        """(n, h) in which frames a point is of a sole that faces the ground."""
+        found = np.zeros(paths.shape[:2], dtype=bool)
+        for foot in {point.foot for point in self.points if point.foot}:
+            own = [k for k, point in enumerate(self.points) if point.foot == foot]
+            back, left, right, front = own[:4]
+            up = np.cross(paths[:, front] - paths[:, back], paths[:, left] - paths[:, right])
+            found[:, own] = (up[:, 2] > FACING * np.linalg.norm(up, axis=1))[:, None]
+        return found
+
+    def landed(self, frame: int, places: Array) -> None:
+        """Keep points where they came down, (h, 3), if a rest begins in this frame: contact may have kept them off."""
+        for number, stands in enumerate(self._stands):
+            if any(stand.first == frame for stand in stands):
+                self._places[number, frame][:2] = places[number, :2]
+
+    def _place(self, number: int, stand: Foothold, paths: Array, shift: Array) -> Array:
+        """(3,) where a point rests, decided when it is first asked for."""
+        known = self._places.get((number, stand.first))
+        if known is not None:
+            return known
+        frames = range(stand.first, min(stand.end, stand.first + self.over))
+        place: Array = np.mean([paths[frame][number] for frame in frames], axis=0) + FOLLOW * shift
+        point = self.points[number]
+        if point.edge:
+            place[2] = self._height(place, stand)
+        elif point.foot:
+            for other, stands in enumerate(self._stands):
+                before = [
+                    each
+                    for each in stands
+                    if each.first <= stand.first < each.end and (other, each.first) in self._places
+                ]
+                if (
+                    self.points[other].foot == point.foot
+                    and self.points[other].role != point.role
+                    and not self.points[other].edge
+                    and before
+                ):
+                    pivot = self._places[other, before[-1].first]
+                    along = np.mean([paths[frame][number] - paths[frame][other] for frame in frames], axis=0)
+                    length = float(np.linalg.norm(paths[frames[0]][number] - paths[frames[0]][other]))
+                    rise = self._scale * (stand.height - before[-1].height)
+                    flat = np.sqrt(max(length**2 - rise**2, 0.0)) / max(float(np.linalg.norm(along[:2])), 1e-9)
+                    place = np.array([*(pivot[:2] + flat * along[:2]), 0.0])
+            place[2] = self._height(place, stand)
+        self._places[number, stand.first] = place
+        return place
+
+    def _height(self, place: Array, stand: Foothold) -> float:
+        """Height at which a point of a sole comes down, metres."""
+        told = self._scale * stand.height
+        below = None if self._surface is None else self._surface(np.array([place[0], place[1], told + STEP]))
+        return CLEARANCE + (told if below is None else below)
+
+
+def surface_of(scene: Scene) -> Callable[[Array], float | None]:
+    """The height of the first surface of a scene's things below a place (3,), metres; None for none within 2 m."""
+    owners, geometry = scene.piece_owner, scene.geometry
+    still = [
+        (piece.geometry, coal.Transform3s(piece.placement.rotation, piece.placement.translation))
+        for piece, owner in zip(geometry.geometryObjects, owners, strict=True)
+        if owner in scene.objects and scene.objects[owner].segment is None
+    ]
+    ball, request, result = coal.Sphere(1e-4), coal.DistanceRequest(), coal.DistanceResult()
+
+    def height(place: Array) -> float | None:
+        at = np.array(place)
+        for _ in range(100):  # goes down by the least distance, so it passes nothing
+            center = coal.Transform3s(np.eye(3), at)
+            gap = min(
+                (float(coal.distance(ball, center, shape, where, request, result)) for shape, where in still),
+                default=np.inf,
+            )
+            if gap < 1e-5:
+                return float(at[2] - 1e-4)
+            at[2] -= gap
+            if not at[2] > place[2] - 2.0:
+                break
+        return None
+
+    return height

@@ -1,0 +1,203 @@
+"""What a recorded person stands on: the floor, its levels, and when and where feet, hands and knees rest."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.records import with_values
+from wholebody.motion.footholds import RestLimits, resting, speeds
+from wholebody.motion.roles import skeleton_roles
+from wholebody.motion.skeleton import SkeletonMotion, checked_motion
+from wholebody.motion.windows import long_runs, runs
+
+FEET = ("ankle", "toe")
+OTHERS = ("hand", "wrist", "knee")
+APART, SPREAD = 0.04, 0.06  # m: between two levels of a floor; within one level, by errors of a recording
+NEAR_GROUND = 0.12  # m: highest place of a knee's or wrist's joint above the ground on which it rests
+
+
+class Foothold(NamedTuple):
+    """A point that rests at one place.
+
+    Attributes:
+        role: part of the body, such as "left_toe".
+        first, end: frames, without the last.
+        place: (3,) mean place of the joint, metres, in the recording's world.
+        height: of the ground there above the lowest level, metres.
+    """
+
+    role: str
+    first: int
+    end: int
+    place: Array
+    height: float
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """The ground of a recording.
+
+    Attributes:
+        footholds: in the order of time.
+        rests: role to (n,) when it rests.
+        lowest: role to the height at which its joint rests on the lowest level, in the recording's world, metres.
+        levels: heights of the floor's levels above the lowest, metres; of uneven ground none beside 0.
+        tilt: degrees by which the lowest level slopes in the recording; drift of less than 2 degrees is usual.
+        uneven: whether heights do not gather in levels; each foothold then has its own.
+        dt: seconds from frame to frame.
+    """
+
+    footholds: tuple[Foothold, ...]
+    rests: Mapping[str, Mask] = field(repr=False)
+    lowest: Mapping[str, float]
+    levels: tuple[float, ...]
+    tilt: float
+    uneven: bool
+    dt: float
+
+    def below(self, frames: int) -> Array:
+        """(frames,) height of the ground under the body, between footholds and over time, metres."""
+        feet = [each for each in self.footholds if each.role in self.lowest]
+        if not feet:
+            return np.zeros(frames)
+        total, count = np.zeros(frames), np.zeros(frames)
+        for each in feet:
+            total[each.first : each.end] += each.height
+            count[each.first : each.end] += 1.0
+        known = np.flatnonzero(count)
+        return np.asarray(np.interp(np.arange(frames), known, total[known] / count[known]))
+
+    def __str__(self) -> str:
+        """One sentence."""
+        shares = ", ".join(f"{role} {mask.mean():.0%}" for role, mask in self.rests.items() if mask.any())
+        kind = "uneven" if self.uneven else f"levels at {', '.join(f'{level:.2f}' for level in self.levels)} m"
+        return f"ground: {kind}, tilt {self.tilt:.1f} degrees; rests: {shares or 'none'}"
+
+    def chart(self, path: str | os.PathLike[str]) -> str:
+        """Draw footholds seen from above and their heights over time into a picture; returns its path."""
+        from matplotlib.figure import Figure as Drawing
+
+        drawing = Drawing(figsize=(10, 6), layout="constrained")
+        seen, timed = drawing.subplots(1, 2)
+        for number, role in enumerate(self.rests):
+            mine = [each for each in self.footholds if each.role == role]
+            if not mine:
+                continue
+            color, places = f"C{number}", np.array([each.place for each in mine])
+            seen.scatter(places[:, 0], places[:, 1], color=color, label=role, s=12)
+            for each in mine:
+                times = self.dt * np.array([each.first, each.end])
+                timed.plot(times, 2 * [each.height], color=color, linewidth=3)
+        seen.set(xlabel="x [m]", ylabel="y [m]", aspect="equal", title="footholds from above")
+        timed.set(xlabel="time [s]", ylabel="height of the ground [m]", title="rests")
+        seen.legend(fontsize=7)
+        drawing.savefig(path)
+        return os.fspath(path)
+
+
+NOTHING = Ground((), {}, {}, (0.0,), 0.0, False, 1.0)
+"""The ground of what never rests."""
+
+
+def ground(
+    motion: SkeletonMotion, names: str | os.PathLike[str] | Mapping[str, Mapping[str, str]] | None = None
+) -> Ground:
+    """Find what a recorded person stands on.
+
+    Args:
+        motion: the skeleton.
+        names: as for `wb.retarget`.
+
+    Returns:
+        Without feet that rest, a ground without footholds.
+
+    Raises:
+        UnknownNameError: a name that does not exist.
+    """
+    motion = checked_motion(motion, "ground: motion")
+    joints = {role: motion.names.index(name) for role, name in skeleton_roles(motion, names).items()}
+    feet = [f"{side}_{part}" for side in ("left", "right") for part in FEET if f"{side}_{part}" in joints]
+    limits, kinds = RestLimits(), [FEET.index(role.split("_")[1]) for role in feet]
+    places = motion.positions[:, [joints[role] for role in feet]]
+    marks = resting(places, motion.dt, limits, kinds)
+    rests = {role: marks[:, k] for k, role in enumerate(feet)}
+    lows = {role: _low(motion.positions[rests[role], joints[role], 2]) for role in feet if rests[role].any()}
+    parts = {part: min(low for role, low in lows.items() if role.endswith(part)) for part in FEET if _any(lows, part)}
+    above = {role: parts[role.split("_")[1]] for role in feet if role.split("_")[1] in parts}
+    raw = [
+        Foothold(role, *run, motion.positions[run.first : run.end, joints[role]].mean(axis=0), 0.0)
+        for role in feet
+        for run in runs(rests[role])
+    ]
+    heights = np.array(
+        [_low(motion.positions[each.first : each.end, joints[each.role], 2]) - above[each.role] for each in raw]
+    )
+    settled, levels, uneven = _levelled(heights, np.array([each.end - each.first for each in raw]))
+    low = float(settled.min()) if len(settled) else 0.0
+    settled, above = settled - low, {role: height + low for role, height in above.items()}
+    holds = [with_values(each, height=float(height)) for each, height in zip(raw, settled, strict=True)]
+    tilt = _tilt(np.array([each.place[:2] for each in raw]).reshape(-1, 2), heights, settled)
+    if holds:
+        for role in (f"{side}_{part}" for side in ("left", "right") for part in OTHERS):
+            if role in joints and not (role.endswith("wrist") and role.replace("wrist", "hand") in joints):
+                mask, more = _others(motion, joints[role], role, holds, above)
+                rests[role], holds = mask, [*holds, *more]
+    return Ground(tuple(sorted(holds, key=lambda each: each.first)), rests, above, levels, tilt, uneven, motion.dt)
+
+
+def _any(lows: Mapping[str, float], part: str) -> bool:
+    return any(role.endswith(part) for role in lows)
+
+
+def _low(heights: Array) -> float:
+    return float(np.percentile(heights, 20.0))
+
+
+def _levelled(heights: Array, counts: Indices) -> tuple[Array, tuple[float, ...], bool]:
+    """Heights (k,) of the ground at footholds, brought to levels where they gather in some; the levels."""
+    if not len(heights):
+        return heights, (0.0,), False
+    order = np.argsort(heights, kind="stable")
+    groups = np.split(order, np.flatnonzero(np.diff(heights[order]) > APART) + 1)
+    settled, levels, uneven = heights.copy(), list[float](), False
+    for group in groups:
+        if np.ptp(heights[group]) > SPREAD:
+            uneven = True
+            continue
+        settled[group] = np.median(np.repeat(heights[group], counts[group]))
+        levels.append(float(settled[group][0]))
+    low = float(settled.min())
+    return settled, (0.0,) if uneven else tuple(level - low for level in levels), uneven
+
+
+def _tilt(places: Array, heights: Array, settled: Array) -> float:
+    """Degrees of the slope of what is on the lowest level."""
+    low = settled <= 1e-9
+    if low.sum() < 3 or np.ptp(places[low], axis=0).max() < 0.5:
+        return 0.0
+    columns = np.column_stack([places[low] - places[low].mean(axis=0), np.ones(low.sum())])
+    slope = np.linalg.lstsq(columns, heights[low], rcond=0.05)[0][:2]
+    return float(np.degrees(np.arctan(np.linalg.norm(slope))))
+
+
+def _others(
+    motion: SkeletonMotion, joint: int, role: str, holds: list[Foothold], above: Mapping[str, float]
+) -> tuple[Mask, list[Foothold]]:
+    """When a hand or a knee rests on the ground, and where."""
+    at, limits = motion.positions[:, joint], RestLimits()
+    feet = [each for each in holds if each.role in above]
+    middles, floors = np.array([each.place[:2] for each in feet]), np.array([each.height for each in feet])
+    nearest = np.linalg.norm(at[:, None, :2] - middles[None], axis=2).argmin(axis=1)
+    floor = floors[nearest] + min(above.values())
+    low = (speeds(at, motion.dt) <= limits.speed) & (at[:, 2] <= floor + NEAR_GROUND)
+    mask = long_runs(low, max(1, round(limits.least / motion.dt)))
+    return mask, [
+        Foothold(role, *run, at[run.first : run.end].mean(axis=0), float(floors[nearest[run.first]]))
+        for run in runs(mask)
+    ]

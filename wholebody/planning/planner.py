@@ -1,0 +1,261 @@
+"""`wb.plan`: a motion from a posture to another one, or to goals, free of collision and within limits of speed.
+
+ends -> straight motion, else two trees -> shortcuts -> smoothing and timing -> judge
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.assessment.motion import frames_passed_through
+from wholebody.assessment.posture import assess
+from wholebody.base import checks
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
+from wholebody.base.runner import processor_time
+from wholebody.figures.self_pairs import random_postures
+from wholebody.methods.qp.method import QP
+from wholebody.motion.clip import Clip
+from wholebody.planning.local_planner import Geodesics, LocalPlanner, TrackedMotions
+from wholebody.planning.rrt_connect import RRTConnect
+from wholebody.planning.smoothing import SPACING, length, resampled, shortcut, smooth
+from wholebody.planning.timing import Pace, Timing
+from wholebody.problem import Problem
+from wholebody.scene.scene import Scene
+from wholebody.tasks.base import Bound, Constraint, Goal
+
+KEPT = 1e-4  # m, rad: by which limits, constraints and clearances may be missed in a frame
+PASSED = 5e-4  # m: overlap between two frames that counts
+OVER = 1.001  # of the limits of velocity and acceleration: the last slowing may end a little above them
+ENDS = 8  # postures that meet goals; more = ends that are reached more easily, for a solve each
+ENOUGH = 1500  # postures of all trees, after which no other search begins
+ROOM = 1.0  # m: by which samples move a free root along each axis
+ROUNDS = 50  # of the trees, until they get another end
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A planned motion and what it is worth.
+
+    Attributes:
+        clip: the motion, from the start to the goal; the start alone where none was found.
+        solved: whether the clip leads to the goal, keeps limits, constraints and clearances in every frame, and passes
+            through nothing between frames, as judged from its postures alone.
+        message: how it was found, or why there is none.
+        length: of the motion, radians and metres.
+        violation: largest by which a frame misses limits, constraints and clearances, metres and radians.
+        velocity: largest of any joint, in parts of its limit.
+        acceleration: the same.
+        seconds: of the processor.
+    """
+
+    clip: Clip = field(repr=False)
+    solved: bool
+    message: str
+    length: float = 0.0
+    violation: float = 0.0
+    velocity: float = 0.0
+    acceleration: float = 0.0
+    seconds: float = 0.0
+
+
+def plan(
+    scene: Scene,
+    start: Array | str | None,
+    goal: Array | str | Goal | Iterable[Goal],
+    *,
+    constraints: Iterable[Constraint | Bound] = (),
+    clearance: float = 0.0,
+    pace: Pace | None = None,
+    seed: int = 0,
+    time_limit: float = 10.0,
+) -> Plan:
+    """Plan a motion of a figure among things that stand still.
+
+    The straight motion is tried first. Then two trees of motions grow towards each other (RRT-Connect, Kuffner and
+    LaValle 2000). The path is shortened and smoothed, and timed as fast as `pace` lets it (TOPP-RA, Pham and Pham
+    2018).
+
+    Args:
+        scene: the figure among things.
+        start: (nq,) posture at which the motion begins, the name of one, or None for the figure's first posture.
+        goal: (nq,) posture at which it ends, the name of one, or goals that its end meets.
+        constraints: what holds throughout, such as `wb.Hold("left_foot")`, as in a `wb.Problem`.
+        clearance: least distance of every pair, metres; pairs that are nearer at an end may be as near on the way.
+        pace: limits of velocity and acceleration, and the time step; None for `wb.planning.Pace()`.
+        seed: of the random postures.
+        time_limit: seconds of the processor after which the search ends.
+
+    Raises:
+        InputError: the start or the goal overlaps something, or misses a limit or a constraint, or an argument is not
+            of its kind.
+        UnknownNameError: a name that the figure does not have.
+    """
+    began = processor_time()
+    checks.instance(scene, Scene, "plan: scene", "make one with wb.Scene(figure)")
+    pace = Pace() if pace is None else checks.instance(pace, Pace, "plan: pace", "give wb.planning.Pace(velocity=1.0)")
+    limit = checks.number(time_limit, "plan: time_limit", 0.0, np.inf, "s")
+    rng = np.random.default_rng(checks.whole(seed, "plan: seed", 0, 2**63 - 1))
+    goals = _goals(goal)
+    problem = Problem(scene, start, goals=goals, constraints=constraints, clearance=clearance)
+    _check_end(problem, problem.start, "start")
+    ends = _answers(problem, rng) if goals else iter([_End(_posture(problem, goal))])
+
+    def ended() -> bool:
+        return processor_time() - began > limit
+
+    with problem.borrow() as workspace:
+        tracked = bool(problem.constraints or problem.bounds or scene.figure.followers)
+        local: LocalPlanner = TrackedMotions(problem) if tracked else Geodesics(problem, workspace)
+        path, message = _Search(problem, local, ends, rng, ended).shortest()
+        if path is None:
+            clip = Clip(scene.figure, problem.start[None], pace.dt, "plan")
+            return Plan(clip, False, message, seconds=processor_time() - began)
+        found = _smoothed(problem, local, path, pace)
+    return replace(found, message=message if found.solved else found.message, seconds=processor_time() - began)
+
+
+def _goals(goal: Any) -> tuple[Goal, ...]:
+    """The goals, where these are given; none for a posture."""
+    if isinstance(goal, Goal):
+        return (goal,)
+    several = isinstance(goal, (list, tuple)) and any(isinstance(one, Goal) for one in goal)
+    return tuple(goal) if several else ()
+
+
+def _posture(problem: Problem, goal: Any) -> Array:
+    figure = problem.scene.figure
+    q = figure.posture(goal) if isinstance(goal, str) else checks.posture(goal, figure.model.nq, "plan: goal")
+    _check_end(problem, q, "goal")
+    return np.array(q, dtype=float)
+
+
+def _check_end(problem: Problem, q: Array, what: str) -> None:
+    judged = assess(problem, q)
+    found = {"things": judged.penetration, "limits": judged.limit_violation, "constraints": judged.constraint_violation}
+    for name, by in found.items():
+        if not by <= KEPT:
+            raise InputError(f"plan: the {what} is {by:.3g} m or rad beyond {name}; give a posture of wb.solve")
+
+
+class _End(NamedTuple):
+    """A posture (nq,) at which a motion may end; None where goals were not met, and why."""
+
+    q: Array | None
+    why: str = ""
+
+
+def _answers(problem: Problem, rng: np.random.Generator) -> Iterator[_End]:
+    """Ends that meet the goals: from the start, then from random postures."""
+    solution = QP().solve(problem)
+    yield _End(solution.q if solution.solved else None, solution.message)
+    for _ in range(ENDS - 1):
+        start = problem.with_start(_drawn(problem, problem.start, 1.0, rng))
+        solution = QP(restarts=0, budget=0).solve(start)
+        yield _End(solution.q if solution.solved else None, solution.message)
+
+
+def _drawn(problem: Problem, near: Array, spread: float, rng: np.random.Generator) -> Array:
+    """A posture (nq,) that is a share of the way from another one to a random one; the root stays within metres."""
+    figure, (drawn,) = problem.scene.figure, random_postures(problem.scene.model, 1, int(rng.integers(2**31)))
+    if figure.root == "free":
+        drawn[:7] = near[:7]
+        drawn[:3] += rng.uniform(-ROOM, ROOM, 3)
+    return np.asarray(pin.interpolate(figure.model, near, drawn, spread))
+
+
+class _Search:
+    """The search for paths from the start of a problem to its ends."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        local: LocalPlanner,
+        ends: Iterator[_End],
+        rng: np.random.Generator,
+        ended: Callable[[], bool],
+    ) -> None:
+        self._problem, self._local, self._ends, self._rng, self._ended = problem, local, ends, rng, ended
+        self._reached: list[Array] = []
+        self._said = ""
+        self._spreads = (0.1, 0.3, 1.0) if isinstance(local, TrackedMotions) else (1.0,)
+        local.admit(problem.start)
+
+    def shortest(self) -> tuple[list[Array] | None, str]:
+        """The shortest of some paths, with shortcuts, and how it was found; or None and why there is none."""
+        model, best, most, size, runs = self._problem.scene.model, None, np.inf, 0, 0
+        while runs < self._local.searches and size < ENOUGH and not self._ended():
+            path, trees = self._path()
+            runs, size = runs + 1, size + trees.size
+            if path is None:
+                break
+            if not trees.size:
+                return path, "the straight motion"
+            path = shortcut(model, path, self._local, self._rng, self._ended)
+            if (found := length(model, path)) < most:
+                best, most = path, found
+        if best is not None:
+            return best, f"the shortest of {runs} searches"
+        if not self._reached:
+            return None, f"no posture meets the goals: {self._said or 'the time is over'}"
+        return None, "no motion was found within the time limit"
+
+    def _path(self) -> tuple[list[Array] | None, RRTConnect]:
+        """A path from the start to an end by new trees, which stay empty where it is straight."""
+        start, model, rounds = self._problem.start, self._problem.scene.model, 0
+        trees = RRTConnect(self._local, model, start)
+        for reached in self._reached:
+            trees.add_end(reached)
+        while not self._ended():
+            if rounds % ROUNDS == 0 or not self._reached:
+                end = next(self._ends, None)
+                if end is None and not self._reached:
+                    break
+                if end is not None and end.q is None:
+                    self._said = self._said or end.why
+                    continue
+                if end is not None and end.q is not None:
+                    self._local.admit(end.q)
+                    way, met = self._local.towards(start, end.q)
+                    if met:
+                        return [start, *way[:-1], end.q], trees
+                    trees.add_end(end.q)
+                    self._reached.append(end.q)
+            rounds += 1
+            near = self._reached[self._rng.integers(len(self._reached))]
+            middle = np.asarray(pin.interpolate(model, start, near, self._rng.uniform()))
+            spread = self._spreads[self._rng.integers(len(self._spreads))]
+            path = trees.grow(_drawn(self._problem, middle, spread, self._rng))
+            if path is not None:
+                return path, trees
+        return None, trees
+
+
+def _smoothed(problem: Problem, local: LocalPlanner, path: list[Array], pace: Pace) -> Plan:
+    """The motion along a smooth path beside a free one; along the free one itself where that one fails."""
+    figure = problem.scene.figure
+    even = resampled(figure.model, path, int(np.clip(length(figure.model, path) / SPACING, 20, 1000)))
+    found = _judged(problem, smooth(figure.model, even, local), pace)
+    return found if found.solved else _judged(problem, local.settled(even)[0], pace)
+
+
+def _judged(problem: Problem, path: Array, pace: Pace) -> Plan:
+    """The motion along a path (m, nq) as fast as it may be, and what it is worth, from its postures alone."""
+    scene = problem.scene
+    q, use = Timing(scene.figure, path, pace).within()
+    judgements = [assess(problem, frame) for frame in q]
+    worst = float(np.max([(one.penetration, one.limit_violation, one.constraint_violation) for one in judgements]))
+    faults = [
+        f"a frame misses what must hold by {worst:.3g} m or rad" if not worst <= KEPT else "",
+        f"velocities reach {use.velocity:.3g} of their limits" if not use.velocity <= OVER else "",
+        f"accelerations reach {use.acceleration:.3g} of their limit" if not use.acceleration <= OVER else "",
+    ]
+    if not any(faults) and (passed := frames_passed_through(scene, q, PASSED)):
+        faults.append(f"something is passed through before frame {passed[0]}")
+    said = "; ".join(fault for fault in faults if fault)
+    return Plan(Clip(scene.figure, q, pace.dt, "plan"), not said, said, length(scene.model, list(q)), worst, *use)

@@ -1,0 +1,92 @@
+"""Two trees of motions that grow towards each other: RRT-Connect (Kuffner and LaValle 2000)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array
+from wholebody.planning.local_planner import LocalPlanner
+
+
+class Tree:
+    """Postures that free motions join to its roots."""
+
+    def __init__(self, model: pin.Model, origin: Array) -> None:
+        """Take the posture (nq,) from which differences count; their length is how far postures are apart."""
+        self._model, self._origin = model, origin
+        self.postures: list[Array] = []
+        self._parents: list[int] = []
+        self._places = np.zeros((64, model.nv))
+
+    def add(self, q: Array, parent: int = -1) -> int:
+        """Join a posture (nq,) to one of the tree, or make it a root; return its number."""
+        number = len(self.postures)
+        if number == len(self._places):
+            self._places = np.concatenate([self._places, np.zeros_like(self._places)])
+        self._places[number] = pin.difference(self._model, self._origin, q)
+        self.postures.append(q)
+        self._parents.append(parent)
+        return number
+
+    def nearest(self, q: Array) -> int:
+        """The number of the posture that is nearest to q (nq,)."""
+        apart = self._places[: len(self.postures)] - np.asarray(pin.difference(self._model, self._origin, q))
+        return int(np.argmin(np.einsum("ij,ij->i", apart, apart)))
+
+    @property
+    def grown(self) -> int:
+        """How many postures it has beyond its roots."""
+        return sum(parent >= 0 for parent in self._parents)
+
+    def path(self, number: int) -> list[Array]:
+        """Postures from a root to one of the tree."""
+        found = []
+        while number >= 0:
+            found.append(self.postures[number])
+            number = self._parents[number]
+        return found[::-1]
+
+
+class RRTConnect:
+    """A tree from the start and one from the ends, which `local` lets grow."""
+
+    def __init__(self, local: LocalPlanner, model: pin.Model, start: Array) -> None:
+        """Take the posture (nq,) at which the motion begins."""
+        self._local = local
+        self._trees = [Tree(model, start), Tree(model, start)]
+        self._trees[0].add(start)
+        self._turn = 0
+
+    @property
+    def size(self) -> int:
+        """How many postures the trees have beyond their roots."""
+        return sum(tree.grown for tree in self._trees)
+
+    def add_end(self, end: Array) -> None:
+        """Add a posture (nq,) at which the motion may end."""
+        self._trees[1].add(end)
+
+    def grow(self, sample: Array) -> list[Array] | None:
+        """Extend one tree towards a sample (nq,), and the other one towards what was reached; trees change turns.
+
+        Returns postures from the start to an end if the trees meet.
+        """
+        here, there = self._turn, 1 - self._turn
+        self._turn = there
+        number, _ = self._extend(self._trees[here], sample)
+        if number is None:
+            return None
+        other, met = self._extend(self._trees[there], self._trees[here].postures[number])
+        if not met or other is None:
+            return None
+        ways = {here: self._trees[here].path(number), there: self._trees[there].path(other)}
+        return [*ways[0], *ways[1][-2::-1]]
+
+    def _extend(self, tree: Tree, target: Array) -> tuple[int | None, bool]:
+        """Add the motion from the nearest posture towards a target; the last of it, and whether it is there."""
+        number = tree.nearest(target)
+        way, met = self._local.towards(tree.postures[number], target)
+        for q in way:
+            number = tree.add(q, number)
+        return (number if way or met else None), met

@@ -1,0 +1,159 @@
+"""The fastest timing of a path within limits of velocity and acceleration (TOPP-RA, Pham and Pham 2018).
+
+Along a path x(s) with b = (ds/dt)^2 and u = d2s/dt2, velocities x' sqrt(b) bound b, and accelerations x' u + x'' b are
+linear in both. A backward pass finds the largest b at each point from which the path can be ended at rest; a forward
+pass accelerates as much as these let it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from scipy.interpolate import make_interp_spline
+
+from wholebody.assessment.motion import velocities
+from wholebody.base import checks
+from wholebody.base.arrays import Array
+from wholebody.figures.figure import Figure
+
+SLOWINGS = 10  # of a motion whose frames exceed a limit, which the derivatives keep
+USUAL_SPEED = 2.0  # rad/s, m/s: of joints without a limit of their own
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How fast a planned motion may be.
+
+    Attributes:
+        velocity: largest of every joint and of the root, rad/s and m/s; None for the limits of the figure, and 2 where
+            it has none.
+        acceleration: largest of every joint and of the root, rad/s^2 and m/s^2.
+        dt: seconds from frame to frame.
+
+    Raises:
+        InputError: a value out of range.
+    """
+
+    velocity: float | None = None
+    acceleration: float = 10.0
+    dt: float = 1.0 / 60.0
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        if self.velocity is not None:
+            checks.settle(self, "velocity", checks.number(self.velocity, "Pace: velocity", 1e-3, 1e3, "rad/s"))
+        checks.settle(
+            self, "acceleration", checks.number(self.acceleration, "Pace: acceleration", 1e-3, 1e5, "rad/s^2")
+        )
+        checks.settle(self, "dt", checks.time_step(self.dt, "Pace: dt"))
+
+    def fastest(self, figure: Figure) -> Array:
+        """(nv,) largest velocities; a limit of the figure of 0 counts as none."""
+        own = np.array(figure.model.velocityLimit, dtype=float).reshape(-1)
+        own = np.where((own > 0.0) & np.isfinite(own), own, np.inf)
+        return (
+            np.minimum(own, self.velocity) if self.velocity is not None else np.where(np.isinf(own), USUAL_SPEED, own)
+        )
+
+
+class Timing:
+    """When the places of a path are passed: a cubic spline through postures (m, nq), from rest to rest."""
+
+    def __init__(self, figure: Figure, path: Array, pace: Pace) -> None:
+        """Find the fastest timing."""
+        self._figure, self._path, self._pace = figure, path, pace
+        knots = np.arange(len(path))
+        places = np.array([pin.difference(figure.model, path[0], q) for q in path])
+        self._spline = make_interp_spline(knots, places, k=min(3, len(path) - 1))
+        limits = pace.fastest(figure), np.full(figure.model.nv, pace.acceleration)
+        self._b = squared_rates(self._spline(knots, 1), self._spline(knots, 2), *limits)
+        self._rate = np.sqrt(self._b)
+        self._at = np.concatenate([[0.0], np.cumsum(2.0 / (self._rate[:-1] + self._rate[1:]))])
+
+    def frames(self, slower: float) -> Array:
+        """Postures (frames, nq), `pace.dt` apart, all of it so many times as slow as the limits let it be."""
+        model, path, rate, at = self._figure.model, self._path, self._rate, self._at
+        count = max(1, int(np.ceil(slower * at[-1] / self._pace.dt - 1e-9)))
+        times = np.linspace(0.0, at[-1], count + 1)
+        gap = np.clip(np.searchsorted(at, times, side="right") - 1, 0, len(rate) - 2)
+        since = times - at[gap]
+        share = np.clip(rate[gap] * since + 0.25 * (self._b[gap + 1] - self._b[gap]) * since**2, 0.0, 1.0)
+        places = self._spline(gap + share)[1:-1]
+        found = [self._figure.clamp(np.asarray(pin.integrate(model, path[0], place))) for place in places]
+        return np.array([path[0], *found, path[-1]])
+
+    def within(self) -> tuple[Array, Use]:
+        """The frames of the fastest timing whose differences keep the limits, and how much of these they use."""
+        slower = 1.0
+        for _ in range(SLOWINGS):
+            q = self.frames(slower)
+            use = used(self._figure, q, self._pace)
+            over = max(use.velocity, np.sqrt(use.acceleration))
+            if over <= 1.0:
+                break
+            slower *= 1.001 * over
+        return q, use
+
+
+class Use(NamedTuple):
+    """The largest velocity and acceleration of a motion in parts of their limits."""
+
+    velocity: float
+    acceleration: float
+
+
+def used(figure: Figure, q: Array, pace: Pace) -> Use:
+    """What postures (frames, nq) use, by their differences; they begin and end at rest."""
+    speed, still = velocities(figure.model, q, pace.dt), np.zeros((1, figure.model.nv))
+    change = np.diff(np.concatenate([still, speed, still]), axis=0) / pace.dt
+    fast = np.abs(speed) / pace.fastest(figure)
+    return Use(float(fast.max(initial=0.0)), float(np.abs(change).max(initial=0.0) / pace.acceleration))
+
+
+def squared_rates(first: Array, second: Array, velocity: Array, acceleration: Array) -> Array:
+    """(m,) largest squares of the rate of s at each point, 0 at both ends, within velocities and accelerations (nv,).
+
+    `first` and `second` (m, nv) are the derivatives of the path with respect to s, whose points are 1 apart.
+    """
+    count = len(first)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        most = np.where(first != 0.0, velocity / np.abs(first), np.inf).min(axis=1, initial=np.inf) ** 2
+        # a constant rate is within the accelerations, so that none forces another where a joint turns back
+        curved = np.where(second != 0.0, acceleration / np.abs(second), np.inf).min(axis=1, initial=np.inf)
+    most = np.minimum(np.minimum(most, curved), 1e12)
+    most[[0, -1]] = 0.0
+    for k in range(count - 2, -1, -1):
+        most[k] = min(most[k], _largest(first[k], second[k], acceleration, most[k + 1]))
+    b = np.zeros(count)
+    for k in range(count - 1):
+        b[k + 1] = min(most[k + 1], b[k] + 2.0 * _fastest_rise(first[k], second[k], acceleration, b[k]))
+    return b
+
+
+def _bounds_of_u(first: Array, second: Array, acceleration: Array) -> tuple[Array, Array, Array, Array]:
+    """Coefficients: u lies between ``low + low_slope b`` and ``high + high_slope b``, for each joint that moves."""
+    moving = np.abs(first) > 1e-12
+    size, turn = np.abs(first[moving]), second[moving] / first[moving]
+    reach = acceleration[moving] / size
+    return -reach, -turn, reach, -turn
+
+
+def _largest(first: Array, second: Array, acceleration: Array, following: float) -> float:
+    """The largest b from which some u leads to at most a b of `following` at the next point."""
+    low, low_slope, high, high_slope = _bounds_of_u(first, second, acceleration)
+    # 0 <= b + 2 u <= following
+    low, low_slope = np.append(low, 0.0), np.append(low_slope, -0.5)
+    high, high_slope = np.append(high, 0.5 * following), np.append(high_slope, -0.5)
+    steeper = low_slope[:, None] - high_slope[None, :]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crossing = np.where(steeper > 1e-12, (high[None, :] - low[:, None]) / steeper, np.inf)
+    return float(max(0.0, crossing.min()))
+
+
+def _fastest_rise(first: Array, second: Array, acceleration: Array, b: float) -> float:
+    """The largest u at a point with b."""
+    _, _, high, slope = _bounds_of_u(first, second, acceleration)
+    return float((high + slope * b).min(initial=1e12))

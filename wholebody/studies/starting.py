@@ -1,0 +1,28 @@
+"""Starts of problems at the answers of others."""
+
+from __future__ import annotations
+
+from dataclasses import is_dataclass, replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array
+from wholebody.problem import Problem
+from wholebody.tasks.bounds import Freeze
+
+
+def begun_at(problem: Problem, q: Array) -> Problem:
+    """Return a problem that begins at the answer (nq,) of another one; what is frozen stays at its own start."""
+    model = problem.scene.model
+    away = np.asarray(pin.difference(model, problem.start, q))
+    for bound in problem.bounds:
+        if isinstance(bound, Freeze):
+            away[problem.scene.figure.dofs(bound.joints)] = 0.0
+    return problem.with_start(np.asarray(pin.integrate(model, problem.start, away)))
+
+
+def warmed(method: Any) -> Any:
+    """Return the method without starts of its own, where it has such: those of the first solve led to nothing."""
+    return replace(method, restarts=0) if hasattr(method, "restarts") and is_dataclass(type(method)) else method
