@@ -359,3 +359,20 @@ def _cylinder(place: pin.SE3, radius: float, half: float) -> float:
     """How far a cylinder reaches below its middle."""
     tilt = abs(float(place.rotation[2, 2]))
     return half * tilt + radius * float(np.sqrt(1.0 - tilt**2))
+
+
+def test_who_stands_keeps_the_margin_of_people() -> None:
+    figure = wb.load("human")
+    scene = wb.Scene(figure)
+    scene.add(wb.HalfSpace(), name="floor")
+    goals = [wb.Point("right_index_tip", (0.2, -0.2, 2.05))]
+    found = {
+        margin: wb.solve(wb.Problem(scene, "standing", goals=goals, constraints=[wb.Stand("floor", margin=margin)]))
+        for margin in (None, 0.0)
+    }
+    assert all(one.solved for one in found.values())
+    stand = wb.Stand("floor").resolve(scene, figure.posture("standing"))
+    # 0.15 of the soles from heel to ball: 201 mm in men of ANSUR II. The toes do not carry in `Stand`.
+    assert stand.keeps == pytest.approx(0.15 * 0.201, abs=0.001)
+    inside = stand.value(scene.state(found[None].q))[stand.lower > 0.0]
+    assert inside.min() >= stand.keeps - 1e-4

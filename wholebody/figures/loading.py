@@ -22,11 +22,10 @@ def load(spec: str | PathLike[str], **options: Any) -> Figure:
         spec: "human", "avatar", "hand", or the path of a URDF or MJCF file.
         **options: for "human" and "avatar": `sex` ("male", "female"), `stature` in metres, `mass` in kilograms,
             `percentile` (1 to 99) for those of the two that are left out, `proportions` such as ``{"sitting_height":
-            0.93}`` in metres (dimensions of ANSUR II, by the names of `docs/human.md`, and `hand_length`,
-            `hand_breadth`, `foot_length`; the others follow as they go together in people), `age` in years (17 to 69;
-            from 45 on some ranges of motion are smaller), and `detail` ("spheres", "capsules", "hulls"): with "spheres"
-            the body is tested against itself and what it carries by its 39 spheres, and against things by its hulls;
-            for "human": `hands` ("rigid", "fingers");
+            0.93}`` in metres (dimensions of ANSUR II, by the names of `docs/human.md`; the others follow as they go
+            together in people), `age` in years (17 to 69; from 45 on some ranges of motion are smaller), and `detail`
+            ("spheres", "capsules", "hulls"): with "spheres" the body is tested against itself and what it carries
+            by its 39 spheres, and against things by its hulls; for "human": `hands` ("rigid", "fingers");
             for "hand": `side` ("left", "right"), `sex`, `stature`, `mass`, `percentile`;
             for a file: `root` ("fixed", "free"), `package_dirs`, folders for ``package://`` names, and `concavity`,
             a number or a mapping from link to number, which asks for the decomposition of meshes into convex pieces

@@ -38,12 +38,13 @@ def foot_points(figure: Figure) -> tuple[str, ...]:
 
 
 def _usual(figure: Figure) -> tuple[str, ...]:
-    return foot_points(figure) or tuple(name for name in FEET if name in (*figure.frames, *figure.segments))
+    named = (f"{body}{foot}" for body in figure.bodies for foot in FEET)
+    return foot_points(figure) or tuple(name for name in named if name in (*figure.frames, *figure.segments))
 
 
 def has_feet(figure: Figure) -> bool:
     """Whether a figure that may move about has frames that `StanceFeet` finds by itself."""
-    return figure.root == "free" and bool(_usual(figure))
+    return bool(figure.roots) and bool(_usual(figure))
 
 
 @dataclass(frozen=True)

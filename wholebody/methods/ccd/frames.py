@@ -92,8 +92,9 @@ class Attraction:
         size = max([float(reach.max(initial=0.5)) for _, reach in self.parts], default=0.5)
         others = np.flatnonzero(rest)
         reach = np.full(len(others), 2.0 * size)
-        if scene.figure.root == "free":
-            reach[others < 3] = 1.0
+        for root in scene.figure.roots.values():
+            first = int(scene.model.joints[root].idx_v)
+            reach[(others >= first) & (others < first + 3)] = 1.0
         self.parts.append((others, reach))
 
     def step(self, q: Array, wanted: Array, settled: list[bool]) -> tuple[Array, Array] | None:
