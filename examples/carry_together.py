@@ -1,4 +1,4 @@
-"""Two people carry one box over a post: two figures and a box as one assembly, a loop of four arms."""
+"""Two people carry one box over a post: two figures in one scene, four palms on the box, a loop of four arms."""
 
 from __future__ import annotations
 
@@ -19,91 +19,73 @@ POST = 0.98  # m: its top, above the box's underside on either side
 GRIP = 0.15  # m: of the hands from the box's middle, along the line between the people
 AWAY = 0.022  # m: of the palms from the box's sides; forearms are 20 mm thicker than hands there
 FRAMES = 12  # of a drag from one corner of the path to the next
-PEOPLE = {"ann": ("female", 1.68, 0.0), "ben": ("male", 1.78, np.pi)}  # sex, stature [m], turned about z
-COLORS = {"ann": (0.80, 0.62, 0.52, 1.0), "ben": (0.52, 0.66, 0.80, 1.0)}
+PEOPLE = {"ann": ("female", 1.68), "ben": ("male", 1.78)}  # sex, stature [m]
+PALMS = [f"{name}/{side}_palm" for name in PEOPLE for side in ("left", "right")]
+FEET = [wb.Hold(f"{name}/{side}_foot") for name in PEOPLE for side in ("left", "right")]
+LEADER = PALMS[0]  # carries the box; the others keep their places at it
 
 
-def build() -> wb.Assembly:
-    """Two people who stand, and a box in the air between them."""
-    made = wb.Assembly()
-    for name, (sex, stature, turn) in PEOPLE.items():
-        figure = wb.load("human", sex=sex, stature=stature)
-        q = np.array(figure.posture(figure.postures[0]))
-        base = pin.SE3(pin.utils.rotate("z", turn), np.array((APART if turn else 0.0, 0.0, 0.0)))
-        q[:7] = pin.SE3ToXYZQUAT(base * pin.XYZQUATToSE3(q[:7]))
-        feet = [wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Balance()]
-        made.figure(name, figure, q, constraints=feet, color=COLORS[name])
-    made.body("box", (0.5 * APART, -SIDEWAYS, LOW), shape=wb.Box(BOX), color=CARDBOARD)
-    made.add(wb.Box((0.08, 0.08, POST)), name="post", at=(0.5 * APART, 0.0, 0.5 * POST), color=DARK)
-    return made.add(wb.HalfSpace(), name="floor").ignore("ann", "floor").ignore("ben", "floor")
+def build() -> wb.Scene:
+    """Two people who face each other over a post, and a box in the air."""
+    ann, ben = (wb.load("human", sex=sex, stature=stature) for sex, stature in PEOPLE.values())
+    scene = wb.Scene({"ann": ann, "ben": (ben, (APART, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0))})
+    scene.add(wb.Box(BOX), name="box", at=(0.5 * APART, -SIDEWAYS, LOW), color=CARDBOARD)
+    scene.add(wb.Box((0.08, 0.08, POST)), name="post", at=(0.5 * APART, 0.0, 0.5 * POST), color=DARK)
+    return scene.add(wb.HalfSpace(), name="floor")
 
 
-def take_hold(made: wb.Assembly) -> wb.methods.AssemblySolution:
-    """Bring four palms to the box's sides, and join them to it there; the box stays where it is.
+def take_hold(scene: wb.Scene) -> Array:
+    """Bring four palms to the box's sides, and give it to them there; the posture.
 
     Raises:
         WholebodyError: a hand does not get there.
     """
-    made.frame_goal("box", made.placement("box"))
-    for name in PEOPLE:
-        toward = 1.0 if name == "ann" else -1.0
-        for side, left in (("left", toward), ("right", -toward)):
-            place = made.placement("box").act(np.array((-toward * GRIP, left * (0.5 * BOX[1] + AWAY), 0.0)))
-            made.point_goal(f"{name}/{side}_palm", place)
-    solution = made.solve(tolerance=1e-4)
+    box, goals = np.array((0.5 * APART, -SIDEWAYS, LOW)), []
+    for palm in PALMS:
+        toward = 1.0 if palm.startswith("ann") else -1.0
+        side = toward if "left" in palm else -toward
+        goals.append(wb.Point(palm, box + (-toward * GRIP, side * (0.5 * BOX[1] + AWAY), 0.0)))
+    solution = wb.solve(wb.Problem(scene, goals=goals, constraints=FEET))
     if solution.status != "solved":
         raise wb.WholebodyError(solution.message)
-    for name in PEOPLE:
-        for side in ("left", "right"):
-            palm = made.placement(f"{name}/{side}_palm").translation
-            made.spherical(f"{name}/{side}_palm", "box", at=palm)
-    made.drop_goals()
-    return solution
+    at = scene.figure.placement(solution.q, LEADER).inverse() * pin.SE3(np.eye(3), box)
+    hands = [palm.replace("palm", "hand") for palm in PALMS]
+    scene.remove("box").attach(wb.Box(BOX), to=LEADER, name="box", at=at, rests_on=hands, color=CARDBOARD)
+    return solution.q
 
 
-def carry(made: wb.Assembly) -> tuple[list[Array], float]:
-    """Drag the box level up, across and down; the states, and how far the box is from its goal at the end, metres."""
+def carry(scene: wb.Scene, q: Array) -> tuple[list[Array], wb.Solution]:
+    """Drag the box level up, across and down; the postures of all frames, and the last one solved."""
+    figure = scene.figure
+    held = [wb.Hold(palm, relative_to=LEADER, orientation=False) for palm in PALMS if palm != LEADER]
+    palm = figure.placement(q, LEADER)
+    problem = wb.Problem(scene, q, goals=[wb.Frame(LEADER, palm)], constraints=[*FEET, *held])
+    drag, postures = wb.Drag(problem), [q]
     path = [(-SIDEWAYS, LOW), (-SIDEWAYS, HIGH), (SIDEWAYS, HIGH), (SIDEWAYS, LOW)]
-    made.frame_goal("box", made.placement("box"))
-    drag, states = wb.Drag(made), [made.q]
     for begin, end in pairwise(path):
         for share in np.linspace(0.0, 1.0, FRAMES + 1)[1:]:
             y, z = np.array(begin) + share * (np.array(end) - begin)
-            states.append(drag.to((0.5 * APART, y, z, 0.0, 0.0, 0.0, 1.0)).q)
+            moved = palm.translation + (0.0, y + SIDEWAYS, z - LOW)
+            postures.append(drag.to(pin.SE3(palm.rotation, moved)).q)
     solution = drag.finish()
-    return [*states, solution.q], solution.goal_error
+    return [*postures, solution.q], solution
 
 
-def main(out: Path = Path("pictures"), pictures: bool = True) -> tuple[wb.Assembly, list[Array], float]:
+def main(out: Path = Path("pictures"), pictures: bool = True) -> tuple[wb.Scene, list[Array], wb.Solution]:
     """Take hold, carry, report and draw."""
-    made = build()
-    reach = take_hold(made)
-    print(f"Two people and a box: {len(made.bodies)} bodies, {len(made.scene.pair_table.pairs)} pairs that can touch")
-    print(f"  {reach.status}, four palms at the box, deepest overlap {reach.penetration:.1e} m")
-    states, left = carry(made)
-    scene = made.scene
-    least = min(float(scene.contacts(state, 0.2).distance.min(initial=0.2)) for state in states)
-    passed = sum(scene.sweep(a, b, tolerance=5e-4) is not None for a, b in pairwise(states) if not np.array_equal(a, b))
-    print(f"  carried in {len(states) - 2} frames; the box ends {1e3 * left:.2f} mm or mrad off")
-    print(f"  least distance on the way {1e3 * least:.3f} mm; {passed} ways between frames pass through something")
+    scene = build()
+    q = take_hold(scene)
+    postures, solution = carry(scene, q)
+    low = min(scene.contacts(posture, 0.0).distance.min(initial=0.0) for posture in postures)
+    print(f"Carried in {len(postures)} frames: {solution.status}, {solution.assessment.goal_errors[0]:.1e} m off")
+    print(f"  deepest penetration in any frame {1e3 * max(-low, 0.0):.3f} mm")
     if pictures:
-        draw(made, [*reach.path, *states], [reach.path[0], states[0], states[len(states) // 2], states[-1]], out)
-    return made, states, left
-
-
-def draw(made: wb.Assembly, motion: list[Array], chosen: list[Array], out: Path) -> None:
-    """Write carry_together.html, which plays the motion, and carry_together.png: start, hold, above the post, end."""
-    play(
-        "carry_together",
-        made,
-        motion,
-        chosen,
-        out,
-        eye=(2.6, -2.4, 1.7),
-        target=(0.5 * APART, 0.0, 0.9),
-        size=(400, 480),
-        dt=1 / 15,
-    )
+        chosen = postures[:: len(postures) // 3]
+        play(
+            "carry_together", scene, np.array(postures), chosen, out,
+            eye=(2.6, -2.4, 1.7), target=(0.5 * APART, 0.0, 0.9), size=(400, 480), dt=1 / 15,
+        )  # fmt: skip
+    return scene, postures, solution
 
 
 if __name__ == "__main__":

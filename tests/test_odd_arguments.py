@@ -27,6 +27,7 @@ from wholebody.figures.state import State
 from wholebody.geometry.shapes import Compound
 from wholebody.motion import measures
 from wholebody.motion.sphere_filling import Spheres, fill_with_spheres
+from wholebody.planning.solutions import Solutions
 from wholebody.view import Viewer
 from wholebody.view.timeline import timeline
 
@@ -219,6 +220,15 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Figure.joint_values", Call(arm.joint_values, {"q": q})
     yield "Figure.placement", Call(arm.placement, {"q": q, "name": "link1"})
     yield "Figure.posture", Call(arm.posture, {"name": arm.postures[0]})
+    off = (1.0, 0.0, 0.0)
+    both = wb.Scene({"one": arm, "two": (arm, off)}).figure
+    mounted = {"other": arm, "on": "link4", "name": "it", "at": off}
+    yield "Figure.mounted", Call(arm.mounted, mounted, lambda made: made.neutral)
+    yield "Figure.part", Call(both.part, {"name": "one", "q": both.neutral})
+    yield "Figure.posture(several)", Call(lambda posture: both.posture({"one": posture}), {"posture": q})
+    added = {"figure": arm, "name": "two", "at": off, "root": None}
+    yield "Scene.add_figure", Call(lambda **given: wb.Scene({"one": arm}).add_figure(**given), added, repr)
+    yield "Scene(several)", Call(lambda figure: wb.Scene({"one": figure}), {"figure": (arm, off)}, repr)
     yield "Figure.reduced", Call(arm.reduced, {"joints": ["joint1"], "posture": q})
     yield "Figure.tangent_bounds", Call(arm.tangent_bounds, {"q": q})
     yield "Figure.with_joints", Call(arm.with_joints, {"q": q, "values": {"joint1": 0.1}}, arm.clamp)
@@ -568,6 +578,8 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Clip.at", Call(clip.at, {"t": 0.05})
     yield "Clip.resampled", Call(clip.resampled, {"dt": 0.05})
     yield "Clip.joined", Call(clip.joined, {"other": clip})
+    pair_of = wb.Scene({"one": arm, "two": arm}).figure
+    yield "Clip.part", Call(wb.Clip(pair_of, [pair_of.neutral], 0.1).part, {"name": "two"})
     yield "Clip.with_q", Call(clip.with_q, {"q": [q], "name": "other"})
     yield "Clip.from_track", Call(wb.Clip.from_track, {"track": track, "figure": arm})
     yield "Clip.write", Call(clip.write, {"path": path / "clip.npz"})
@@ -609,6 +621,17 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "retarget", Call(wb.retarget, {"motion": skeleton, "figure": arm, "names": bones, "progress": print})
     errors = {"motion": skeleton, "clip": wb.retarget(skeleton, arm, names=bones), "names": bones}
     yield "bone_errors", Call(wb.motion.bone_errors, errors)
+    named = {"skeleton": {"left_ankle": "a"}, "figure": {"left_ankle": "link4"}}
+    yield "ground", Call(wb.motion.ground, {"motion": skeleton, "names": named}, str)
+    stood = wb.motion.ground(skeleton, named)
+    yield "Ground.below", Call(stood.below, {"frames": 3})
+    yield "Ground.chart", Call(stood.chart, {"path": path / "ground.png"})
+    paced = {"velocity": 1.0, "acceleration": 5.0, "dt": 0.1}
+    yield "Pace", Call(wb.planning.Pace, paced, lambda made: made.fastest(arm))
+    yield "Pace.fastest", Call(wb.planning.Pace().fastest, {"figure": arm})
+    planned = {"start": q, "goal": q + 0.1, "constraints": (), "clearance": 0.0, "pace": None, "seed": 0}
+    yield "plan", Call(partial(wb.plan, there, time_limit=1.0), planned)
+    yield "plan(scene)", Call(lambda **given: wb.plan(start=q, goal=q, **given), {"scene": there, "time_limit": 1.0})
     yield "read_clip", Call(wb.read_clip, {"path": path / "walk.npz", "figure": arm})
     checked = {"clip": clip, "scene": wb.Scene(arm), "depth": 1e-3, "progress": lambda done: None}
     yield "check", Call(wb.check, checked, lambda found: found.as_dict())
@@ -627,6 +650,11 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     at_once: dict[str, Any] = {"method": "qp", "jobs": 1, "seconds": 9.0, "warm_start": True}
     at_once |= {"folder": path / "records", "progress": lambda told: True}
     yield "solve_many", Call(wb.solve_many, {"problems": [], **at_once})
+    several = {"most": 2, "apart": 0.2, "method": wb.QP(), "starts": 2, "seed": 0, "time_limit": 1.0}
+    yield "solutions", Call(wb.solutions, {"problem": ask, **several}, str)
+    listed = {"answers": (), "found": 0, "descents": 0, "starts": 0, "complete": False}
+    yield "Solutions", Call(Solutions, listed)
+    yield "QP.minima", Call(wb.QP().minima, {"problem": ask, "starts": [ask.start]}, list)
     varied = {"task": path / "task.toml", "layouts": {"as it is": {}}}
     yield "study", Call(partial(wb.study, progress=lambda told: True), varied)
     anything = {"people": [arm], "targets": [places[0]], "layouts": [None], **at_once}
@@ -649,7 +677,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Records.chart", Call(kept.chart, {"path": path / "records.png"})
     yield "Records.to_csv", Call(kept.to_csv, {"path": path / "records.csv"})
     yield "people", Call(wb.people, {"count": 2, "sex": "male", "seed": 1})
-    yield "people of percentiles", Call(wb.people, {"percentiles": [5, 95]})
+    yield "people(percentiles)", Call(wb.people, {"percentiles": [5, 95]})
     yield "boundary", Call(wb.boundary, {"confidence": 0.9, "dimensions": ["stature"], "sex": "male"})
     counted = {"task": path / "person.toml", "sees": (1.0, 0.0, 1.0), "people": wb.people(1, "male")}
     yield "accommodation", Call(partial(wb.accommodation, jobs=1, progress=lambda told: True), counted)
@@ -728,7 +756,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Equipment.filled", Call(bag.filled, {"count": 1, "envelope": False})
     yield "Equipment.attach", Call(lambda scene: bag.attach(scene), {"scene": wb.Scene(arm)})
     put = {"shape": wb.Sphere(0.1), "figure": hand, "name": "bag", "to": "left_hand", "side": "back"}
-    put |= {"height": 0.0, "sideways": 0.0, "color": None}
+    put |= {"middle": (0.0, 0.0), "color": None}
     yield "Equipment.worn", Call(wb.motion.Equipment.worn, put)
     yield "equipment", Call(wb.motion.equipment, {"name": "pack", "figure": hand})
     yield "fill_with_spheres", Call(fill_with_spheres, {"shape": wb.Sphere(0.1), "count": 1, "envelope": False})
@@ -789,7 +817,7 @@ ANSWERS = (
     "AssemblyStep", "SolveRecord", "SolveRecord.of", "SolveRecord.row", "SolveRecord.as_json",
     "SolveRecord.from_json", "SolveProgress", "Records.to_parquet", "ReachMap", "Accommodation", "Ergonomics",
     "BodyAngles", "Rula", "Reba", "StaticTorques", "Sight", "Result", "Contacts.joined", "DerivativeCheck",
-    "AvoidedCase", "BatchProgress", "WorldFrame", "Overlap", "EngineFrame", "Event",
+    "AvoidedCase", "BatchProgress", "Ground", "Plan", "WorldFrame", "Overlap", "EngineFrame", "Event",
 )  # fmt: skip
 """What calls return: nobody builds it, so its constructor is not fed."""
 
@@ -800,6 +828,8 @@ AVOIDERS = ("Trajectory.avoid", "PerFrame.avoid", "Bisection.avoid")
 """Called by `avoid` alone, with a run that it set up."""
 
 DERIVATIVES = (
+    "on_polygon",
+    "joint_placement",
     "companion",
     "folded",
     "spread",

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from wholebody.motion.clip import Clip
     from wholebody.motion.reading import read_clip
     from wholebody.motion.retargeting import retarget
-    from wholebody.planning import plan
+    from wholebody.planning import plan, solutions
     from wholebody.problem import Problem
     from wholebody.scene.matter.body import Body
     from wholebody.scene.mjcf_scene import read_scene
@@ -179,6 +179,7 @@ __all__ = [
     "read_task",
     "retarget",
     "simplify",
+    "solutions",
     "solve",
     "solve_many",
     "studies",
@@ -204,7 +205,7 @@ _MODULES = {
     "wholebody.motion.clip": "Clip",
     "wholebody.motion.reading": "read_clip",
     "wholebody.motion.retargeting": "retarget",
-    "wholebody.planning": "plan",
+    "wholebody.planning": "plan solutions",
     "wholebody.problem": "Problem",
     "wholebody.scene.matter.body": "Body",
     "wholebody.scene.mjcf_scene": "read_scene",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Sequence, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import fields, is_dataclass
 from functools import partial
 from operator import is_
@@ -25,7 +25,7 @@ from wholebody.scene.workspace import Workspace, borrowed
 from wholebody.tasks.answers import in_words, is_own
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.checks import check_measure, check_rows
-from wholebody.tasks.defaults import default_constraints, default_measures, stands
+from wholebody.tasks.defaults import balancing, default_constraints, default_measures, standing
 from wholebody.terms.linearisation import Lineariser
 from wholebody.terms.plan import TermPlan, Terms, make_plan
 
@@ -79,7 +79,7 @@ class Problem(checks.FixedAttributes):
     def __init__(
         self,
         scene: Scene,
-        start: Array | str | None = None,
+        start: Array | str | Mapping[str, Array | str] | None = None,
         *,
         goals: Iterable[Goal] = (),
         constraints: Iterable[Constraint | Bound] = (),
@@ -93,7 +93,7 @@ class Problem(checks.FixedAttributes):
 
         Args:
             scene: figure and things.
-            start: (nq,) posture, or the name of one of the figure's; None for the figure's first posture.
+            start: (nq,) posture, or the name of one; of several figures also one by figure; None for the first posture.
             goals: equalities that are met if possible.
             constraints: what must always hold; bounds on the displacement are given here too.
             measures: costs to minimise; None for `Effort()`, and `Rhythm()` beside it for a person.
@@ -131,7 +131,7 @@ class Problem(checks.FixedAttributes):
         )
         with scene.borrow() as workspace:
             state = workspace.state
-            if scene.figure.root == "free" or self.bounds or any(map(is_own, (*self.goals, *stated, *self.measures))):
+            if scene.figure.roots or self.bounds or any(map(is_own, (*self.goals, *stated, *self.measures))):
                 state.update(self.start)
             self.defaults, self.left_out = self._usual_constraints(state, stated)
             self.constraints: tuple[Constraint, ...] = (*stated, *self.defaults)
@@ -147,13 +147,13 @@ class Problem(checks.FixedAttributes):
 
     def _usual_constraints(self, state: State, stated: Sequence[Constraint]) -> tuple[tuple[Constraint, ...], str]:
         scene, start, ranges, known = self.scene, self.start, self.range_of_motion, frozenset(map(type, stated))
-        required = self.balance is True
-        balance = stands(scene, state, stated, self.bounds, self.goals) if self.balance is None else required
-        if not (balance or (ranges and scene.figure.ranges)):
+        steady = standing(scene, state, (*stated, *self.goals), self.bounds) if self.balance is None else ()
+        steady = balancing(scene, stated) if (required := self.balance is True) else steady
+        if not (steady or (ranges and scene.figure.ranges)):
             return (), ""
-        moves = scene.built.moves if balance else 0  # shoes carry too
-        key = "constraints", ranges, balance, required, known, moves, start.tobytes()
-        make = partial(default_constraints, scene, start, known, ranges=ranges, balance=balance, required=required)
+        moves = bool(steady) * scene.built.moves  # shoes carry too
+        key = "constraints", ranges, steady, required, known, moves, start.tobytes()
+        make = partial(default_constraints, scene, start, known, ranges=ranges, standing=steady, required=required)
         return scene.built.known(key, make)
 
     def __repr__(self) -> str:
@@ -364,11 +364,11 @@ def _check_goals(goals: Sequence[Goal], state: State) -> None:
             check_rows(f"goals[{number}]", goal, goal.error, state)
 
 
-def _start(scene: Scene, start: Array | str | None) -> Array:
+def _start(scene: Scene, start: Array | str | Mapping[str, Array | str] | None) -> Array:
     figure = scene.figure
     if start is None:
         return np.array(figure.posture(figure.postures[0]), dtype=float)
-    if isinstance(start, str):
+    if isinstance(start, (str, Mapping)):
         return np.array(figure.posture(start), dtype=float)
     q = checks.posture(start, scene.model.nq, "start")
     figure.warn_of_angles(q, "start")

@@ -172,7 +172,12 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
     from wholebody.methods.qp.working_set import WorkingSet
     from wholebody.terms import linearisation
 
-    search, descent = multistart.Multistart, sqp.SQP
+    search, descent, corrected = multistart.Multistart, sqp.SQP, WorkingSet._corrected
+
+    def cold(self: WorkingSet, *given: Any) -> Any:
+        self.reset()
+        return corrected(self, *given)
+
     return {
         "watchdog": (descent, "_is_tentative", lambda self, here, there: False),
         "acceleration": (Anderson, "propose", lambda self, step, stretch=0.0: None),
@@ -180,7 +185,7 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         "Lagrangian in the judgement of steps": (sqp, "lagrangian", lambda multipliers, measure, rows: measure),
         "supporting planes": (linearisation, "term_planes", lambda terms, counts, state: None),
         "second derivatives of contacts": (descent, "_bent", lambda self, here: here.at),
-        "warm start from the last active set": (WorkingSet, "hot", property(lambda self: False)),
+        "warm start from the last active set": (WorkingSet, "_corrected", cold),
         "seeds of arms": (qp, "from_seeds", lambda *given: None),
         "before contact": (multistart, "before_contact", lambda *given: iter(())),
         "feasibility first": (search, "_feasibility_first", lambda self, start: self.best),

@@ -26,7 +26,7 @@ OTHERS = (
     *("chair", "console_two_people", "hand_on_table", "avatar_two_arms"),
     *("sit_on_chair", "four_bar", "assemble_shelf", "free_a_clip"),
     *("four_bar_among_obstacles", "scissor_lift", "carry_together", "take_a_seat", "lift_a_box"),
-    *("reach_map", "study_of_people", "own_method"),
+    *("reach_map", "study_of_people", "own_method", "two_arms_one_bar", "person_and_arm"),
 )
 REST_ON = {("pelvis", "pouch"), ("lower_lumbar", "pouch")}  # what the figure wears lies on it
 
@@ -325,18 +325,36 @@ def test_a_scissor_lift_stops_at_its_load_limit_and_at_a_beam(example: Example, 
 
 def test_two_people_carry_a_box_over_a_post(example: Example, tmp_path: Path) -> None:
     module = example("carry_together")
-    module.FRAMES = 5  # of a drag; the example has more to look at
-    made, states, left = module.main(out=tmp_path, pictures=False)
-    assert left < 1e-3
-    box = made.placement("box")
-    np.testing.assert_allclose(box.translation, (0.5 * module.APART, module.SIDEWAYS, module.LOW), atol=1e-3)
-    for name in module.PEOPLE:
-        for side in ("left", "right"):  # palms where they took hold, soles on the floor
-            palm = box.actInv(made.placement(f"{name}/{side}_palm").translation)
-            assert abs(abs(palm[1]) - 0.5 * module.BOX[1] - module.AWAY) < 1e-3
-            assert abs(made.placement(f"{name}/{side}_sole").translation[2]) < 1e-3
-    heights = [made.scene.contacts(q, 0.0).distance.min(initial=0.0) for q in states]
+    module.FRAMES = 8  # of a drag; the example has more to look at
+    scene, postures, solution = module.main(out=tmp_path, pictures=False)
+    assert solution.status == "solved"
+    figure, box = scene.figure, scene.objects["box"].placement
+    place = figure.placement(solution.q, module.LEADER) * box
+    np.testing.assert_allclose(place.translation, (0.5 * module.APART, module.SIDEWAYS, module.LOW), atol=1e-3)
+    for q in postures:
+        at = figure.placement(q, module.LEADER) * box
+        for palm in module.PALMS:  # where they took hold
+            seen = at.actInv(figure.placement(q, palm).translation)
+            assert abs(abs(seen[1]) - 0.5 * module.BOX[1] - module.AWAY) < 3e-3  # a frame's steps are long
+        for foot in ("ann/left_sole", "ben/right_sole"):
+            assert abs(figure.placement(q, foot).translation[2]) < 1e-3
+    heights = [scene.contacts(q, 0.0).distance.min(initial=0.0) for q in postures]
     assert min(heights) > -1e-4
+
+
+@pytest.mark.parametrize("name", ["two_arms_one_bar", "person_and_arm"])
+def test_two_figures_meet(example: Example, name: str, tmp_path: Path) -> None:
+    problem, solution = example(name).main(out=tmp_path, pictures=False)
+    assert solution.status == "solved"
+    assert wb.assess(problem, solution.q).holds(1e-5)
+    figure = problem.scene.figure
+    if name == "two_arms_one_bar":  # both grips where they were at the bar
+        left, right = (figure.placement(solution.q, f"{side}/grip") for side in ("left", "right"))
+        np.testing.assert_allclose(left.actInv(right.translation), (0.22, 0.0, 0.0), atol=1e-3)
+    else:
+        touching = {frozenset((problem.scene.piece_owner[a], problem.scene.piece_owner[b])) for a, b in
+                    problem.scene.contacts(solution.q, 1e-4).pair}  # fmt: skip
+        assert frozenset(("anna/right_hand", "part")) in touching
 
 
 def test_a_method_of_ones_own_reaches(example: Example, capsys: Any) -> None:

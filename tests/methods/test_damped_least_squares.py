@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -12,7 +14,7 @@ from hypothesis import strategies as st
 
 import wholebody as wb
 from tests.answers import honest
-from wholebody.base.errors import InputError
+from wholebody.base.errors import InputError, TermError
 from wholebody.methods.damped_least_squares import DampedLeastSquares
 
 
@@ -134,3 +136,28 @@ def test_inequalities_are_refused_by_name(human: wb.Figure, term: wb.Constraint)
 def test_settings_out_of_range_are_refused(settings: dict[str, float]) -> None:
     with pytest.raises(InputError, match=next(iter(settings))):
         DampedLeastSquares(**settings)  # type: ignore[arg-type]
+
+
+class _Fickle(wb.Goal):
+    """Another number of rows from the second time on that it is asked."""
+
+    def __init__(self) -> None:
+        self.asked = 0
+
+    def resolve(self, scene: Any, start: Any) -> _Fickle:
+        return self
+
+    def error(self, state: Any) -> Any:
+        self.asked += 1
+        return np.full(3 if self.asked < 9 else 4, 0.1)
+
+    def jacobian(self, state: Any) -> Any:
+        return np.full((3 if self.asked < 9 else 4, state.model.nv), 0.01)
+
+
+@pytest.mark.parametrize("before", range(9))
+def test_a_goal_that_changes_its_rows_is_refused_or_followed(arm: wb.Figure, before: int) -> None:
+    goal = _Fickle()
+    goal.asked = before
+    with suppress(TermError):
+        DampedLeastSquares().solve(wb.Problem(wb.Scene(arm), goals=[goal]))

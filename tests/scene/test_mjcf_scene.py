@@ -101,3 +101,40 @@ def _top(planes: np.ndarray, x: float, y: float) -> float | None:
     low = max(-rest[~upright & (up < 0.0)] / up[~upright & (up < 0.0)])
     high = min(-rest[~upright & (up > 0.0)] / up[~upright & (up > 0.0)])
     return float(high) if high >= low and (rest[upright] < 1e-12).all() else None
+
+
+TWO = """<mujoco><worldbody><geom name="floor" type="plane" size="2 2 0.1"/>
+  <body name="left" pos="0 0.5 0.2"><geom size="0.05"/>
+    <body name="l1" pos="0 0 0.1"><joint name="turn_left" axis="0 1 0"/>
+    <geom type="capsule" fromto="0 0 0 0 0 0.3" size="0.03"/></body></body>
+  <body name="right" pos="0 -0.5 0.2" euler="0 0 90"><joint name="turn_right" axis="0 1 0"/>
+    <geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.03"/></body>
+  <body name="drone" pos="0 0 1"><freejoint/><geom size="0.1"/><body name="arm"><joint name="swing" axis="1 0 0"/>
+    <geom type="capsule" fromto="0 0 0 0 0 -0.3" size="0.02"/></body></body>
+</worldbody>EXCLUDED</mujoco>"""
+
+
+def test_several_robots_stand_where_mujoco_has_them(tmp_path: Path) -> None:
+    path = tmp_path / "cell.xml"
+    path.write_text(TWO.replace("EXCLUDED", ""))
+    scene = wb.read_scene(path)
+    assert tuple(scene.figure.bodies) == ("left/", "right/", "drone/")
+    assert set(scene.figure.roots) == {"drone/root"}
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data, q = mujoco.MjData(model), scene.figure.neutral
+    for name, value in {"left/turn_left": 0.4, "right/turn_right": -0.7, "drone/swing": 0.3}.items():
+        q = scene.figure.with_joints(q, {name: value})
+        data.joint(name.partition("/")[2]).qpos[0] = value
+    mujoco.mj_kinematics(model, data)
+    for name in ("left/l1", "right/right", "drone/drone", "drone/arm"):
+        ours, theirs = scene.figure.placement(q, name), data.body(name.partition("/")[2])
+        np.testing.assert_allclose(ours.translation, theirs.xpos, atol=1e-9)
+        np.testing.assert_allclose(ours.rotation, theirs.xmat.reshape(3, 3), atol=1e-9)
+    assert wb.read_scene(path, root="right").figure.joints == ("turn_right",)
+
+
+def test_pairs_of_robots_that_are_not_tested_are_told(tmp_path: Path) -> None:
+    path = tmp_path / "cell.xml"
+    path.write_text(TWO.replace("EXCLUDED", '<contact><exclude body1="l1" body2="right"/></contact>'))
+    with pytest.warns(UserWarning, match="two robots that the file does not test are tested: l1 and right"):
+        wb.read_scene(path)

@@ -94,7 +94,7 @@ def test_the_good_file_is_good(write: Callable[[str], Path]) -> None:
         ("[[goal]]", "[[gaol]]", ["no key or table is called 'gaol'", "goal"]),
         # a wrong structure
         ("[[goal]]", "[goal]", ["goal", "write [[goal]]"]),
-        ("[figure]", "[[figure]]", ["figure", "write [figure]"]),
+        ("[figure]", "[[figure]]", ["figure 1", 'write called = "anna"']),
         ('name = "human"\n', "", ["figure", "key name is missing", "human, avatar, hand, urdf"]),
         ('frame = "right_index_tip"\n', "", ["goal 1", "key frame is missing"]),
         ('type = "point"\n', "", ["goal 1", "key type is missing", "point, frame"]),

@@ -18,7 +18,7 @@ class StandInFigure:
 
     def __init__(self, model: pin.Model) -> None:
         self.model = model
-        self.root = "free"
+        self.root, self.roots, self.bodies = "free", {"root": 1}, {"": range(1, model.njoints)}
         self.neutral = pin.neutral(model)
         weights = np.linspace(0.5, 2.0, model.nv)
         weights[:6] = 0.0

@@ -73,6 +73,6 @@ def test_mistakes_are_named(humanoid: Any) -> None:
         StepLimit(joints={"left_arm": -1.0})
     with pytest.raises(InputError, match="velocity is nan"):
         StepLimit(float("nan"))
-    humanoid.figure.root = "fixed"
+    humanoid.figure.roots = {}
     with pytest.raises(InputError, match="leave root_velocity and root_turn out"):
         StepLimit(root_velocity=1.0).resolve(humanoid, humanoid.figure.neutral)

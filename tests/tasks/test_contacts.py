@@ -103,6 +103,39 @@ def test_a_frame_touches_where_the_round_end_of_its_piece_does(turn: float) -> N
     assert touch.value(scene.state(q))[0] == pytest.approx(asked, abs=1e-8)
 
 
+def test_a_frame_within_a_face_is_told_how_far_the_face_is_turned() -> None:
+    """A palm a millimetre over a board that is turned by 0.01 rad: the rows are the angle, at the farthest corner."""
+    figure = wb.load("human")
+    q = figure.posture("standing")
+    palm, state = figure.placement(q, "right_palm"), State(figure.model).update(q)
+    hand = figure.geometry.geometryObjects[figure.geometry.getGeometryId("right_hand:0")]
+    place, half = state.data.oMi[hand.parentJoint] * hand.placement, np.asarray(hand.geometry.halfSide)
+    local = place.actInv(palm.translation)
+    axis = int(np.argmin(half - np.abs(local)))
+    out = place.rotation[:, axis] * np.sign(local[axis])
+    others = [k for k in range(3) if k != axis]
+    corners = np.array([local + np.where(np.arange(3) == axis, 0.0, s * half - local) for s in _signs(others)])
+    far = float(np.linalg.norm(corners - local, axis=1).max())
+    for turn in (0.0, 0.01):
+        normal = pin.exp3(turn * place.rotation[:, others[0]]) @ out
+        board = pin.Quaternion.FromTwoVectors(np.array((0.0, 0.0, 1.0)), normal)
+        at = pin.SE3(board.matrix(), palm.translation + 1e-3 * out + 0.01 * normal)
+        scene = wb.Scene(figure).add(wb.Box((2.0, 2.0, 0.02)), name="board", at=at)
+        planes = wb.Touch("right_palm", "board").resolve(scene, q).supporting_planes(scene.state(q))
+        turned = planes.value[planes.key >= 512] + 8e-6 * np.cos(np.pi / 8)
+        assert np.abs(turned).max() == pytest.approx((far + 1e-3) * np.sin(turn), abs=2e-2 * far * turn + 1e-8)
+
+
+def _signs(axes: list[int]) -> list[Any]:
+    found = []
+    for first in (-1.0, 1.0):
+        for second in (-1.0, 1.0):
+            signs = np.zeros(3)
+            signs[axes] = first, second
+            found.append(signs)
+    return found
+
+
 def test_touch_of_a_segment_is_coals_least_distance(scene: wb.Scene) -> None:
     q = scene.figure.posture("arms_forward")
     state = scene.state(q)

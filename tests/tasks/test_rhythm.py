@@ -61,10 +61,10 @@ def test_a_start_that_bends_is_what_counts(scene: wb.Scene) -> None:
     for name in ("prone", "sitting", "squatting"):
         q = figure.posture(name)
         term = wb.Rhythm().resolve(scene, q)
-        assert term.lumbar is not None
+        assert term.lumbar
         turned = pin.SE3(pin.utils.rotate("z", 1.0), np.zeros(3)) * pin.XYZQUATToSE3(q[:7])
         q[:7] = pin.SE3ToXYZQUAT(turned)  # which way it faces does not count
-        clavicles = filled(term, lumbar=None)
+        clavicles = filled(term, lumbar=())
         state = State(figure.model).update(q)
         assert term.value(state) == pytest.approx(clavicles.value(state), abs=1e-9)
 

@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.geometry.continuous.sweep import Sweep
+from wholebody.methods.ccd.chain import ChainResolver
+from wholebody.scene.moving_scene import MovingScene
 from wholebody.tracking.live import LiveDrag
 
 SETTLING = 60
@@ -171,3 +174,22 @@ def test_an_assembly_without_bodies_is_refused_and_one_without_shapes_is_dragged
 def test_what_cannot_be_dragged_is_refused() -> None:
     with pytest.raises(wb.InputError, match="is not what can be dragged"):
         LiveDrag("human")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("method", ["qp", "ccd", "dls"])
+def test_what_frames_need_is_made_before_them(drag: LiveDrag, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sweeps, chains and the scene of what moves take as long as ten frames."""
+
+    def made(*_: object, **__: object) -> None:
+        raise AssertionError("made in a frame")
+
+    drag.choose(method)
+    for name, way in (("right_palm", (0.2, 0.1, -0.3)), ("table", (-0.3, 0.0, 0.1))):
+        with monkeypatch.context() as patched:
+            drag.take(name)
+            for kind in (Sweep, MovingScene, ChainResolver):
+                patched.setattr(kind, "__init__", made)
+            start = drag.place(name)
+            for share in np.linspace(0.0, 1.0, 20):
+                drag.move(start + share * np.array(way))
+        drag.let_go()

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 import trimesh
 
@@ -73,6 +74,21 @@ def test_visuals_are_drawn_and_pieces_where_a_link_has_none(robot: wb.Figure) ->
     for same in (pickle.loads(pickle.dumps(robot)), copy.deepcopy(robot)):
         assert set(drawn(same)) == wanted
     assert LinkVisuals(robot.reduced(["ab"])).links == {"a", "b"}
+
+
+def test_figures_side_by_side_are_drawn_each_as_it_is_alone(robot: wb.Figure) -> None:
+    at = (0.5, -0.3, 0.2, 0.0, 0.0, 1.0, 0.0)
+    scene = wb.Scene({"anna": wb.load("human"), "robot": (robot, at)})
+    assert LinkVisuals(scene.figure, ("anna/",)).links == {"robot/a", "robot/b"}
+    bodies, graph = Bodies(scene, (), False), SceneGraph()
+    bodies.build(graph)
+    shown = {path for path, node in graph.store.nodes.items() if node.object and path.startswith("/figure")}
+    assert all(path.startswith("/figure/anna/body") for path in shown if "anna" in path)  # her surface alone
+    assert sorted(path.rsplit("|", 1)[-1] for path in shown if "|c:" in path or "|d:" in path) == ["c:0", "d:0"]
+    assert any(path.endswith("universe/visual 0") for path in shown)
+    base = next(one for one in scene.figure.visual.geometryObjects if one.name.startswith("robot/a"))
+    expected = pin.XYZQUATToSE3(np.array(at)) * pin.SE3(np.eye(3), np.array((0.0, 0.0, 0.4)))
+    np.testing.assert_allclose(base.placement.homogeneous, expected.homogeneous, atol=1e-12)
 
 
 def test_parts_have_their_colours_and_places(tmp_path: Path) -> None:

@@ -98,10 +98,15 @@ class FirstOrder:
         return {"fits": self.fits, "optimality": self.optimality, "blockers": self.blockers}
 
     @cached_property
+    def residual(self) -> Array:
+        """(nv,) what nothing balances of the objective's gradient, divided by the objective's curvature."""
+        with self._lent() as state:
+            return _residual(self._asked, state, _active(self._asked, state, self._near))
+
+    @cached_property
     def optimality(self) -> float:
         """See `Assessment`."""
-        with self._lent() as state:
-            return _optimality(self._asked, state, _active(self._asked, state, self._near))
+        return float(np.abs(self.residual).max(initial=0.0))
 
     @cached_property
     def blockers(self) -> tuple[Blocker, ...]:
@@ -118,8 +123,8 @@ class FirstOrder:
             yield pairs.state.update(self._q)
 
 
-def _optimality(asked: _Asked, state: State, active: _Active) -> float:
-    """Residual of the objective's gradient after the best combination of all active gradients."""
+def _residual(asked: _Asked, state: State, active: _Active) -> Array:
+    """What the best combination of all active gradients leaves of the objective's (nv,), divided by its curvature."""
     nv = state.model.nv
     goals = [(*values_and_rows(goal, goal.error, state), goal) for goal in asked.goals]
     met = all(np.abs(error).max(initial=0.0) <= MET for error, _, _ in goals)
@@ -139,9 +144,9 @@ def _optimality(asked: _Asked, state: State, active: _Active) -> float:
     # share of the largest curvature below which a degree of freedom counts as having that much
     scale = np.maximum(curvature, 1e-2 * curvature.max(initial=0.0))
     if not scale.any():
-        return 0.0
+        return np.zeros(nv)
     _, left = _balanced(objective, signed, one_sided)
-    return float((np.abs(left) / scale).max())
+    return np.asarray(left / scale)
 
 
 def _blockers(asked: _Asked, state: State, near: NearPairs, clearances: Array) -> tuple[Blocker, ...]:

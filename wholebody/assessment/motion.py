@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from wholebody.assessment.all_pairs import AllPairs, all_pairs
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
-from wholebody.figures.state import State, has_free_root
+from wholebody.figures.state import State, root_freedoms
 from wholebody.geometry.continuous.sweep import Sweep
 from wholebody.scene.scene import Scene
 from wholebody.tasks import ReachCones
@@ -102,8 +102,7 @@ def velocities(model: pin.Model, q: Array, dt: float) -> Array:
 
 def jerk(model: pin.Model, q: Array, dt: float) -> Array:
     """(n - 3,) root of the mean square of the third difference of the joint angles, rad/s^3."""
-    joints = slice(6 if has_free_root(model) else 0, None)
-    return root_mean_square(third_differences(model, q, dt)[:, joints])
+    return root_mean_square(third_differences(model, q, dt)[:, ~root_freedoms(model)])
 
 
 def third_differences(model: pin.Model, q: Array, dt: float) -> Array:

@@ -15,6 +15,7 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
+from wholebody.figures.joined import one_figure
 
 SIDES = ("left", "right")
 NAMES = {"pelvis", "thorax", "neck", "head"}.union(
@@ -117,7 +118,7 @@ def body_angles(figure: Figure, q: Array) -> BodyAngles:
 
 def check_person(figure: object, what: str) -> Figure:
     """A figure with the names of a person."""
-    person = checks.instance(figure, Figure, what, "load one with wb.load('human')")
+    person = one_figure(figure, what)
     lacking = sorted(NAMES - {*person.segments, *person.frames})
     if lacking:
         raise InputError(f"{what}: {person.name} has no {checks.some(lacking)}; load a person with wb.load('human')")

@@ -82,7 +82,7 @@ class Sight:
         return self.off <= 1.0 and not self.hidden_by and self.distance >= BLURRED
 
 
-def sight(scene: Scene, q: Array, point: Array, field: FieldOfView = LARGEST) -> Sight:
+def sight(scene: Scene, q: Array, point: Array, field: FieldOfView = LARGEST, *, eyes: str = EYES) -> Sight:
     """Whether a person in a posture sees a point, without turning the head.
 
     A thing that the point is in, or on the surface of, is what is looked at and hides nothing.
@@ -92,6 +92,7 @@ def sight(scene: Scene, q: Array, point: Array, field: FieldOfView = LARGEST) ->
         q: (nq,) posture.
         point: (3,) metres.
         field: how far the eyes turn.
+        eyes: the frame between the eyes of the person who looks, such as "anna/gaze" of one of several figures.
 
     Raises:
         InputError: a value of the wrong kind, or a figure without eyes.
@@ -101,19 +102,21 @@ def sight(scene: Scene, q: Array, point: Array, field: FieldOfView = LARGEST) ->
     scene.figure.warn_of_angles(q, "sight: q")
     target = inputs.point(point, "sight: point")
     checks.instance(field, FieldOfView, "sight: field", "give one such as FieldOfView()")
-    if EYES not in scene.figure.frames:
-        raise InputError(f"sight: {scene.figure.name} has no frame {EYES!r} between its eyes; load a person")
-    eyes = scene.figure.placement(q, EYES)
-    local = eyes.actInv(target)
+    if eyes not in scene.figure.frames:
+        raise InputError(f"sight: {scene.figure.name} has no frame {eyes!r} between its eyes; load a person")
+    between = scene.figure.placement(q, eyes)
+    local = between.actInv(target)
     distance = float(np.linalg.norm(local))
     if distance < BLURRED:
         return Sight(0.0, False, distance, "")
-    hidden = _between(scene, q, np.asarray(eyes.translation), target, distance)
+    own = tuple(eyes.removesuffix(EYES) + part for part in ("head", "neck"))  # which do not hide anything from them
+    hidden = _between(scene, q, np.asarray(between.translation), target, own)
     return Sight(field.off(local), COMFORTABLE.off(local) <= 1.0, distance, hidden)
 
 
-def _between(scene: Scene, q: Array, eyes: Array, target: Array, distance: float) -> str:
-    """The piece that a thin capsule from the eyes to the point meets first, by its owner; "" for none."""
+def _between(scene: Scene, q: Array, eyes: Array, target: Array, own: tuple[str, ...]) -> str:
+    """The piece that a thin capsule from the eyes to the point meets first, by its owner; "" for none of others."""
+    distance = float(np.linalg.norm(target - eyes))
     length = distance - 2.0 * NEAR
     if length <= 0.0:
         return ""
@@ -129,11 +132,10 @@ def _between(scene: Scene, q: Array, eyes: Array, target: Array, distance: float
         return _meet(shape, there, coal.Capsule(RAY, reach), at)
 
     spot, found, nearest = coal.Transform3s(np.eye(3), target), "", length
-    # segments that do not hide anything from their own eyes
     pieces = [
         (piece.geometry, owner, coal.Transform3s(place.rotation, place.translation))
         for piece, owner, place in zip(scene.geometry.geometryObjects, scene.piece_owner, placed.oMg, strict=True)
-        if owner not in ("head", "neck")
+        if owner not in own
     ]
     looked_at = {owner for shape, owner, there in pieces if _meet(shape, there, coal.Sphere(RAY), spot)}
     for shape, owner, there in pieces:

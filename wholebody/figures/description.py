@@ -17,7 +17,7 @@ from wholebody.figures.motion_ranges import MotionRange
 from wholebody.figures.reach_cones import ReachCone
 
 ROOT_JOINT = "root_joint"
-"""Name of a free root in the model."""
+"""Name of a free root in the model; that of a joined figure follows the figure's name: "anna/root_joint"."""
 
 
 class Chain(NamedTuple):
@@ -95,6 +95,18 @@ Articulated: TypeAlias = Any
 """A `Figure`, for the functions that make its parts: the module of figures imports this one."""
 
 
+class Member(NamedTuple):
+    """A figure among those that were joined.
+
+    Attributes:
+        figure: as it is alone.
+        at: where the world of that figure is in the world: it places a fixed root, and the postures of a free one.
+    """
+
+    figure: Articulated
+    at: pin.SE3
+
+
 class Description(NamedTuple):
     """The named parts of a figure, in addition to its model and geometry.
 
@@ -109,9 +121,11 @@ class Description(NamedTuple):
         effort: joint to weight of its effort; joints that are not named have 1.
         excluded: pairs of pieces that are not tested, with the reason.
         ranges: ranges of motion that more than one joint angle decides; a problem takes them by default.
-        root_effort: weight of the root's position [rad^2/m^2] and of its rotation in the effort.
+        root_effort: weight of the position [rad^2/m^2] and of the rotation of each free root in the effort.
         notes: sentences on what had to be changed about the geometry of a file, or about stated dimensions.
         person: sex, stature and mass of the figure or of the hand's owner; None for a figure of a file.
+        members: figures that were joined, by name; empty for one figure.
+        prefixes: what the names of each figure's parts begin with, such as "anna/"; "" for one figure.
         outer: makes the pieces that meet things in the world, on frames of the model, for a figure whose own are too
             coarse for it; None if its own do.
     """
@@ -126,9 +140,11 @@ class Description(NamedTuple):
     effort: Mapping[str, float] = MappingProxyType({})
     excluded: tuple[ExcludedPair, ...] = ()
     ranges: Mapping[str, MotionRange] = MappingProxyType({})
-    root_effort: tuple[float, float] = (0.0, 0.0)
+    root_effort: tuple[float, ...] = (0.0, 0.0)
     notes: tuple[str, ...] = ()
     person: Person | None = None
+    members: Mapping[str, Member] = MappingProxyType({})
+    prefixes: tuple[str, ...] = ("",)
     outer: Callable[[], tuple[Solid, ...]] | None = None
 
 
@@ -139,6 +155,11 @@ def chosen_pairs(
     told = [(a.name, b.name, reason(a, b)) for a, b in combinations(solids, 2)]
     tested = tuple((a, b) for a, b, why in told if not why)
     return tested, tuple(ExcludedPair(a, b, why) for a, b, why in told if why)
+
+
+def is_root(joint: str) -> bool:
+    """Whether the name of a joint of a model is that of a free root."""
+    return joint.rpartition("/")[2] == ROOT_JOINT
 
 
 def limits_of(model: pin.Model) -> Limits:

@@ -15,11 +15,19 @@ from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.pool import Pool
 from wholebody.base.records import as_dict
 from wholebody.figures.body_spec import geometry_of
-from wholebody.figures.description import ROOT_JOINT, Description, followers_of, limits_of
+from wholebody.figures.description import Description, followers_of, is_root, limits_of
 from wholebody.figures.grounding import grounded
+from wholebody.figures.joining import mounted_parts, posture_of_all
 from wholebody.figures.model_check import LARGEST, Turning, check_model
 from wholebody.figures.reduction import reduced_parts
-from wholebody.figures.state import has_free_root
+from wholebody.figures.state import free_roots, root_freedoms
+from wholebody.geometry.placement import placement
+
+
+def _joints_of(names: Sequence[str], prefix: str) -> range:
+    """Indices of the joints of a model whose names begin with a prefix."""
+    found = [k for k in range(1, len(names)) if names[k].startswith(prefix)]
+    return range(found[0], found[-1] + 1) if found else range(0)
 
 
 def _with_limits(made_from: tuple[Any, ...], limits: Mapping[str, Array]) -> Figure:
@@ -45,7 +53,11 @@ class Figure(checks.FixedAttributes):
             they are drawn; otherwise the pieces.
         detail: "spheres", "capsules", "hulls", or "own" for the geometry of a URDF. Spheres are too coarse to meet
             things: `outer` does.
-        root: "free" (a floating base) or "fixed".
+        root: "free" (a floating base) or "fixed"; "several" of figures that were joined.
+        roots: free root to the index of its joint: "root", or "anna/root" of a joined figure.
+        members: figures that were joined, by name; empty for one figure.
+        bodies: what the names of each figure's parts begin with, such as "anna/", to the indices of its joints; "" for
+            one figure.
         joints: names of the joints in the model's order, without the free root.
         groups: group to joint names, without the root.
         chains: limb to its joints from the root outwards, and the frame at its tip.
@@ -91,25 +103,29 @@ class Figure(checks.FixedAttributes):
         self.collision_groups = MappingProxyType(dict(description.collision_groups))
         self.excluded_pairs, self.notes = description.excluded, description.notes
         self.loaded_as: tuple[str, dict[str, Any]] | None = None
+        self.members = MappingProxyType(dict(description.members))
         self._data = Pool(model.createData, at_most=1)  # 6.5 MB for 55 freedoms, 27 MB for 95
         self._description = description
         self._made: dict[str, Array] = {}
         self._outer: tuple[pin.GeometryObject, ...] | None = None
-        self.root = "free" if has_free_root(model) else "fixed"
+        names = list(model.names)
+        self.roots = MappingProxyType({f"{names[k].rpartition('/')[0]}/root".lstrip("/"): k for k in free_roots(model)})
+        several = description.prefixes != ("",)
+        self.root = "several" if several else "free" if self.roots else "fixed"
+        self.bodies = MappingProxyType({prefix: _joints_of(names, prefix) for prefix in description.prefixes})
         self._frame_ids = {frame.name: index for index, frame in reversed(list(enumerate(model.frames)))}
         self._joint_ids = {name: index for index, name in enumerate(model.names) if index > 0}
-        self.joints: tuple[str, ...] = tuple(name for name in self._joint_ids if name != ROOT_JOINT)
+        self.joints: tuple[str, ...] = tuple(name for name in self._joint_ids if not is_root(name))
         self.limits = limits_of(model)
         self._turning = Turning(model)
         self.followers = MappingProxyType(followers_of(model))
-        root = 6 if self.root == "free" else 0
         self.effort_weights = np.ones(model.nv)
         for joint, weight in description.effort.items():
             if joint in self._joint_ids:
                 self.effort_weights[self.dofs([joint])] = weight
-        self.neutral_weights = np.ones(model.nv)
-        self.neutral_weights[:root] = 0.0
-        self.effort_weights[:root] = np.repeat(description.root_effort, 3)[:root]
+        root = root_freedoms(model)
+        self.neutral_weights = np.where(root, 0.0, 1.0)
+        self.effort_weights[root] = np.repeat(description.root_effort, 3)[: int(root.sum())]
 
     def __repr__(self) -> str:
         return (
@@ -154,12 +170,28 @@ class Figure(checks.FixedAttributes):
         """Names of the postures; the first one is the default start of a problem."""
         return tuple(self._description.postures)
 
-    def posture(self, name: str) -> Array:
-        """Return a copy of a named posture, shape (nq,)."""
+    def posture(self, name: str | Mapping[str, str | Array]) -> Array:
+        """Return a copy of a named posture, shape (nq,).
+
+        Of figures that were joined a mapping may be given: figure to a posture of it, by name or as an array. Those
+        that it leaves out have their first posture.
+        """
+        if isinstance(name, Mapping):
+            return posture_of_all(self, name)
         checks.known(name, self.postures, "posture")
         if name not in self._made:
             self._made[name] = self._description.postures[name](self)
         return np.array(self._made[name])
+
+    def part(self, name: str, q: Array) -> Array:
+        """The posture of one of the joined figures in a posture of all, (nq,) or (n, nq): a view of those numbers."""
+        checks.known(name, self.members, "figure", "part")
+        q = checks.array(q, "part: q", wanted := f"a posture of {self.model.nq} values, or several")
+        if q.shape[-1:] != (self.model.nq,):
+            raise InputError(f"part: q has shape {q.shape}; give {wanted}")
+        joints = [self.model.joints[joint] for joint in self.bodies[f"{name}/"]]
+        first = min((int(joint.idx_q) for joint in joints), default=0)
+        return q[..., first : max((int(joint.idx_q) + int(joint.nq) for joint in joints), default=0)]
 
     @property
     def neutral(self) -> Array:
@@ -185,9 +217,9 @@ class Figure(checks.FixedAttributes):
             return data.oMi[joint].copy()
 
     def joint_id(self, name: str) -> int:
-        """Return the index of a joint in the model; "root" is the free root."""
-        if isinstance(name, str) and name == "root" and self.root == "free":
-            return 1
+        """Return the index of a joint in the model; "root", or "anna/root", is a free root."""
+        if isinstance(name, str) and name in self.roots:
+            return self.roots[name]
         return self._joint_ids[checks.known(name, self._joint_ids, "joint", offered=self.joints)]
 
     def joint_names(self, names: str | Iterable[str]) -> tuple[str, ...]:
@@ -198,10 +230,10 @@ class Figure(checks.FixedAttributes):
                 raise InputError(f"{checks.shown(name)} is not the name of a joint or group; give a text")
             if name in self.groups:
                 found.update(dict.fromkeys(self.groups[name]))
-            elif name in self._joint_ids or (name == "root" and self.root == "free"):
+            elif name in self._joint_ids or name in self.roots:
                 found[name] = None
             else:
-                raise UnknownNameError("joint or group", name, {*self.joints, *self.groups, "root"})
+                raise UnknownNameError("joint or group", name, {*self.joints, *self.groups, *(self.roots or ["root"])})
         return tuple(found)
 
     def dofs(self, names: str | Iterable[str]) -> Indices:
@@ -291,16 +323,22 @@ class Figure(checks.FixedAttributes):
     def grounded(self, q: Array, scene: Any) -> Array:
         """Return a copy of q (nq,) moved vertically until the lowest segments stand on the things of a scene.
 
-        What the figure carries is not looked at.
+        What the figure carries is not looked at. Of figures that were joined each with a free root is moved alone, and
+        none stands on another.
 
         Raises:
             InputError: the root is fixed, nothing is below the figure, or the scene has another figure.
         """
-        if self.root != "free":
+        if not self.roots:
             raise InputError(f"{self.name} has a fixed root and stays where it is; load it with root='free'")
         if getattr(scene, "model", None) is not self.model or not hasattr(scene, "piece_owner"):
             raise InputError(f"grounded: give a scene of this figure, not {checks.shown(scene)}; see wb.Scene(figure)")
-        return grounded(self.model, self.segments, self._checked(q), scene)
+        model, q = scene.model, self._checked(q)
+        for name, joint in self.roots.items():
+            prefix = name.removesuffix("root")
+            own = tuple(segment for segment in self.segments if segment.startswith(prefix))
+            q = grounded(model, own, q, scene, int(model.joints[joint].idx_q) + 2)
+        return q
 
     def reduced(self, joints: str | Sequence[str], posture: str | Array | None = None) -> Figure:
         """Return a figure that keeps only some joints; the others are locked, and pairs that cannot move are dropped.
@@ -316,6 +354,30 @@ class Figure(checks.FixedAttributes):
         self.warn_of_angles(self._checked(q), "reduced: posture")
         model, geometry, description, visual = reduced_parts(self, self.joint_names(joints), self._checked(q))
         return Figure(self.name, model, geometry, self.detail, description, visual)
+
+    def mounted(self, other: Figure, *, on: str, name: str | None = None, at: Any = (0.0, 0.0, 0.0)) -> Figure:
+        """Return this figure with another one on a frame: a hand on an arm, a tool with joints in a hand.
+
+        A free root of the other is fixed as in its first posture. Its name comes before its names: "hand/palm".
+        Pieces of the two are tested against each other, but for those that touch where it is mounted; see
+        `excluded_pairs`.
+
+        Args:
+            other: what is mounted.
+            on: the frame of this figure that carries the world of the other.
+            name: of the other; its own if left out.
+            at: where its world is in that frame: (x, y, z), (x, y, z, qx, qy, qz, qw), a 4x4 matrix or a pin.SE3.
+
+        Raises:
+            UnknownNameError: there is no such frame.
+            InputError: no figure, or a name or a placement that cannot be used.
+        """
+        checks.instance(other, Figure, "mounted: other", "load one with wb.load('hand')")
+        frame, prefix = self.frame_id(on), checks.text(other.name if name is None else name, "mounted: name")
+        if "/" in prefix or prefix in {*self.groups, *self.joints}:
+            raise InputError(f"mounted: {self.name} has a part {prefix!r}, or it has a slash; give name=")
+        parts = mounted_parts(self, other, frame, f"{prefix}/", placement(at, "mounted: at"))
+        return Figure(f"{self.name} with {prefix}", *parts[:2], "own", *parts[2:])
 
     def describe(self) -> Description:
         """Return the named parts of the figure, to build another one from them."""

@@ -13,11 +13,14 @@ from wholebody.base.errors import InputError
 from wholebody.figures.postures import support
 
 
-def grounded(model: pin.Model, segments: tuple[str, ...], q: Array, scene: Any) -> Array:
-    """Copy (nq,) of a posture of a model with a free root; see `Figure.grounded`."""
+def grounded(model: pin.Model, segments: tuple[str, ...], q: Array, scene: Any, height: int) -> Array:
+    """Copy (nq,) of a posture of a model with a free root; see `Figure.grounded`.
+
+    `segments` are those that the root carries, and `height` is the place of the root's height in the posture.
+    """
     data = model.createData()
     pin.forwardKinematics(model, data, q)
-    own = set(segments)
+    own, around = set(segments), set(scene.objects)
     pieces = list(zip(scene.geometry.geometryObjects, scene.piece_owner, strict=True))
     placed = [(piece.geometry, data.oMi[piece.parentJoint] * piece.placement, owner) for piece, owner in pieces]
     body = [
@@ -28,7 +31,7 @@ def grounded(model: pin.Model, segments: tuple[str, ...], q: Array, scene: Any) 
     things = [
         (shape, coal.Transform3s(place.rotation, place.translation))
         for (shape, place, owner), (piece, _) in zip(placed, pieces, strict=True)
-        if owner not in own and piece.parentJoint == 0
+        if owner in around and piece.parentJoint == 0
     ]
     if not things or not body:
         raise InputError("grounded: there is nothing to stand on; add wb.HalfSpace() to the scene")
@@ -45,7 +48,7 @@ def grounded(model: pin.Model, segments: tuple[str, ...], q: Array, scene: Any) 
         if abs(shift) > 10.0:
             raise InputError("grounded: nothing is below the figure within 10 m; add wb.HalfSpace()")
     result = np.array(q, dtype=float)
-    result[2] += shift
+    result[height] += shift
     return result
 
 

@@ -11,7 +11,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.base.records import with_values
-from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, ExcludedPair
+from wholebody.figures.description import Articulated, Chain, Description, ExcludedPair, is_root
 from wholebody.figures.motion_ranges import CoupledRange, EllipticRange, MotionRange
 from wholebody.figures.self_pairs import drop_pairs
 
@@ -31,7 +31,7 @@ def reduced_parts(
     geometry = geometries[0]
     visual = geometry if figure.visual is figure.geometry else geometries[1]
     fixed = drop_rigid_pairs(geometry)
-    names = {name for name in small.names if name != ROOT_JOINT}
+    names = {name for name in small.names if not is_root(name)}
     old = figure.describe()
     frames = {frame.name: frame for frame in small.frames}
     description = Description(
@@ -53,7 +53,13 @@ def reduced_parts(
         effort=old.effort,
         excluded=(*old.excluded, *fixed),
         ranges=_ranges(old.ranges, names, figure.joint_values(q), frames),
-        root_effort=old.root_effort,
+        root_effort=tuple(
+            share
+            for joint, pair in zip(figure.roots.values(), zip(*[iter(old.root_effort)] * 2, strict=True), strict=False)
+            for share in pair
+            if joint in kept
+        ),
+        prefixes=old.prefixes,
         notes=old.notes,
         person=old.person,
         outer=old.outer,

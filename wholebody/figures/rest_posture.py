@@ -14,7 +14,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.figures.description import ExcludedPair, limits_of
 from wholebody.figures.self_pairs import drop_pairs, random_postures
-from wholebody.figures.state import State, has_free_root
+from wholebody.figures.state import State, root_freedoms
 from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 
 APART = 1e-3
@@ -90,9 +90,7 @@ class _Parting:
         self.model, self.zero = model, zero
         self.proximity, self.state = Proximity(PairTable(model, geometry)), State(model)
         self.limits = limits_of(model)
-        self.movable = np.ones(model.nv, dtype=bool)
-        if has_free_root(model):
-            self.movable[:6] = False
+        self.movable = ~root_freedoms(model)
 
     def contacts(self, q: Array, within: float) -> Contacts:
         return self.proximity.query(self.state.update(q).data, within)

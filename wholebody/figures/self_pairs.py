@@ -26,7 +26,7 @@ def choose_pairs(model: pin.Model, geometry: pin.GeometryModel, samples: int, se
     """
     geometry.removeAllCollisionPairs()
     joint = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
-    above = _carriers_above(model, joint)
+    above = carriers_above(model, joint)
     first, second = np.triu_indices(geometry.ngeoms, 1)
     a, b = joint[first], joint[second]
     together, neighbours = a == b, (above[a] == b) | (above[b] == a)
@@ -82,7 +82,7 @@ def random_postures(model: pin.Model, count: int, seed: int) -> Array:
     return postures
 
 
-def _carriers_above(model: pin.Model, joint: Indices) -> Indices:
+def carriers_above(model: pin.Model, joint: Indices) -> Indices:
     """For every joint the nearest one towards the root that carries a piece; -1 if there is none."""
     carries = np.zeros(model.njoints, dtype=bool)
     carries[joint] = True

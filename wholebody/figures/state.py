@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array
 from wholebody.base.checks import instance, posture, whole
 from wholebody.base.errors import InputError
+from wholebody.figures.description import ROOT_JOINT
 from wholebody.geometry.memory_views import placement_view
 
 DOUBLE = np.dtype(np.float64)
@@ -69,7 +70,7 @@ class State:
         self._shared = np.shares_memory(self.jacobian, self.data.J)
         self._joints = placement_view(self.data.oMi)
         self._frames: dict[int, pin.SE3] = {}
-        self._center_of_mass: Array | None = None
+        self._centers: dict[range | None, Array] = {}
         self._spare: pin.Data | None = None
         self._companions: dict[object, State] = {}
         self.update(self.q)
@@ -92,7 +93,7 @@ class State:
         if not self._shared:
             self._take_jacobian()
         self._frames.clear()
-        self._center_of_mass = None
+        self._centers.clear()
         return self
 
     def _take_jacobian(self) -> None:
@@ -152,18 +153,35 @@ class State:
         """A tangent displacement (nv,) over the columns of `jacobian`, (n,): the transpose of `folded`."""
         return displacement if self._columns is None else displacement[self._columns]
 
-    def center_of_mass(self) -> Array:
-        """Centre of mass in the world, shape (3,), metres."""
-        if self._center_of_mass is None:
-            pin.centerOfMass(self.model, self.data, self.q)
-            self._center_of_mass = self.data.com[0].copy()
-        return self._center_of_mass
+    def center_of_mass(self, joints: range | None = None) -> Array:
+        """Centre of mass in the world, shape (3,), metres: of all, or of what these joints carry."""
+        if joints not in self._centers:
+            if joints is None:
+                pin.centerOfMass(self.model, self.data, self.q)
+                self._centers[None] = self.data.com[0].copy()
+            else:
+                mass, moment = self._moments(joints)
+                self._centers[joints] = moment.sum(axis=0) / mass.sum()
+        return self._centers[joints]
 
-    def center_of_mass_jacobian(self) -> Array:
-        """Jacobian of the centre of mass, shape (3, nv).
+    def _moments(self, joints: range) -> tuple[Array, Array]:
+        """Of what each of some joints carries: mass (k,), and mass times centre in the world (k, 3)."""
+        inertias = [self.model.inertias[k] for k in joints]
+        centers = [self.data.oMi[k].act(inertia.lever) for k, inertia in zip(joints, inertias, strict=True)]
+        mass = np.array([inertia.mass for inertia in inertias])
+        return mass, mass[:, None] * np.array(centers).reshape(-1, 3)
+
+    def center_of_mass_jacobian(self, joints: range | None = None) -> Array:
+        """Jacobian of the centre of mass, shape (3, nv): of all, or of what these joints carry.
 
         Works on data of its own, because Pinocchio's routine overwrites the joint Jacobians.
         """
+        if joints is not None:
+            mass, moment = self._moments(joints)
+            moved = self.support[joints.start : joints.stop].T  # a column moves what hangs on its joint
+            linear, turn = self.columns[:, :3], self.columns[:, 3:]
+            rows = (moved @ mass)[:, None] * linear + np.cross(turn, moved @ moment)
+            return self.folded(rows.T / mass.sum())
         if self._spare is None:
             self._spare = self.model.createData()
         return np.array(pin.jacobianCenterOfMass(self.model, self._spare, self.q)).reshape(3, -1)
@@ -173,9 +191,24 @@ def _restored(model: pin.Model, q: Array) -> State:
     return State(model).update(q)
 
 
-def has_free_root(model: pin.Model) -> bool:
-    """Whether a model has a floating base. A joint without limits too has more coordinates than degrees of freedom."""
-    return bool(model.njoints > 1 and model.joints[1].nq == 7)
+def free_roots(model: pin.Model) -> tuple[int, ...]:
+    """The joints that are floating bases: the first one, and of figures that were joined those with a root's name.
+
+    A joint without limits too has more coordinates than degrees of freedom.
+    """
+    return tuple(
+        k
+        for k in range(1, model.njoints)
+        if (k == 1 or model.names[k].endswith(f"/{ROOT_JOINT}")) and model.joints[k].nq == 7
+    )
+
+
+def root_freedoms(model: pin.Model) -> NDArray[np.bool_]:
+    """(nv,) whether a degree of freedom is one of the six of a floating base."""
+    found = np.zeros(model.nv, dtype=bool)
+    for joint in free_roots(model):
+        found[model.joints[joint].idx_v : model.joints[joint].idx_v + 6] = True
+    return found
 
 
 def joint_support(model: pin.Model) -> Array:

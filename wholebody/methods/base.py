@@ -142,18 +142,12 @@ def named_terms(problem: Problem) -> list[tuple[str, object]]:
 
 
 class SolvedStep(NamedTuple):
-    """A step that was a whole solve.
+    """A step that was a whole solve."""
 
-    Attributes:
-        q: (nq,) the next posture.
-        iterations: of the method.
-        judging: seconds of wall time that the assessment took.
-        collisions: what things that moved meanwhile (`Scene.move` with `over`) passed through, or are inside of.
-    """
-
-    q: Array
-    iterations: int
-    judging: float
+    q: Array  # (nq,) the next posture
+    iterations: int  # of the method
+    judging: float  # seconds of wall time that the assessment took
+    # what things that moved meanwhile (`Scene.move` with `over`) passed through, or are inside of.
     collisions: tuple[Collision, ...] = ()
 
 

@@ -109,9 +109,9 @@ class _Descent:
         q, step, best = self.best, 0.0, (np.inf, np.inf)
         for _ in range(method.iterations + 1):
             self._state.update(q)
-            held, wanted = self._held(), self._wanted()
+            held = [term.lower - values(term, "value", term.value(self._state)) for term in problem.stated]
             distance, angle, _ = goal_errors(problem, self._state)
-            violation, error = float(np.abs(held).max(initial=0.0)), max(distance, angle)
+            violation, error = float(np.abs(_joined(held)).max(initial=0.0)), max(distance, angle)
             self.trace.append(TraceEntry(error, violation, 0.0, step))
             self._control.tell(self.trace[-1])
             if (max(violation, enough), error) < best:
@@ -122,7 +122,7 @@ class _Descent:
                 return True
             if self.steps == method.iterations or (self.steps and self._control.over):  # a frame gets on in any case
                 break
-            moved = self._moved(q, self._step(held, wanted))
+            moved = self._moved(q, self._step())
             if moved is None:
                 return False
             step = float(np.abs(pin.difference(problem.scene.model, q, moved)).max(initial=0.0))
@@ -144,22 +144,14 @@ class _Descent:
             way = 0.5 * way
         return None
 
-    def _held(self) -> Array:
-        """Errors of all equalities."""
-        return _joined([term.lower - values(term, "value", term.value(self._state)) for term in self._problem.stated])
-
-    def _wanted(self) -> Array:
-        """Errors of all goals, multiplied by the roots of their weights."""
-        goals = self._problem.goals
-        return _joined([-(goal.weight**0.5) * values(goal, "error", goal.error(self._state)) for goal in goals])
-
-    def _step(self, held: Array, wanted: Array) -> Array:
+    def _step(self) -> Array:
         """Displacement (nv,), within the limits."""
         problem, state = self._problem, self._state
-        of_held = _rows([values_and_rows(term, term.value, state)[1] for term in problem.stated], state)
-        of_wanted = _rows(
-            [goal.weight**0.5 * values_and_rows(goal, goal.error, state)[1] for goal in problem.goals], state
-        )
+        equal = [(term, *values_and_rows(term, term.value, state)) for term in problem.stated]
+        asked = [(goal.weight**0.5, *values_and_rows(goal, goal.error, state)) for goal in problem.goals]
+        held, of_held = _joined([term.lower - value for term, value, _ in equal]), _rows([e[2] for e in equal], state)
+        wanted = _joined([-root * error for root, error, _ in asked])
+        of_wanted = _rows([root * rows for root, _, rows in asked], state)
         lower, upper = problem.scene.figure.tangent_bounds(state.q)
         for bound in problem.bounds:
             low, high = bound.bounds(state, None)

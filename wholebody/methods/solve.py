@@ -107,15 +107,17 @@ def solve(problem: Problem, method: str | Method = "qp", progress: Progress | No
 def _warn_if_nothing_holds(problem: Problem, solution: Solution) -> None:
     """Warn if the goals were met by carrying the whole figure to them, since nothing holds it."""
     figure = problem.scene.figure
-    if figure.root != "free" or not problem.goals or problem.stated or problem.bounds:
+    if not figure.roots or not problem.goals or problem.stated or problem.bounds:
         return
     if any(term.touching for term in problem.goals):
         return
-    flown = float(np.linalg.norm(solution.q[:3] - problem.start[:3]))
+    moved = solution.q - problem.start
+    places = {name: int(figure.model.joints[joint].idx_q) for name, joint in figure.roots.items()}
+    flown, root = max((float(np.linalg.norm(moved[q : q + 3])), name) for name, q in places.items())
     # m: a root that moved farther than this was carried to the goals; a person who bends moves it less
     if flown > 0.3:
         warnings.warn(
             f"nothing holds the figure: its root moved {flown:.2f} m to meet the goals; add "
-            "wb.Stand(on=...), wb.Hold('left_foot') or wb.Freeze('root')",
+            f"wb.Stand(on=...), wb.Hold('{root.removesuffix('root')}left_foot') or wb.Freeze({root!r})",
             stacklevel=3,
         )

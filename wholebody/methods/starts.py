@@ -97,9 +97,13 @@ class Minima:
     @property
     def complete(self) -> bool:
         """Whether all minima count as found."""
-        found, count = len(self._values), self._count
-        enough = count >= max(self._fewest, found + 3)
-        return enough and found * (count - 1) <= (found + 0.5) * (count - found - 2)
+        return all_found(len(self._values), self._count, self._fewest)
+
+
+def all_found(found: int, count: int, fewest: int = 0) -> bool:
+    """Whether so many different minima count as all there are, after so many descents; see `Minima`."""
+    enough = count >= max(fewest, found + 3)
+    return enough and found * (count - 1) <= (found + 0.5) * (count - found - 2)
 
 
 def _ranges(problem: Problem, start: Array) -> tuple[Array, Array]:

@@ -16,7 +16,7 @@ from types import MappingProxyType
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.checks import a, flag, function, instance, listed, shown
+from wholebody.base.checks import a, flag, function, instance, listed, shown, warn
 from wholebody.base.errors import InputError, UndefinedTermError, UnknownNameError
 from wholebody.base.records import with_values
 from wholebody.methods.control import ctrl_c_ends_all
@@ -112,6 +112,8 @@ def avoid(
         given = (*given, StanceFeet()) if has_feet(scene.figure) else given
     flag(keep_ends, "avoid: keep_ends")
     judge = _Judge(clip, scene, chosen, given, keep_ends)
+    if judge.held_inside:
+        warn(f"avoid: {clip.name}: {judge.held_inside}")
     with scene.borrow() as workspace:
         run = Run(clip, judge.terms, workspace, chosen.clearance, Watch(progress), judge.feet)
         began = time.perf_counter()
@@ -154,15 +156,37 @@ class _Judge:
         terms = frame_terms(scene, clip.q, clip.dt, given, method.clearance)
         self.asked = _bounds(given, self._was, terms, keep_ends)
         self.terms = replace(terms, largest=self.asked.largest)
+        self.held_inside = _held_inside(self.terms, self._was)
 
     def report(self, result: MethodResult, run: Run) -> AvoidanceReport:
         """What a method made of the clip."""
-        said = [result.message, "the caller ended it" if run.ended else "", run.work.left_out]
+        said = [result.message, "the caller ended it" if run.ended else "", run.work.left_out, self.held_inside]
         result, change = with_values(result, message="; ".join(part for part in said if part)), None
         if self._loads is not None and self._strength is not None:
             places = None if result.times is None else result.times / self._clip.dt
             change = load_change(self._loads, self._clip.with_q(result.q), places, self._strength, self.feet)
         return judged(self._was, self.terms, self.asked, result, run.work, self._name, change)
+
+
+def _held_inside(terms: FrameTerms, was: ClipCheck) -> str:
+    """Which feet are held where they are inside of a thing, so that no method can free them; empty without one."""
+    figure, told = terms.scene.figure, list[str]()
+    joints = [{figure.model.frames[figure.frame_id(name)].parentJoint for name in names} for names in terms.stands]
+    for contact in was.contacts:
+        segment, thing = contact.first, contact.second
+        segment, thing = (segment, thing) if segment in figure.segments else (thing, segment)
+        if contact.kind != "thing" or segment not in figure.segments:
+            continue
+        joint = figure.model.frames[figure.frame_id(segment)].parentJoint
+        held = np.array([joint in here for here in joints]) & (contact.depth > HELD)
+        if held.any():
+            told.append(f"{segment} stands up to {1e3 * contact.depth[held].max():.0f} mm inside {thing}")
+    if not told:
+        return ""
+    return (
+        f"{', '.join(told)}, and is held there; give hold_feet=False, or retarget the recording with this scene, which "
+        "puts feet on what is below them"
+    )
 
 
 def freed(method: Avoider, run: Run) -> MethodResult:

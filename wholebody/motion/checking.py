@@ -13,6 +13,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import function, instance, number
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
+from wholebody.figures.state import root_freedoms
 from wholebody.geometry.continuous.swept_depth import SweptDepth
 from wholebody.motion.clip import Clip
 from wholebody.motion.clip_contacts import Contact, ContactTable, contact_as_dict
@@ -222,7 +223,7 @@ def check(
 def joint_jerk(clip: Clip) -> Array:
     """(n - 3, k) third difference of the k joint coordinates over time, without a free root; rad/s^3, m/s^3."""
     found = third_differences(clip.figure.model, clip.q, clip.dt)
-    return found[:, 6 if clip.figure.root == "free" else 0 :]
+    return found[:, ~root_freedoms(clip.figure.model)]
 
 
 def same_joints(clip: Clip, figure: Figure, what: str) -> None:

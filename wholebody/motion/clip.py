@@ -15,6 +15,7 @@ from wholebody.base.arrays import Array, Indices
 from wholebody.base.checks import array, instance, number, shown, text, time_step
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
+from wholebody.figures.joined import one_figure
 from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.tracking.tracks import MOST_FRAMES, Track, check_figure, check_frames
 
@@ -49,7 +50,7 @@ def mirrored(figure: Figure, q: Array) -> Array:
     Raises:
         InputError: the figure is not symmetric to y = 0 of its root, or has joints of more than one degree of freedom.
     """
-    source, sign = _exchange(figure)
+    source, sign = _exchange(one_figure(figure, "mirrored: the clip's figure"))
     found: Array = q[:, source] * sign
     if figure.root == "free":  # (x, -y, z), and the rotation M R M: the axis's x and z change their signs
         found[:, :7] = q[:, :7] * (1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0)
@@ -193,6 +194,11 @@ class Clip:
             )
         return Clip(self.figure, self.q[first:last:step], self.dt * step, self.name)
 
+    def part(self, name: str) -> Clip:
+        """The clip of one of the figures that were joined, by its name: what files and measures of one person take."""
+        q = self.figure.part(name, self.q)
+        return Clip(self.figure.members[name].figure, q, self.dt, f"{self.name} of {name}")
+
     def with_q(self, q: ArrayLike, name: str | None = None) -> Clip:
         """The clip with other postures (m, nq), any number of them, and another name if one is given."""
         return Clip(self.figure, q, self.dt, self.name if name is None else name)  # type: ignore[arg-type]
@@ -318,9 +324,9 @@ class Clip:
 
 def column_name(figure: Figure, column: int) -> str:
     """What a column of a clip's postures is, for messages."""
-    for name in ("root", *figure.joints) if figure.root == "free" else figure.joints:
+    for name in (*figure.roots, *figure.joints):
         joint = figure.model.joints[figure.joint_id(name)]
         if joint.idx_q <= column < joint.idx_q + joint.nq:
-            what = "the root" if name == "root" else f"joint {name}"
+            what = ("the root" if name == "root" else name) if name in figure.roots else f"joint {name}"
             return what if joint.nq == 1 else f"value {column - joint.idx_q} of {what}"
     return f"value {column}"

@@ -12,6 +12,7 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
+from wholebody.figures.joined import one_figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.inverse_dynamics import ROOT, InverseDynamics, foot_wrenches
 from wholebody.motion.stance import FEET, standing_feet
@@ -151,7 +152,7 @@ def torques(
         cutoff = checks.number(cutoff, "torques: cutoff", 1e-3, 1e6, "Hz")
     strength = Strength() if strength is None else strength
     checks.instance(strength, Strength, "torques: strength", "give wb.motion.Strength(percentile=50, sex='female')")
-    figure = clip.figure
+    figure = one_figure(clip.figure, "torques: the clip's figure")
     if feet is FEET:
         feet = [name for name in FEET if name in figure.segments]
     feet = checks.listed(feet, "torques: feet", "['left_foot', 'right_foot']")

@@ -18,7 +18,6 @@ from wholebody.motion.windows import Window, long_runs, runs
 NEARBY = 0.8  # m: ground farther away than a step says nothing of the height here
 BEFORE = 0.4  # s: how long before and after a rest a point is looked at: half of a swing
 CAME_DOWN = 0.006  # m: by which a point that rests on higher ground was above it before and after
-SLID = 0.03  # m: a point that moves farther has made a step
 WAITED = 0.25  # s: a body that nothing lower bears for longer is borne by what rests higher
 
 
@@ -29,11 +28,13 @@ class RestLimits(NamedTuple):
         speed: m/s, largest speed; a rest begins where the speed falls below two thirds of it.
         height: m, largest height above the lowest rest nearby.
         least: s, shortest rest.
+        slid: m: a point that goes on farther while it is slow has made a step, and rests at two places.
     """
 
     speed: float = 0.15
     height: float = 0.05
     least: float = 0.1
+    slid: float = 0.08
 
 
 def speeds(places: Array, dt: float) -> Array:
@@ -77,7 +78,7 @@ def _slow(places: Array, speed: Array, dt: float, limits: RestLimits) -> Mask:
     waiting = runs(kept)
     while waiting:
         first, last = waiting.pop()
-        if last - first > 2 and np.linalg.norm(np.ptp(places[first:last], axis=0)) > SLID:
+        if last - first > 2 and np.linalg.norm(np.ptp(places[first:last], axis=0)) > limits.slid:
             cut = first + 1 + int(speed[first + 1 : last - 1].argmax())
             kept[cut] = False
             waiting += [Window(first, cut), Window(cut + 1, last)]

@@ -18,13 +18,14 @@ from wholebody.base.arrays import Array, Mask
 from wholebody.figures.figure import Figure
 from wholebody.geometry.pieces import swept_points
 from wholebody.motion.posture_fit import CLEARANCE
-from wholebody.motion.retarget_targets import upright
 from wholebody.motion.roles import Roles
 from wholebody.motion.standing_ground import Foothold, Ground
+from wholebody.motion.structure import upright
 from wholebody.scene.scene import Scene
 
-STRONG, NEARING, SWING = 200.0, 3.0, 0.3  # weights of what rests, nearly does, and of a sole between; 1 of a bone
-BESIDE = np.array([0.3, 0.3, 1.0])  # shares of that weight: soles that meet come down beside each other
+STRONG, NEARING, SWING = 200.0, 10.0, 0.3  # weights of what rests, nearly does, and of a sole between; 1 of a bone
+LANDING = 3.0  # weight in the frame in which a point comes down, where contact decides
+BESIDE = np.array([0.1, 0.1, 1.0])  # shares of that weight: soles that meet come down beside each other
 STEP = 0.3  # m: a surface higher than this above the recording's ground is not what a sole comes down on
 SOLE = 0.002  # m: what is lower than this above a foot's lowest point is its sole
 FACING = 0.3  # least cosine of the angle from up to the normal of a sole that faces the ground
@@ -148,7 +149,7 @@ class Holds:
             places = [self._place(number, stand, paths, shift) for stand in around]
             if around[0].first <= frame < around[0].end:
                 goals[number] = places[0]
-                weights[number] = NEARING * BESIDE if frame == around[0].first and not again else STRONG
+                weights[number] = LANDING * BESIDE if frame == around[0].first and not again else STRONG
             else:
                 goals[number], share = self._swing(number, frame, around, places, paths)
                 weights[number] = (

@@ -16,6 +16,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
+from wholebody.figures.joined import one_figure
 from wholebody.motion.stance import pieces_on
 from wholebody.tasks.balance import convex_polygon, edges, low_points
 
@@ -177,6 +178,7 @@ class InverseDynamics:
 
     def __init__(self, figure: Figure, feet: Sequence[str], friction: float) -> None:
         """Take a figure, and the coefficient of friction of the ground."""
+        one_figure(figure, "dynamics: the figure")
         self._model, self._data, self._friction = figure.model, figure.model.createData(), friction
         self.feet = tuple(feet)
         self.soles = Soles(figure, self.feet)

@@ -19,6 +19,7 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.checks import instance
 from wholebody.base.errors import InputError
+from wholebody.figures.state import root_freedoms
 from wholebody.motion.checking import joint_jerk
 from wholebody.motion.clip import Clip
 from wholebody.motion.stance import paths, standing_points
@@ -51,7 +52,7 @@ def deviation(before: Clip, after: Clip) -> Deviation:
     _same(before, after, "deviation")
     model = before.figure.model
     apart = np.array([pin.difference(model, *pair) for pair in zip(before.q, after.q, strict=True)])
-    angles = apart[:, 6 if before.figure.root == "free" else 0 :]
+    angles = apart[:, ~root_freedoms(model)]
     away = np.linalg.norm(_centres(before) - _centres(after), axis=2)
     return Deviation(
         angle=_rms(angles),
@@ -240,9 +241,10 @@ def _speed_ratios(before: Clip, after: Clip) -> Array:
     return found
 
 
-def _parts(clip: Clip) -> tuple[slice, ...]:
-    """Columns of the free root, if there is one, and of the joints."""
-    return (slice(0, 6), slice(6, None)) if clip.figure.root == "free" else (slice(None),)
+def _parts(clip: Clip) -> tuple[Mask, ...]:
+    """Which columns are of free roots, if there are any, and which of joints."""
+    free = root_freedoms(clip.figure.model)
+    return (free, ~free) if free.any() else (~free,)
 
 
 def _near(values: Array, dt: float, fill: float) -> Array:

@@ -117,6 +117,10 @@ class Fitter:
         self._state.update(q)
         return bool((self._angles() < -CONE_SLACK).any())
 
+    def overlaps(self, q: Array) -> bool:
+        """Whether a pair overlaps at a posture (nq,) by more than the clearance that rows ask for."""
+        return bool(self._workspace.near(q, 0.0).distance.min(initial=0.0) < -CLEARANCE)
+
     def cost(self, q: Array, goals: Goals) -> float:
         """Half the sum of the squared weighted errors."""
         self._state.update(q)

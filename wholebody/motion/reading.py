@@ -11,6 +11,7 @@ from wholebody.base.checks import choice, flag
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, InputError, one_line
 from wholebody.figures.figure import Figure
+from wholebody.figures.joined import one_figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.files import FBX, amass, archive, bvh, columns, gltf_reading, read_frames
 from wholebody.motion.files.base import Frames
@@ -74,6 +75,8 @@ def read_clip(
     """
     path = checked_path(path, "path")
     check_figure(figure, "read_clip")
+    if path.suffix.lower() != ".npz":
+        one_figure(figure, f"read_clip: {path.name} holds one figure, and the figure")
     motion: SkeletonMotion | None = None
     degrees = flag(degrees, "read_clip: degrees")
     if path.suffix.lower() == ".csv":

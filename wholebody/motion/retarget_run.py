@@ -22,8 +22,9 @@ from wholebody.base.records import with_values
 from wholebody.figures.figure import Figure
 from wholebody.motion.held_points import HeldPoint, Holds
 from wholebody.motion.posture_fit import Fitter, Goals, Layout
-from wholebody.motion.retarget_targets import LIMBS, Targets, has_trunk, known_bones, upright
+from wholebody.motion.retarget_targets import LIMBS, Targets, has_trunk, known_bones
 from wholebody.motion.roles import Roles
+from wholebody.motion.structure import upright
 from wholebody.scene.workspace import Workspace
 
 FIRST, FREE, PASS, SWEEP = 60, 2, 3, 2  # most steps of a first frame, a free one, one of the first pass, one of a sweep
@@ -198,8 +199,8 @@ class Run:
         goals = self._goals(frame, reference, BEND / self.dt * self.levers, held)
         before = found[frame - 1] if frame else None
         q = self._reached(before, reference)
-        for number in range(4 * SWEEP):  # more than the usual for reach cones, which are curved
-            if number >= SWEEP and not self.fitter.outside(q):
+        for number in range(4 * SWEEP):  # more than the usual where cones, or contacts, are curved
+            if number >= SWEEP and not (self.fitter.outside(q) or self.fitter.overlaps(q)):
                 break
             q = self.fitter.step(q, goals, most=self._room(q, before))
         return q

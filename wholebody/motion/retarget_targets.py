@@ -16,6 +16,7 @@ from wholebody.motion.roles import Roles
 from wholebody.motion.skeleton import RIGID, SkeletonMotion
 from wholebody.motion.soles import soled
 from wholebody.motion.standing_ground import Ground
+from wholebody.motion.structure import upright
 
 SMALL = 1e-9
 """Metres: shorter ways have no direction."""
@@ -64,11 +65,6 @@ class _Body:
     def length(self, first: str, second: str) -> float:
         """Length of a bone; of a trunk, which bends, that of its straightest frames."""
         return float(np.percentile(np.linalg.norm(self.way(first, second), axis=-1), 95))
-
-
-def upright(figure: Figure) -> Array:
-    """(nq,) the posture in which a figure stands with flat soles and straight limbs: a robot's zero, if it has one."""
-    return np.asarray(figure.posture("zero") if "zero" in figure.postures else figure.neutral)
 
 
 def standing_places(figure: Figure, roles: Roles) -> tuple[dict[str, Array], dict[str, Array], float]:

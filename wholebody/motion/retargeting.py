@@ -11,6 +11,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import function, instance, warn
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
+from wholebody.figures.joined import one_figure
 from wholebody.geometry.shapes import HalfSpace
 from wholebody.motion.clip import Clip
 from wholebody.motion.held_points import Holds, held_points, surface_of
@@ -23,7 +24,6 @@ from wholebody.motion.stance import paths
 from wholebody.motion.standing_ground import NOTHING, Ground
 from wholebody.motion.standing_ground import ground as find_ground
 from wholebody.scene.scene import Scene
-from wholebody.tracking.tracks import check_figure
 
 
 def retarget(
@@ -61,7 +61,7 @@ def retarget(
             ground is none, or of a recording of another length.
     """
     motion = checked_motion(motion, "retarget: motion")
-    check_figure(figure, "retarget")
+    one_figure(figure, "retarget: figure")
     function(progress, "progress")
     if scene is not None:
         same_figure(instance(scene, Scene, "retarget: scene", "make one with wb.Scene(figure)"), figure)

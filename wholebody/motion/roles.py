@@ -14,7 +14,7 @@ from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.files import packaged_table, parsed_toml, read_text
 from wholebody.figures.figure import Figure
 from wholebody.motion.skeleton import SkeletonMotion
-from wholebody.motion.structure import built
+from wholebody.motion.structure import built, built_figure
 
 ROWS = packaged_table(Path(__file__).parent / "data" / "roles.csv")
 
@@ -158,6 +158,8 @@ def _frames(figure: Figure) -> dict[str, str]:
         # Of several joints at a hip, a shoulder or an ankle the last one is where they meet; of a wrist the first.
         if side and part and (part in ("hip", "shoulder", "ankle") or f"{side}_{part}" not in found):
             found[f"{side}_{part}"] = joint
+    if not {"left_knee", "left_elbow"} <= found.keys():  # a humanoid whose joints are numbered, such as Talos
+        found = built_figure(figure) | found
     if figure.root == "free":
         found["pelvis"] = figure.segments[0]
     return found

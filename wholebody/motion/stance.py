@@ -23,7 +23,8 @@ from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.geometry.pieces import swept_points
 from wholebody.motion.clip import Clip
-from wholebody.motion.windows import Window, long_runs, runs
+from wholebody.motion.footholds import RestLimits, resting
+from wholebody.motion.windows import Window, runs
 from wholebody.tasks import Hold
 
 FEET = ("left_foot", "right_foot")
@@ -37,26 +38,28 @@ def foot_points(figure: Figure) -> tuple[str, ...]:
 
 
 def _usual(figure: Figure) -> tuple[str, ...]:
-    return foot_points(figure) or tuple(name for name in FEET if name in (*figure.frames, *figure.segments))
+    named = (f"{body}{foot}" for body in figure.bodies for foot in FEET)
+    return foot_points(figure) or tuple(name for name in named if name in (*figure.frames, *figure.segments))
 
 
 def has_feet(figure: Figure) -> bool:
     """Whether a figure that may move about has frames that `StanceFeet` finds by itself."""
-    return figure.root == "free" and bool(_usual(figure))
+    return bool(figure.roots) and bool(_usual(figure))
 
 
 @dataclass(frozen=True)
 class StanceFeet:
     """Hold every foot that stands where it was: a constraint for `wb.avoid`.
 
-    A frame stands where it is slow and near its lowest height in the clip. Of a foot of which one point stands, this
-    point is held, and the foot may turn about it; of a foot of which two stand, the orientation is held too.
+    A frame stands where it is slow, and low above what is below it: the floor, a step, uneven ground. Of a foot of
+    which one point stands, this point is held, and the foot may turn about it; of a foot of which two stand, the
+    orientation is held too.
 
     Attributes:
         feet: frames of the feet; None for the figure's heels, balls and tips of the toes, or without these for its
             "left_foot" and "right_foot".
         speed: largest speed of a standing frame, m/s.
-        height: largest height of a standing frame above its lowest, metres.
+        height: largest height of a standing frame above the lowest nearby, metres, unless it came down from above.
         least: shortest stand, seconds; shorter ones are moments of a swing.
 
     Raises:
@@ -102,16 +105,10 @@ def standing(figure: Figure, q: Array, dt: float, feet: StanceFeet | None = None
     """
     settings = StanceFeet() if feet is None else feet
     names = settings.names(figure)
-    places = paths(figure, q, names)
-    speed = speeds(places, dt)
-    shortest = max(1, round(settings.least / dt))
-    found = {}
-    for number, name in enumerate(names):
-        height = places[:, number, 2]
-        lowest = np.quantile(height, 0.02)  # what is lower is an error
-        stand = (speed[:, number] <= settings.speed) & (height <= lowest + settings.height)
-        found[name] = long_runs(stand, shortest)
-    return found
+    limits = RestLimits(settings.speed, settings.height, settings.least, slid=np.inf)
+    kinds = [next((k for k, end in enumerate(POINTS, 1) if name.endswith(end)), 0) for name in names]
+    found = resting(paths(figure, q, names), dt, limits, kinds)
+    return {name: found[:, number] for number, name in enumerate(names)}
 
 
 def pieces_on(figure: Figure, joint: int) -> list[Any]:
@@ -165,13 +162,6 @@ def held_feet(figure: Figure, stand: Sequence[str]) -> tuple[Hold, ...]:
         elif joint not in joints[:number]:
             found.append(Hold(name, orientation=joints.count(joint) > 1))
     return tuple(found)
-
-
-def speeds(places: Array, dt: float) -> Array:
-    """(n, ...) speeds of places (n, ..., 3), `dt` seconds apart; central inside."""
-    if len(places) < 2:
-        return np.zeros(places.shape[:-1])
-    return np.asarray(np.linalg.norm(np.gradient(places, dt, axis=0), axis=-1))
 
 
 class _Foot:

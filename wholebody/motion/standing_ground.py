@@ -9,7 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wholebody.base import checks
 from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.files import checked_target
 from wholebody.base.records import with_values
 from wholebody.motion.footholds import RestLimits, resting, speeds
 from wholebody.motion.roles import skeleton_roles
@@ -63,14 +65,15 @@ class Ground:
 
     def below(self, frames: int) -> Array:
         """(frames,) height of the ground under the body, between footholds and over time, metres."""
+        frames = checks.whole(frames, "below: frames", 0, 10**9)
         feet = [each for each in self.footholds if each.role in self.lowest]
-        if not feet:
-            return np.zeros(frames)
         total, count = np.zeros(frames), np.zeros(frames)
         for each in feet:
             total[each.first : each.end] += each.height
             count[each.first : each.end] += 1.0
         known = np.flatnonzero(count)
+        if not len(known):
+            return total
         return np.asarray(np.interp(np.arange(frames), known, total[known] / count[known]))
 
     def __str__(self) -> str:
@@ -83,6 +86,7 @@ class Ground:
         """Draw footholds seen from above and their heights over time into a picture; returns its path."""
         from matplotlib.figure import Figure as Drawing
 
+        target = checked_target(path, "chart: path", "a chart", (".png", ".svg", ".pdf"))
         drawing = Drawing(figsize=(10, 6), layout="constrained")
         seen, timed = drawing.subplots(1, 2)
         for number, role in enumerate(self.rests):
@@ -97,8 +101,8 @@ class Ground:
         seen.set(xlabel="x [m]", ylabel="y [m]", aspect="equal", title="footholds from above")
         timed.set(xlabel="time [s]", ylabel="height of the ground [m]", title="rests")
         seen.legend(fontsize=7)
-        drawing.savefig(path)
-        return os.fspath(path)
+        drawing.savefig(target)
+        return os.fspath(target)
 
 
 NOTHING = Ground((), {}, {}, (0.0,), 0.0, False, 1.0)

@@ -12,10 +12,14 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
+from wholebody.figures.figure import Figure
 from wholebody.motion.skeleton import UNITS, SkeletonMotion, longest_way
 
+PARTS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist", "head")
+NEAR_JOINTS = 0.07  # of a figure's size: joints that are nearer to each other meet in one place
 SHORT = 0.01  # of the skeleton's longest way: a bone that is shorter has no direction
 
 
@@ -135,6 +139,45 @@ def _letter(name: str) -> int:
         r"(?:^|(?<=[^A-Za-z]))([LRlr])(?=[^a-z]|$)|(?<=[a-z])([LR])$", plain
     )
     return 0 if side is None else 1 if side[0].lower().startswith("l") else -1
+
+
+def upright(figure: Figure) -> Array:
+    """(nq,) the posture in which a figure stands with flat soles and straight limbs: a robot's zero, if it has one."""
+    return np.asarray(figure.posture("zero") if "zero" in figure.postures else figure.neutral)
+
+
+def built_figure(figure: Figure) -> dict[str, str]:
+    """Joint by role of a figure without names of parts, by its limbs at its zero; empty where it is no person's.
+
+    Joints that are near to each other are one: a hip is where its last joint is, a wrist where its first one is.
+    """
+    model, data = figure.model, figure.model.createData()
+    pin.forwardKinematics(model, data, upright(figure))
+    at = np.array([place.translation for place in data.oMi])
+    root = 1 if figure.root == "free" else 0
+    near = NEAR_JOINTS * float(np.ptp(at[root:], axis=0).max())
+    first, groups, parents = {root: 0}, [[root]], [-1]  # joint to its group
+    for joint in range(root + 1, model.njoints):
+        own = first[model.parents[joint]]
+        if own and np.linalg.norm(at[joint] - at[groups[own][-1]]) < near and model.parents[joint] == groups[own][-1]:
+            groups[own].append(joint)
+        else:
+            parents.append(own)
+            groups.append([joint])
+            own = len(groups) - 1
+        first[joint] = own
+    places = np.array([at[group[-1]] for group in groups])
+    offsets = np.array([places[k] - places[max(parent, 0)] for k, parent in enumerate(parents)])
+    names = tuple(model.names[group[-1]] for group in groups)
+    still = SkeletonMotion(
+        names, np.array(parents), offsets, np.tile(np.eye(3), (1, len(names), 1, 1)), places[None], 1.0
+    )
+    wrists = {model.names[group[-1]]: model.names[group[0]] for group in groups}
+    return {
+        role: wrists[name] if role.endswith("wrist") else name
+        for role, name in built(still).items()
+        if role.split("_")[-1] in PARTS
+    }
 
 
 def recognised_unit(parents: Indices, offsets: Array) -> str:

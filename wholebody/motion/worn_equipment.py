@@ -16,7 +16,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import choice, color, instance, known, listed, number, text
+from wholebody.base.checks import choice, color, instance, known, listed, numbers, shown, text
 from wholebody.base.checks import text as checked_text
 from wholebody.base.errors import InputError
 from wholebody.base.files import is_file
@@ -79,8 +79,7 @@ class Equipment:
         name: str,
         to: str = "thorax",
         side: Side = "back",
-        height: float = 0.0,
-        sideways: float = 0.0,
+        middle: tuple[float, float] = (0.0, 0.0),
         color: tuple[float, float, float, float] | None = None,
     ) -> Equipment:
         """Equipment against the surface of a segment: the nearest point of its bounding box touches it.
@@ -93,8 +92,8 @@ class Equipment:
             name: a name that nothing else in the scene has.
             to: the segment that carries it.
             side: of the segment in the figure's zero posture, in which x is forward and y left.
-            height: of the middle of the shape's bounding box above the segment's origin, metres.
-            sideways: of its middle to the left (on the left and right side: forward) of the segment's origin, metres.
+            middle: of the shape's bounding box: how far it is to the left of the segment's origin (on the left and
+                right side: forward of it), and above it, metres.
             color: red, green, blue and, if wanted, alpha, each from 0 to 1; a name such as "steelblue", or "#rrggbb".
 
         Raises:
@@ -110,12 +109,13 @@ class Equipment:
                 choice(side, get_args(Side), f"{where}: side")
             ]
         )
-        shift = number(sideways, f"{where}: sideways", -1.0, 1.0, "m")
-        middle = np.array([0.0, shift, 0.0]) if side in ("front", "back") else np.array([shift, 0.0, 0.0])
-        middle[2] = number(height, f"{where}: height", -1.0, 1.0, "m")
+        along, above = numbers(middle, (2,), f"{where}: middle")
+        if not max(abs(along), abs(above)) <= 1.0:
+            raise InputError(f"{where}: middle is {shown(middle)}; give two numbers between -1 and 1 m")
+        place = np.array([0.0, along, above] if side in ("front", "back") else [along, 0.0, above])
         low, high = bounds(shape)
         half = 0.5 * np.abs(outward) @ (high - low)
-        at = middle + outward * (_surface(figure, to, outward, where) + half) - 0.5 * (low + high)
+        at = place + outward * (_surface(figure, to, outward, where) + half) - 0.5 * (low + high)
         return cls(name, shape, to, tuple(at.tolist()), group_of(figure, to), color)
 
     def filled(self, count: int, *, envelope: bool = False) -> Equipment:
@@ -251,9 +251,7 @@ def equipment(name: str, figure: Figure) -> tuple[Equipment, ...]:
     shape, found = make(), list[Equipment]()
     for side in sides:
         called = name if len(sides) == 1 else f"{side}_pouch"
-        one = Equipment.worn(
-            shape, figure, name=called, to=to, side=side, height=height, sideways=sideways, color=CLOTH
-        )
+        one = Equipment.worn(shape, figure, name=called, to=to, side=side, middle=(sideways, height), color=CLOTH)
         if isinstance(shape, Sphere):  # half inside
             at = placement(one.at, name)
             one = replace(one, at=at.translation - np.array([0.0, shape.radius, 0.0]))

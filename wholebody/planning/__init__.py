@@ -1,4 +1,4 @@
-"""Motions between postures: `plan` finds one that is free of collision and keeps constraints on the way."""
+"""Motions between postures, free of collision, by `plan`; all postures that meet goals, by `solutions`."""
 
 from __future__ import annotations
 
@@ -8,10 +8,16 @@ from wholebody.base.imports import exported
 
 if TYPE_CHECKING:
     from wholebody.planning.planner import Plan, plan
+    from wholebody.planning.solutions import Solutions, solutions
     from wholebody.planning.timing import Pace
 
-__all__ = ["Pace", "Plan", "plan"]
+__all__ = ["Pace", "Plan", "Solutions", "plan", "solutions"]
 
 __getattr__, __dir__ = exported(
-    __name__, {"wholebody.planning.planner": "Plan plan", "wholebody.planning.timing": "Pace"}
+    __name__,
+    {
+        "wholebody.planning.planner": "Plan plan",
+        "wholebody.planning.solutions": "Solutions solutions",
+        "wholebody.planning.timing": "Pace",
+    },
 )

@@ -55,7 +55,7 @@ class LocalPlanner(Protocol):
 class Geodesics:
     """Geodesics of Pinocchio, for figures that hold nothing."""
 
-    searches = 8
+    searches: ClassVar[int] = 8
 
     def __init__(self, problem: Problem, workspace: Workspace, resolution: float = 0.2) -> None:
         """Take a problem without constraints, and the length of a part of a motion, radians."""
@@ -112,7 +112,7 @@ class Geodesics:
 class TrackedMotions:
     """Motions by steps of the QP tracker, for figures that hold something on the way."""
 
-    searches = 2
+    searches: ClassVar[int] = 2
 
     def __init__(self, problem: Problem) -> None:
         """Take a problem whose constraints and bounds hold on the way."""

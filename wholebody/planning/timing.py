@@ -52,6 +52,7 @@ class Pace:
 
     def fastest(self, figure: Figure) -> Array:
         """(nv,) largest velocities; a limit of the figure of 0 counts as none."""
+        checks.instance(figure, Figure, "fastest: figure", "load one with wb.load('human')")
         own = np.array(figure.model.velocityLimit, dtype=float).reshape(-1)
         own = np.where((own > 0.0) & np.isfinite(own), own, np.inf)
         return (

@@ -13,6 +13,8 @@ import pinocchio as pin
 
 from wholebody.base import checks
 from wholebody.base.errors import InputError
+from wholebody.figures.figure import Figure
+from wholebody.figures.joined import join, welded
 from wholebody.geometry.placement import placement as to_placement
 from wholebody.geometry.proximity import PairTable
 from wholebody.geometry.shapes import Box, Capsule, Cylinder, Ellipsoid, Hull, Mesh, Shape, Sphere
@@ -23,8 +25,6 @@ from wholebody.scene.matter.materials import material as to_material
 
 if TYPE_CHECKING:
     from typing_extensions import Self
-
-    from wholebody.figures.figure import Figure
 
 WIDEST_LIKELY, THICKEST_LIKELY = 100.0, 2.0  # m: a wider thing is probably in a smaller unit, unless it is a thin floor
 SHAPES = "give wb.Box, wb.Sphere, wb.Mesh or another"
@@ -39,8 +39,14 @@ class SceneContents(checks.FixedAttributes):
 
     _correction = "make another with wb.Scene(figure), or change its things by add, move and remove"
 
-    def __init__(self, figure: Figure) -> None:
-        """Make a scene with the figure alone; an InputError if it is none."""
+    def __init__(self, figure: Figure | Mapping[str, Any]) -> None:
+        """Make a scene with a figure alone, or with several by name; see `figures.join` for those.
+
+        Raises:
+            InputError: no figure, or several that cannot be joined.
+        """
+        if isinstance(figure, Mapping):
+            figure = join(figure)
         if not isinstance(getattr(figure, "model", None), pin.Model):
             raise InputError(f"Scene takes a figure, not {checks.shown(figure)}; load one with wb.load('human')")
         self.figure = figure
@@ -119,6 +125,40 @@ class SceneContents(checks.FixedAttributes):
         return int(self.figure.frame_id(name))
 
     # ---- changes
+
+    def add_figure(self, figure: Figure, *, name: str, at: Any = (0.0, 0.0, 0.0), root: str | None = None) -> Self:
+        """Add a figure to a scene of figures that have names, and return the scene.
+
+        `scene.figure` is another one then: postures (nq,) become longer by those of the new figure, which come last.
+
+        Args:
+            figure: one figure.
+            name: its name, which comes before the names of its parts: "anna/right_palm".
+            at: where its world is; see `figures.join`.
+            root: "fixed" to fix a free root as in its first posture; None to leave it as it is.
+
+        Raises:
+            InputError: the scene was made of one figure without a name, or the figure, its name, root or placement
+                cannot be used.
+        """
+        checks.text(name, "add_figure: name")
+        checks.instance(figure, Figure, "add_figure: figure", "load one with wb.load('human')")
+        if not self.figure.members:
+            raise InputError(
+                f"add_figure: the scene's figure has no name; make it with wb.Scene({{'anna': figure, {name!r}: ...}})"
+            )
+        if name in self.figure.members:
+            raise InputError(f"add_figure: the scene has a figure {name!r} already; give this one another name")
+        if root is not None:
+            checks.choice(root, ("fixed",), "add_figure: root")
+        known = {other: (member.figure, member.at) for other, member in self.figure.members.items()}
+        made = join({**known, name: (figure if root is None else welded(figure), at)})
+        with self._lock:
+            if taken := next((thing for thing in self._objects if thing in made.segments), None):
+                raise InputError(f"add_figure: the scene has a thing {taken!r} already; give the figure another name")
+            object.__setattr__(self, "figure", made)
+            self._changed()
+        return self
 
     def add(
         self,

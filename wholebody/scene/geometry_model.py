@@ -93,7 +93,18 @@ class SceneGeometry:
         self.table = PairTable(model, geometry, pairs)
         self.number_of = {name: number for number, name in enumerate(pieces_of, start=1)}
         standing: Indices = np.flatnonzero(self.table.joint == 0).astype(np.intp)
-        self.standing = standing, np.array([self.number_of.get(owners[k], 0) for k in standing], dtype=np.intp)
+        # those of joined figures, "anna/seat", have numbers below zero: each figure's its own
+        own = {name: -number for number, name in enumerate({owner.partition("/")[0]: 0 for owner in owners})}
+        self.standing = (
+            standing,
+            np.array(
+                [
+                    self.number_of.get(owners[k], own[owners[k].partition("/")[0]] if "/" in owners[k] else 0)
+                    for k in standing
+                ],
+                dtype=np.intp,
+            ),
+        )
         self.rows = ContactRowBuilder(self.table)
         compiled_kernel()  # of `far_moved`: compile now, not during a solve
         self.lock = Lock()

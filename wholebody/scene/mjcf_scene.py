@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations, product
 from os import PathLike
 from typing import Any
 
 import pinocchio as pin
 
 from wholebody.base.checks import path as as_path
-from wholebody.base.checks import text, warn
+from wholebody.base.checks import some, text, warn
 from wholebody.base.errors import FileFormatError
 from wholebody.base.files import check_file
 from wholebody.figures.link_pieces import Concavity
@@ -28,19 +29,20 @@ MOST_PRISMS = 10_000
 def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Concavity = None) -> Scene:
     """Return the scene of an MJCF file, as MuJoCo compiles it.
 
-    The robot is what `wb.load` returns. The geoms of the world, of static and of mocap bodies are fixed things, at most
-    one for each geom; a body with a free joint alone is a thing that moves by itself, with the mass of the file spread
-    evenly. Geoms that can touch nothing are markers and left out. A height field is one thing of convex prisms; one
-    that needs too many is left out with a warning.
+    The robot is what `wb.load` returns; several have the name of their body before their names. The geoms of the
+    world, of static and of mocap bodies are fixed things, at most one for each geom; a body with a free joint alone is
+    a thing that moves by itself, with the mass of the file spread evenly. Geoms that can touch nothing are markers and
+    left out. A height field is one thing of convex prisms; one that needs too many is left out with a warning.
 
     Args:
         path: the file.
-        root: as for `wb.load`: "fixed", "free", or the name of one of several robots.
+        root: as for `wb.load`: "fixed", "free", or the name of one of several robots, the others being left out; of
+            several robots each keeps its own without it.
         concavity: as for `wb.load`.
 
     Raises:
         FileFormatError: a file that cannot be read, with the place and the correction.
-        InputError: several robots and none chosen, or a concavity out of range.
+        InputError: several robots and a root for all, or a concavity out of range.
         MissingPackageError: MuJoCo is not installed.
     """
     place = as_path(path, "read_scene: path")
@@ -52,9 +54,16 @@ def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Co
     if root is not None:
         text(root, "read_scene: root")
     compiled = Compiled(place)
-    scene = Scene(mjcf_figure(compiled, root, concavity))
     names, model = compiled.names, compiled.model
-    mine = compiled.tree(compiled.robot(None if root in (None, "fixed", "free") else root))
+    if root is None and len(compiled.robots) > 1:
+        robots = {names["body"][top]: top for top in compiled.robots}
+        scene = Scene({_figure_name(name): mjcf_figure(compiled, name, concavity) for name in robots})
+        mine = [body for top in robots.values() for body in compiled.tree(top)]
+        if told := _untested_between(compiled, list(robots.values())):
+            warn(f"{place}: pairs of two robots that the file does not test are tested: {some(told)}")
+    else:
+        scene = Scene(mjcf_figure(compiled, root, concavity))
+        mine = list(compiled.tree(compiled.robot(None if root in (None, "fixed", "free") else root)))
     left: list[str] = []
     _add_fixed(scene, compiled, 0, pin.SE3.Identity(), left)
     for top in compiled.children[0]:
@@ -131,6 +140,29 @@ def _shape(compiled: Compiled, geom: int) -> tuple[Shape, pin.SE3] | None:
         "box": lambda: Box((2.0 * a, 2.0 * b, 2.0 * c)),
     }
     return shapes[kind](), at
+
+
+def _untested_between(compiled: Compiled, robots: Sequence[int]) -> list[str]:
+    """Pairs of bodies of two robots that <exclude> or their contact bits keep from touching."""
+    model, names = compiled.model, compiled.names["body"]
+    excluded = {frozenset((value >> 16, value & 0xFFFF)) for value in map(int, model.exclude_signature)}
+    found = []
+    for first, second in combinations(robots, 2):
+        for one, other in product(compiled.tree(first), compiled.tree(second)):
+            pairs = product(*(filter(compiled.collides, compiled.geoms(body)) for body in (one, other)))
+            meet = [
+                (model.geom_contype[a] & model.geom_conaffinity[b])
+                | (model.geom_contype[b] & model.geom_conaffinity[a])
+                for a, b in pairs
+            ]
+            if meet and (frozenset((one, other)) in excluded or not all(meet)):
+                found.append(f"{names[one]} and {names[other]}")
+    return found
+
+
+def _figure_name(body: str) -> str:
+    """The name of a figure: that of its body, whose slashes would end it."""
+    return body.strip("/").replace("/", "-")
 
 
 def _free_name(scene: Scene, name: str) -> str:

@@ -71,8 +71,9 @@ class TaskFile:
         return TaskFile, (self._place,)
 
     def _figure(self, person: Mapping[str, Any]) -> Entry:
-        entry = self.contents.one("figure")
-        assert entry is not None
+        entry, *others = self.contents.tables["figure"]
+        if others:
+            raise InputError(f"study: {self.path.name} has several figures; people take the place of one: give one")
         for name in person:
             if name not in entry.keys:
                 raise UnknownNameError("option", name, entry.keys, "study: a person")

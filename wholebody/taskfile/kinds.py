@@ -275,18 +275,19 @@ POSITION = Numbers(Vector(3, Range(-FARTHEST, FARTHEST, "m")), "[x, y, z]")
 DIRECTION = Numbers(Vector(3, Range(-1e6, 1e6)), "[x, y, z], any length")
 PLACEMENT = Placement()
 QUATERNION = Numbers(Vector(4, Range(-1.001, 1.001)), "[qx, qy, qz, qw]")
+ROOT = Name("free root", lambda figure: figure.roots)
 JOINT = Name("joint", lambda figure: figure.joints)
-GROUP = Name(
-    "joint or group", lambda figure: {*figure.joints, *figure.groups, *(["root"] if figure.root == "free" else [])}
-)
+GROUP = Name("joint or group", lambda figure: {*figure.joints, *figure.groups, *figure.roots})
 FRAME = Name("frame", lambda figure: {*figure.frames, *figure.segments, *figure.joints})
 SEGMENT = Name("segment", lambda figure: figure.segments)
+MEMBER = Name("figure", lambda figure: figure.members)
 POSTURE = Name("posture", lambda figure: figure.postures)
 PROPORTIONS = ByName(Number(DIMENSION), "dimensions", "sitting_height = 0.93", "m")
 JOINT_VALUES = ByName(
     Number(Range(-2.0 * math.pi, 2.0 * math.pi, "rad")), "joints", "left_elbow_flexion = 0.5",
     "rad (m for sliding joints)", JOINT,
 )  # fmt: skip
+ROOT_PLACES = ByName(PLACEMENT, "free roots", '"anna/root" = [0.0, 0.0, 0.93]', "m", ROOT)
 CONE = Name("reach cone", lambda figure: figure.cones)
 RANGE = Name("range of motion", lambda figure: figure.ranges)
 
@@ -338,3 +339,4 @@ class Table:
     chooser: str = ""  # key that names the type; empty if there are no types
     implied: tuple[tuple[str, str], ...] = ()  # keys that only one type has and that imply it: (key, type)
     forms: dict[str, Form] | None = None  # types by name
+    either: bool = False  # whether it may have one in single brackets, or several in double ones

@@ -81,9 +81,10 @@ def contents_of(path: Path, kind: str, keys: tuple[Key, ...], known: Mapping[str
 def _entries(name: str, data: Any, table: Table, where: Where) -> list[Entry]:
     written = data if isinstance(data, list) else [data]
     wanted = f"[[{name}]]" if table.many else f"[{name}]"
-    if isinstance(data, list) != table.many or not all(isinstance(entry, dict) for entry in written):
+    many = isinstance(data, list)
+    if (many != table.many and not (many and table.either)) or not all(isinstance(entry, dict) for entry in written):
         raise where.in_table(name).fault(f"is written in another way; write {wanted}")
-    places = [where.in_table(name, number + 1 if table.many else 0) for number in range(len(written))]
+    places = [where.in_table(name, number + 1 if many else 0) for number in range(len(written))]
     return [_entry(entry, table, place) for entry, place in zip(written, places, strict=True)]
 
 

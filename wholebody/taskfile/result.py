@@ -47,6 +47,8 @@ def describe(task: Task, solution: Solution, folder: Path) -> dict[str, Any]:
     """Return the content of result.json."""
     figure, q = task.problem.scene.figure, solution.q
     state = State(figure.model).update(q)
+    places = {name: int(figure.model.joints[joint].idx_q) for name, joint in figure.roots.items()}
+    roots = {name: q[first : first + 7].tolist() for name, first in places.items()}
     return {
         "wholebody": __version__,
         "task": os.path.relpath(task.path.resolve(), folder.resolve()),
@@ -61,7 +63,7 @@ def describe(task: Task, solution: Solution, folder: Path) -> dict[str, Any]:
         "goals": [as_dict(goal) for goal in goals_left(task, q)],
         "measures": {type(term).__name__: float(term.value(state)) for term in task.problem.measures},
         "assessment": solution.assessment.summary(),
-        "root": q[:7].tolist() if figure.root == "free" else None,
+        "root": roots.get("root", roots or None),
         "joints": figure.joint_values(q),
         "q": q.tolist(),
     }

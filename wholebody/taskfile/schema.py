@@ -108,7 +108,7 @@ GOALS = {
     "frame": _form(tasks.Frame, "frame target weight", frame=FRAME),
     "orientation": _form(tasks.Orientation, "frame target weight", frame=FRAME),
     "axis": _form(tasks.Axis, "frame axis direction toward weight", frame=FRAME),
-    "center_of_mass": _form(tasks.CenterOfMass, "target axes weight"),
+    "center_of_mass": _form(tasks.CenterOfMass, "target axes weight figure", figure=kinds.MEMBER),
     "relative": _form(tasks.Relative, "frame to placement orientation weight", frame=FRAME, to=FRAME),
     "posture": _form(tasks.Posture, "target joints weight", target=kinds.POSTURE, joints=Several(GROUP)),
     **CONTACTS,
@@ -184,8 +184,14 @@ TOP = _keys(
 )
 
 TABLES = {
-    "figure": Table(_keys(joints=Several(GROUP)), chooser="name", implied=(("path", "urdf"),), forms=FIGURES),
-    "start": Table(_keys(posture=kinds.POSTURE, joints=kinds.JOINT_VALUES, root=PLACEMENT)),
+    "figure": Table(
+        _keys(joints=Several(GROUP), called=Text(), at=PLACEMENT),
+        either=True,
+        chooser="name",
+        implied=(("path", "urdf"),),
+        forms=FIGURES,
+    ),
+    "start": Table(_keys(posture=kinds.POSTURE, joints=kinds.JOINT_VALUES, root=PLACEMENT, roots=kinds.ROOT_PLACES)),
     "object": Table((*_needed(name=Text()), *_THING, *_BODY), True, "shape", forms=SHAPES),
     "attach": Table(
         (*_needed(name=Text(), to=FRAME), *_keys(rests_on=Several(Text())), *_THING), True, "shape", forms=SHAPES

@@ -16,7 +16,7 @@ from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import UnknownNameError
 from wholebody.base.files import is_file, is_folder, title_of
 from wholebody.base.records import with_values
-from wholebody.figures import Figure, load
+from wholebody.figures import Figure, join, load
 from wholebody.geometry.placement import placement
 from wholebody.geometry.shapes import Mesh, Shape
 from wholebody.methods.base import Method
@@ -104,9 +104,22 @@ def task_from(contents: Contents, file: Path) -> Task:
 
 
 def _figure(contents: Contents) -> Figure:
-    entry = contents.one("figure")
-    assert entry is not None
-    options = dict(entry.values)
+    """The figure of the file, or its figures, each with what it is called."""
+    entries = contents.tables["figure"]
+    if not entries[0].where.number and not entries[0].values.keys() & {"called", "at"}:
+        return _loaded(entries[0])
+    found: dict[str, tuple[Figure, Any]] = {}
+    for entry in entries:
+        called = entry.values.get("called")
+        if called is None or called in found:
+            raise entry.where.fault('write called = "anna", another name for each figure: its parts begin with it')
+        found[called] = _loaded(entry), entry.values.get("at", (0.0, 0.0, 0.0))
+    with entries[0].where.named():
+        return join(found)
+
+
+def _loaded(entry: Entry) -> Figure:
+    options = {name: value for name, value in entry.values.items() if name not in ("called", "at")}
     joints = options.pop("joints", None)
     spec: str | Path = entry.name
     if entry.name == "urdf":
@@ -117,7 +130,7 @@ def _figure(contents: Contents) -> Figure:
         figure: Figure = load(spec, **options)
     if joints is None:
         return figure
-    entry.check_names(figure)
+    entry.keys["joints"].kind.names(joints, figure, entry.where.at("joints"))
     with entry.where.at("joints").named():
         return figure.reduced(joints)
 
@@ -138,9 +151,14 @@ def _start(contents: Contents, figure: Figure) -> NDArray[np.float64]:
         )
     if "root" in entry.values:
         if figure.root != "free":
-            raise entry.where.at("root").fault("the figure's root is fixed; leave the key out, or load a free root")
+            correction = "write roots" if figure.members else "leave the key out, or load a free root"
+            raise entry.where.at("root").fault(f"there is no one free root; {correction}")
         with entry.where.at("root").named():
             q[:7] = pin.SE3ToXYZQUAT(placement(entry.values["root"], "root"))
+    for name, place in entry.values.get("roots", {}).items():
+        first = int(figure.model.joints[figure.joint_id(name)].idx_q)
+        with entry.where.at("roots").at(name).named():
+            q[first : first + 7] = pin.SE3ToXYZQUAT(placement(place, name))
     return q
 
 

@@ -61,7 +61,7 @@ def write_task(problem: Problem | Scene, path: str | PathLike[str], *, title: st
         top["range_of_motion"] = False
     if problem.balance is not None:
         top["balance"] = problem.balance
-    parts = [_lines(top), _table("[figure]", _figure(scene.figure, target)), _table("[start]", _start(problem))]
+    parts = [_lines(top), *_figures(scene.figure, target), _table("[start]", _start(problem))]
     for thing in scene.objects.values():
         parts.append(_table("[[object]]" if thing.segment is None else "[[attach]]", _thing(thing, target, beside)))
     parts += [_table("[[goal]]", _term(term, GOALS, "goals", n)) for n, term in enumerate(problem.goals)]
@@ -74,6 +74,15 @@ def write_task(problem: Problem | Scene, path: str | PathLike[str], *, title: st
     for file, text in beside.items():
         files.write(file, text)
     return files.write(target, "\n".join(parts))
+
+
+def _figures(figure: Figure, target: Path) -> list[str]:
+    if not figure.members:
+        return [_table("[figure]", _figure(figure, target))]
+    return [
+        _table("[[figure]]", {"called": name, **_figure(one, target), "at": _seven(at)})
+        for name, (one, at) in figure.members.items()
+    ]
 
 
 def _figure(figure: Figure, target: Path) -> dict[str, Any]:
@@ -105,9 +114,9 @@ def _start(problem: Problem) -> dict[str, Any]:
     start: dict[str, Any] = {"posture": figure.postures[0]}
     if joints:
         start["joints"] = joints
-    if figure.root == "free":
-        start["root"] = q[:7].tolist()
-    return start
+    places = {name: int(figure.model.joints[joint].idx_q) for name, joint in figure.roots.items()}
+    roots = {name: q[first : first + 7].tolist() for name, first in places.items()}
+    return start | ({"root": roots["root"]} if "root" in roots else {"roots": roots} if roots else {})
 
 
 def _thing(thing: SceneObject, target: Path, beside: dict[Path, str]) -> dict[str, Any]:

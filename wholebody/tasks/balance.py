@@ -141,11 +141,13 @@ class Balance(Constraint):
     Attributes:
         feet: names of the segments that carry the figure, including their child segments, such as toes.
         margin: least distance from the edges [m].
+        joints: of the figure that stands, among several; None where there is one.
     """
 
     feet: Feet = ("left_foot", "right_foot")
     _: KW_ONLY
     margin: Margin = 0.0
+    joints: range | None = field(init=False, repr=False, default=None)
     normals: Array = field(init=False, repr=False)  # (m, 2) unit normals of the edges of the support polygon, inward
     offsets: Array = field(init=False, repr=False)  # (m,) of the edges: inside, normals @ x >= offsets [m]
 
@@ -155,13 +157,13 @@ class Balance(Constraint):
 
     def on_polygon(self, corners: Array, scene: Surroundings) -> Balance:
         """Copy that is ready to be evaluated, on a support polygon with these corners (k, 2)."""
-        inputs.check_mass(scene, "Balance")
+        joints = inputs.joints_with_mass(scene, "Balance", self.feet)
         if len(shrunk(corners, self.margin)) == 0:
             raise InputError(
                 f"Balance: a margin of {self.margin:g} m leaves nothing of the support polygon; make it smaller"
             )
         normals, offsets = edges(corners)
-        return filled(self, normals=normals, offsets=offsets)
+        return filled(self, joints=joints, normals=normals, offsets=offsets)
 
     @property
     def lower(self) -> Array:
@@ -170,8 +172,8 @@ class Balance(Constraint):
 
     def value(self, state: State) -> Array:
         """(m,) distance inside each edge [m]."""
-        return np.asarray(self.normals @ state.center_of_mass()[:2] - self.offsets)
+        return np.asarray(self.normals @ state.center_of_mass(self.joints)[:2] - self.offsets)
 
     def jacobian(self, state: State) -> Array:
         """(m, nv)."""
-        return np.asarray(self.normals @ state.center_of_mass_jacobian()[:2])
+        return np.asarray(self.normals @ state.center_of_mass_jacobian(self.joints)[:2])

@@ -26,7 +26,8 @@ class Freeze(Bound):
     """Keep joints as they are at the start, such as the lower body while the upper body works.
 
     Attributes:
-        joints: names of joints and groups; "root" for the figure's placement in the world.
+        joints: names of joints and groups; "root" for the figure's placement in the world, "anna/root" for
+            that of one of several.
     """
 
     _lower: Array
@@ -86,10 +87,10 @@ class StepLimit(Bound):
     def resolve(self, scene: Surroundings, start: Array) -> StepLimit:
         """Find the joints."""
         velocity = np.full(scene.model.nv, self.velocity)
-        if scene.figure.root == "free":
-            root = inputs.find_dofs(scene, ("root",), "StepLimit")
+        for name in scene.figure.roots:
+            root = inputs.find_dofs(scene, (name,), "StepLimit")
             velocity[root[:3]], velocity[root[3:]] = self.root_velocity, self.root_turn
-        elif np.isfinite((self.root_velocity, self.root_turn)).any():
+        if not scene.figure.roots and np.isfinite((self.root_velocity, self.root_turn)).any():
             raise InputError("StepLimit: this figure is fixed to the world; leave root_velocity and root_turn out")
         for name, speed in self.joints.items():
             velocity[inputs.find_dofs(scene, (name,), "StepLimit")] = speed

@@ -41,26 +41,32 @@ class Part(Protocol):
         """Values (m,) and their derivative (m, nv)."""
 
 
-class RoundEnd(NamedTuple):
-    """A point on the round surface of its own piece, which touches there only where the two normals are opposed.
+class OwnSurface(NamedTuple):
+    """A point on the surface of its own piece, which touches there only where the two normals are opposed.
 
     With c the centre of curvature, p the point and P(c) the point of the other surface nearest to c, they are where
     p = P(c). The distances of point and piece say so to second order alone, by r (1 - cos t) for an angle t: their
     derivatives are the same there. The two rows t_k . (p - P(c)) do not vanish. They may be as large as leaves the
     point at most `ROUND_DEPTH` off where the piece touches; within that, the distance is that of the piece.
+
+    Of a flat face any point behind p serves as c: what does not penetrate the face is nearest to it at p. The distances
+    of point and corners meet there as well, without a direction in which all of them give way.
     """
 
     middle: Surface  # c as a surface
-    radius: float  # of the piece [m]
+    radius: float  # of the piece, or of a flat face about the point [m]
     across: Array  # (2, 3) t_k, two directions in the axes of the joint, along the surface at the point
+    flat: bool = False
 
     @property
     def room(self) -> float:
-        """What the rows may be in any direction along the surface [m]."""
-        return float(np.sqrt(2.0 * self.radius * ROUND_DEPTH))
+        """What the rows may be in any direction along the surface [m]: a corner of a face is as deep as they are."""
+        return ROUND_DEPTH if self.flat else float(np.sqrt(2.0 * self.radius * ROUND_DEPTH))
 
     def nearest(self, near: Nearest, other: Surface, state: State) -> Nearest:
         """The nearest points of the piece and the other surface where the point is about there, else of the point."""
+        if self.flat:
+            return near
         of_middle = nearest(self.middle, other, state)
         distance = max(of_middle.distance - self.radius, near.distance - ROUND_DEPTH)
         return with_values(of_middle if distance > near.distance - ROUND_DEPTH else near, distance=distance)
@@ -88,19 +94,19 @@ class Gap(NamedTuple):
     first: Surface  # the surfaces
     second: Surface
     face: Face | None = None  # the face of the second that the first is to lie on; None where any side will do
-    end: RoundEnd | None = None  # of a first surface that is a point on its own round piece
+    own: OwnSurface | None = None  # of a first surface that is a point on its own piece
     in_radians: tuple[bool, ...] = (False,)
 
     def rows(self, state: State) -> tuple[Array, Array]:
         """The distance, and a force along the normal."""
         near = nearest(self.first, self.second, state)
-        if self.end is not None:
-            near = self.end.nearest(near, self.second, state)
+        if self.own is not None:
+            near = self.own.nearest(near, self.second, state)
         wrench = through(near.point, near.normal[None])
         return np.array([near.distance]), between(state, wrench, near.joint, near.against)
 
     def planes(self, state: State) -> SupportingPlanes:
-        """Of faces and edges that what touches is not beyond, and of the angle between the normals at a round end."""
+        """Of faces and edges that what touches is not beyond, and of the angle where a point is on its own piece."""
         near = nearest(self.first, self.second, state)
         if near.distance > PLANES_WITHIN:
             return no_planes(state.model.nv)
@@ -115,21 +121,18 @@ class Gap(NamedTuple):
         value = np.array([plane.value for plane in found])
         rows = state.rows(wrench, np.ascontiguousarray(of), np.ascontiguousarray(against))
         key = np.array([plane.key for plane in found], dtype=np.intp)
-        if self.end is None:
+        if self.own is None or self.own.flat:
             turned = through(near.point, bends(self.first, self.second, near, state))
-            bend = between(state, turned, near.joint, near.against)
-            return SupportingPlanes(value, rows, key, bend, np.zeros(len(bend), dtype=np.intp))
-        bend = between(state, self.end.bends(self.second, state), near.joint, near.against)
-        upright, turns = self.end.rows(self.first, self.second, near, state)
-        sides = 2.0 * np.pi * np.arange(8) / 8  # of the octagon within the circle of the room
-        ways, room = np.column_stack([np.cos(sides), np.sin(sides)]), self.end.room * np.cos(np.pi / 8)
-        return SupportingPlanes(
-            np.concatenate([value, ways @ upright - room]),
-            np.vstack([rows, ways @ turns]),
-            np.concatenate([key, 2 * MOST_FACES + np.arange(8)]),
-            bend,
-            np.zeros(len(bend), dtype=np.intp),
-        )
+        else:
+            turned = self.own.bends(self.second, state)
+        bend = between(state, turned, near.joint, near.against)
+        if self.own is not None:
+            upright, turns = self.own.rows(self.first, self.second, near, state)
+            sides = 2.0 * np.pi * np.arange(8) / 8  # of the octagon within the circle of the room
+            ways, room = np.column_stack([np.cos(sides), np.sin(sides)]), self.own.room * np.cos(np.pi / 8)
+            value, rows = np.concatenate([value, ways @ upright - room]), np.vstack([rows, ways @ turns])
+            key = np.concatenate([key, 2 * MOST_FACES + np.arange(8)])
+        return SupportingPlanes(value, rows, key, bend, np.zeros(len(bend), dtype=np.intp))
 
 
 class Near(NamedTuple):

@@ -34,12 +34,13 @@ def default_measures(scene: Surroundings, start: Array, *, ranges: bool) -> tupl
 
 
 def default_constraints(
-    scene: Surroundings, start: Array, known: Set[type], *, ranges: bool, balance: bool, required: bool
+    scene: Surroundings, start: Array, known: Set[type], *, ranges: bool, standing: Sequence[str], required: bool
 ) -> tuple[tuple[Constraint, ...], str]:
     """What is added to the constraints that were stated; a stated term takes the place of the default of its class.
 
-    A person who stands at the start on a line, such as the tips of two toes, keeps no balance that is measured by an
-    area. The default is left out there, unless it is required.
+    `standing` are the figures that keep their balance, by what their names begin with. One who stands at the start on a
+    line, such as the tips of two toes, keeps no balance that is measured by an area. The default is left out there,
+    unless it is required.
     """
     figure = scene.figure
     found: list[Constraint] = []
@@ -47,33 +48,63 @@ def default_constraints(
         found.append(RangeOfMotion().resolve(scene, start))
     if ranges and figure.ranges and figure.cones and ReachCones not in known:
         found.append(ReachCones().resolve(scene, start))
-    if not balance or known & {Balance, Stand}:
-        return tuple(found), ""
-    try:
-        corners = convex_polygon(standing_points(scene, start, FEET)[:, :2])
-        inputs.check_mass(scene, "Balance")
-    except InputError as error:
-        if required:
-            raise
-        return tuple(
-            found
-        ), f"the default Balance is left out: {str(error).removeprefix('Balance: ').partition(';')[0]}"
-    return (*found, Balance(margin=STEADY * least_width(corners)).on_polygon(corners, scene)), ""
+    left_out = ""
+    for body in standing:
+        feet = tuple(body + foot for foot in FEET)
+        try:
+            corners = convex_polygon(standing_points(scene, start, feet)[:, :2])
+            found.append(Balance(feet, margin=STEADY * least_width(corners)).on_polygon(corners, scene))
+        except InputError as error:
+            if required:
+                raise
+            why = str(error).removeprefix("Balance: ").partition(";")[0]
+            left_out = f"the default Balance is left out: {body}{': ' if body else ''}{why}"
+    return tuple(found), left_out
 
 
-def stands(
-    scene: Surroundings, state: State, stated: Sequence[Constraint], bounds: Sequence[Bound], goals: Sequence[Goal]
+def standing(
+    scene: Surroundings, state: State, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound]
+) -> tuple[str, ...]:
+    """The persons who stand, by what the names of each begin with; see `_stands`."""
+    figure = scene.figure
+    return tuple(
+        body
+        for body in balancing(scene, terms)
+        if figure.ranges and f"{body}root" in figure.roots and _stands(scene, state, terms, bounds, body)
+    )
+
+
+def balancing(scene: Surroundings, terms: Sequence[Constraint | Goal]) -> tuple[str, ...]:
+    """The figures with feet, by what their names begin with, of which no term says how they stand."""
+    figure = scene.figure
+    told = [inputs.body_of(scene, term.feet) for term in terms if isinstance(term, (Balance, Stand))]
+    return tuple(
+        body
+        for body in figure.bodies
+        if body not in told and (body == "" or {body + foot for foot in FEET} <= set(figure.segments))
+    )
+
+
+def _stands(
+    scene: Surroundings, state: State, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound], body: str
 ) -> bool:
     """Whether a person stands: both feet are held where they are at the start, and nothing else carries it."""
     figure = scene.figure
-    if figure.root != "free" or not figure.ranges or not set(FEET) <= set(figure.segments):
+    feet_names = [body + foot for foot in FEET]
+    if not set(feet_names) <= set(figure.segments):
         return False
-    if any(isinstance(bound, Freeze) and "root" in figure.joint_names(bound.joints) for bound in bounds):
+    root = f"{body}root"
+    if any(isinstance(bound, Freeze) and root in figure.joint_names(bound.joints) for bound in bounds):
         return False
-    if any(isinstance(term, (Sit, Lean)) for term in (*stated, *goals)):
+    if any(isinstance(term, (Sit, Lean)) and str(term.frame).startswith(body) for term in terms):
         return False
-    feet = {int(scene.model.frames[figure.frame_id(foot)].parentJoint) for foot in FEET}
-    holds = [term for term in stated if isinstance(term, Hold) and not term.residual.base.frame]
+    feet = {int(scene.model.frames[figure.frame_id(foot)].parentJoint) for foot in feet_names}
+    mine = figure.bodies[body]
+    holds = [
+        term
+        for term in terms
+        if isinstance(term, Hold) and not term.residual.base.frame and (not body or term.residual.place.joint in mine)
+    ]
     if {term.residual.place.joint for term in holds} != feet:
         return False
     # m, rad: a foot held this near to its place at the start stands where the support polygon is computed.

@@ -60,7 +60,11 @@ class Discomfort(Measure):
         ends = np.array([limits.upper[moves], limits.lower[moves]])
         span = ends[0] - ends[1]
         weights = figure.effort_weights[idx_v]
-        weights = weights / (max(float(weights.max(initial=0.0)), LEAST_CURVATURE) * span * span)
+        greatest = np.ones(len(weights))
+        for joints in figure.bodies.values():  # each figure's weights over the greatest of its own
+            mine = np.isin(idx_v, [figure.model.joints[k].idx_v for k in joints])
+            greatest[mine] = max(float(weights[mine].max(initial=0.0)), LEAST_CURVATURE)
+        weights = weights / (greatest * span * span)
         phase = STEEPNESS * np.array([-1.0 / span, 1.0 / span])
         return filled(self, limited=LimitedJoints(idx_q, idx_v, figure.neutral[idx_q], weights, ends, phase))
 

@@ -54,7 +54,7 @@ class Grasp(ContactTerm):
     Use it as a goal or as a constraint. The clearance between hand and thing is zero.
 
     Attributes:
-        hand: "left" or "right", or the hand's segment.
+        hand: "left" or "right", or the hand's segment; "anna/left" of one of several figures.
         thing: what is taken.
         kind: "palm", "power", "pinch" or "fingertips".
         side: (3,) for a palm, direction in the world in which the face looks; by default a left hand takes the face on
@@ -88,11 +88,17 @@ class Grasp(ContactTerm):
     @property
     def frame(self) -> str:
         """The frame of the grasp."""
-        return f"{self._side}_palm"
+        return f"{self._own}_palm"
 
     @property
     def _side(self) -> str:
-        return self.hand.split("_")[0]
+        return self._own.rpartition("/")[2]
+
+    @property
+    def _own(self) -> str:
+        """What the names of the hand's frames and segments begin with: "left", "anna/left"."""
+        figure, slash, hand = self.hand.rpartition("/")
+        return f"{figure}{slash}{hand.split('_')[0]}"
 
     def resolve(self, scene: Surroundings, start: Array) -> Grasp:
         """Find the hand, and the face, bar or sides that it takes."""
@@ -158,14 +164,14 @@ class Grasp(ContactTerm):
         """Of a pinch or of all fingertips: they touch, and the thumb opposes the others."""
         known = set(scene.figure.segments)
         wanted = FINGERS if self.kind == "fingertips" else FINGERS[:2]
-        ends = [f"{self._side}_{finger}_distal" for finger in wanted]
+        ends = [f"{self._own}_{finger}_distal" for finger in wanted]
         if not set(ends) <= known and self.kind == "fingertips":
             raise InputError(
                 f"{where}: kind 'fingertips' needs a hand with fingers; load the person with hands='fingers', "
                 "or take the thing by kind 'pinch'"
             )
         if not set(ends) <= known:
-            ends = [f"{self._side}_{finger}_tip" for finger in wanted]
+            ends = [f"{self._own}_{finger}_tip" for finger in wanted]
             missing = [end for end in ends if not scene.model.existFrame(end)]
             if missing:
                 raise InputError(
@@ -188,14 +194,15 @@ class Grasp(ContactTerm):
         if bar is not None and (self.along is not None or bar.half[2] > 2.0 * bar.half[1]):
             low, high = self._room(float(bar.half[2]))
             lengthwise = with_values(bar, axes=bar.axes[::-1])
-            tip = inputs.find_place(scene, f"{self._side}_index_tip", where)
+            tip = inputs.find_place(scene, f"{self._own}_index_tip", where)
             parts.append(Over(tip, lengthwise, np.array([low]), np.array([high])))
         return parts
 
     def _outwards(self, scene: Surroundings, state: State) -> Array:
-        """Direction (3,) in the world to the hand's side, by the heading of the figure's root at the start."""
+        """Direction (3,) in the world to the hand's side, by the heading of its figure's root at the start."""
         left = 1.0 if self._side == "left" else -1.0
-        ahead = state.data.oMi[1].rotation[:2, 0] if scene.figure.root == "free" else np.zeros(2)
+        root = inputs.root_of(scene, inputs.find_place(scene, self.frame, "Grasp"))
+        ahead = state.data.oMi[root].rotation[:2, 0] if root else np.zeros(2)
         length = float(np.hypot(*ahead))
         x, y = ahead / length if length >= 1e-6 else (1.0, 0.0)
         return np.array((-left * y, left * x, 0.0))
@@ -211,7 +218,7 @@ class Grasp(ContactTerm):
         found = {}
         for finger in FINGERS:
             kinds = ("proximal" if finger == "thumb" else "middle", "distal")
-            parts = {f"{self._side}_{finger}_{kind}" for kind in kinds}
+            parts = {f"{self._own}_{finger}_{kind}" for kind in kinds}
             if owned := parts.intersection(scene.figure.segments):
-                found[finger] = joined(scene, f"{self._side}_{finger}", owned)
+                found[finger] = joined(scene, f"{self._own}_{finger}", owned)
         return found

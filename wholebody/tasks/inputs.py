@@ -54,6 +54,18 @@ def find_base(scene: Surroundings, name: str | None, moved: str, where: str) -> 
     return base
 
 
+def body_of(scene: Surroundings, frames: Sequence[str]) -> str | None:
+    """What the names of the figure begin with that all these frames belong to; None if they are of several."""
+    found = {body for body in scene.figure.bodies for frame in frames if str(frame).startswith(body)}
+    return found.pop() if len(found) == 1 else None
+
+
+def root_of(scene: Surroundings, place: Place) -> int:
+    """Index of the joint of the free root that carries a frame; 0, the world, for one of a fixed figure."""
+    roots = set(scene.figure.roots.values())
+    return next((int(joint) for joint in scene.model.supports[place.joint] if joint in roots), 0)
+
+
 def find_dofs(scene: Surroundings, names: Sequence[str], where: str) -> Indices:
     """Tangent indices (k,) of joints and groups."""
     try:
@@ -124,7 +136,18 @@ Target: TypeAlias = Annotated[PlacementLike, target_placement]
 Name: TypeAlias = Annotated[str, name]
 
 
-def check_mass(scene: Surroundings, where: str) -> None:
-    """Check that a moving part of the figure has mass; otherwise its centre of mass is undefined."""
-    if not any(inertia.mass > 0.0 for inertia in list(scene.model.inertias)[1:]):
-        raise InputError(f"{where}: nothing of {scene.figure.name} that moves has mass; leave it out")
+def joints_with_mass(scene: Surroundings, where: str, frames: Sequence[str] = ()) -> range | None:
+    """The joints whose centre of mass counts: None for all, or those of the one figure that has these frames.
+
+    An InputError if the frames are of several figures, or if nothing of the figure that moves has mass.
+    """
+    figure, joints = scene.figure, None
+    if frames and len(figure.bodies) > 1:
+        body = body_of(scene, frames)
+        if body is None:
+            raise InputError(f"{where}: {', '.join(frames)} are of several figures; state one {where} for each")
+        joints = figure.bodies[body]
+    inertias = list(scene.model.inertias)
+    if not any(inertias[k].mass > 0.0 for k in joints or range(1, len(inertias))):
+        raise InputError(f"{where}: nothing of {figure.name} that moves has mass; leave it out")
+    return joints

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import settle
+from wholebody.base.checks import known, settle
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Constraint, Goal, Surroundings, filled
@@ -60,12 +60,16 @@ class CenterOfMass(Goal):
         target: (3,) position in the world [m].
         axes: "xyz", or "xy" to leave the height free.
         weight: factor on the squared error [1/m^2].
+        figure: name of the figure whose centre of mass it is; None for all figures of the scene together.
+        joints: its joints; None for all of the scene.
     """
 
     target: inputs.Position
     _: KW_ONLY
     axes: Literal["xy", "xyz"] = "xyz"
     weight: inputs.Weight = 1.0
+    figure: str | None = None
+    joints: range | None = field(init=False, repr=False, default=None)
     resolved_target: Array = field(init=False, repr=False)  # (2,) or (3,) the components of `target` along `axes` [m]
 
     def __post_init__(self) -> None:
@@ -74,17 +78,19 @@ class CenterOfMass(Goal):
         settle(self, "resolved_target", self.resolved_target[: len(self.axes)])
 
     def resolve(self, scene: Surroundings, start: Array) -> CenterOfMass:
-        """The goal itself; InputError if no moving part has mass."""
-        inputs.check_mass(scene, "CenterOfMass")
-        return self
+        """Find the figure; InputError if no moving part of it has mass."""
+        frames: tuple[str, ...] = ()
+        if self.figure is not None:
+            frames = (f"{known(self.figure, scene.figure.members, 'figure', 'CenterOfMass')}/",)
+        return filled(self, joints=inputs.joints_with_mass(scene, "CenterOfMass", frames))
 
     def error(self, state: State) -> Array:
         """(2,) or (3,) from the target to the centre of mass [m]."""
-        return np.asarray(state.center_of_mass()[: len(self.axes)] - self.resolved_target)
+        return np.asarray(state.center_of_mass(self.joints)[: len(self.axes)] - self.resolved_target)
 
     def jacobian(self, state: State) -> Array:
         """(2, nv) or (3, nv)."""
-        return state.center_of_mass_jacobian()[: len(self.axes)]
+        return state.center_of_mass_jacobian(self.joints)[: len(self.axes)]
 
 
 @dataclass(frozen=True, eq=False)

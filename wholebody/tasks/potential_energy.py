@@ -45,8 +45,8 @@ class PotentialEnergy(Measure):
         """Compute the weights of the segments, and their heights in the neutral posture."""
         model = scene.model
         neutral = np.array(scene.figure.neutral, dtype=float)
-        if scene.figure.root == "free":
-            root = model.joints[1]
+        for joint in scene.figure.roots.values():
+            root = model.joints[joint]
             neutral[root.idx_q : root.idx_q + root.nq] = start[root.idx_q : root.idx_q + root.nq]
         state = State(model).update(neutral)
         joints = np.array([k for k in range(1, model.njoints) if model.inertias[k].mass > 0.0], dtype=np.intp)

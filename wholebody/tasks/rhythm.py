@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, TypeAlias
 
@@ -60,6 +60,7 @@ class Lumbar(NamedTuple):
 
     idx_q: Three  # their flexion: places in the posture
     idx_v: Three  # the same in the tangent
+    root: tuple[int, int]  # of the root: its first place in the posture, and in the tangent
     rest: float  # what they have beyond their share at the start, radians
 
 
@@ -79,24 +80,27 @@ class Rhythm(Measure):
 
     Attributes:
         weight: factor on the measure.
-        knees: knees with their hips, once resolved; they count where there is a lumbar spine.
+        girdles: clavicles with their arms, once resolved; those of each of several figures.
+        knees: knees with their hips; they count where there is a lumbar spine.
+        lumbar: the lumbar spine of each figure with a free root.
     """
 
     weight: inputs.Weight = 1.0
-    girdles: tuple[Elevation, ...] = field(init=False, repr=False)  # clavicles with their arms
+    girdles: tuple[Elevation, ...] = field(init=False, repr=False)
     knees: tuple[Elevation, ...] = field(init=False, repr=False)
-    lumbar: Lumbar | None = field(init=False, repr=False)  # the lumbar spine; None without a free root
+    lumbar: tuple[Lumbar, ...] = field(init=False, repr=False)
 
     def resolve(self, scene: Surroundings, start: Array) -> Rhythm:
         """Find the joints, and what the lumbar spine has at the start."""
         figure = scene.figure
-        girdles, lumbar = girdles_of(figure), _lumbar(figure, start)
-        if not girdles and lumbar is None:
+        girdles = girdles_of(figure)
+        spines = {body: spine for body in figure.bodies for spine in _lumbar(figure, start, body)}
+        if not girdles and not spines:
             raise InputError("Rhythm: this figure has no clavicles and no lumbar spine; leave the measure out")
         names = ("knee_flexion", "hip_flexion", "hip_abduction")
-        knees = _elevations(figure, names, KNEE_WEIGHT, KNEE_SHARE, KNEE_ONSET) if lumbar is not None else ()
+        knees = _elevations(figure, names, KNEE_WEIGHT, KNEE_SHARE, KNEE_ONSET, spines)
         knees = tuple(with_values(knee, rest=_beyond(start, knee)[0]) for knee in knees)
-        return filled(self, girdles=girdles, knees=knees, lumbar=lumbar)
+        return filled(self, girdles=girdles, knees=knees, lumbar=tuple(spines.values()))
 
     def value(self, state: State) -> float:
         """The measure."""
@@ -131,9 +135,10 @@ class Rhythm(Measure):
         for part in (*self.girdles, *self.knees):
             excess, slopes = _beyond(q, part)
             found.append((part.weight, excess, list(part.idx_v), np.array(slopes)))
-        if self.lumbar is not None:
-            excess, turn = _bent(q, self.lumbar)
-            found.append((LUMBAR_WEIGHT, excess, [*self.lumbar.idx_v, 4, 5], np.array([1.0, 1.0, 1.0, *turn])))
+        for spine in self.lumbar:
+            excess, turn = _bent(q, spine)
+            places = [*spine.idx_v, spine.root[1] + 4, spine.root[1] + 5]
+            found.append((LUMBAR_WEIGHT, excess, places, np.array([1.0, 1.0, 1.0, *turn])))
         return found
 
 
@@ -144,13 +149,13 @@ def girdles_of(figure: Figure) -> tuple[Elevation, ...]:
     # - cos(elevation), which stays within 4 degrees of 0.2 (elevation - 30 degrees). The scapula turns upward by 0.43
     # degrees for each of the arm in its socket (Braman et al. 2009, Journal of Shoulder and Elbow Surgery 18(6)), about
     # half of it at the inner end of the clavicle: ESTIMATE.
-    return _elevations(figure, parts, CLAVICLE_WEIGHT, math.radians(13.0), 0.0)
+    return _elevations(figure, parts, CLAVICLE_WEIGHT, math.radians(13.0), 0.0, figure.bodies)
 
 
 def _elevations(
-    figure: Figure, parts: tuple[str, str, str], weight: float, most: float, onset: float
+    figure: Figure, parts: tuple[str, str, str], weight: float, most: float, onset: float, bodies: Iterable[str]
 ) -> tuple[Elevation, ...]:
-    sides = ([f"{side}_{part}" for part in parts] for side in ("left", "right"))
+    sides = ([f"{body}{side}_{part}" for part in parts] for body in bodies for side in ("left", "right"))
     found = [Elevation(*_places(figure, names), weight, most, onset=onset) for names in sides if _has(figure, names)]
     return tuple(found)
 
@@ -165,12 +170,14 @@ def _places(figure: Figure, names: Sequence[str]) -> tuple[Three, Three]:
     return (a.idx_q, b.idx_q, c.idx_q), (a.idx_v, b.idx_v, c.idx_v)
 
 
-def _lumbar(figure: Figure, start: Array) -> Lumbar | None:
-    names = [f"spine{level}_flexion" for level in (1, 2, 3)]
-    if figure.root != "free" or not _has(figure, names):
-        return None
-    part = Lumbar(*_places(figure, names), 0.0)
-    return with_values(part, rest=_bent(start, part)[0])
+def _lumbar(figure: Figure, start: Array, body: str) -> tuple[Lumbar, ...]:
+    """The lumbar spine of the figure whose names begin with `body`; none without it or without a free root."""
+    names = [f"{body}spine{level}_flexion" for level in (1, 2, 3)]
+    if f"{body}root" not in figure.roots or not _has(figure, names):
+        return ()
+    root = figure.model.joints[figure.roots[f"{body}root"]]
+    part = Lumbar(*_places(figure, names), (int(root.idx_q), int(root.idx_v)), 0.0)
+    return (with_values(part, rest=_bent(start, part)[0]),)
 
 
 def _beyond(q: Array, part: Elevation) -> tuple[float, tuple[float, float, float]]:
@@ -190,7 +197,7 @@ def _beyond(q: Array, part: Elevation) -> tuple[float, tuple[float, float, float
 
 def _bent(q: Array, lumbar: Lumbar) -> tuple[float, tuple[float, float]]:
     """Flexion of the lumbar spine beyond its share [rad], and its slopes by turns of the root about its y and z."""
-    x, y, z, w = (float(value) for value in q[3:7])
+    x, y, z, w = (float(value) for value in q[lumbar.root[0] + 3 : lumbar.root[0] + 7])
     forward, left, up = 2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)
     # The root's x axis dips by sin(tilt) = -forward, the height of that axis.
     share = math.tanh(-LUMBAR_RATE * forward)

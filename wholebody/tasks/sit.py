@@ -64,7 +64,9 @@ class Sit(ContactTerm):
         # m: how much higher than on the deepest point of the pelvis and thighs the pelvis may sit
         deep = _depth(scene, self.pelvis, place) + 0.01
         over = Over(place, seat, np.append(-edge, -np.inf), np.append(edge, deep))
-        left = upright(scene).frame(place.frame).rotation.T @ np.array((0.0, 1.0, 0.0))
+        rest = upright(scene)
+        root = inputs.root_of(scene, place)  # in the first posture it looks ahead, wherever that is
+        left = rest.frame(place.frame).rotation.T @ rest.data.oMi[root].rotation[:, 1]
         parts: list[Part] = [Gap(bottom, thing, seat), over]
         touches = owner_pairs(bottom.owners, thing.owners)
         if self.back is None:
@@ -73,18 +75,18 @@ class Sit(ContactTerm):
             at_back = surface(scene, self.back, where)
             upper = joined(scene, self.trunk, _trunk(scene, place, trunk))
             middle = seat.at(state)[0]
-            rest = face(scene, self.back, _level(middle - _middle(at_back, state, middle, where), where), state, where)
-            to_left = _level(np.cross(UP, rest.at(state)[1][2]), where)
+            side = face(scene, self.back, _level(middle - _middle(at_back, state, middle, where), where), state, where)
+            to_left = _level(np.cross(UP, side.at(state)[1][2]), where)
             lower = joined(scene, self.pelvis, [self.pelvis])
             # m: how far the pelvis may be from the back; more, and the figure slouches
-            parts += [Gap(upper, at_back, rest), Near(lower, at_back, 0.06, rest)]
-            parts += [Facing(place, across(left), rest, rest.at(state)[1] @ to_left)]
+            parts += [Gap(upper, at_back, side), Near(lower, at_back, 0.06, side)]
+            parts += [Facing(place, across(left), side, side.at(state)[1] @ to_left)]
             touches += owner_pairs([*upper.owners, *lower.owners], at_back.owners)
         return filled(self, parts=tuple(parts), touches=touches)
 
 
 def upright(scene: Surroundings) -> State:
-    """The state of the figure's first posture, in which it looks along x."""
+    """The state of the figure's first posture, in which it is upright."""
     return State(scene.model).update(scene.figure.posture(scene.figure.postures[0]))
 
 

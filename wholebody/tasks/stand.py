@@ -74,8 +74,8 @@ class Stand(TermOfParts):
             corners += [np.asarray(inside.act(point)) for point in lows]
             joints += [place.joint] * len(lows)
         if self.balance:
-            inputs.check_mass(scene, where)
-            polygon = SolePolygon(np.array(corners), np.array(joints, dtype=np.intp))
+            mass = inputs.joints_with_mass(scene, where, self.feet)
+            polygon = SolePolygon(np.array(corners), np.array(joints, dtype=np.intp), mass)
             if not (polygon.rows(state)[0] < FAR_INSIDE).any():
                 raise InputError(f"{where}: the soles are a line, not an area; name more feet, or leave balance out")
             parts.append(polygon)
@@ -105,6 +105,7 @@ class SolePolygon(NamedTuple):
 
     points: Array  # (m, 3) in the axes of their joints [m]
     joints: Indices  # (m,) joint that carries each
+    mass: range | None  # joints of the figure whose centre of mass it is; None for all
 
     @property
     def in_radians(self) -> tuple[bool, ...]:
@@ -124,7 +125,7 @@ class SolePolygon(NamedTuple):
     def rows(self, state: State) -> tuple[Array, Array]:
         """Distances (m,) inside the edges and their derivative (m, nv); `FAR_INSIDE` and zero for no corner."""
         points = self._placed(state)
-        center, moves = state.center_of_mass(), state.center_of_mass_jacobian()
+        center, moves = state.center_of_mass(self.mass), state.center_of_mass_jacobian(self.mass)
         values, rows = np.full(len(points), FAR_INSIDE), np.zeros((len(points), state.model.nv))
         begin = np.array(hull_corners(points[:, :2]), dtype=np.intp)
         if not len(begin):

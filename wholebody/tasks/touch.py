@@ -12,12 +12,14 @@ from wholebody.base.checks import shown
 from wholebody.base.errors import InputError
 from wholebody.base.records import with_values
 from wholebody.figures.state import State
-from wholebody.geometry.pieces import swept_points
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import Surroundings, filled
-from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, RoundEnd, owner_pairs
+from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, OwnSurface, owner_pairs
 from wholebody.tasks.surfaces import Surface, carried_by, face, nearest, surface
+
+ON_SURFACE = 1e-6  # m: a point this near to a surface of its own piece is on it
+WITHIN_FACE = 1e-3  # m: and one on a face is within it if it is this far from all others
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,8 +28,9 @@ class Touch(ContactTerm):
 
     The value is the signed distance of the two surfaces [m]: positive apart, negative in an overlap. Its derivative is
     that of the nearest points along the normal. A frame on the round end of its own piece counts as touching where the
-    piece does, if it is at most 8e-6 m off there. Use it as a goal or as a constraint. The clearance of what is to
-    touch is zero, for a frame that of the segment which carries it. A thing that is moved is touched where it is.
+    piece does, if it is at most 8e-6 m off there; one within a flat face lays that on what it touches. Use it as a goal
+    or as a constraint. The clearance of what is to touch is zero, for a frame that of the segment which carries it. A
+    thing that is moved is touched where it is.
 
     Attributes:
         part: name of a segment, of a piece such as "left_hand:0", or of a frame, whose origin then touches. Of a link
@@ -57,7 +60,7 @@ class Touch(ContactTerm):
         check_apart(first, second, where)
         return filled(
             self,
-            parts=(Gap(first, second, end=round_end(scene, first)),),
+            parts=(Gap(first, second, own=own_surface(scene, first)),),
             touches=owner_pairs(touched(scene, first), touched(scene, second)),
         )
 
@@ -99,24 +102,32 @@ class Lean(ContactTerm):
         return filled(self, parts=parts, touches=owner_pairs(touched(scene, first), second.owners))
 
 
-def round_end(scene: Surroundings, point: Surface) -> RoundEnd | None:
-    """The round piece on whose surface a point is; None for other surfaces and places."""
+def own_surface(scene: Surroundings, point: Surface) -> OwnSurface | None:
+    """The piece on whose round surface, or within whose face, a point is; None for other surfaces and places."""
     if point.fixed is None:
         return None
     own = carried_by(scene, point.name, point.joints[0])
-    for index, shape in zip(own.pieces, own.shapes, strict=True):
-        swept = swept_points(shape)
-        if not swept.radius:
-            continue
+    for index, swept in zip(own.pieces, own.swept, strict=True):
         place = scene.geometry.geometryObjects[index].placement
         there = place.actInv(point.fixed.translation)
-        low, high = swept.points.min(axis=0), swept.points.max(axis=0)
-        center = np.clip(there, low, high)  # a sphere's centre, or the segment of a capsule along its own axis
-        # m: a point this near to a surface of its own piece is on it
-        if abs(float(np.linalg.norm(there - center)) - swept.radius) <= 1e-6:
+        if swept.radius:
+            low, high = swept.points.min(axis=0), swept.points.max(axis=0)
+            center = np.clip(there, low, high)  # a sphere's centre, or the segment of a capsule along its own axis
+            size = float(swept.radius)
+        elif len(swept.faces) > 1:
+            behind = swept.faces[:, 3] - swept.faces[:, :3] @ there  # m: how far in front of the point each face is
+            face = swept.faces[np.argmin(behind)]
+            if np.sum(behind < WITHIN_FACE) > 1:
+                continue  # a point on an edge leaves the piece room to turn
+            on_it = swept.points[face[3] - swept.points @ face[:3] <= ON_SURFACE]
+            size = float(np.linalg.norm(on_it - there, axis=1).max(initial=WITHIN_FACE))
+            center = there - size * face[:3] if np.abs(behind).min() <= ON_SURFACE else there
+        else:
+            continue
+        if abs(float(np.linalg.norm(there - center)) - size) <= ON_SURFACE:
             basis = across(place.rotation @ (there - center) / float(np.linalg.norm(there - center)))
             middle = with_values(point, fixed=pin.SE3(np.eye(3), place.act(center)))
-            return RoundEnd(middle, float(swept.radius), basis[:2])
+            return OwnSurface(middle, size, basis[:2], not swept.radius)
     return None
 
 

@@ -124,6 +124,7 @@ def root_distances(tables: Array, places: Integers, q: Array, measure: Array) ->
     at, target, error, slope = np.zeros((1, 3), dtype=np.int64), np.empty((1, 12)), np.zeros(6), np.zeros((6, 6))
     last = measure.shape[1] - 1
     for e in range(len(tables)):
+        at[0, 1] = places[e, 0]
         for k in range(12):
             target[0, k] = tables[e, k]
         roots(target, at, q, error, slope)
@@ -131,7 +132,7 @@ def root_distances(tables: Array, places: Integers, q: Array, measure: Array) ->
             force = tables[e, 12 + i] * error[i]
             measure[0, last] += force * error[i]
             for v in range(6):
-                measure[0, v] += 2.0 * force * slope[i, v]
+                measure[0, places[e, 1] + v] += 2.0 * force * slope[i, v]
 
 
 @compiled(inner=True)
@@ -165,15 +166,16 @@ def rhythms(
             at[k] = elevation_places[e, 3 + k]
         _square(elevations[e, 0], excess, slopes[:3], at[:3], measure, squares, e)
     for e in range(len(lumbars)):
-        x, y, z, w = q[3], q[4], q[5], q[6]
+        root, first = lumbar_places[e, 6], lumbar_places[e, 7]
+        x, y, z, w = q[root + 3], q[root + 4], q[root + 5], q[root + 6]
         share = np.tanh(-lumbars[e, 2] * 2.0 * (x * z - y * w))
         steep = lumbars[e, 1] * lumbars[e, 2] * (1.0 - share * share)
         excess = -lumbars[e, 1] * share - lumbars[e, 3]
         for k in range(3):
             excess += q[lumbar_places[e, k]]
             slopes[k], at[k] = 1.0, lumbar_places[e, 3 + k]
-        slopes[3], at[3] = -steep * (1.0 - 2.0 * (x * x + y * y)), 4
-        slopes[4], at[4] = steep * 2.0 * (y * z + x * w), 5
+        slopes[3], at[3] = -steep * (1.0 - 2.0 * (x * x + y * y)), first + 4
+        slopes[4], at[4] = steep * 2.0 * (y * z + x * w), first + 5
         _square(lumbars[e, 0], excess, slopes, at, measure, squares, len(elevations) + e)
 
 

@@ -100,7 +100,7 @@ def check_derivatives(term: Goal | Constraint | Measure, scene: Scene, q: ArrayL
             worst = (float(difference[row, dof]) / scale, row, dof, *entry, here, scale)
     share, row, dof, mine, true, where, scale = worst
     joint = next((j for j in range(1, model.njoints) if dof in _dofs(model, j)), 0)
-    name = "root" if joint == 1 and figure.root == "free" else str(model.names[joint])
+    name = next((root for root, k in figure.roots.items() if k == joint), str(model.names[joint]))
     return DerivativeCheck(
         type(term).__name__, max(share, 0.0) * scale, row, name, mine, true, where, share <= AGREEMENT
     )

@@ -27,7 +27,7 @@ WIDTHS = {
     RESIDUAL: (36, 6),  # place in the joint (12), base in its joint (12), target (3), rotation back from it (9)
     PLANE: (7, 2),  # origin in the joint (3), normal (3), height
     AXIS: (24, 3),  # place in the joint (12), basis (9), target (3)
-    MASS_CENTER: (4, 1),  # direction (3), offset
+    MASS_CENTER: (4, 3),  # direction (3), offset
     COORDINATE: (1, 3),  # target
     TURN: (2, 3),  # cosine and sine of the target
     ROOT: (12, 3),  # target
@@ -39,10 +39,10 @@ WIDTHS = {
 """Floats and integers of a goal or constraint in its table. The first integer is its first row, then:
 
 RESIDUAL: joint, joint of the base, whether the place and the rotation count, whether there is a base other than the
-world; PLANE: joint; AXIS: joint, whether the target is a place; COORDINATE, TURN, ROOT: place in the posture and in the
-tangent; CONE: joint, joint of the reference, how many edges, the first of them; COUPLED, ELLIPSE: place in the posture
-and in the tangent of each coordinate, -1 for none, two of them for each angle of an ellipse; TWIST: joint, joint of the
-reference.
+world; PLANE: joint; AXIS: joint, whether the target is a place; MASS_CENTER: first joint that counts, and the one after
+the last; COORDINATE, TURN, ROOT: place in the posture and in the tangent; CONE: joint, joint of the reference, how many
+edges, the first of them; COUPLED, ELLIPSE: place in the posture and in the tangent of each coordinate, -1 for none, two
+of them for each angle of an ellipse; TWIST: joint, joint of the reference.
 """
 
 Integers: TypeAlias = NDArray[np.int64]
@@ -120,14 +120,18 @@ def _axis(term: tasks.Axis, model: pin.Model) -> list[Entry]:
 def _mass_center(term: tasks.CenterOfMass, model: pin.Model) -> list[Entry]:
     axes = np.eye(3)
     return [
-        Entry(MASS_CENTER, (), np.array([*axes[k], target]), 1)
+        Entry(MASS_CENTER, _ends(term.joints, model), np.array([*axes[k], target]), 1)
         for k, target in enumerate(term.resolved_target.tolist())
     ]
 
 
+def _ends(joints: range | None, model: pin.Model) -> tuple[int, int]:
+    return (1, model.njoints) if joints is None else (joints.start, joints.stop)
+
+
 def _balance(term: tasks.Balance, model: pin.Model) -> list[Entry]:
     return [
-        Entry(MASS_CENTER, (), np.array([x, y, 0.0, offset]), 1)
+        Entry(MASS_CENTER, _ends(term.joints, model), np.array([x, y, 0.0, offset]), 1)
         for (x, y), offset in zip(term.normals.tolist(), term.offsets.tolist(), strict=True)
     ]
 

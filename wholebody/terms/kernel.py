@@ -177,7 +177,10 @@ def _mass_centers(
     value: Array,
     jacobian: Array,
 ) -> None:
-    """Rows of the centre of mass: what hangs on a joint moves with it, so each column needs its subtree's moment."""
+    """Rows of the centre of mass: what hangs on a joint moves with it, so each column needs its subtree's moment.
+
+    An entry says of which joints: all, or those of one of several figures, which hang on the world alone.
+    """
     tables, entries = table
     columns, column, parents = tree
     count = len(bodies)
@@ -193,18 +196,33 @@ def _mass_centers(
     for j in range(count - 1, 0, -1):
         for i in range(4):
             moment[parents[j, 0], i] += moment[j, i]
-    total = moment[0, 0]
-    for e in range(len(tables)):
-        inner = tables[e, 0] * moment[0, 1] + tables[e, 1] * moment[0, 2] + tables[e, 2] * moment[0, 3]
-        value[entries[e, 0]] = inner / total - tables[e, 3]
-    for k in range(len(columns)):
-        j = column[k, 1]
-        mass, x, y, z = moment[j, 0] / total, moment[j, 1] / total, moment[j, 2] / total, moment[j, 3] / total
-        forth = mass * columns[k, 0] + columns[k, 4] * z - columns[k, 5] * y
-        left = mass * columns[k, 1] + columns[k, 5] * x - columns[k, 3] * z
-        up = mass * columns[k, 2] + columns[k, 3] * y - columns[k, 4] * x
-        for e in range(len(tables)):
-            jacobian[entries[e, 0], column[k, 0]] += tables[e, 0] * forth + tables[e, 1] * left + tables[e, 2] * up
+    whole = np.empty(4)
+    begin = 0
+    while begin < len(tables):
+        first, last, end = entries[begin, 1], entries[begin, 2], begin
+        while end < len(tables) and entries[end, 1] == first and entries[end, 2] == last:
+            end += 1
+        whole[:] = moment[0]
+        if first > 1 or last < count:
+            whole[:] = 0.0
+            for j in range(first, last):
+                if parents[j, 0] == 0:
+                    whole += moment[j]
+        total = whole[0]
+        for e in range(begin, end):
+            inner = tables[e, 0] * whole[1] + tables[e, 1] * whole[2] + tables[e, 2] * whole[3]
+            value[entries[e, 0]] = inner / total - tables[e, 3]
+        for k in range(len(columns)):
+            j = column[k, 1]
+            if j < first or j >= last:
+                continue
+            mass, x, y, z = moment[j, 0] / total, moment[j, 1] / total, moment[j, 2] / total, moment[j, 3] / total
+            forth = mass * columns[k, 0] + columns[k, 4] * z - columns[k, 5] * y
+            left = mass * columns[k, 1] + columns[k, 5] * x - columns[k, 3] * z
+            up = mass * columns[k, 2] + columns[k, 3] * y - columns[k, 4] * x
+            for e in range(begin, end):
+                jacobian[entries[e, 0], column[k, 0]] += tables[e, 0] * forth + tables[e, 1] * left + tables[e, 2] * up
+        begin = end
 
 
 @compiled(inner=True)

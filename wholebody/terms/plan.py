@@ -18,7 +18,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import TermError
 from wholebody.base.records import with_values
 from wholebody.figures.description import Limits
-from wholebody.figures.state import State, Wrench, extended_columns
+from wholebody.figures.state import State, Wrench, extended_columns, free_roots, root_freedoms
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.distance import LEAST_CURVATURE, SquaredDistance
 from wholebody.tasks.rhythm import LUMBAR_MOST, LUMBAR_RATE, LUMBAR_WEIGHT
@@ -245,9 +245,9 @@ def _measures(
             for part in (*term.girdles, *term.knees):
                 numbers = np.array([term.weight * part.weight, part.most, part.rest, part.onset])
                 parts[kinds.ELEVATION].append(((*part.idx_q, *part.idx_v), numbers))
-            if term.lumbar is not None:
-                share = np.array([term.weight * LUMBAR_WEIGHT, LUMBAR_MOST, LUMBAR_RATE, term.lumbar.rest])
-                parts[kinds.LUMBAR].append(((*term.lumbar.idx_q, *term.lumbar.idx_v), share))
+            for spine in term.lumbar:
+                share = np.array([term.weight * LUMBAR_WEIGHT, LUMBAR_MOST, LUMBAR_RATE, spine.rest])
+                parts[kinds.LUMBAR].append(((*spine.idx_q, *spine.idx_v, *spine.root), share))
         else:
             others.append(term)
     return tuple(others), curvature
@@ -265,15 +265,17 @@ def _distances(
 ) -> bool:
     """Write the tables of a distance; false where a joint that counts is no free root and no coordinate."""
     weighed = np.flatnonzero(distance.weights).tolist()
-    root = model.joints[1] if model.njoints > 1 and model.joints[1].nq == 7 else None
-    own = range(0, 6) if root is not None else range(0)
-    if any(places[v] < 0 for v in weighed if v not in own):
+    own = root_freedoms(model)
+    if any(places[v] < 0 for v in weighed if not own[v]):
         return False
-    if any(v in own for v in weighed):
-        target = placement_floats(pin.XYZQUATToSE3(distance.reference[:7]))
-        parts[kinds.ROOT_DISTANCE].append(((0, 0), np.concatenate([target, weight * distance.weights[:6]])))
+    for root in (model.joints[joint] for joint in free_roots(model)):
+        q, v = int(root.idx_q), int(root.idx_v)
+        if distance.weights[v : v + 6].any():
+            target = placement_floats(pin.XYZQUATToSE3(distance.reference[q : q + 7]))
+            floats = np.concatenate([target, weight * distance.weights[v : v + 6]])
+            parts[kinds.ROOT_DISTANCE].append(((q, v), floats))
     for v in weighed:
-        if v not in own:
+        if not own[v]:
             q = int(places[v])
             parts[kinds.DISTANCE].append(((q, v), np.array([weight * distance.weights[v], distance.reference[q]])))
     return True

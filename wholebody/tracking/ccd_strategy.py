@@ -30,8 +30,9 @@ class CCDStrategy:
         # largest velocity, rad/s, with which a joint moves away from the tracked one or returns to it: fast
         # enough to return from 2 rad in half a second, and slow enough not to look like a jump
         self._largest_motion = np.full(scene.model.nv, 4.0 * dt)
-        if scene.figure.root == "free":
-            self._largest_motion[:3] = 2.0 * dt  # root speed, m/s
+        for root in scene.figure.roots.values():
+            first = int(scene.model.joints[root].idx_v)
+            self._largest_motion[first : first + 3] = 2.0 * dt  # root speed, m/s
         self._tracked = shown
         self._rng = np.random.default_rng(seed)
 
@@ -67,7 +68,8 @@ class RigidTranslation:
 
     def __init__(self, scene: Scene) -> None:
         if scene.figure.root != "free":
-            raise InputError(f"{scene.figure.name} is fixed to the world and cannot be displaced; leave rigid out")
+            what = "are several figures" if scene.figure.members else "is fixed to the world"
+            raise InputError(f"{scene.figure.name} {what} and cannot be displaced as one; leave rigid out")
         self.scene, self.model, self._workspace = scene, scene.model, scene.workspace()
         segments = set(scene.figure.segments) | {n for n, thing in scene.objects.items() if thing.segment is not None}
         self._mine = np.array([owner in segments for owner in scene.piece_owner])

@@ -88,10 +88,10 @@ class LiveDrag:
             method = "newton" if method == "qp" else method
         self._undo: list[tuple[Array, Any]] = []
         self.taken = ""
-        self.choose(method)
         self._drag: Drag[Any] | None = None
         self._trouble = ""
         self._state = self.scene.state(self.q)
+        self.choose(method)
 
     # ---- what the mouse and the buttons do
 
@@ -149,6 +149,7 @@ class LiveDrag:
         self.method: Method = method_for_motions(method)
         self.chosen = str(getattr(method, "name", method))
         self.methods.setdefault(self.chosen, method)
+        self._rehearse()
         if self.taken:
             self._restart()
 
@@ -189,8 +190,33 @@ class LiveDrag:
         held = self.held - {self.taken}
         try:
             self._drag = self._subject.drag(self.q, followed, self.place(followed), held, self.method)
+            if self._drag.tracker is not None:  # what later frames need is made now
+                workspace = self._drag.tracker.workspace
+                workspace.sweep.first_contact(self.q, self.q, None, FARTHEST_STEP)
+                if self.taken in self.things:
+                    workspace.frame({self.taken: (workspace.where(self.taken),) * 2})
         except WholebodyError as trouble:
             self._drag, self._trouble = None, str(trouble)
+
+    def _rehearse(self) -> None:
+        """Make frames that are forgotten: what is loaded or set up at the first of a kind is there then.
+
+        A handle stays where it is, and a thing moves by a micrometre.
+        """
+        q, remembered = self.q, self._subject.remembered()
+        name = next(iter(self.handles))
+        place = self.place(name)
+        try:
+            drag = self._subject.drag(q, name, place, self.held - {name}, self.method)
+            drag.to(place)
+            for thing in self.things[:1]:
+                at = self.scene.objects[thing].placement
+                self._subject.move(thing, pin.SE3(at.rotation, at.translation + 1e-6), FRAME)
+                drag.to(place)
+        except WholebodyError:
+            pass  # it is told when a handle is taken
+        finally:
+            self._subject.restore(remembered)
 
     def _push(self, place: Array) -> None:
         at = self.scene.objects[self.taken].placement

@@ -43,8 +43,10 @@ def things_of(scene: Scene) -> tuple[str, ...]:
 
 
 def handle_frames(frames: Collection[str]) -> list[str]:
-    """Those of `HANDLES` that a figure has."""
-    return [name for name in HANDLES if name in frames]
+    """Those of `HANDLES` that a figure has, and each of several figures."""
+    bodies = dict.fromkeys(name.rpartition("/")[0] for name in frames)
+    named = (f"{body}/{name}".lstrip("/") for body in bodies for name in HANDLES)
+    return [name for name in named if name in frames]
 
 
 class LiveProblem:

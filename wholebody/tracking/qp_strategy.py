@@ -137,15 +137,17 @@ def weights(scene: Scene, rigid: bool) -> Array:
     a ten-thousandth of a displacement.
     """
     result = np.full(scene.model.nv, 100.0 if rigid else 1.0)
-    if scene.figure.root == "free":
-        result[:3] = 1.0 if rigid else 1000.0
-        result[3:6] = 100.0 if rigid else 1000.0
+    for root in scene.figure.roots.values():
+        first = int(scene.model.joints[root].idx_v)
+        result[first : first + 3] = 1.0 if rigid else 1000.0
+        result[first + 3 : first + 6] = 100.0 if rigid else 1000.0
     return result
 
 
 def largest_motions(scene: Scene, dt: float) -> Array:
     """Largest motion of every degree of freedom in a frame, (nv,): a released figure returns soon but does not jump."""
     result = np.full(scene.model.nv, 8.0 * dt)  # rad/s: above that of people
-    if scene.figure.root == "free":
-        result[:3] = 3.0 * dt  # m/s
+    for root in scene.figure.roots.values():
+        first = int(scene.model.joints[root].idx_v)
+        result[first : first + 3] = 3.0 * dt  # m/s
     return result

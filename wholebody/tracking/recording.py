@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from wholebody.assessment.motion import OVERLAPS, assess_motion, cone_violation, frames_passed_through, root_mean_square
 from wholebody.base.arrays import Array
 from wholebody.base.checks import instance
+from wholebody.figures.state import root_freedoms
 from wholebody.scene.scene import Scene
 from wholebody.tracking.frame import Frame
 
@@ -82,7 +83,7 @@ class Judgement:
         cone_violation: largest angle of a limb outside its reach cone, radians.
         passed: frames before which some pair got deeper than 0.1 mm (qp) or 1 mm (ccd) during the motion.
         distance: (n,) root of the mean square of joint angles between shown and tracked posture, radians.
-        root_distance: (n,) distance between the two positions of a free root, metres.
+        root_distance: (n,) distance between the two positions of a free root, metres; the largest of several.
         jerk: (n - 3,) the root of the mean square of the third difference of the shown joint angles, rad/s^3.
         tracked_jerk: (n - 3,) of the tracked ones.
         returns: for every end of contact that was followed by 30 frames without contact: the frame, and the number of
@@ -108,10 +109,14 @@ def judge(scene: Scene, recording: Recording) -> Judgement:
     instance(scene, Scene, "judge: scene", "make one with wb.Scene(figure)")
     instance(recording, Recording, "judge: recording", "make one with follow(scene, track)")
     shown, tracked = (assess_motion(scene, q, recording.dt, recording.moves) for q in (recording.q, recording.tracked))
-    model, free = scene.model, scene.figure.root == "free"
+    model = scene.model
     each = [pin.difference(model, *pair) for pair in zip(recording.tracked, recording.q, strict=True)]
     apart = np.array(each)
-    places = np.linalg.norm(recording.q[:, :3] - recording.tracked[:, :3], axis=1)
+    places = [np.zeros(len(recording))]
+    for root in scene.figure.roots.values():
+        first = int(model.joints[root].idx_q)
+        away = recording.q[:, first : first + 3] - recording.tracked[:, first : first + 3]
+        places.append(np.linalg.norm(away, axis=1))
     passing = {"qp": 1e-4, "ccd": 1e-3}[recording.overlap]  # m: as much as may remain in the frames themselves
     return Judgement(
         depth=shown.depth,
@@ -120,8 +125,8 @@ def judge(scene: Scene, recording: Recording) -> Judgement:
         limit_violation=shown.limit_violation,
         cone_violation=cone_violation(scene, recording.q),
         passed=frames_passed_through(scene, recording.q, passing, recording.moves),
-        distance=root_mean_square(apart[:, 6 if free else 0 :]),
-        root_distance=places if free else np.zeros(len(recording)),
+        distance=root_mean_square(apart[:, ~root_freedoms(model)]),
+        root_distance=np.max(places, axis=0),
         jerk=shown.jerk,
         tracked_jerk=tracked.jerk,
         returns=_returns(tracked.depth > OVERLAPS, np.abs(apart).max(axis=1)),

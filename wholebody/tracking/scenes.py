@@ -16,11 +16,12 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import known
 from wholebody.figures.figure import Figure
+from wholebody.figures.joined import one_figure
 from wholebody.geometry.shapes import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Sphere, Torus
 from wholebody.scene.scene import Scene
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.scripts import Keys, Place, ScenePlan, standing_at
-from wholebody.tracking.tracks import Track, check_figure
+from wholebody.tracking.tracks import Track
 
 Color = tuple[float, float, float, float]
 
@@ -88,7 +89,7 @@ def gallery(figure: Figure) -> Scene:
     Walls, a door with a lintel, a niche in the east room, tables, a bench, pedestals, and sculptures on them: a torus,
     a sphere, an egg, an obelisk and a column. All of them are fixed.
     """
-    scene = Scene(check_figure(figure, "gallery"))
+    scene = Scene(one_figure(figure, "gallery: figure"))
     scene.add(HalfSpace(), name="floor")
     _walls(scene)
     _furniture(scene)

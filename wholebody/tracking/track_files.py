@@ -18,8 +18,9 @@ from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, InputError
 from wholebody.base.files import checked_target, read_text, write
 from wholebody.figures.figure import Figure
+from wholebody.figures.joined import one_figure
 from wholebody.tracking.tracks import LARGEST as LARGEST_VALUE
-from wholebody.tracking.tracks import Track, check_figure
+from wholebody.tracking.tracks import Track
 
 ROOT_COLUMNS = ("root_x", "root_y", "root_z", "root_qx", "root_qy", "root_qz", "root_qw")
 LARGEST = 200_000_000  # bytes: an hour of a person at 60 frames a second
@@ -63,7 +64,7 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
             length; the frame is named.
     """
     path = checked_path(path, "path")
-    check_figure(figure, "read_track")
+    one_figure(figure, "read_track: figure")
     values, dt = read_values(path, figure)
     track = Track.of(figure, values, dt, path.name)
     track.check(figure)

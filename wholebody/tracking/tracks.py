@@ -73,7 +73,8 @@ class Track:
         if not all(isinstance(joint, str) for joint in joints):
             raise InputError(f"{self.name}: joints is {shown(self.joints)}; give names, such as figure.joints")
         object.__setattr__(self, "joints", tuple(joints))
-        if len(self.joints) not in (q.shape[1], q.shape[1] - ROOT_SIZE):
+        roots, rest = divmod(q.shape[1] - len(self.joints), ROOT_SIZE)
+        if roots < 0 or rest:
             raise InputError(
                 f"{self.name}: {q.shape[1]} values a frame do not fit {len(self.joints)} joints; give one value "
                 "for each joint, after seven for a free root"
@@ -121,8 +122,9 @@ class Track:
         if self.joints != figure.joints:
             raise InputError(f"{self.name}: its joints are in another order than {figure.name}'s; use posed(...)")
         figure.warn_of_angles(self.q, self.name)
-        if figure.root == "free":
-            off = np.abs(np.linalg.norm(self.q[:, 3:ROOT_SIZE], axis=1) - 1.0)
+        for root in figure.roots.values():
+            first = int(figure.model.joints[root].idx_q)
+            off = np.abs(np.linalg.norm(self.q[:, first + 3 : first + ROOT_SIZE], axis=1) - 1.0)
             if off.max() > UNIT_TOLERANCE:
                 frame = int(np.argmax(off > UNIT_TOLERANCE))
                 raise InputError(
@@ -131,6 +133,8 @@ class Track:
 
     def _place(self, size: int, column: int) -> str:
         root = size - len(self.joints)
+        if root > ROOT_SIZE:  # of several figures, each of which has its root before its joints
+            return f"value {column}"
         return f"value {column} of the root" if column < root else f"joint {self.joints[column - root]}"
 
 
@@ -174,7 +178,8 @@ def posed(
         q[:, figure.model.joints[figure.joint_id(joint)].idx_q] = values
     if roots is not None:
         if figure.root != "free":
-            raise InputError(f"{name}: {figure.name} is fixed to the world; leave roots out")
+            what = "is fixed to the world" if figure.root == "fixed" else "are several figures"
+            raise InputError(f"{name}: {figure.name} {what}; leave roots out")
         for frame, root in enumerate(roots):
             try:
                 q[frame, :ROOT_SIZE] = pin.SE3ToXYZQUAT(placement(root))

@@ -123,14 +123,21 @@ class Bodies:
     def _drawn_figures(self) -> Iterator[DrawnFigure]:
         """The figures that have a surface or visuals; their joints' nodes join the carriers."""
         scene = self.scene
-        figures = scene.figures if isinstance(scene, ViewedAssembly) else {"": (scene.figure, None)}
+        skinned: tuple[str, ...] = ()
+        if isinstance(scene, ViewedAssembly):
+            figures = scene.figures
+        else:
+            members = getattr(scene.figure, "members", {})
+            figures = {name: (one.figure, None) for name, one in members.items() if surface_of(one.figure) is not None}
+            skinned = tuple(f"{name}/" for name in figures)
+            figures |= {"": (scene.figure, None)}  # what has no surface, where it stands among the others
         for name, (figure, color) in figures.items():
             surface = surface_of(figure)
             visual: Skin | LinkVisuals | None = None
             if surface is not None:
                 visual = Skin(surface, figure)
             elif isinstance(figure, Figure) and figure.visual is not figure.geometry:
-                visual = LinkVisuals(figure)
+                visual = LinkVisuals(figure, skinned)
             if visual is None:
                 continue
             prefix = f"{name}/" if name else ""

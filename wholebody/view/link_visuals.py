@@ -20,8 +20,9 @@ class LinkVisuals:
         links, joints: names of the links that are drawn, and of the joints that carry them.
     """
 
-    def __init__(self, figure: Any) -> None:
-        self.drawn = drawn_of(figure)
+    def __init__(self, figure: Any, skinned: tuple[str, ...] = ()) -> None:
+        """Read the visuals, but for links whose names begin with one of `skinned`: figures that have a surface."""
+        self.drawn = [one for one in drawn_of(figure) if not one.link.startswith(skinned)]
         self.links = frozenset(one.link for one in self.drawn)
         self.joints = tuple(dict.fromkeys(one.joint for one in self.drawn))
 

@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from tests.audits.qp_programs.recording import Recorded
+from wholebody.base.arrays import Array
 from wholebody.base.errors import FileFormatError
 from wholebody.base.files import make_folder, read_text, write
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
-from wholebody.methods.qp.solvers.split_form import split
 
 TEST_SET = "wholebody_postures"
 """Name of the test set's file, without its suffix; qpbenchmark derives the name of the class from it."""
@@ -30,12 +30,23 @@ def save(programs: list[Recorded], folder: Path) -> None:
     make_folder(folder)
     write(folder / f"{TEST_SET}.py", read_text(Path(__file__).with_name(f"{TEST_SET}.txt")))
     for one in programs:
-        form, m = split(one.program), len(one.program.target)
-        np.savez_compressed(
-            folder / f"{one.name}.npz",
-            P=np.diag(form.diagonal), q=form.linear, G=-form.matrix[m:], h=-form.lower[m:],
-            A=form.matrix[:m], b=form.lower[:m], lb=form.box_lower, ub=form.box_upper,
-        )  # fmt: skip
+        np.savez_compressed(folder / f"{one.name}.npz", **split(one.program))
+
+
+def split(program: QuadraticProgram) -> dict[str, Array]:
+    """A program over its displacement, the residuals of soft rows and the slacks of elastic ones, by `KEYS`."""
+    _n, m, k = program.size, len(program.target), len(program.least)
+    free = np.full(m + k, np.inf)
+    return {
+        "P": np.diag(np.concatenate([program.diagonal, program.weight, program.elastic_weight])),
+        "q": np.concatenate([program.linear, np.zeros(m + k)]),
+        "G": np.hstack([-program.elastic, np.zeros((k, m)), -np.eye(k)]),
+        "h": -program.least,
+        "A": np.hstack([program.rows, -np.eye(m), np.zeros((m, k))]),
+        "b": program.target,
+        "lb": np.concatenate([program.lower, -free]),
+        "ub": np.concatenate([program.upper, free]),
+    }
 
 
 def load(folder: Path) -> list[Recorded]:

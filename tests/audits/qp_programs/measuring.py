@@ -125,7 +125,7 @@ def measure(
         for name in [*solvers[shift:], *solvers[:shift]]:
             solver = make_solver(name, hot_start=False)
             solver.load()
-            solver.solve(mine[-1].program, None)
+            solver.solve(mine[-1].program)
             rows += [_row(one, name, solver) for one in mine]
         if mine[0].set != done:
             done = mine[0].set
@@ -142,10 +142,10 @@ def _row(one: Recorded, name: str, solver: QPSolver) -> QPRow:
     program = one.program
     gc.disable()
     worked, clock = time.thread_time_ns(), time.perf_counter_ns()
-    answer = solver.solve(program, None)
+    answer = solver.solve(program)
     wall, cpu = time.perf_counter_ns() - clock, time.thread_time_ns() - worked
     gc.enable()
-    own = solver.uncorrected()
+    own = solver.uncorrected
     found = residuals(program, answer)
     return QPRow(
         one.set, one.name, name, program.size, len(program.target), len(program.least), wall / 1e3, cpu / 1e3,

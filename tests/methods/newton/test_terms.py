@@ -84,8 +84,9 @@ def test_the_objective_has_the_measures_gradient(human: wb.Figure) -> None:
         assert objective.value(x) == pytest.approx(wb.assess(problem, q).measure)
         objective.renew(q)
         everything = np.concatenate([x, (0, 0, 0, 0, 0, 0, 1.0)]).reshape(-1, 7)
-        assert objective.root is not None
-        apart = objective.rows.residual(everything)[:, 0], objective.root.residual(everything)[0]
+        ((root, place),) = objective.roots
+        assert place == 0
+        apart = objective.rows.residual(everything)[:, 0], root.residual(everything)[0]
         force = objective.stiffness * np.concatenate(apart)
         gradient = sum(term.weight * term.gradient(problem.scene.state(q)) for term in problem.measures)
         joints = [j for j in human.model.joints[1:] if j.nq == 1 and j.shortname().startswith("JointModelR")]

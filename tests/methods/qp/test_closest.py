@@ -8,8 +8,10 @@ import pytest
 
 import wholebody as wb
 from wholebody.methods.control import Control
-from wholebody.methods.qp.closest import Closest
+from wholebody.methods.qp.closest import ENDLESS, Closest
+from wholebody.methods.qp.iterates import Run
 from wholebody.methods.qp.solvers.registry import make_solver
+from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.qp.subproblem_kernel import add_kinematic_hessian
 
 FEET = (wb.Hold("left_foot"), wb.Hold("right_foot"))
@@ -18,6 +20,13 @@ FEET = (wb.Hold("left_foot"), wb.Hold("right_foot"))
 @pytest.fixture(scope="module")
 def standing():
     return wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+
+
+def closest(problem, workspace, control, depth, enough, most):
+    lineariser = problem.lineariser(workspace)
+    lineariser = lineariser.relaxed(depth) if depth else lineariser
+    run = Run(Subproblem(problem, workspace.state), lineariser, make_solver("osqp"), [], control)
+    return Closest(run, enough, most, problem=problem, contacts=not depth)
 
 
 def test_how_a_pull_bends_is_the_second_derivative_of_the_place():
@@ -50,8 +59,7 @@ def test_a_start_whose_holds_are_far_off_comes_back_to_them(standing, seed):
     way = rng.uniform(-0.5, 0.5, len(lower)) * np.where(np.isfinite(upper - lower), upper - lower, 0.2)
     start = figure.clamp(pin.integrate(figure.model, problem.start, np.clip(way, lower, upper)))
     with problem.borrow() as workspace, Control(np.inf) as control:
-        reach = Closest(problem, problem.lineariser(workspace), make_solver("osqp"), control)
-        local = reach.without_contacts(start, 1e-4, 60)
+        local = closest(problem, workspace, control, ENDLESS, 1e-4, 60).run(start)
     assert local.converged
     assert local.violation.hold < 1e-2
 
@@ -73,8 +81,7 @@ def test_the_nearest_posture_holds_what_must_hold(standing, honest):
     goals = [wb.Point("right_index_tip", (1.6, -0.3, 1.2)), wb.Point("left_index_tip", (-0.6, 0.9, 0.5))]
     problem = wb.Problem(standing, goals=goals, constraints=FEET)
     with problem.borrow() as workspace, Control(np.inf) as control:
-        reach = Closest(problem, problem.lineariser(workspace), make_solver("osqp"), control)
-        local = reach.with_contacts(problem.start, 1e-5, 100)
+        local = closest(problem, workspace, control, 0.0, 1e-5, 100).run(problem.start)
     assert local.converged
     assert max(local.violation.hold, local.violation.elastic) <= 1e-5
 

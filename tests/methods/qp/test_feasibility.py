@@ -40,7 +40,9 @@ def test_what_fits_is_kept_where_measures_lead_away(honest):
 
 
 def test_whole_steps_stay_in_their_box(planar_arm):
+    from wholebody.methods.control import Control
     from wholebody.methods.qp.feasibility import Feasibility
+    from wholebody.methods.qp.iterates import Run
     from wholebody.methods.qp.settings import FEASIBILITY
     from wholebody.methods.qp.solvers.registry import make_solver
     from wholebody.methods.qp.subproblem import Subproblem
@@ -49,9 +51,8 @@ def test_whole_steps_stay_in_their_box(planar_arm):
         wb.Scene(planar_arm((0.5, 0.4))), start=np.array([0.1, 0.4]), goals=[wb.Point("tip", (-0.5, 0.3, 0.0))]
     )
     workspace = problem.workspace()
-    run = Feasibility(
-        problem, Subproblem(problem, workspace.state), problem.lineariser(workspace), make_solver("osqp"), 1e-6, 100
-    )
-    local = run.run(problem.start)
+    parts = Subproblem(problem, workspace.state), problem.lineariser(workspace), make_solver("osqp")
+    run = Run(*parts, [], Control(np.inf))
+    local = Feasibility(run, 1e-6, 100, figure=problem.scene.figure).run(problem.start)
     assert local.violation.worst <= 1e-6
     assert max(entry.step for entry in run.trace) <= FEASIBILITY.step + 1e-12

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.methods.qp.rows import StepSize
 from wholebody.methods.qp.subproblem import Subproblem
 
 
@@ -29,9 +30,9 @@ def test_feasibility_only_asks_for_full_steps_and_damps_it_as_the_page_says():
     workspace = problem.workspace()
     subproblem = Subproblem(problem, workspace.state)
     at = problem.lineariser(workspace).at(problem.start, 0.1)
-    rows, none = subproblem.rows(at), np.zeros(len(at.goal_error))
-    piece = subproblem.program(at, rows, 0.3, 0.1, 0.0, none, False)
-    whole = subproblem.program(at, rows, 0.3, None, 0.5, none, False)
+    rows = subproblem.rows(at)
+    piece = subproblem.program(at, rows, StepSize(0.3, 0.1, 0.0, False))
+    whole = subproblem.program(at, rows, StepSize(0.3, 0.0, 0.5, False))
     assert np.abs(piece.target).max() == pytest.approx(0.1)
     assert whole.target == pytest.approx(-at.goal_error)
     assert np.ptp(piece.diagonal) > 0.0

@@ -9,7 +9,7 @@ from tests.methods.qp.test_programs import by_quadprog
 from tests.reference import active_set as reference
 from tests.reference import semismooth_newton
 from wholebody.base.records import with_values
-from wholebody.methods.qp.active_set import minimise, solve_from, violated_set
+from wholebody.methods.qp.active_set import minimise, solve_from
 from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram
 from wholebody.methods.qp.solvers.registry import make_solver
 
@@ -99,6 +99,6 @@ def test_rows_that_repeat_each_other_have_multipliers_that_belong_to_their_resid
 @pytest.mark.parametrize("name", ["osqp", "daqp"])
 def test_a_solver_hands_on_what_is_too_large_for_it(name):
     program = crowded(np.random.default_rng(11), n=24, k=2500)
-    answer = make_solver(name).solve(program, violated_set(program))
+    answer = make_solver(name).solve(program)
     assert answer.exact
     assert program.optimality(answer.x) < 1e-9

@@ -14,6 +14,7 @@ import wholebody as wb
 from wholebody.bench.measure.track import judge, track
 from wholebody.bench.suite.adapters.registry import make_tool
 from wholebody.figures.state import State
+from wholebody.methods.qp.rows import StepSize
 from wholebody.methods.qp.settings import PROGRAM, STEP
 from wholebody.methods.qp.solvers.registry import make_solver
 from wholebody.methods.qp.step_program import StepProgram
@@ -39,6 +40,10 @@ def whole(at: PackedLinearisation) -> Linearisation:
         at.gap, at.jacobian[terms:], at.gap_contact, at.clearance, float(at.measure[0, -1]), at.measure[0, :-1],
         at.measure[1, :-1], at.box[0], at.box[1],
     )  # fmt: skip
+
+
+def size(damping: float, gain: float) -> StepSize:
+    return StepSize(STEP.radius, PROGRAM.error_clamp * STEP.radius, damping, True, gain)
 
 
 class Plain:
@@ -72,9 +77,7 @@ class Plain:
                 shift[:goals] = 0.0
             damping = STEP.damping * min(1.0, self.before[2] / error)
         for _ in range(1 + STEP.again):
-            program = self.subproblem.program(
-                at, rows, STEP.radius, PROGRAM.error_clamp * STEP.radius, damping, shift, True, gain
-            )
+            program = self.subproblem.program(at, rows, size(damping, gain), shift)
             answer = self.working_set.solve(program, rows.key)
             left = float(np.linalg.norm((rows.soft @ answer.x - program.target)[:goals]))
             asked = STEP.damping * min(1.0, left / error) if left > STEP.resting else 0.0
@@ -89,9 +92,7 @@ class Plain:
             if self.curving:
                 self.foresaw += 1
                 shift[goals:] = curve
-                program = self.subproblem.program(
-                    at, rows, STEP.radius, PROGRAM.error_clamp * STEP.radius, damping, shift, True, gain
-                )
+                program = self.subproblem.program(at, rows, size(damping, gain), shift)
                 answer = self.working_set.solve(program, rows.key)
         return rows, program, answer
 

@@ -49,12 +49,10 @@ def asked(monkeypatch):
     return answers
 
 
-def test_as_it_comes_only_the_first_program_is_osqps(over_a_table, asked):
+def test_as_it_comes_the_solver_is_asked_where_no_active_set_settles(over_a_table, asked):
     solution = wb.QP().solve(over_a_table)
     assert solution.method == "qp"
-    assert solution.programs["osqp"] >= 1
-    assert solution.programs["active set"] > solution.programs["osqp"]
-    assert asked[0].iterations > 0
+    assert solution.programs["active set"] > 0.9 * sum(solution.programs.values())
     assert len(asked) <= sum(count for by, count in solution.programs.items() if by != "active set")
 
 
@@ -64,7 +62,7 @@ def test_without_a_hot_start_every_program_is_the_named_solvers(over_a_table, as
     assert solution.solved
     assert solution.method == f"qp/{name}"
     assert set(solution.programs) <= {name, "semismooth newton"}
-    assert len(asked) >= sum(solution.programs.values())  # a program with a row that was missed is solved again
+    assert len(asked) >= sum(solution.programs.values())
     assert all(answer.iterations > 0 for answer in asked), "the solver's own iterations"
 
 
@@ -97,8 +95,7 @@ def test_a_tracker_tells_of_every_step(over_a_table, method):
         q = steps[-1].q
     assert all(sum(step.programs.values()) >= 1 for step in steps)
     if method.name == "qp":
-        assert list(steps[0].programs) == ["osqp"]
-        assert all(list(step.programs) == ["active set"] for step in steps[1:])
+        assert all(list(step.programs) == ["active set"] for step in steps)
     elif method.name == "qp/osqp":
         assert all(list(step.programs) == ["osqp"] and step.iterations > 0 for step in steps)
     else:
@@ -136,12 +133,11 @@ def test_the_name_says_what_runs(settings, name):
     assert wb.QP(**settings).name == name
 
 
-def test_a_program_counts_once_and_as_what_it_needed():
+def test_programs_are_counted_until_they_are_asked_for():
     solver = make_solver("osqp")
-    assert solver.count(["osqp", "active set"]) == "osqp"
-    assert solver.count(["active set", "active set"]) == "active set"
-    assert solver.count(["active set", "semismooth newton", "osqp"]) == "semismooth newton"
-    assert solver.counted() == {"osqp": 1, "active set": 1, "semismooth newton": 1}
+    for by in ("osqp", "active set", "osqp"):
+        assert solver.count(by) == by
+    assert solver.counted() == {"osqp": 2, "active set": 1}
     assert solver.counted() == {}
 
 

@@ -14,7 +14,11 @@ from wholebody.bench.rows import Figure, Row, measured_ms
 from wholebody.geometry.gltf_document import GltfDocument
 from wholebody.motion.files import READERS
 
-ROBOTS, MESHES, SKELETONS = (".urdf", ".xml"), (".stl", ".obj", ".ply", ".dae", ".glb", ".gltf"), (".bvh", ".npz")
+ROBOTS, MESHES, SKELETONS = (
+    (".urdf", ".xml"),
+    (".stl", ".obj", ".ply", ".dae", ".glb", ".gltf"),
+    (".bvh", ".npz", ".fbx"),
+)
 
 
 def read(folder: Path, frames: int) -> Iterator[Row]:

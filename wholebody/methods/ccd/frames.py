@@ -92,8 +92,9 @@ class Attraction:
         size = max([float(reach.max(initial=0.5)) for _, reach in self.parts], default=0.5)
         others = np.flatnonzero(rest)
         reach = np.full(len(others), 2.0 * size)
-        if scene.figure.root == "free":
-            reach[others < 3] = 1.0
+        for root in scene.figure.roots.values():
+            first = int(scene.model.joints[root].idx_v)
+            reach[(others >= first) & (others < first + 3)] = 1.0
         self.parts.append((others, reach))
 
     def step(self, q: Array, wanted: Array, settled: list[bool]) -> tuple[Array, Array] | None:
@@ -206,6 +207,10 @@ class FrameResolver:
         """A posture near q (nq,) out of what things were moved into it, and whether it is free."""
         resolver = self._resolver
         found, overlaps = resolver.resolve(q, rng, OVERRUN)
+        if overlaps:  # a link that is turned back to its tracked direction may be turned into the thing
+            resolver.tracked = None
+            found, overlaps = resolver.resolve(q, rng, resolver.counts.work + OVERRUN)
+            resolver.tracked = self._tracked
         for size in PERTURBATIONS if overlaps else ():
             perturbed, still = resolver.resolve(self._perturbed(q, size, rng), rng, resolver.counts.work + OVERRUN)
             if not still:

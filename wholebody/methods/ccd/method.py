@@ -121,6 +121,7 @@ class CCDTracker(DescentTracker[CCD]):
         """Set up; arguments and errors as for `DescentTracker`."""
         super().__init__(method, problem, dt)
         self._shared = _Shared(problem.scene, self.workspace)
+        self.overlap_resolutions(problem.start)  # makes its chains, which would take as long as ten frames
 
     def search(self, method: CCD, problem: Problem, control: Control) -> Ending:
         """The end of a search."""

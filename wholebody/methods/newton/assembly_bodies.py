@@ -13,6 +13,7 @@ from wholebody.base.checks import color as checked_color
 from wholebody.base.checks import instance, known, numbers, shown, text
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
+from wholebody.figures.joined import one_figure
 from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.geometry.shapes import LENGTH, Shape
@@ -129,7 +130,7 @@ class AssemblyBodies:
             UnsupportedTermError: a joint or a constraint has no equations.
         """
         self._check_new(text(name, "the name of a figure"), "figure")
-        instance(figure, Figure, f"figure {name!r}", "load one with wb.load('human')")
+        one_figure(figure, f"figure {name!r}")
         painted = None if color is None else checked_color(color, f"figure {name!r}: color")
         # The other bodies may carry it, so it is not taken for one that stands; its ranges have no equations of bodies.
         problem = Problem(Scene(figure), start, constraints=constraints, range_of_motion=False, balance=False)

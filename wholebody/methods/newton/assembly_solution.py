@@ -66,24 +66,16 @@ class AssemblySolution:
 
 
 class AssemblyStep(NamedTuple):
-    """Answer of one frame of a drag.
+    """Answer of one frame of a drag."""
 
-    Attributes:
-        goal_error: largest distance [m] or angle [rad] of a goal from its target, as `Assembly.goal_error` says it.
-        joint_error: largest distance [m] or angle [rad] by which a joint, a constraint or a contact is open.
-        iterations: Newton iterations.
-        systems: linear systems solved.
-        taken: whether the bodies moved there.
-        collisions: what things that move passed through, or are inside of; empty if nothing.
-        path: shares of the frame, from 0 to 1, and the postures (nq,) there, if things moved; otherwise empty.
-    """
-
+    # largest distance [m] or angle [rad] of a goal from its target, as `Assembly.goal_error` says it.
     goal_error: float
-    joint_error: float
-    iterations: int
-    systems: int
-    taken: bool
-    collisions: tuple[Collision, ...] = ()
+    joint_error: float  # largest distance [m] or angle [rad] by which a joint, a constraint or a contact is open
+    iterations: int  # Newton iterations
+    systems: int  # linear systems solved
+    taken: bool  # whether the bodies moved there
+    collisions: tuple[Collision, ...] = ()  # what things that move passed through, or are inside of; empty if nothing
+    # shares of the frame, from 0 to 1, and the postures (nq,) there, if things moved; otherwise empty
     path: tuple[tuple[float, Array], ...] = ()
 
 

@@ -72,14 +72,15 @@ class FigureBodies:
         return self.first + joint - 1 if joint else -1
 
     @property
-    def floating(self) -> bool:
-        """Whether the first joint is a free root."""
-        return self.figure.root == "free"
+    def roots(self) -> tuple[tuple[int, int, int], ...]:
+        """Of each free root its body, and its first places in the posture and in the tangent."""
+        joints = [(joint, self.model.joints[joint]) for joint in self.figure.roots.values()]
+        return tuple((joint - 1, int(kind.idx_q), int(kind.idx_v)) for joint, kind in joints)
 
     @property
     def uncharted(self) -> tuple[str, ...]:
         """Names of the joints whose degrees of freedom `tangent_rows` omits."""
-        return tuple(self.names[joint - 1] for joint in self._others if not (joint == 1 and self.floating))
+        return tuple(self.names[joint - 1] for joint in self._others if joint not in self.figure.roots.values())
 
     @property
     def start_state(self) -> State:
@@ -110,11 +111,13 @@ class FigureBodies:
         result = np.zeros((self.model.nv, 7 * (self.count + 1)))
         columns = 7 * self.angles.bodies[:, :, None] + np.arange(7)
         result[self._tangent[:, None], columns.reshape(len(columns), 14)] = self.angles.jacobian(x)[:, 0]
-        if self.floating:
-            a, b, c, w = x[0, 3:].tolist()
-            result[:3, :3] = pin.Quaternion(x[0, 3:]).toRotationMatrix().T
+        for body, _, v in self.roots:
+            a, b, c, w = x[body, 3:].tolist()
+            first = 7 * body
+            result[v : v + 3, first : first + 3] = pin.Quaternion(x[body, 3:]).toRotationMatrix().T
             # the rotation is 2 vec(conj(e) de), in the root's own axes
-            result[3:6, 3:7] = 2.0 * np.array(((w, c, -b, -a), (-c, w, a, -b), (b, -a, w, -c)))
+            turn = 2.0 * np.array(((w, c, -b, -a), (-c, w, a, -b), (b, -a, w, -c)))
+            result[v + 3 : v + 6, first + 3 : first + 7] = turn
         return result[:, : 7 * self.count]
 
     @property
@@ -123,8 +126,9 @@ class FigureBodies:
         result = np.zeros((self.model.nv, 7 * (self.count + 1)), dtype=bool)
         columns = 7 * self.angles.bodies[:, :, None] + np.arange(7)
         result[self._tangent[:, None], columns.reshape(len(columns), 14)] = self.angles.pattern
-        if self.floating:
-            result[:3, :3] = result[3:6, 3:7] = True
+        for body, _, v in self.roots:
+            first = 7 * body
+            result[v : v + 3, first : first + 3] = result[v + 3 : v + 6, first + 3 : first + 7] = True
         return result[:, : 7 * self.count]
 
     def bound_step(self, q: Array, lower: Array, upper: Array) -> None:

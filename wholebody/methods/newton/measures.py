@@ -46,7 +46,7 @@ class Objective:
 
     Attributes:
         rows: the joints' angles, each relative to its minimiser.
-        root: the root's motion relative to its minimiser; None where it is fixed, or counts nothing.
+        roots: the motion of each free root that counts relative to its minimiser, and its place in the posture.
         squares: the rows of measures that are sums of squares.
         minimised: the measures that are minimised.
         reported: names of the others.
@@ -56,8 +56,9 @@ class Objective:
         """Prepare the rows for the figure's revolute joints."""
         self._state, self._bodies = state, bodies
         self.rows, tangent = bodies.distance(problem.start)
-        self.root = RootMotion(0, "the root") if bodies.floating and _counts_root(problem, state) else None
-        self._tangent = tangent if self.root is None else np.concatenate([tangent, np.arange(6)])
+        counted = [root for root in bodies.roots if _counts_root(problem, state, root[2])]
+        self.roots = [(RootMotion(body, "the root"), q) for body, q, _ in counted]
+        self._tangent = np.concatenate([tangent, *(np.arange(v, v + 6) for _, _, v in counted)])
         self.minimised: list[Measure] = []
         self.reported: list[str] = []
         self.squares: list[TangentRows] = []
@@ -75,7 +76,7 @@ class Objective:
 
     def batches(self) -> list[Batch]:
         """All rows, in the order of their factors."""
-        found: list[Batch] = [self.rows, *([] if self.root is None else [self.root]), *self.squares]
+        found: list[Batch] = [self.rows, *(motion for motion, _ in self.roots), *self.squares]
         for batch in found:
             batch.role = OBJECTIVE
         return found
@@ -123,18 +124,18 @@ class Objective:
         """Count from the posture q (nq,), towards displacements (k,) of the revolute joints and the root."""
         joints = len(self.rows)
         self.rows.bound = self._bodies.angles_at(q) + way[:joints]
-        if self.root is not None:
-            self.root.anchor(q[:7], way[joints:])
+        for number, (motion, place) in enumerate(self.roots):
+            motion.anchor(q[place : place + 7], way[joints + 6 * number : joints + 6 * number + 6])
 
 
-def _counts_root(problem: Problem, state: State) -> bool:
-    """Whether the measures that are always minimised count the motion of a free root."""
+def _counts_root(problem: Problem, state: State, first: int) -> bool:
+    """Whether the measures that are always minimised count the motion of the free root with these freedoms."""
     curved = [
         term.weight * term.curvature(state.update(problem.start))
         for term in problem.measures
         if type(term) in MINIMISED
     ]
-    return bool(curved) and float(np.min(np.sum(curved, axis=0)[:6])) > 0.0
+    return bool(curved) and float(np.min(np.sum(curved, axis=0)[first : first + 6])) > 0.0
 
 
 def _depends_on(measure: Measure, tangent: Indices, start: Array, state: State) -> bool:

@@ -9,6 +9,7 @@ from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.control import Control, Progress
 from wholebody.methods.inputs import check_problem
 from wholebody.methods.newton.multistart import Search, Settings
+from wholebody.methods.newton.settings import STARTS
 from wholebody.methods.newton.terms import FigureSystem, state_equations
 from wholebody.methods.newton.tracking import NewtonTracker
 from wholebody.problem import Problem
@@ -34,8 +35,8 @@ class Newton(Settings):
         inequalities: "slack" (squared slacks) or "barrier" (logarithmic).
         restarts: most seeded starts that are tried if the descent from the start does not solve the problem.
         seed: of the restarts.
-        time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None, it
-            ends after four seconds of processor time.
+        time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None,
+            the numbers of iterations end it, and at last twenty seconds of processor time.
     """
 
     @property
@@ -65,7 +66,7 @@ class Newton(Settings):
         """
         check_problem(problem, "Newton.solve: problem")
         began = time.perf_counter()
-        with problem.borrow() as workspace, Control(self.time_limit, progress) as control:
+        with problem.borrow() as workspace, Control(self.time_limit, progress, STARTS.longest) as control:
             active_system = FigureSystem(problem, workspace, self.algebra)
             active_system.control = control
             search = Search(active_system, self)

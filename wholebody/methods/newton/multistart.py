@@ -92,7 +92,7 @@ class Search:
 
     def _from_other_starts(self, q: Array, best: SearchResult) -> SearchResult:
         """The best result of the other starts and the best so far; each start has a trial first."""
-        minima, control = Minima(), self.active_system.control
+        minima, control, most = Minima(), self.active_system.control, self.iterations + STARTS.iterations
         for start, how in self._starts(q):
             if minima.complete:
                 break
@@ -104,7 +104,7 @@ class Search:
             best = found if self._better(found, best) else best
             if self._solves(best):
                 self.contradictions = ()
-            if self._solves(best) or control.over or control.spent > STARTS.time_share:
+            if self._solves(best) or self.iterations > most or control.over or control.spent > STARTS.time_share:
                 break
         return best
 

@@ -137,8 +137,8 @@ def _reads(bodies: FigureBodies) -> Mask:
     """(7 n,) the variables on which the tangent depends: all rotations, and the position of a free root."""
     result = np.zeros((bodies.count, 7), dtype=bool)
     result[:, 3:] = True
-    if bodies.floating:
-        result[0, :3] = True
+    for body, _, _ in bodies.roots:
+        result[body, :3] = True
     return result.ravel()
 
 

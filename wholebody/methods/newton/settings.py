@@ -82,6 +82,8 @@ class Starts(NamedTuple):
     # of the tolerance, to which the equations are solved: an assessment uses norms over the rows of a goal
     sharper: float = 0.3
     trial: int = 30  # iterations in which another start must come nearer than the best so far
+    iterations: int = 250  # after which no other start follows. More: more is solved, later; one to four seconds
+    longest: float = 20.0  # s of processor time: several times what these take
     # of the time limit for other starts: the last iteration, towards the least violation, takes time too
     time_share: float = 0.5
     alike: float = 1e-5  # relative difference of goal errors up to which two results count as equally near

@@ -66,7 +66,9 @@ def goal_equations(problem: Problem, bodies: FigureBodies, goals: Sequence[Goal]
         elif isinstance(goal, Axis):
             _axis(result, bodies, goal, label)
         elif isinstance(goal, CenterOfMass):
-            result.add(_mass_center(bodies, label, np.eye(3)[: len(goal.axes)], goal.resolved_target), role)
+            result.add(
+                _mass_center(bodies, label, goal.joints, np.eye(3)[: len(goal.axes)], goal.resolved_target), role
+            )
         elif isinstance(goal, Posture):
             bodies.add_posture_goals(result, label, goal.resolved_target, set(goal.dofs.tolist()), role)
         else:
@@ -88,7 +90,7 @@ def constraint_equations(problem: Problem, bodies: FigureBodies) -> EquationSet:
             result.slide(-1, body, label, term.resolved_normal, place, term.height, role)
         elif isinstance(term, Balance):
             normals = np.column_stack([term.normals, np.zeros(len(term.normals))])
-            result.add(_mass_center(bodies, label, normals, term.offsets + term.margin), ONE_SIDED)
+            result.add(_mass_center(bodies, label, term.joints, normals, term.offsets + term.margin), ONE_SIDED)
         elif isinstance(term, ReachCones):
             result.add(_cones(bodies, term, label), ONE_SIDED)
         else:
@@ -124,9 +126,11 @@ def _axis(equations: EquationSet, bodies: FigureBodies, goal: Axis, label: str) 
     equations.add(Toward(np.array([[body]]), [label], axes[None], point[None], places), role)
 
 
-def _mass_center(bodies: FigureBodies, label: str, directions: Array, height: Array) -> Batch:
+def _mass_center(bodies: FigureBodies, label: str, joints: range | None, directions: Array, height: Array) -> Batch:
     inertias = list(bodies.model.inertias)[1:]
     mass = np.array([inertia.mass for inertia in inertias])
+    if joints is not None:  # of one of several figures
+        mass[[k for k in range(len(mass)) if k + 1 not in joints]] = 0.0
     heavy = np.flatnonzero(mass > 0.0)
     centers = np.array([inertias[k].lever for k in heavy])
     return MassCenter(bodies.first + heavy[None], [label], mass[heavy] / mass.sum(), centers, directions, height)

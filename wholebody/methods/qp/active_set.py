@@ -1,20 +1,10 @@
 """From a guess to the exact answer of a quadratic program: by correcting active sets, else by semismooth Newton steps.
 
-With the active set fixed the program is a linear system. Eliminating x leaves one symmetric positive definite system in
-the multipliers y of the soft and active elastic rows A (Schur complement of the diagonal),
-
-    (A_F D_F^-1 A_F' + W^-1) y = A x_fixed-part - A_F D_F^-1 g_F - b,        x_F = -D_F^-1 (g_F + A_F' y),
-
-of a few dozen unknowns: about 30 us. Weights enter as their inverse, so large ones cost no accuracy. With more rows
-than variables, and where rows repeat each other to rounding, the system in x is the better one: the least squares
-problem of the weighted rows, by QR. The set is then corrected where signs are wrong (the primal-dual active set method,
-Hintermueller, Ito and Kunisch 2002), which ends after a few corrections when the guess was near. First-order solvers
-such as OSQP thereby end in answers exact to rounding.
-
-Correcting sets may not end. Semismooth Newton steps with an exact line search do: the objective is convex, piecewise
-quadratic and smooth, and on a piece its minimiser is a linear least squares problem. Each step goes towards that
-minimiser as far as the objective falls; along a line its derivative is piecewise linear and increasing, so the best
-step is found exactly (Nocedal and Wright 2006, section 16.7, does the same for bounds).
+docs/theory/qp_programs.md has the equations. With the active set fixed the program is a linear system: in the
+multipliers (Schur complement of the diagonal), or, with more rows than variables and where rows repeat each other to
+rounding, in x by QR of the weighted rows. The set is then corrected where signs are wrong (Hintermueller, Ito and
+Kunisch 2002). That may not end. Semismooth Newton steps with an exact line search do: the objective is convex,
+piecewise quadratic and smooth, and along a line its derivative is piecewise linear and increasing.
 """
 
 from __future__ import annotations
@@ -87,14 +77,8 @@ def without_gradient(program: QuadraticProgram, active: ActiveSet, target: Array
     """
     program.check_shapes(active)
     x = np.empty(program.size)
-    parts = (
-        program.diagonal, program.rows, target, program.weight, program.elastic, program.least,
-        program.elastic_weight, program.lower, program.upper,
-    )  # fmt: skip
-    finite = compiled_kernel().minimise_without_gradient(
-        *map(np.ascontiguousarray, parts), *active, CORRECTIONS.tolerance, work, x
-    )
-    return x if finite else None
+    without = with_values(program, linear=np.zeros(program.size), target=target).packed()
+    return x if compiled_kernel().minimise_with(without, active, CORRECTIONS.tolerance, work, x) else None
 
 
 def minimise(program: QuadraticProgram, start: Array, iterations: int) -> tuple[Array, ActiveSet, int]:
@@ -151,12 +135,8 @@ def compiled_kernel() -> Any:
     index, x = np.zeros(0, dtype=np.intp), np.zeros(1)
     room = Room(np.empty(work_size(1, 0, 0)), index, active.elastic)
     active_set_kernel.primal_dual_active_set(program, index, active, 1, CORRECTIONS, room, x)
-    active_set_kernel.solve_growing(
-        *program, index, index, *active, room.chosen, index, room.work, np.array(CORRECTIONS, dtype=float), x
-    )
-    active_set_kernel.minimise_without_gradient(
-        program.diagonal, *program[2:], *active, CORRECTIONS.tolerance, room.work, x
-    )
+    active_set_kernel.grow(program, index, index, active, CORRECTIONS, room, x)
+    active_set_kernel.minimise_with(program, active, CORRECTIONS.tolerance, room.work, x)
     semismooth_kernel()
     return active_set_kernel
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
 from wholebody.methods.qp.dense_kernel import dot
 from wholebody.methods.qp.face_kernel import Face, face, minimise_on_face, stack_elastic, stack_soft
@@ -12,45 +12,7 @@ from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram, 
 from wholebody.methods.qp.settings import Corrections
 
 
-@compiled(error_model="numpy")
-def solve_growing(
-    diagonal: Array,
-    linear: Array,
-    rows: Array,
-    target: Array,
-    weight: Array,
-    elastic: Array,
-    least: Array,
-    elastic_weight: Array,
-    lower: Array,
-    upper: Array,
-    key: Indices,
-    known: Indices,
-    at_lower: Mask,
-    at_upper: Mask,
-    pushing: Mask,
-    chosen: Mask,
-    places: Indices,
-    work: Array,
-    limits: Array,
-    x: Array,
-) -> int:
-    """`grow`, whose records are given part by part: the first ten are the program, then comes `key` to `x`.
-
-    A record of ten arrays costs 3.4 us at a call from Python beside 2.3 us of the arrays, and 1 us to be made.
-    """
-    program = QuadraticProgram(diagonal, linear, rows, target, weight, elastic, least, elastic_weight, lower, upper)
-    room = Room(work, places, chosen)
-    return grow(program, key, known, ActiveSet(at_lower, at_upper, pushing), limits_of(limits), room, x)
-
-
-@compiled(inner=True, forceinline=True)
-def limits_of(numbers: Array) -> Corrections:
-    """`Corrections` from an array of its fields."""
-    return Corrections(numbers[0], int(numbers[1]), int(numbers[2]), int(numbers[3]), int(numbers[4]), numbers[5])
-
-
-@compiled(inner=True, error_model="numpy", forceinline=True)
+@compiled(error_model="numpy", forceinline=True)
 def grow(
     program: QuadraticProgram,
     key: Indices,
@@ -143,119 +105,75 @@ def primal_dual_active_set(
             return False
         for c in range(k):
             reached[c] = dot(elastic[places[c]], x)
-        if _is_right(program, places, active, own, limits.tolerance, x):
+        if attempt < limits.at_once:
+            wrong = _correct_all(program, places, active, own, limits.tolerance, x)
+        else:
+            wrong = _correct_worst(program, places, active, own, limits.tolerance, x)
+        if not wrong:
             for i in range(n):
                 x[i] = min(max(x[i], lower[i]), upper[i])
             return True
-        if attempt < limits.at_once:
-            _correct_all(program, places, active, own, limits.tolerance, x)
-        else:
-            _correct_worst(program, places, active, own, limits.tolerance, x)
     return False
 
 
 @compiled(error_model="numpy")
-def minimise_without_gradient(
-    diagonal: Array,
-    rows: Array,
-    target: Array,
-    weight: Array,
-    elastic: Array,
-    least: Array,
-    elastic_weight: Array,
-    lower: Array,
-    upper: Array,
-    at_lower: Mask,
-    at_upper: Mask,
-    pushing: Mask,
-    tolerance: float,
-    work: Array,
-    x: Array,
-) -> bool:
-    """Minimiser x (n,) of a program with g = 0 and its active set fixed, clipped to the bounds; whether it is finite.
+def minimise_with(program: QuadraticProgram, active: ActiveSet, tolerance: float, work: Array, x: Array) -> bool:
+    """Minimiser x (n,) of a program with its active set fixed, clipped to the bounds; whether it is finite.
 
-    The first nine are the program's, the next three the active set. `work` is room; see `Room`.
+    `work` is room; see `Room`.
     """
-    program = QuadraticProgram(
-        diagonal, np.zeros(len(x)), rows, target, weight, elastic, least, elastic_weight, lower, upper
-    )
-    active = ActiveSet(at_lower, at_upper, pushing)
-    own = face(work, len(x), len(target), len(least))
+    soft = len(program.target)
+    own = face(work, len(x), soft, len(program.least))
     stack_soft(program, own)
-    pushes = pushing.nonzero()[0]
+    pushes = active.elastic.nonzero()[0]
     stack_elastic(program, pushes, own)
-    finite = minimise_on_face(program, active, own, len(target) + len(pushes), tolerance, x)
+    finite = minimise_on_face(program, active, own, soft + len(pushes), tolerance, x)
     for i in range(len(x)):
-        x[i] = min(max(x[i], lower[i]), upper[i])
+        x[i] = min(max(x[i], program.lower[i]), program.upper[i])
     return finite
-
-
-@compiled(inner=True, error_model="numpy", forceinline=True)
-def _is_right(
-    program: QuadraticProgram, places: Indices, active: ActiveSet, own: Face, tolerance: float, x: Array
-) -> bool:
-    """Whether an active set is that of its minimiser x (n,)."""
-    target, least, lower, upper = program.target, program.least, program.lower, program.upper
-    at_lower, at_upper, pushing = active.lower, active.upper, active.elastic
-    multiplier, gradient, reached = own.multiplier, own.gradient, own.reached
-    for i in range(len(x)):
-        if at_lower[i]:
-            right = gradient[i] >= 0.0
-        elif at_upper[i]:
-            right = gradient[i] <= 0.0
-        else:
-            right = lower[i] - tolerance <= x[i] <= upper[i] + tolerance
-        if not right:
-            return False
-    following = len(target)
-    for c in range(len(places)):
-        j = places[c]
-        if pushing[j]:
-            right = multiplier[following] <= 0.0
-            following += 1
-        else:
-            right = reached[c] >= least[j] - tolerance
-        if not right:
-            return False
-    return True
 
 
 @compiled(inner=True, error_model="numpy", forceinline=True)
 def _correct_all(
     program: QuadraticProgram, places: Indices, active: ActiveSet, own: Face, tolerance: float, x: Array
-) -> None:
-    """Put right everything that is wrong in an active set with the minimiser x (n,)."""
+) -> bool:
+    """Put right everything that is wrong in an active set with the minimiser x (n,); whether anything was."""
     target, least, lower, upper = program.target, program.least, program.lower, program.upper
     at_lower, at_upper, pushing = active.lower, active.upper, active.elastic
     multiplier, gradient, reached = own.multiplier, own.gradient, own.reached
+    wrong = False
     for i in range(len(x)):
-        held_low, held_high = at_lower[i], at_upper[i]
-        at_lower[i] = gradient[i] >= 0.0 if held_low else x[i] < lower[i] - tolerance
-        at_upper[i] = gradient[i] <= 0.0 if held_high else x[i] > upper[i] + tolerance
+        low = gradient[i] >= 0.0 if at_lower[i] else x[i] < lower[i] - tolerance
+        high = gradient[i] <= 0.0 if at_upper[i] else x[i] > upper[i] + tolerance
+        wrong = wrong or low != at_lower[i] or high != at_upper[i]
+        at_lower[i], at_upper[i] = low, high
     following = len(target)
     for c in range(len(places)):
         j = places[c]
+        push = reached[c] < least[j] - tolerance
         if pushing[j]:
-            pushing[j] = multiplier[following] <= 0.0
+            push = multiplier[following] <= 0.0
             following += 1
-        else:
-            pushing[j] = reached[c] < least[j] - tolerance
+        wrong = wrong or push != pushing[j]
+        pushing[j] = push
+    return wrong
 
 
 @compiled(inner=True, error_model="numpy", forceinline=True)
 def _correct_worst(
     program: QuadraticProgram, places: Indices, active: ActiveSet, own: Face, tolerance: float, x: Array
-) -> None:
-    """Put right the entry that is most wrong, in units of x."""
+) -> bool:
+    """Put right the entry that is most wrong, in units of x; whether any was."""
     diagonal, target, elastic = program.diagonal, program.target, program.elastic
     least, lower, upper = program.least, program.lower, program.upper
     at_lower, at_upper, pushing = active.lower, active.upper, active.elastic
     multiplier, gradient, reached = own.multiplier, own.gradient, own.reached
-    worst, mask, place = -np.inf, at_lower, 0
+    worst, mask, place, found = -np.inf, at_lower, 0, False
     for i in range(len(x)):
         pull = abs(gradient[i]) / diagonal[i]
         next_lower = gradient[i] >= 0.0 if at_lower[i] else x[i] < lower[i] - tolerance
         next_upper = gradient[i] <= 0.0 if at_upper[i] else x[i] > upper[i] + tolerance
+        found = found or next_lower != at_lower[i] or next_upper != at_upper[i]
         wrong = pull if at_lower[i] else lower[i] - x[i]
         if next_lower != at_lower[i] and wrong > worst:
             worst, mask, place = wrong, at_lower, i
@@ -274,6 +192,9 @@ def _correct_worst(
                 norm += elastic[j, i] * elastic[j, i] / diagonal[i]
             wrong = multiplier[following] * norm
             following += 1
+        found = found or flips
         if flips and wrong > worst:
             worst, mask, place = wrong, pushing, j
-    mask[place] = not mask[place]
+    if found:
+        mask[place] = not mask[place]
+    return found

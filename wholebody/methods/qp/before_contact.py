@@ -13,57 +13,40 @@ from itertools import chain
 import numpy as np
 
 from wholebody.base.records import with_values
-from wholebody.methods.control import Control
 from wholebody.methods.qp.closest import ENDLESS
-from wholebody.methods.qp.iterates import LocalSolution
-from wholebody.methods.qp.solvers.base import QPSolver
+from wholebody.methods.qp.iterates import LocalSolution, Run
 from wholebody.methods.qp.sqp import SQP
-from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.starts import restarts
 from wholebody.problem import Problem
-from wholebody.solution import TraceEntry
 from wholebody.tasks.contact_parts import approached, has_face
-from wholebody.terms.linearisation import Lineariser
 
 IN_FRONT = 0.01  # m: how far surfaces are in front of faces; more: reached by fewer limbs, and farther from the contact
 
 
-def before_contact(
-    problem: Problem,
-    subproblem: Subproblem,
-    lineariser: Lineariser,
-    solver: QPSolver,
-    seed: int,
-    trace: list[TraceEntry],
-    most: int,
-    control: Control,
-) -> Iterator[LocalSolution]:
+def before_contact(problem: Problem, shared: Run, seed: int, most: int) -> Iterator[LocalSolution]:
     """Descents through everything to where surfaces are in front of their faces; none where no term has a face.
 
     The measures count: as nothing is in the way, all that the terms leave open is as the figure likes it.
 
     Args:
         problem: to be solved.
-        subproblem: builds the programs.
-        lineariser: of the problem.
-        solver: of the programs.
+        shared: of the search.
         seed: of the starts.
-        trace: grows by one entry a program.
         most: entries of the trace with which no further descent begins.
-        control: what may end it.
     """
     if not any(has_face(term) for term in (*problem.goals, *problem.constraints)):
         return
     goals = [approached(term, IN_FRONT) for term in problem.goals]
     constraints = [approached(term, IN_FRONT) for term in problem.constraints]
-    alone = lineariser.relaxed(ENDLESS)
+    alone = shared.lineariser.relaxed(ENDLESS)
     alone.take(goals, alone.clearances, constraints)
     start = problem.scene.figure.clamp(problem.start)
     # most descents, of which the first is from the start; of a driver in 30 one in ten is met
-    others = restarts(problem, lineariser.state, start, np.random.default_rng(seed), 24 - 1)
+    others = restarts(problem, shared.lineariser.state, start, np.random.default_rng(seed), 24 - 1)
     ends, missed = list[float](), list[LocalSolution]()
     for q in chain([start], others):
-        local = _descent(subproblem, alone, solver, trace, control).run(q)
+        # to 1 mm or mrad: what is exact there is not where surfaces meet
+        local = SQP(with_values(shared, lineariser=alone), 1e-3, 40, "before contact", full_step=True).run(q)
         # m, rad: nearer ends lead to the contacts; of the others, which take ten times as long, one in ten does
         if local.violation.worst <= 0.01:
             yield with_values(local, iterations=local.iterations + sum(each.iterations for each in missed))
@@ -74,26 +57,8 @@ def before_contact(
         # ends that are the least and equally far: the goals are out of reach, and others are no nearer
         # times the least violation up to which ends count as equally far
         alike = sum(end <= 1.1 * min(ends) for end in ends) >= 3
-        if alike or control.over or len(trace) >= most:
+        if alike or shared.control.over or len(shared.trace) >= most:
             break
     if missed and not alike:
         nearest = min(missed, key=lambda each: each.violation.total)
         yield with_values(nearest, iterations=sum(each.iterations for each in missed))
-
-
-def _descent(
-    subproblem: Subproblem, alone: Lineariser, solver: QPSolver, trace: list[TraceEntry], control: Control
-) -> SQP:
-    # m, rad: to which a descent goes; what is exact there is not where surfaces meet
-    # most programs of one descent
-    return SQP(
-        subproblem,
-        alone,
-        solver,
-        1e-3,
-        40,
-        trace=trace,
-        note="before contact",
-        full_step=True,
-        control=control,
-    )

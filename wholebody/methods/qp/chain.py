@@ -40,18 +40,12 @@ _SHARES = np.linspace(0.0, 1.0, SEEDS.samples)
 
 
 class Met(NamedTuple):
-    """A posture that meets the goals with everything held.
+    """A posture that meets the goals with everything held."""
 
-    Attributes:
-        q: (nq,) posture.
-        trace: one entry a descent, but for one that ends where it begins.
-        stationary: whether the measures are stationary too.
-        blocked: (nq,) an end of far less effort that does not keep its clearances; None where there is none.
-    """
-
-    q: Array
-    trace: tuple[TraceEntry, ...]
-    stationary: bool
+    q: Array  # (nq,) posture
+    trace: tuple[TraceEntry, ...]  # one entry a descent, but for one that ends where it begins
+    stationary: bool  # whether the measures are stationary too
+    # (nq,) an end of far less effort that does not keep its clearances; None where there is none
     blocked: Array | None = None
 
     @property

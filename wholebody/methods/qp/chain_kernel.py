@@ -17,57 +17,33 @@ TURN = 2.0 * np.pi
 
 
 class Chain(NamedTuple):
-    """Joints of one degree of freedom each that carry the frames of some goals.
+    """Joints of one degree of freedom each that carry the frames of some goals."""
 
-    Attributes:
-        parents: (n,) joint that each joint hangs on, 0 being the world; joint k is number k + 1.
-        places: (n, 4, 3) its placement in its parent at zero: columns of the rotation, then the translation.
-        turns: (n, 3) axis that it turns about, in its own frame; zero for one that slides.
-        slides: (n, 3) axis that it slides along; zero for one that turns.
-        support: (n + 1, n) 1 where a column moves a joint.
-        lower: (n,) least values of the joints.
-        upper: (n,) greatest values.
-    """
-
-    parents: Indices
-    places: Array
-    turns: Array
-    slides: Array
-    support: NDArray[np.int8]
-    lower: Array
-    upper: Array
+    parents: Indices  # (n,) joint that each joint hangs on, 0 being the world; joint k is number k + 1
+    places: Array  # (n, 4, 3) its placement in its parent at zero: columns of the rotation, then the translation
+    turns: Array  # (n, 3) axis that it turns about, in its own frame; zero for one that slides
+    slides: Array  # (n, 3) axis that it slides along; zero for one that turns
+    support: NDArray[np.int8]  # (n + 1, n) 1 where a column moves a joint
+    lower: Array  # (n,) least values of the joints
+    upper: Array  # (n,) greatest values
 
 
 class Goals(NamedTuple):
-    """Goals of places and rotations, as in `terms.entries.RESIDUAL`, with the numbers of the chain's joints.
+    """Goals of places and rotations, as in `terms.entries.RESIDUAL`, with the numbers of the chain's joints."""
 
-    Attributes:
-        tables: (e, 36) their floats.
-        entries: (e, 6) their integers.
-    """
-
-    tables: Array
-    entries: Integers
+    tables: Array  # (e, 36) their floats
+    entries: Integers  # (e, 6) their integers
 
 
 class Room(NamedTuple):
-    """Room for a descent.
+    """Room for a descent."""
 
-    Attributes:
-        joints: (n + 1, 4, 3) placements of the joints; the first is the world's.
-        columns: (n, 6) columns of the joint Jacobian.
-        wrench: (m, 6) of the errors.
-        value: (m,) the errors.
-        jacobian: (m, n) their derivatives.
-        free: (n,) whether a joint moves in the present step.
-    """
-
-    joints: Array
-    columns: Array
-    wrench: Array
-    value: Array
-    jacobian: Array
-    free: Mask
+    joints: Array  # (n + 1, 4, 3) placements of the joints; the first is the world's
+    columns: Array  # (n, 6) columns of the joint Jacobian
+    wrench: Array  # (m, 6) of the errors
+    value: Array  # (m,) the errors
+    jacobian: Array  # (m, n) their derivatives
+    free: Mask  # (n,) whether a joint moves in the present step
 
 
 @compiled(error_model="numpy")

@@ -25,17 +25,11 @@ TRIED = (0.0, 0.7, -1.9)  # rad: of a joint that is held; what axes have in comm
 
 
 class Branches(NamedTuple):
-    """Branches of a closed form; arrays have a row a posture.
+    """Branches of a closed form; arrays have a row a posture."""
 
-    Attributes:
-        values: (k, n) of the joints.
-        effort: (k,) of each; inf where it does not exist or is beyond limits.
-        least: (m, n) those that take less effort than the samples beside them, the least first.
-    """
-
-    values: Array
-    effort: Array
-    least: Array
+    values: Array  # (k, n) of the joints
+    effort: Array  # (k,) of each; inf where it does not exist or is beyond limits
+    least: Array  # (m, n) those that take less effort than the samples beside them, the least first
 
     def cheaper(self, most: float) -> Array:
         """Those (j, n) within limits whose effort is less than `most`, the least first."""

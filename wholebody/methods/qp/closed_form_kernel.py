@@ -28,25 +28,15 @@ Vector: TypeAlias = tuple[float, float, float]
 
 
 class Arm(NamedTuple):
-    """The axes of an arm at zero, from the base to the end, or from the end to the base.
+    """The axes of an arm at zero, from the base to the end, or from the end to the base."""
 
-    Attributes:
-        axes: (n, 3) h_k, unit vectors; n is 6, or 7 with one that is held.
-        points: (n, 3) o_k.
-        joints: (n,) which joint of the chain each is.
-        held: which of them is held, -1 for none.
-        kind: what makes it solvable.
-        backwards: 1 where the axes begin at the end.
-        end: (4, 3) placement of the last joint at zero: the columns of its rotation, then its translation.
-    """
-
-    axes: Array
-    points: Array
-    joints: Indices
-    held: int
-    kind: int
-    backwards: int
-    end: Array
+    axes: Array  # (n, 3) h_k, unit vectors; n is 6, or 7 with one that is held
+    points: Array  # (n, 3) o_k
+    joints: Indices  # (n,) which joint of the chain each is
+    held: int  # which of them is held, -1 for none
+    kind: int  # what makes it solvable
+    backwards: int  # 1 where the axes begin at the end
+    end: Array  # (4, 3) placement of the last joint at zero: the columns of its rotation, then its translation
 
 
 @compiled(inner=True)

@@ -16,11 +16,10 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.figures.state import has_free_root
+from wholebody.figures.state import free_roots, root_freedoms
 from wholebody.methods.qp.settings import ESCAPE
 from wholebody.terms.linearisation import PackedLinearisation
 
-ROOT, PLACES = 3, 6  # coordinates of a free root's position, and with its rotation
 WAYS = (
     (1, 0, 0),
     (-1, 0, 0),
@@ -36,19 +35,12 @@ WAYS = (
 
 
 class ProjectionRows(NamedTuple):
-    """What a posture is projected out of: rows of near contacts and of constraints.
+    """What a posture is projected out of: rows of near contacts and of constraints."""
 
-    Attributes:
-        depth: greatest of any pair, metres.
-        rows: (k, nv) rates of what must not become negative.
-        room: (k,) how much that is, metres and radians.
-        box: (2, nv) displacements that bounds allow.
-    """
-
-    depth: float
-    rows: Array
-    room: Array
-    box: Array
+    depth: float  # greatest of any pair, metres
+    rows: Array  # (k, nv) rates of what must not become negative
+    room: Array  # (k,) how much that is, metres and radians
+    box: Array  # (2, nv) displacements that bounds allow
 
 
 def projection_rows(at: PackedLinearisation, rows: Array, room: Array) -> ProjectionRows:
@@ -89,17 +81,19 @@ def free_end(model: pin.Model, q: Array, out: float, rows_at: Callable[[Array], 
 def _starts(model: pin.Model, box: Array) -> Iterator[Array]:
     """Displacements (nv,) to begin at, all within a box (2, nv)."""
     yield np.zeros(model.nv)
-    free = has_free_root(model)
-    if free and np.isfinite(box[:, :ROOT]).all() and box[:, :ROOT].any():
-        for way in WAYS:
-            begun = np.zeros(model.nv)
-            begun[:ROOT] = [0.0 if sign == 0 else box[max(sign, 0), axis] for axis, sign in enumerate(way)]
-            yield begun
+    for joint in free_roots(model):
+        first = int(model.joints[joint].idx_v)
+        place = slice(first, first + 3)
+        if np.isfinite(box[:, place]).all() and box[:, place].any():
+            for way in WAYS:
+                begun = np.zeros(model.nv)
+                begun[place] = [0.0 if sign == 0 else box[max(sign, 0), first + axis] for axis, sign in enumerate(way)]
+                yield begun
     low, high = np.clip(box, -ESCAPE.farthest, ESCAPE.farthest)
-    rng, places = np.random.default_rng(0), PLACES if free else 0
+    rng, joints = np.random.default_rng(0), ~root_freedoms(model)
     for _ in range(ESCAPE.random):
         begun = rng.uniform(low, high)
-        begun[places:] *= rng.uniform()
+        begun[joints] *= rng.uniform()
         yield begun
 
 

@@ -13,25 +13,15 @@ from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram
 
 
 class Face(NamedTuple):
-    """Rows that count with an active set fixed, and room for their system.
+    """Rows that count with an active set fixed, and room for their system."""
 
-    Attributes:
-        stacked: (m + k, n) the soft rows and the pushing elastic ones.
-        right: (m + k,) what they are to be.
-        compliance: (m + k,) their inverse weights.
-        multiplier: (m + k,) becomes weight times residual of each.
-        gradient: (n,) becomes the derivative of the objective by x.
-        reached: (k,) values of the elastic rows at x.
-        scaled, table, inverse, trial: room; (m + k, n), (m + k)^2, (n,) and (n,).
-    """
-
-    stacked: Array
-    right: Array
-    compliance: Array
-    multiplier: Array
-    gradient: Array
-    reached: Array
-    scaled: Array
+    stacked: Array  # (m + k, n) the soft rows and the pushing elastic ones
+    right: Array  # (m + k,) what they are to be
+    compliance: Array  # (m + k,) their inverse weights
+    multiplier: Array  # (m + k,) becomes weight times residual of each
+    gradient: Array  # (n,) becomes the derivative of the objective by x
+    reached: Array  # (k,) values of the elastic rows at x
+    scaled: Array  # room; (m + k, n), (m + k)^2, (n,) and (n,)
     table: Array
     inverse: Array
     trial: Array

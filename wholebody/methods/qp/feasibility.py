@@ -1,12 +1,8 @@
 """Feasibility first: from a start to a feasible posture, by whole Gauss-Newton steps in a small box, without measures.
 
-Each program asks for the whole residual of the goals and lets no degree of freedom go farther than the box. So the step
-slides along what is in the way with all of its length: the joints that are held up stay, and the others go on. A step
-that asks for a part of the errors and least motion, as `sqp` does, gets no nearer there. Steps are taken as they are;
-where they go to and fro the box shrinks.
-
-Where a joint is held up by its limit, and turning on by what is missing to a full turn leads to its other limit, it is
-put there: a goal beyond the limit of a shoulder that turns by 320 degrees is reached from the other side.
+The step slides along what is in the way with all of its length: the joints that are held up stay, and the others go
+on. A step that asks for a part of the errors and least motion, as `sqp` does, gets no nearer there. Where a joint is
+held up by its limit, and turning on by what is missing to a full turn leads to its other limit, it is put there.
 """
 
 from __future__ import annotations
@@ -14,74 +10,47 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.base.errors import UndefinedTermError
-from wholebody.geometry.continuous.moved_pairs import QueryResult
-from wholebody.methods.control import Control
-from wholebody.methods.qp.iterates import Iterate, LocalSolution
+from wholebody.figures.figure import Figure
+from wholebody.methods.qp.iterates import Iterate, LocalSolution, Stage
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
+from wholebody.methods.qp.rows import StepSize
 from wholebody.methods.qp.settings import FEASIBILITY, PROGRAM
-from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.qp.working_set import WorkingSet
-from wholebody.problem import Problem
-from wholebody.solution import TraceEntry
-from wholebody.terms.linearisation import Lineariser
 
 SHORTER, LONGER = 0.7, 1.2  # factors of the box after a step back and after a step on
 AT_LIMIT = 1e-6  # rad
 
 
 @dataclass
-class Feasibility:
-    """One attempt; call `run` once.
+class Feasibility(Stage):
+    """One attempt; call `run` once."""
 
-    Attributes:
-        problem: to be solved.
-        subproblem: builds the programs.
-        lineariser: linearises the problem.
-        solver: solves the programs.
-        tolerance: metres and radians.
-        iterations: most programs to solve.
-        trace: grows by one entry a program.
-        note: what to call the programs in the trace.
-        control: what may end it.
-    """
-
-    problem: Problem
-    subproblem: Subproblem
-    lineariser: Lineariser
-    solver: QPSolver
-    tolerance: float
-    iterations: int
-    trace: list[TraceEntry] = field(default_factory=list)
-    note: str = "feasibility"
-    control: Control = field(default_factory=lambda: Control(np.inf))
+    figure: Figure = field(kw_only=True)
 
     def run(self, start: Array) -> LocalSolution:
         """Go from a posture within limits, shape (nq,), to a feasible one; else to a stationary one."""
-        working_set = WorkingSet(self.solver)
-        here, box, last = self._iterate_at(start), FEASIBILITY.step, np.zeros(self.lineariser.state.model.nv)
+        working_set = WorkingSet(self.shared.solver)
+        here, box, last = self.look(start), FEASIBILITY.step, np.zeros(self.figure.model.nv)
         history: list[float] = []
         count = 0
         wrapped: set[int] = set()
-        while here.violation.worst > self.tolerance and count < self.iterations and not self.control.over:
+        while here.violation.worst > self.tolerance and count < self.iterations and not self.shared.control.over:
             history.append(here.violation.total)
             count += 1
             program = self._program(here, box)
             step = working_set.solve(program, here.rows.key).x
             stuck = float(np.abs(step).max(initial=0.0)) <= self.tolerance**2 or stalls(history, self.tolerance)
             if stuck:
-                q = self._turned_on(here, program, step, wrapped)
-                there = None if q is None else self._moved(q)
+                way = self._turned_on(here, program, step, wrapped)
+                there = None if way is None else self.moved(here, way)
                 if there is None:
                     return _end(here, True, count)
                 here, history, box = there, [], FEASIBILITY.step
                 last = np.zeros_like(step)
                 working_set.reset()
-                self._record(here, 2.0 * np.pi, "turned on")
+                self.record(here, "turned on")
                 continue
             box = (
                 max(SHORTER * box, FEASIBILITY.least_step)
@@ -89,7 +58,7 @@ class Feasibility:
                 else min(LONGER * box, FEASIBILITY.step)
             )
             last = step
-            there = self._moved(np.asarray(pin.integrate(self.lineariser.state.model, here.at.q, step)))
+            there = self.moved(here, step)
             if there is None:
                 if box < FEASIBILITY.least_step:
                     return _end(here, False, count)
@@ -97,15 +66,15 @@ class Feasibility:
                 box, last = 0.3 * min(box, float(np.abs(step).max())), np.zeros_like(step)
                 continue
             here = there
-            self._record(here, float(np.abs(step).max(initial=0.0)), "goal")
+            self.record(here, "goal")
         return _end(here, here.violation.worst <= self.tolerance, count)
 
     def _program(self, here: Iterate, box: float) -> QuadraticProgram:
-        none = np.zeros(len(here.rows.soft_error))
-        return self.subproblem.program(here.at, here.rows, box / PROGRAM.box, None, FEASIBILITY.damping, none, False)
+        size = StepSize(box / PROGRAM.box, 0.0, FEASIBILITY.damping, False)
+        return self.shared.subproblem.program(here.at, here.rows, size)
 
     def _turned_on(self, here: Iterate, program: QuadraticProgram, step: Array, wrapped: set[int]) -> Array | None:
-        """The posture (nq,) with the joint at its other limit that presses hardest at one; None where there is none.
+        """The way (nv,) of the joint that presses hardest at a limit to its other limit; None where there is none.
 
         Args:
             here: where nothing leads nearer.
@@ -113,43 +82,27 @@ class Feasibility:
             step: (nv,) its answer.
             wrapped: joints for which this was done; it grows.
         """
-        limits, q, model = self.problem.scene.figure.limits, here.at.q, self.lineariser.state.model
+        limits, q, model = self.figure.limits, here.at.q, self.figure.model
         turning = [joint.idx_v for joint in model.joints if joint.shortname().startswith("JointModelR")]
         pushed = program.gradient(step)[limits.idx_v]
         after = q[limits.idx_q] + step[limits.idx_v]
         high = (pushed < 0.0) & (after > limits.upper - AT_LIMIT)
         low = (pushed > 0.0) & (after < limits.lower + AT_LIMIT)
-        there = np.where(high, limits.lower, limits.upper)
-        move = there - q[limits.idx_q]
+        move = np.where(high, limits.lower, limits.upper) - q[limits.idx_q]
         allowed = (move >= here.at.lower[limits.idx_v] - AT_LIMIT) & (move <= here.at.upper[limits.idx_v] + AT_LIMIT)
         range_ = limits.upper - limits.lower
         wide = (range_ > FEASIBILITY.wide) & (range_ < 2.0 * np.pi) & np.isin(limits.idx_v, turning)
         for index in np.argsort(-np.abs(pushed)).tolist():
             if ((high | low) & allowed & wide)[index] and index not in wrapped:
                 wrapped.add(index)
-                moved: Array = q.copy()
-                moved[limits.idx_q[index]] = there[index]
-                return moved
+                way = np.zeros(len(step))
+                way[limits.idx_v[index]] = move[index]
+                return way
         return None
 
-    def _moved(self, q: Array) -> Iterate | None:
-        """What is at a posture (nq,); None where a term of one's own is not finite there."""
-        try:
-            return self._iterate_at(q)
-        except UndefinedTermError as error:
-            self.control.step_back(error)
-            return None
-
-    def _iterate_at(self, q: Array) -> Iterate:
-        at = self.lineariser.at(q, FEASIBILITY.within, planes=True)
-        rows = self.subproblem.rows(at)
-        return Iterate(at, rows, self.subproblem.violation(rows), QueryResult(at.contacts, FEASIBILITY.within))
-
-    def _record(self, here: Iterate, step: float, what: str) -> None:
-        violation = here.violation
-        held = max(violation.hold, violation.elastic)
-        self.trace.append(TraceEntry(violation.left, held, here.at.measure, step, f"{self.note}: {what}"))
-        self.control.tell(self.trace[-1])
+    def look(self, q: Array, longest: float = np.inf) -> Iterate:
+        """See `Stage.look`."""
+        return self.iterate_at(q, FEASIBILITY.within, longest)
 
 
 def _end(here: Iterate, converged: bool, count: int) -> LocalSolution:

@@ -1,33 +1,34 @@
-"""What a descent looks at and answers: a posture with its linearisation, a step with its prediction, and the end."""
+"""What stages of a search have in common: postures with their linearisations, steps with predictions, and ends."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.base.arrays import Array
+from wholebody.base.errors import UndefinedTermError
 from wholebody.geometry.continuous.moved_pairs import QueryResult
+from wholebody.geometry.continuous.passing_through import passes_through
+from wholebody.methods.control import Control
 from wholebody.methods.qp.rows import Multipliers, Rows, Violation
 from wholebody.methods.qp.settings import DESCENT
+from wholebody.methods.qp.solvers.base import QPSolver
+from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.qp.tangential import Parts
-from wholebody.terms.linearisation import Linearisation
+from wholebody.solution import TraceEntry
+from wholebody.terms.linearisation import Linearisation, Lineariser
 
 
 class StepAcceptance(NamedTuple):
-    """How a step did.
+    """How a step did."""
 
-    Attributes:
-        accepted: whether it is taken.
-        good: whether it achieved the predicted reduction.
-        poor: whether it achieved much less.
-        by: "measure" or "goal", by which it was judged; "rejected", or "rejected measure" where the measures led.
-    """
-
-    accepted: bool
-    good: bool
-    poor: bool
-    by: str
+    accepted: bool  # whether it is taken
+    good: bool  # whether it achieved the predicted reduction
+    poor: bool  # whether it achieved much less
+    by: str  # "measure" or "goal", by which it was judged; "rejected", or "rejected measure" where the measures led
 
 
 class PredictedReduction(NamedTuple):
@@ -38,21 +39,13 @@ class PredictedReduction(NamedTuple):
 
 
 class LocalSolution(NamedTuple):
-    """Where a descent ended.
+    """Where a descent ended."""
 
-    Attributes:
-        q: (nq,) posture.
-        violation: the residual violation.
-        measure: weighted sum of the measures.
-        converged: whether it ended because nothing better is near, rather than out of iterations.
-        iterations: how many programs were solved.
-    """
-
-    q: Array
-    violation: Violation
-    measure: float
-    converged: bool
-    iterations: int
+    q: Array  # (nq,) posture
+    violation: Violation  # the residual violation
+    measure: float  # weighted sum of the measures
+    converged: bool  # whether it ended because nothing better is near, rather than out of iterations
+    iterations: int  # how many programs were solved
 
 
 class Iterate(NamedTuple):
@@ -66,25 +59,65 @@ class Iterate(NamedTuple):
 
 
 class Step(NamedTuple):
-    """What a program says about the way from a posture.
+    """What a program says about the way from a posture."""
 
-    Attributes:
-        dq: (nv,) the step: the program's answer, or its normal part where the measures have nothing to gain.
-        parts: the answer's parts; None far from the goals, and where measures do not count.
-        flat: whether the tangential part saves less of the measures than counts.
-        answer: (nv,) the program's answer.
-        predicted: the reduction that the program predicts.
-        multipliers: of the program; None as for the parts.
-        saves: by how much the measures decrease, to second order, with the program's answer.
-    """
+    dq: Array  # (nv,) the step: the program's answer, or its normal part where the measures have nothing to gain
+    parts: Parts | None  # the answer's parts; None far from the goals, and where measures do not count
+    flat: bool  # whether the tangential part saves less of the measures than counts
+    answer: Array  # (nv,) the program's answer
+    predicted: PredictedReduction  # the reduction that the program predicts
+    multipliers: Multipliers | None  # of the program; None as for the parts
+    saves: float  # by how much the measures decrease, to second order, with the program's answer
 
-    dq: Array
-    parts: Parts | None
-    flat: bool
-    answer: Array
-    predicted: PredictedReduction
-    multipliers: Multipliers | None
-    saves: float
+
+class Run(NamedTuple):
+    """What the stages of a search share."""
+
+    subproblem: Subproblem  # builds the programs
+    lineariser: Lineariser  # linearises the problem
+    solver: QPSolver  # solves the programs
+    trace: list[TraceEntry]  # grows by one entry a program
+    control: Control  # what may end it
+
+
+@dataclass
+class Stage:
+    """What leads from a start to a posture."""
+
+    shared: Run
+    tolerance: float  # metres and radians
+    iterations: int  # most programs to solve
+    note: str = ""  # what to call the programs in the trace
+
+    def iterate_at(self, q: Array, within: float, longest: float = np.inf, *, planes: bool = True) -> Iterate:
+        """A posture (nq,) with the rows of pairs within a distance, metres; UndefinedTermError."""
+        at = self.shared.lineariser.at(q, within, planes=planes)
+        rows = self.shared.subproblem.rows(at)
+        return Iterate(at, rows, self.shared.subproblem.violation(rows), QueryResult(at.contacts, within), longest)
+
+    def moved(self, here: Iterate, way: Array) -> Iterate | None:
+        """Where a way (nv,) leads; None where a term of one's own is not finite there."""
+        q = np.asarray(pin.integrate(self.shared.lineariser.state.model, here.at.q, way))
+        try:
+            return self.look(q, float(np.abs(way).max(initial=0.0)))
+        except UndefinedTermError as error:
+            self.shared.control.step_back(error)
+            return None
+
+    def look(self, q: Array, longest: float = np.inf) -> Iterate:
+        """A posture (nq,) that a way with this longest entry led to, with its rows; UndefinedTermError."""
+        raise NotImplementedError
+
+    def jumps(self, here: Iterate, there: Iterate) -> bool:
+        """Whether the motion between two postures passes through something."""
+        return passes_through(self.shared.lineariser.workspace, here.placed, there.placed, here.at.q, there.at.q)
+
+    def record(self, there: Iterate, what: str) -> None:
+        """Tell of a program by what became of its step."""
+        violation, note = there.violation, f"{self.note}: {what}" if self.note else what
+        held = max(violation.hold, violation.elastic)
+        self.shared.trace.append(TraceEntry(violation.left, held, there.at.measure, there.longest, note))
+        self.shared.control.tell(self.shared.trace[-1])
 
 
 def judge(

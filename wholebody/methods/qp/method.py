@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Annotated
 
 from wholebody.assessment.posture import assess
+from wholebody.base.arrays import Array
+from wholebody.base.checks import posture, shown
+from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked
 from wholebody.methods.conclusion import Ending, concluded, meets
 from wholebody.methods.control import Control, Progress
@@ -31,9 +35,9 @@ class QP(Checked):
     Attributes:
         solver: "osqp", "active_set" (our own), "daqp" or any name that qpsolvers lists on this machine; see `wholebody
             doctor`.
-        hot_start: whether programs after the first of a solve begin with the active set of the one before, corrected,
-            and the solver is asked only where that does not settle. Otherwise every program is the solver's. The
-            answers are the same to rounding; `Solution.programs` says how many programs each closed.
+        hot_start: whether programs begin with the active set of the one before, corrected, and the solver is asked only
+            where that does not settle. Otherwise every program is the solver's. The answers are the same to rounding;
+            `Solution.programs` says how many programs each closed.
         tolerance: metres and radians to which goals and constraints are met.
         iterations: most programs for one descent.
         budget: most programs that restarts may add when no descent from the start reaches the goals; a program takes
@@ -74,8 +78,7 @@ class QP(Checked):
     def name(self) -> str:
         """Name for tables: "qp" as it comes; else what stands behind the slash is asked for every program.
 
-        "qp/active_set" begins with the active set of the program before. "+hot_start" says that so do others, and that
-        their solver is asked for the first program and where that set does not settle.
+        "qp/active_set" and "+hot_start" begin with the last active set, and ask their solver where it does not settle.
         """
         if self.hot_start:
             return {"osqp": "qp", "active_set": "qp/active_set"}.get(self.solver, f"qp/{self.solver}+hot_start")
@@ -122,6 +125,30 @@ class QP(Checked):
                     contradictions=search.contradictions, programs=search.solver.counted(),
                 )  # fmt: skip
         return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
+
+    def minima(self, problem: Problem, starts: Iterable[Array]) -> Iterator[Solution]:
+        """For each start (nq,) the minimum of the measures that one descent from it leads to, without other starts.
+
+        Raises:
+            InputError: the scene changed after the problem was stated.
+        """
+        check_problem(problem, "QP.minima: problem")
+        try:
+            begins = iter(starts)
+        except TypeError:
+            raise InputError(f"QP.minima: starts is {shown(starts)}; give postures, such as [problem.start]") from None
+        budget = Budget(self.tolerance, self.iterations, self.budget, 0, self.seed, self.measures)
+        for given in begins:
+            start = posture(given, problem.scene.model.nq, "QP.minima: a start")
+            began = time.perf_counter()
+            with problem.borrow() as workspace, Control(self.time_limit, None, LONGEST) as control:
+                search = Multistart(problem, workspace, self._qp_solver(), budget, control)
+                end = search.feasibility_first(start)
+            ending = Ending(
+                end.q, end.converged, search.spent, tuple(search.trace), search.how,
+                programs=search.solver.counted(),
+            )  # fmt: skip
+            yield concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
 
     def _qp_solver(self) -> QPSolver:
         """A QP solver of the name in the settings, for one run."""

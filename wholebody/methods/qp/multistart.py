@@ -12,6 +12,7 @@ from itertools import chain, takewhile
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.assessment.posture import assess
 from wholebody.base.arrays import Array
@@ -20,9 +21,9 @@ from wholebody.methods.contradictions import NEAREST, Contradiction, contradicti
 from wholebody.methods.control import Control
 from wholebody.methods.qp.before_contact import before_contact
 from wholebody.methods.qp.cancelling import posture_apart
-from wholebody.methods.qp.closest import Closest
+from wholebody.methods.qp.closest import ENDLESS, Closest
 from wholebody.methods.qp.feasibility import Feasibility
-from wholebody.methods.qp.iterates import LocalSolution, better, held
+from wholebody.methods.qp.iterates import LocalSolution, Run, better, held
 from wholebody.methods.qp.settings import SEARCH
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP
@@ -47,17 +48,11 @@ class Budget(NamedTuple):
 
 
 class Attempt(NamedTuple):
-    """A part of a search.
+    """A part of a search."""
 
-    Attributes:
-        starts: (nq,) postures to begin at.
-        stage: where it leads from one; None where that is given up.
-        how: what the message says of an answer that it found.
-    """
-
-    starts: Iterable[Array]
-    stage: Callable[[Array], LocalSolution | None]
-    how: str
+    starts: Iterable[Array]  # (nq,) postures to begin at
+    stage: Callable[[Array], LocalSolution | None]  # where it leads from one; None where that is given up
+    how: str  # what the message says of an answer that it found
 
 
 class Multistart:
@@ -71,6 +66,7 @@ class Multistart:
         self.subproblem = Subproblem(problem, workspace.state)
         self.lineariser = problem.lineariser(workspace)
         self.trace: list[TraceEntry] = []
+        self._shared = Run(self.subproblem, self.lineariser, solver, self.trace, control)
         self.spent = 0
         self.how = "directly"
         self.contradictions: tuple[Contradiction, ...] = ()
@@ -104,8 +100,8 @@ class Multistart:
         if other is not None:
             self._accept(self._directly(other), "directly")
         self._find_closest()
-        self._descend_again()
-        self._restart_for_measure()
+        poor = self._descend_again()
+        self._restart_for_measure(max(self.budget.restarts_for_measure, SEARCH.poor if poor else 0))
         if self.best.violation.worst <= self.budget.tolerance:
             self.contradictions = ()  # by less than the tolerance
         if self._out_of_reach:  # although a closer posture may be near
@@ -131,10 +127,10 @@ class Multistart:
         if least is None:
             return
         yield Attempt(self._before_contact(), lambda q: self._descend(q, full_step=True), "from before contact")
-        yield Attempt([start], self._feasibility_first, "by feasibility first")
+        yield Attempt([start], self.feasibility_first, "by feasibility first")
         hooked = [*self.lineariser.defined(hooked_hands(self.problem, state, start))]
         yield Attempt(self._while_open(hooked), self._relaxed, "from another start")
-        yield Attempt(hooked, self._feasibility_first, "from hooked hands")
+        yield Attempt(hooked, self.feasibility_first, "from hooked hands")
         near = self.best.violation.left <= SEARCH.relaxation_depth  # as far as limbs in the way keep goals off
         yield Attempt(self._while_open([start] if near else []), self._relaxed, "from another start")
         self._out_of_reach = self._known_out_of_reach(self.best.q)
@@ -166,10 +162,7 @@ class Multistart:
 
     def _before_contact(self) -> Iterator[Array]:
         """Postures where surfaces are in front of the faces that they are to meet."""
-        for local in before_contact(
-            self.problem, self.subproblem, self.lineariser, self.solver, self.budget.seed, self.trace,
-            len(self.trace) + self._left, self.control,
-        ):  # fmt: skip
+        for local in before_contact(self.problem, self._shared, self.budget.seed, len(self.trace) + self._left):
             self.spent += local.iterations
             yield local.q
 
@@ -179,7 +172,7 @@ class Multistart:
         self.spent += local.iterations
         return local
 
-    def _feasibility_first(self, start: Array) -> LocalSolution:
+    def feasibility_first(self, start: Array) -> LocalSolution:
         """Find a feasible posture without measures, and descend with measures from there."""
         local = self._feasibility(self.lineariser, self.budget.iterations, "feasibility").run(start)
         self.spent += local.iterations
@@ -209,25 +202,40 @@ class Multistart:
             return probe
         return self._descend(probe.q, "restart", most=max(self._left, 1))
 
-    def _descend_again(self) -> None:
-        """Where contacts are met by an end that is no local minimum of the measures, descend from it once more.
+    def _descend_again(self) -> bool:
+        """Where contacts are met by an end that is no local minimum of the measures, descend from beside it once more.
 
-        Steps along a curved surface or over a kink can end early. Only contacts are tested: the test takes a quarter
-        of the time of a reach to a point.
+        The answer is whether it is none even then.
+
+        Steps along a curved surface can end early, and so they do at a kink: two points touch at once, and the one that
+        counts as the contact is that which should leave. Beside the kink, along the gradient that nothing balances, the
+        other one is nearest. Only contacts are tested: the test takes a quarter of the time of a reach to a point.
         """
-        problem, met = self.problem, self.best.violation.worst <= self.budget.tolerance
+        problem, tolerance = self.problem, self.budget.tolerance
         touches = any(hasattr(term, "touches") for term in (*problem.goals, *problem.constraints))
-        if not (met and touches and self.budget.measures) or self.control.over:
-            return
-        if assess(problem, self.best.q).optimality > 1e-2:  # rad: good answers are nearer to a local minimum
-            self._accept(self._directly(self.best.q), self.how)
+        if not (touches and self.budget.measures and self.best.violation.worst <= tolerance):
+            return False
+        for share in (0.3, 1.0, 0.1):  # of that step: more leaves more kinks, and comes to other minima
+            judged = assess(problem, self.best.q)
+            if judged.optimality <= SEARCH.optimal or self.control.over:
+                return False
+            way = -share * judged.first_order.residual
+            start = problem.scene.figure.clamp(np.asarray(pin.integrate(problem.scene.model, self.best.q, way)))
+            local = self._descent(self.budget.iterations, None, "", tolerance=0.1 * tolerance).run(start)
+            self.spent += local.iterations
+            alike = local.violation.worst <= tolerance and local.measure <= 1.005 * self.best.measure
+            if alike and assess(problem, local.q).optimality < judged.optimality:
+                self._best = local  # what it costs more was bought with the tolerance
+            else:
+                self._accept(local, self.how)
+        return assess(problem, self.best.q).optimality > SEARCH.optimal
 
-    def _restart_for_measure(self) -> None:
+    def _restart_for_measure(self, count: int) -> None:
         """Where all is met, search for a lower minimum of the measures from other starts, which are screened first.
 
         A feasible posture costs a few programs, and its measure tells which minimum it is near; a descent costs many.
         """
-        count, tolerance = self.budget.restarts_for_measure, self.budget.tolerance
+        tolerance = self.budget.tolerance
         if not (count and self.budget.measures and self.best.violation.worst <= tolerance):
             return
         rng, screened = np.random.default_rng([self.budget.seed, count]), SEARCH.screened * count
@@ -257,10 +265,8 @@ class Multistart:
         return local
 
     def _feasibility(self, lineariser: Lineariser, most: int, note: str) -> Feasibility:
-        return Feasibility(
-            self.problem, self.subproblem, lineariser, self.solver, self.budget.tolerance, most, self.trace, note,
-            self.control,
-        )  # fmt: skip
+        shared = with_values(self._shared, lineariser=lineariser)
+        return Feasibility(shared, self.budget.tolerance, most, note, figure=self.problem.scene.figure)
 
     def _find_closest(self) -> None:
         """Where the goals are not reached, find the closest posture, then improve the measures from there."""
@@ -294,7 +300,7 @@ class Multistart:
         """
         if not (self.problem.goals and self.problem.scene.model.nv):
             return False
-        tolerance, reach, ends = self.budget.tolerance, self._closest(), list[LocalSolution]()
+        tolerance, ends = self.budget.tolerance, list[LocalSolution]()
         given = (self.problem, self.lineariser.state, self._start, np.random.default_rng(self.budget.seed))
         few = self._moving() < SEARCH.few
         agreeing = SEARCH.agreeing_few if few else SEARCH.agreeing
@@ -304,8 +310,10 @@ class Multistart:
             else restarts(*given, SEARCH.reach_trials - 1, SEARCH.far)
         )
         enough, programs = SEARCH.reached * tolerance, self._at_most(SEARCH.reach_trial_programs)
+        alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
+        reach = Closest(alone, enough, programs, problem=self.problem, contacts=False)
         for begin in chain([q], self.lineariser.defined(others)):
-            local = reach.without_contacts(begin, enough, programs)
+            local = reach.run(begin)
             self.spent += local.iterations
             if local.violation.worst <= enough or self.control.over:
                 if local.violation.worst <= enough and begin is not q:
@@ -328,7 +336,7 @@ class Multistart:
 
     def _closest_from_best(self) -> None:
         """Find the closest posture from the best one; where that is stationary no closer one is near."""
-        nearest = self._closest().with_contacts(self.best.q, self.budget.tolerance, self._at_most(SEARCH.coming_near))
+        nearest = self._closest(self._at_most(SEARCH.coming_near)).run(self.best.q)
         self.spent += nearest.iterations
         if not nearest.converged:
             self._accept(nearest, self.how)
@@ -339,7 +347,7 @@ class Multistart:
     def _approach(self, begin: Array) -> None:
         """Find the closest posture from one (nq,); where constraints do not hold then, restore them."""
         tolerance = self.budget.tolerance
-        local = self._closest().with_contacts(begin, tolerance, self._at_most(SEARCH.coming_near))
+        local = self._closest(self._at_most(SEARCH.coming_near)).run(begin)
         self.spent += local.iterations
         if not held(local, tolerance) and local.violation.total < self.best.violation.total:
             local = self._descend(local.q, note="nearest", measures=False, most=SEARCH.coming_near)
@@ -349,8 +357,8 @@ class Multistart:
         """The smaller of this number of programs and that of one descent."""
         return min(programs, self.budget.iterations)
 
-    def _closest(self) -> Closest:
-        return Closest(self.problem, self.lineariser, self.solver, self.control)
+    def _closest(self, most: int) -> Closest:
+        return Closest(self._shared, self.budget.tolerance, most, problem=self.problem)
 
     def _stay(self, local: LocalSolution) -> LocalSolution:
         """Descend with the goals' errors to stay as they are: constraints are restored, then the measures improve."""
@@ -373,19 +381,17 @@ class Multistart:
         iterations = self.budget.iterations if most is None else min(most, self.budget.iterations)
         local = self._descent(iterations, None, note, measures=measures, full_step=full_step).run(start)
         self.spent += local.iterations
-        ended = most is None or local.iterations < most
-        if ended and not held(local, self.budget.tolerance):
+        if (most is None or local.iterations < most) and not held(local, self.budget.tolerance):
             stayed = self._stay(local)
             local = stayed if better(stayed, local, self.budget.tolerance) else local
         return local
 
     def _descent(
-        self, iterations: int, offset: Array | None, note: str, *, measures: bool = True, full_step: bool = False
-    ) -> SQP:
-        return SQP(
-            self.subproblem, self.lineariser, self.solver, self.budget.tolerance, iterations, offset, self.trace, note,
-            measures and self.budget.measures, full_step, self.control,
-        )  # fmt: skip
+        self, iterations: int, offset: Array | None, note: str, *, measures: bool = True, full_step: bool = False,
+        tolerance: float | None = None,
+    ) -> SQP:  # fmt: skip
+        tolerance, measures = tolerance or self.budget.tolerance, measures and self.budget.measures
+        return SQP(self._shared, tolerance, iterations, note, offset, measures, full_step)
 
     def _accept(self, local: LocalSolution, how: str) -> bool:
         """Keep the better one; whether the problem is solved now."""

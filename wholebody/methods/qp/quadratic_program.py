@@ -17,33 +17,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.base.records import with_values
 
 
 class QuadraticProgram(NamedTuple):
-    """Data of one program in n variables; compiled loops take it as it is.
+    """Data of one program in n variables; compiled loops take it as it is."""
 
-    Attributes:
-        diagonal: (n,) D, positive.
-        linear: (n,) g.
-        rows: (m, n) soft rows t.
-        target: (m,) their targets e.
-        weight: (m,) their weights w, positive.
-        elastic: (k, n) elastic rows c.
-        least: (k,) their least values l.
-        elastic_weight: (k,) their weights v, positive.
-        lower, upper: (n,) the box, finite, lower <= upper.
-    """
-
-    diagonal: Array
-    linear: Array
-    rows: Array
-    target: Array
-    weight: Array
-    elastic: Array
-    least: Array
-    elastic_weight: Array
-    lower: Array
+    diagonal: Array  # (n,) D, positive
+    linear: Array  # (n,) g
+    rows: Array  # (m, n) soft rows t
+    target: Array  # (m,) their targets e
+    weight: Array  # (m,) their weights w, positive
+    elastic: Array  # (k, n) elastic rows c
+    least: Array  # (k,) their least values l
+    elastic_weight: Array  # (k,) their weights v, positive
+    lower: Array  # (n,) the box, finite, lower <= upper
     upper: Array
 
     def check_shapes(self, active: ActiveSet) -> None:
@@ -82,12 +69,6 @@ class QuadraticProgram(NamedTuple):
     def size(self) -> int:
         """Number of variables n."""
         return len(self.diagonal)
-
-    def with_elastic(self, chosen: Mask) -> QuadraticProgram:
-        """The program with the chosen ones of its elastic rows, (k,) of bool."""
-        return with_values(
-            self, elastic=self.elastic[chosen], least=self.least[chosen], elastic_weight=self.elastic_weight[chosen]
-        )
 
     def value(self, x: Array) -> float:
         """Objective at x, shape (n,)."""
@@ -140,17 +121,11 @@ class ActiveSet(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Room of the compiled loops for a program with k elastic rows.
+    """Room of the compiled loops for a program with k elastic rows."""
 
-    Attributes:
-        work: see `work_size`.
-        places: (2 k or more,).
-        chosen: (k or more,).
-    """
-
-    work: Array
-    places: Indices
-    chosen: Mask
+    work: Array  # see `work_size`
+    places: Indices  # (2 k or more,)
+    chosen: Mask  # (k or more,)
 
 
 def work_size(variables: int, soft: int, elastic: int) -> int:
@@ -160,75 +135,44 @@ def work_size(variables: int, soft: int, elastic: int) -> int:
 
 
 class QPSolution(NamedTuple):
-    """Answer to a program.
+    """Answer to a program."""
 
-    Attributes:
-        x: (n,) the minimiser.
-        active: the active set it was found with.
-        exact: whether the optimality conditions hold to rounding; otherwise x is the best found.
-        iterations: iterations of the solver that was used; 0 where none was.
-        by: what closed the program: "active set" where one that was known led to the answer, the solver's name,
-            "semismooth newton" where the solver's answer did not lead to an exact one, or "not exact".
-    """
-
-    x: Array
-    active: ActiveSet
-    exact: bool
-    iterations: int
+    x: Array  # (n,) the minimiser
+    active: ActiveSet  # the active set it was found with
+    exact: bool  # whether the optimality conditions hold to rounding; otherwise x is the best found
+    iterations: int  # iterations of the solver that was used; 0 where none was
+    # what closed the program: "active set" where one that was known led to the answer, the solver's name, "semismooth
+    # newton" where the solver's answer did not lead to an exact one, or "not exact"
     by: str = ""
 
 
 class Scaling(NamedTuple):
-    """How solvers get a program.
+    """How solvers get a program."""
 
-    Attributes:
-        x: what it is multiplied by, so that its entries are as large as the residuals.
-        heaviest: scale of a row at most, squared; larger = heavy rows closer, light ones later.
-        inactive: least value of slots without a row: never active, and no other kind of row than those in use.
-        infinite: what a solver takes for infinite.
-    """
-
-    x: float = 100.0
-    heaviest: float = 1e5
+    x: float = 100.0  # what it is multiplied by, so that its entries are as large as the residuals
+    heaviest: float = 1e5  # scale of a row at most, squared; larger = heavy rows closer, light ones later
+    # least value of slots without a row: never active, and no other kind of row than those in use
     inactive: float = -1e3
-    infinite: float = 1e30
+    infinite: float = 1e30  # what a solver takes for infinite
 
 
 class SplitForm(NamedTuple):
-    """Objective and rows over z of size n + m + k.
+    """Objective and rows over z of size n + m + k."""
 
-    Attributes:
-        diagonal: (n + m + k,) diagonal Hessian.
-        linear: (n + m + k,).
-        matrix: (m + k, n + m + k) rows [T -I 0; C 0 I], dense.
-        lower, upper: (m + k,) bounds of the rows.
-        box_lower, box_upper: (n + m + k,) bounds of z; infinite for r and s.
-    """
-
-    diagonal: Array
-    linear: Array
-    matrix: Array
-    lower: Array
-    upper: Array
-    box_lower: Array
-    box_upper: Array
+    diagonal: Array  # (n + m + k,) diagonal Hessian
+    linear: Array  # (n + m + k,)
+    matrix: Array  # (m + k, n + m + k) rows [T -I 0; C 0 I]
+    least: Array  # (m + k,) what the first m rows are, and the others are at least
+    box: Array  # (2, n) bounds of x; r and s have none
 
 
 class SparseForm(NamedTuple):
-    """The same over a fixed pattern of A = [I 0 0; T -I 0; C 0 I], column by column, with the box among its rows.
+    """The same over a fixed pattern of A = [I 0 0; T -I 0; C 0 I], column by column, with the box among its rows."""
 
-    Attributes:
-        hessian, gradient: (n + m + slots,) diagonal of P, and q.
-        values: entries of A.
-        lower, upper: (n + m + slots,) bounds of its rows.
-        starts: (n + 1,) where each column begins in `places`.
-        places: rows of the pattern of T.
-    """
-
-    hessian: Array
+    hessian: Array  # (n + m + slots,) diagonal of P, and q
     gradient: Array
-    values: Array
-    lower: Array
+    values: Array  # entries of A
+    lower: Array  # (n + m + slots,) bounds of its rows
     upper: Array
-    starts: NDArray[np.int64]
-    places: NDArray[np.int64]
+    starts: NDArray[np.int64]  # (n + 1,) where each column begins in `places`
+    places: NDArray[np.int64]  # rows of the pattern of T

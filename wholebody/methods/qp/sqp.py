@@ -8,62 +8,36 @@ one. No penalty weight has to be guessed. Steps that could have jumped over some
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.base.errors import UndefinedTermError
 from wholebody.base.records import with_values
-from wholebody.geometry.continuous.moved_pairs import QueryResult
-from wholebody.geometry.continuous.passing_through import passes_through
-from wholebody.methods.control import Control
-from wholebody.methods.qp.iterates import Iterate, LocalSolution, PredictedReduction, Step, StepAcceptance, judge
+from wholebody.methods.qp.iterates import Iterate, LocalSolution, PredictedReduction, Stage, Step, StepAcceptance, judge
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
-from wholebody.methods.qp.rows import Multipliers
+from wholebody.methods.qp.rows import Multipliers, StepSize
 from wholebody.methods.qp.settings import DESCENT, PROGRAM
-from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.subproblem import Subproblem, lagrangian, multipliers_of
+from wholebody.methods.qp.subproblem import lagrangian, multipliers_of
 from wholebody.methods.qp.tangential import Extrapolation, parts_of
 from wholebody.methods.qp.working_set import WorkingSet
-from wholebody.solution import TraceEntry
-from wholebody.terms.linearisation import Linearisation, Lineariser
+from wholebody.terms.linearisation import Linearisation
 
 LEAST_RADIUS = 1e-7
 
 
 @dataclass
-class SQP:
-    """One descent; call `run` once.
+class SQP(Stage):
+    """One descent; call `run` once."""
 
-    Attributes:
-        subproblem: builds the programs.
-        lineariser: linearises the problem.
-        solver: solves the programs.
-        tolerance: metres and radians.
-        iterations: most programs to solve.
-        offset: (goal rows,) subtracted from the goal errors: a nearer goal on the way to the true one.
-        trace: grows by one entry an iteration.
-        note: what to call the iterations in the trace.
-        measures: whether the measures count from the beginning; without them only the goals are sought, and the first
-            feasible posture is the end.
-        full_step: whether to ask for all of the way to the goals in every step, damped by how far they are, until
-            steps are rejected or gain little; else for a piece of it.
-        control: what may end it.
-    """
-
-    subproblem: Subproblem
-    lineariser: Lineariser
-    solver: QPSolver
-    tolerance: float
-    iterations: int
+    # (goal rows,) subtracted from the goal errors: a nearer goal on the way to the true one
     offset: Array | None = None
-    trace: list[TraceEntry] = field(default_factory=list)
-    note: str = ""
+    # whether the measures count from the beginning; without them only the goals are sought, and the first feasible
+    # posture is the end
     measures: bool = True
+    # whether to ask for all of the way to the goals in every step, damped by how far they are, until steps are rejected
+    # or gain little; else for a piece of it
     full_step: bool = False
-    control: Control = field(default_factory=lambda: Control(np.inf))
 
     def __post_init__(self) -> None:
         """Begin with a wide trust region and nothing remembered."""
@@ -80,26 +54,19 @@ class SQP:
 
     def run(self, start: Array) -> LocalSolution:
         """Descend from a posture within limits, shape (nq,)."""
-        here = self._iterate_at(start)
+        here = self.look(start)
         self._width = max(DESCENT.width, here.violation.total)
         self._shift = np.zeros(len(here.rows.soft_error))
-        self._working_set = WorkingSet(self.solver)
+        self._working_set = WorkingSet(self.shared.solver)
         self._keep(here)  # a feasible start is an answer, should the descent end early
         count, converged = 0, False
-        while count < self.iterations and not self.control.over:
+        while count < self.iterations and not self.shared.control.over:
             if not self.measures and here.violation.worst <= self.tolerance:
                 converged = True
                 break
             count += 1
-            program = self.subproblem.program(
-                self._bent(here),
-                here.rows,
-                self._radius,
-                None if self._full_step else self._pull,
-                self._damping,
-                self._shift,
-                self.measures,
-            )
+            size = StepSize(self._radius, 0.0 if self._full_step else self._pull, self._damping, self.measures)
+            program = self.shared.subproblem.program(self._bent(here), here.rows, size, self._shift)
             program = self._shortened(program, len(here.rows.soft_error))
             answer = self._working_set.solve(program, here.rows.key)
             step = self._predicted_step(here, program, answer)
@@ -167,7 +134,7 @@ class SQP:
         planes = here.at.planes
         if planes is None or self._tension is None or not len(planes.bend) or not self.measures:
             return here.at
-        pull = np.maximum(self._tension[self.subproblem.soft_row(planes.bend_row)], 0.0)
+        pull = np.maximum(self._tension[self.shared.subproblem.soft_row(planes.bend_row)], 0.0)
         return with_values(here.at, squares=np.vstack([here.at.squares, np.sqrt(pull)[:, None] * planes.bend]))
 
     def _shortened(self, program: QuadraticProgram, soft: int) -> QuadraticProgram:
@@ -192,23 +159,23 @@ class SQP:
         if self.measures and here.violation.total <= DESCENT.width:
             parts = parts_of(program, answer, self._shift, self._working_set.room(program).work)
         if parts is None:
-            saved = self.subproblem.saving(program, here.rows, x)
+            saved = self.shared.subproblem.saving(program, here.rows, x)
         else:
-            multipliers = self._multipliers = multipliers_of(program, answer, here.rows, self.subproblem.scale)
+            multipliers = self._multipliers = multipliers_of(program, answer, here.rows, self.shared.subproblem.scale)
             if here.at.planes is not None:
                 self._tension = multipliers.net(here.rows)
-            saved = self.subproblem.quadratic_part(program, here.rows, parts.tangential)
+            saved = self.shared.subproblem.quadratic_part(program, here.rows, parts.tangential)
             if (answer.active.lower | answer.active.upper).any():  # they hold back more than the curvature says
-                saved = self.subproblem.saving(program, here.rows, parts.tangential)
+                saved = self.shared.subproblem.saving(program, here.rows, parts.tangential)
                 saved -= multipliers.change(program, parts.tangential)
             bent = here.at.planes is not None and len(here.at.planes.bend)
             # share of the tolerance below which a gain counts as none, where its curvature is known
             flat = saved / self._gain <= (1e-2 if bent else 1.0) * self.tolerance * (1.0 + abs(here.at.measure))
-            flat = flat and self.subproblem.violation(here.rows, parts.normal).total <= here.violation.total
+            flat = flat and self.shared.subproblem.violation(here.rows, parts.normal).total <= here.violation.total
             x = parts.normal if flat else x  # the residual is met at once, to second order
-        violation = self.subproblem.violation(here.rows, x).total
+        violation = self.shared.subproblem.violation(here.rows, x).total
         predicted = PredictedReduction(here.violation.total - violation, saved)
-        saves = self.subproblem.saving(program, here.rows, answer.x)
+        saves = self.shared.subproblem.saving(program, here.rows, answer.x)
         return Step(x, parts, flat, answer.x, predicted, multipliers, saves)
 
     def _settled(self, here: Iterate, step: Step) -> bool:
@@ -235,24 +202,24 @@ class SQP:
             self._ahead.reset()
         fast = None if step.parts is None or step.flat else self._ahead.propose(step.parts, program)
         if fast is not None:
-            leap = self._moved(here, fast)
+            leap = self.moved(here, fast)
             acceptance = StepAcceptance(False, False, False, "undefined")
             if leap is not None:
                 acceptance = self._judge(here, leap, step)
-            if leap is not None and acceptance.accepted and not self._jumps(here, leap):
-                self._record(leap, "accelerated")
+            if leap is not None and acceptance.accepted and not self.jumps(here, leap):
+                self.record(leap, "accelerated")
                 return self._take(here, leap, program, step, fast, acceptance)
             self._ahead.rejected()
         dq = step.dq
-        there = self._moved(here, dq)
+        there = self.moved(here, dq)
         if there is None:
             self._reject(float(np.abs(dq).max(initial=0.0)), "undefined")
             return None
         acceptance = self._judge(here, there, step)
         watched = not acceptance.accepted and self._is_tentative(here, there)
-        if (acceptance.accepted or watched) and self._jumps(here, there):
+        if (acceptance.accepted or watched) and self.jumps(here, there):
             acceptance, watched = StepAcceptance(False, False, False, "blocked"), False
-        self._record(there, "tentative" if watched else acceptance.by)
+        self.record(there, "tentative" if watched else acceptance.by)
         if watched:
             self._watched = here
             self._ahead.reset()
@@ -309,32 +276,14 @@ class SQP:
         self._shift = residual if np.abs(residual).max(initial=0.0) < DESCENT.near_met else np.zeros_like(residual)
         return there
 
-    def _jumps(self, here: Iterate, there: Iterate) -> bool:
-        return passes_through(self.lineariser.workspace, here.placed, there.placed, here.at.q, there.at.q)
-
-    def _moved(self, here: Iterate, way: Array) -> Iterate | None:
-        """Where a way (nv,) leads; None where a term of one's own is not finite there."""
-        q = pin.integrate(self.lineariser.state.model, here.at.q, way)
-        try:
-            return self._iterate_at(q, float(np.abs(way).max(initial=0.0)))
-        except UndefinedTermError as error:
-            self.control.step_back(error)
-            return None
-
-    def _iterate_at(self, q: Array, longest: float = np.inf) -> Iterate:
-        within = max(
-            DESCENT.least_within,
-            min(
-                PROGRAM.error_clamp * self._radius,
-                DESCENT.within_step * longest,
-                DESCENT.most_within,
-            ),
-        )
-        at = self.lineariser.at(q, within, planes=self.offset is None)
-        rows = self.subproblem.rows(at)
-        if self.offset is not None:
-            rows.soft_error[: rows.goals] -= self.offset
-        return Iterate(at, rows, self.subproblem.violation(rows), QueryResult(at.contacts, within), longest)
+    def look(self, q: Array, longest: float = np.inf) -> Iterate:
+        """See `Stage.look`."""
+        seen = min(PROGRAM.error_clamp * self._radius, DESCENT.within_step * longest, DESCENT.most_within)
+        there = self.iterate_at(q, max(DESCENT.least_within, seen), longest, planes=self.offset is None)
+        if self.offset is None:
+            return there
+        there.rows.soft_error[: there.rows.goals] -= self.offset
+        return with_values(there, violation=self.shared.subproblem.violation(there.rows))
 
     def _is_tentative(self, here: Iterate, there: Iterate) -> bool:
         """Whether a rejected step reduced the goal errors and violates constraints little (watchdog)."""
@@ -356,17 +305,3 @@ class SQP:
         ]
         values = (before.violation.total, measures[0]), (there.violation.total, measures[1])
         return judge(*values, predicted, self._width if self.measures else None)
-
-    def _record(self, there: Iterate, what: str) -> None:
-        note = f"{self.note}: {what}" if self.note else what
-        violation = there.violation
-        self.trace.append(
-            TraceEntry(
-                violation.left,
-                max(violation.hold, violation.elastic),
-                there.at.measure,
-                there.longest,
-                note,
-            )
-        )
-        self.control.tell(self.trace[-1])

@@ -18,7 +18,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
 from wholebody.figures.state import State
 from wholebody.methods.qp.quadratic_program import QuadraticProgram, work_size
-from wholebody.methods.qp.rows import Rows, StepParts, Terms, step_size
+from wholebody.methods.qp.rows import NUMBERS, PackedRows, Rows, StepParts, StepRoom, StepSize, Terms
 from wholebody.methods.qp.settings import CORRECTIONS, PROGRAM, STEP, WEIGHTS
 from wholebody.methods.qp.solvers.base import ACTIVE_SET
 from wholebody.methods.qp.subproblem import Subproblem
@@ -33,32 +33,20 @@ from wholebody.terms.linearisation import PackedLinearisation
 
 
 class Answer(NamedTuple):
-    """Answer to the program of a step.
+    """Answer to the program of a step."""
 
-    Attributes:
-        x: (n,) displacement; overwritten by the next program.
-        motion: longest way of any point of any piece, metres, to first order.
-        turn: largest turn of a piece, radians.
-        worst: largest violation of an elastic row at x = 0, metres.
-        spare: least distance beyond its clearance that a contact has after the displacement, metres, to first order;
-            negative infinite where it is not known.
-        missed: largest violation of an elastic row after the displacement, metres or radians, to first order.
-        asked: least clearance asked of a contact, metres; infinite without contacts.
-        exact: see `QPSolution`, like the next two.
-        iterations: of the solver.
-        by: what closed the program.
-    """
-
-    x: Array
-    motion: float
-    turn: float
-    worst: float
+    x: Array  # (n,) displacement; overwritten by the next program
+    motion: float  # longest way of any point of any piece, metres, to first order
+    turn: float  # largest turn of a piece, radians
+    worst: float  # largest violation of an elastic row at x = 0, metres
+    # least distance beyond its clearance that a contact has after the displacement, metres, to first order; negative
+    # infinite where it is not known
     spare: float
-    missed: float
-    asked: float
-    exact: bool
-    iterations: int
-    by: str
+    missed: float  # largest violation of an elastic row after the displacement, metres or radians, to first order
+    asked: float  # least clearance asked of a contact, metres; infinite without contacts
+    exact: bool  # see `QPSolution`, like the next two
+    iterations: int  # of the solver
+    by: str  # what closed the program
 
 
 class StepProgram:
@@ -89,11 +77,16 @@ class StepProgram:
         self._holds = ConstraintValues([problem.constraints[k] for k in self._holding], state)
         self._asked = terms.bound[0, self._held]
         self._there = State(state.model)
-        self._unknown = np.zeros((2, self._variables), dtype=bool)
         self._workspace = workspace
-        self._before = np.zeros(state.model.nq + self._soft + 2)
-        """See `tracking_kernel.solve`."""
-        self._after = self._before.copy()
+        table, length = workspace.table, state.model.nq + self._soft + 2
+        self._places = np.concatenate([[len(terms.kind)], terms.kind, *self.turning.joints])
+        self._fixed = np.concatenate([
+            numbers_of(self._subproblem.scale), terms.share, terms.bound.ravel(), table.reach,
+            np.zeros(18 * state.model.njoints + 2 * length),
+        ])  # fmt: skip
+        self._share = self._fixed[NUMBERS : NUMBERS + self.goals]
+        self._memory = self._fixed[len(self._fixed) - 2 * length :].reshape(2, length)
+        """See `tracking_kernel.solve`, like the arrays before."""
         self._sizes, self._laid_out = (0, 0), dict[tuple[int, int], StepParts]()
         self.take(dt)
         self._grow(64)
@@ -102,7 +95,7 @@ class StepProgram:
         """Make the next steps take so long, for what measures do meanwhile."""
         # without goals the measures are the task
         gain = min(1.0, seconds / STEP.settling) if self.goals else 1.0
-        self._numbers = numbers_of(self._subproblem.scale, gain)
+        self._fixed[4] = gain
 
     def hold(self, constraints: Sequence[Constraint]) -> bool:
         """Take others in place of the problem's constraints, with the same bounds; the last step is forgotten.
@@ -110,7 +103,7 @@ class StepProgram:
         Returns:
             Whether they are of the same classes and frames; if not, nothing is done.
         """
-        self._before[-1], self._curving, self._bend = 0.0, False, 0.0
+        self._memory[0, -1], self._curving, self._bend = 0.0, False, 0.0
         return self._holds.take([constraints[k] for k in self._holding])
 
     def solve(self, at: PackedLinearisation, measures: bool) -> Answer:
@@ -143,15 +136,15 @@ class StepProgram:
             displacement: (nv,).
             whole: whether that is the last program's answer as it was.
         """
-        after = self._after
+        before, after = self._memory
         if not (whole and self._settled):
             rows, program = self._parts.rows, self._parts.program
             gone = rows.soft @ displacement
             left = (gone - program.target)[: self.goals]
             after[len(q) : -2] = rows.soft_error + gone
             after[-2], after[-1] = sqrt(left @ left), 1.0
-        after[: len(q)] = q
-        self._before, self._after = after, self._before
+        before[:] = after
+        before[: len(q)] = q
 
     @property
     def rows(self) -> Rows:
@@ -205,22 +198,29 @@ class StepProgram:
         own, working = self._subproblem, self._working_set
         own.check_rows(at.goals, len(at.value) - at.goals)
         k = own.one_sided + len(at.gap)
-        if 5 * k > len(self._integers):
+        if 5 * k > len(self._room.integers):
             self._grow(2 * k)
-        contacts, turning, workspace = at.contacts, self.turning, self._workspace
+        contacts = at.contacts
         self._sizes = (k, own.one_sided + len(contacts.distance))
-        held = self._unknown if working.held is None else working.held
+        if working.held is not self._last:
+            self._last[:] = False if working.held is None else working.held
+        if self._mixed:
+            self._share[:] = given.share
+        self._fixed[2], self._fixed[3] = least_damping, measures
+        rows_at = PackedRows(
+            at.value, at.jacobian, at.gap, at.gap_contact, at.clearance, at.measure, at.box, at.q, contacts.number
+        )
         solved, count, motion, turn, worst, spare, missed, least, damping, asked = self._kernel.solve(
-            at.value, at.jacobian, at.gap, at.gap_contact, at.clearance, contacts.number, at.measure, at.box, at.q,
-            self._before, self._after, given.kind, given.bound, given.share, held, working.pushing,
-            workspace.state.columns, turning.joints, contacts.placements, workspace.table.reach, turning.twists,
-            self._floats, self._integers, self._masks, self._numbers, measures, working.hot, least_damping,
+            rows_at, self._workspace.state.columns, contacts.placements, working.pushing, self._fixed, self._places,
+            self._room, working.solver.hot_start,
         )  # fmt: skip
         self._settled = solved
         if solved:
-            working.pushing = self._integers[2 * k : 2 * k + count].copy()
-            by = working.solver.count([ACTIVE_SET])
+            working.pushing = self._room.integers[2 * k : 2 * k + count].copy()
+            working.held, by = self._last, working.solver.count(ACTIVE_SET)
             return Answer(self._x, motion, turn, worst, spare, missed, least, True, 0, by), damping, asked
+        if working.solver.hot_start:
+            working.reset()  # what was known of the last one did not settle
         rows, program = self._parts.rows, self._parts.program
         answer = working.solve(program, rows.key)
         motion, turn = self.turning.motion(at, answer.x)
@@ -240,9 +240,7 @@ class StepProgram:
         state, rows = self._there.update(pin.integrate(self._there.model, at.q, displacement)), self._parts.rows
         there = self._holds.at(state)[self._among] - self._asked
         curved = there - (rows.soft_error + rows.soft @ displacement)[self.goals :]
-        other: bool = self._kernel.run_ahead(
-            curved, rows.soft_error, self.goals, at.q, 2.0 * STEP.resting, STEP.curved, STEP.straight, self._before
-        )
+        other: bool = self._kernel.run_ahead(curved, rows.soft_error, self.goals, at.q, STEP, self._memory[0])
         return other
 
     @property
@@ -252,7 +250,7 @@ class StepProgram:
         if found is None:
             layout = self._kernel.parts.py_func  # a compiled loop would look up each record's class to return it
             sizes = (self._variables, self.goals, self._soft, *self._sizes)
-            found = layout(self._floats, self._integers, self._masks, *sizes)
+            found = layout(self._room, *sizes)
             self._laid_out[self._sizes] = found
         return found
 
@@ -260,9 +258,10 @@ class StepProgram:
         """Make room for so many elastic rows."""
         n, m = self._variables, self._soft
         room = 5 * n + 3 * m + m * n + elastic * (n + 3) + work_size(n, m, elastic)  # see `tracking_kernel.parts`
-        self._floats = np.zeros(room)
-        self._integers, self._masks = np.zeros(5 * elastic, dtype=np.intp), np.zeros(2 * (n + elastic), dtype=bool)
-        self._x = self._floats[:n]
+        self._room = StepRoom(
+            np.zeros(room), np.zeros(5 * elastic, dtype=np.intp), np.zeros(2 * (n + elastic), dtype=bool)
+        )
+        self._x, self._last = self._room.floats[:n], self._room.masks[: 2 * n].reshape(2, n)
         self._laid_out.clear()
 
 
@@ -274,19 +273,17 @@ def _holding(problem: Problem, state: State, held: NDArray[np.intp]) -> tuple[li
     return holding.tolist(), np.searchsorted(np.flatnonzero(np.isin(owner, holding)), held)
 
 
-def numbers_of(scale: float, gain: float) -> Array:
-    """The numbers of a tracker's programs, (25,).
+def numbers_of(scale: float) -> Array:
+    """The numbers of a tracker's programs, (29,).
 
-    They are those of `StepSize`, in which a step replaces its damping and whether measures count; of `Corrections`;
-    damping of the pull of goals out of reach; error below which a goal rests; how far what is held is run ahead of at
-    most; and the weights of the rows.
-
-    Args:
-        scale: of the measures.
-        gain: share of the way to the least measures that a step is to go.
+    They are those of `StepSize`, in which a step replaces its damping and whether measures count, of `ProgramNumbers`,
+    `Corrections` and `Weights`; the scale of the measures; damping of the pull of goals out of reach; error below which
+    a goal rests; and how far what is held is run ahead of at most.
     """
-    size = step_size(scale, STEP.radius, PROGRAM.error_clamp * STEP.radius, 0.0, gain, True)
-    return np.concatenate([size, CORRECTIONS, (STEP.damping, STEP.resting, STEP.curved), WEIGHTS])
+    size = StepSize(STEP.radius, PROGRAM.error_clamp * STEP.radius, 0.0, True)
+    return np.concatenate([
+        size, PROGRAM, CORRECTIONS, WEIGHTS, (scale, STEP.damping, STEP.resting, STEP.curved),
+    ])  # fmt: skip
 
 
 @lru_cache(maxsize=1)
@@ -295,13 +292,11 @@ def compiled_kernel() -> Any:
     from wholebody.methods.qp import tracking_kernel
 
     compiled_turning()
-    none, index, one = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros(1, dtype=np.intp)
-    pair, places = np.zeros((2, 1), dtype=bool), np.zeros((0, 4, 3))
+    none, index = np.zeros(0), np.zeros(0, dtype=np.intp)
     tracking_kernel.solve(
-        none, np.zeros((0, 1)), none, index, none, index, np.zeros((2, 2)), np.zeros((2, 1)), none, np.zeros(2),
-        np.zeros(2), index, np.zeros((2, 0)), none, pair, index, np.zeros((1, 6)), np.repeat(one, 3), places, none,
-        np.zeros((3, 1, 6)), np.zeros(5 + work_size(1, 0, 0)), index, np.zeros(2, dtype=bool),
-        numbers_of(1.0, 1.0), True, False, 0.0,
+        PackedRows(none, np.zeros((0, 1)), none, index, none, np.zeros((2, 2)), np.zeros((2, 1)), none, index),
+        np.zeros((1, 6)), np.zeros((0, 4, 3)), index, np.append(numbers_of(1.0), np.zeros(18 + 4)),
+        np.zeros(4, dtype=np.intp), StepRoom(np.zeros(5 + work_size(1, 0, 0)), index, np.zeros(2, dtype=bool)), False,
     )  # fmt: skip
-    tracking_kernel.run_ahead(none, none, 0, none, 0.0, 0.0, 0.0, np.zeros(2))
+    tracking_kernel.run_ahead(none, none, 0, none, STEP, np.zeros(2))
     return tracking_kernel

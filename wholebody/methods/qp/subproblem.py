@@ -17,13 +17,7 @@ from wholebody.base.errors import InputError
 from wholebody.base.records import with_values
 from wholebody.figures.state import State
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
-from wholebody.methods.qp.rows import (
-    Multipliers,
-    Rows,
-    Terms,
-    Violation,
-    step_size,
-)
+from wholebody.methods.qp.rows import LinearRows, Multipliers, Rows, StepSize, Terms, Violation
 from wholebody.methods.qp.settings import PROGRAM, WEIGHTS
 from wholebody.problem import Problem
 from wholebody.terms.linearisation import Linearisation, TermPlanes
@@ -93,7 +87,7 @@ class Subproblem:
         neither = (self._lower != self._upper) & ~low & ~high
         kind = np.where(neither, -1, low + 2 * high).astype(np.intp)
         self.terms = Terms(kind, np.array([self._lower, self._upper]).reshape(2, -1), share, np.array(WEIGHTS))
-        self._kernel = compiled_kernel()
+        self._numbers, self._kernel = np.array(PROGRAM), compiled_kernel()
 
     def rows(self, at: Linearisation) -> Rows:
         """Sort the rows of a linearisation.
@@ -107,14 +101,15 @@ class Subproblem:
         soft_rows, soft_values = np.empty((soft, nv)), np.empty((2, soft))
         elastic_rows, elastic_values = np.empty((elastic, nv)), np.empty((2, elastic))
         labels = np.empty((2, elastic), dtype=np.intp)
-        self._kernel.sort_rows(
-            at.goal_error, at.goal_jacobian, at.value, at.value_jacobian, at.gap, at.gap_jacobian, at.gap_contact,
-            at.clearance, at.contacts.number, *self.terms, soft_rows, soft_values, elastic_rows, elastic_values, labels,
-        )  # fmt: skip
         rows = Rows(
             soft_rows, soft_values[0], soft_values[1], goals, elastic_rows, elastic_values[0], labels[0],
             self.one_sided + len(at.contacts.distance), labels[1], elastic_values[1],
         )  # fmt: skip
+        there = LinearRows(
+            at.goal_error, at.goal_jacobian, at.value, at.value_jacobian, at.gap, at.gap_jacobian, at.gap_contact,
+            at.clearance, at.contacts.number,
+        )  # fmt: skip
+        self._kernel.fill_rows(there, self.terms, rows)
         return rows if at.planes is None else _with_planes(rows, at.planes)
 
     def soft_row(self, row: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -133,12 +128,7 @@ class Subproblem:
     def violation(self, rows: Rows, displacement: Array | None = None) -> Violation:
         """Violation at the linearised posture, or what the linearisation predicts after a displacement (nv,)."""
         way = _NONE if displacement is None else displacement
-        return Violation(
-            *self._kernel.violation(
-                rows.soft, rows.soft_error, rows.elastic, rows.elastic_violation, rows.contact, rows.contacts,
-                self.terms.share, way,
-            )
-        )  # fmt: skip
+        return Violation(*self._kernel.violation(rows, self.terms.share, way))
 
     def saving(self, program: QuadraticProgram, rows: Rows, x: Array) -> float:
         """By how much the measures of a program decrease, to second order, with the displacement x (nv,)."""
@@ -153,41 +143,23 @@ class Subproblem:
             bent += (program.weight[soft:] * turned) @ turned
         return 0.5 * float(bent) / self.scale
 
-    def program(
-        self,
-        at: Linearisation,
-        rows: Rows,
-        radius: float,
-        pull: float | None,
-        damping: float,
-        shift: Array,
-        measures: bool,
-        gain: float = 1.0,
-    ) -> QuadraticProgram:
+    def program(self, at: Linearisation, rows: Rows, step: StepSize, shift: Array | None = None) -> QuadraticProgram:
         """The program of one step.
+
+        The squares that measures are the sum of are soft rows, after those of `rows`.
 
         Args:
             at: where.
             rows: its rows.
-            radius: about the largest entry that the displacement should have, radians and metres.
-            pull: of goals farther away only so much is asked for, metres and radians; None asks for all of it.
-            damping: how much of the goals' neglected second derivative to add, bounded by |pull| times lever; where all
-                is asked for, how much of the weighted squared error (Sugihara 2011, as in `DampedLeastSquares`).
+            step: its size.
             shift: (soft rows,) added to the errors so that weights need not be infinite (method of multipliers).
-            measures: whether the measures count; without them the nearest posture to the goals is sought. The squares
-                that they are the sum of are soft rows, after those of `rows`.
-            gain: share of its tangential part that the step has.
         """
-        squares = at.squares if measures else at.squares[:0]
+        squares = at.squares if step.measures else at.squares[:0]
         curvature = at.curvature - at.squared if len(squares) else at.curvature
-        step = step_size(self.scale, radius, 0.0 if pull is None else pull, damping, gain, measures)
-        soft, columns = np.array([rows.soft_error, rows.soft_weight, shift]), np.empty((4, len(at.gradient)))
+        columns = np.array([curvature, at.gradient, at.lower, at.upper])
         least = np.empty(len(rows.elastic_violation))
-        self._kernel.fill_program(
-            np.array([at.gradient, curvature]), np.array([at.lower, at.upper]), rows.goals, soft,
-            rows.elastic_violation, step, columns, least,
-        )  # fmt: skip
-        target = soft[2]
+        target = np.zeros(len(rows.soft_error)) if shift is None else shift.copy()
+        self._kernel.fill_program(columns, rows, target, least, step, self._numbers, self.scale)
         program = QuadraticProgram(
             columns[0], columns[1], rows.soft, target, rows.soft_weight, rows.elastic, least, rows.elastic_weight,
             columns[2], columns[3],
@@ -198,7 +170,7 @@ class Subproblem:
             program,
             rows=np.vstack([rows.soft, squares]),
             target=np.concatenate([target, np.zeros(len(squares))]),
-            weight=np.concatenate([rows.soft_weight, np.full(len(squares), self.scale / gain)]),
+            weight=np.concatenate([rows.soft_weight, np.full(len(squares), self.scale / step.gain)]),
         )
 
 
@@ -235,16 +207,12 @@ def compiled_kernel() -> Any:
     from wholebody.methods.qp import subproblem_kernel
 
     none, matrix, index = np.zeros(0), np.zeros((0, 1)), np.zeros(0, dtype=np.intp)
-    two, labels = np.zeros((2, 0)), np.zeros((2, 0), dtype=np.intp)
-    subproblem_kernel.sort_rows(
-        none, matrix, none, matrix, none, matrix, index, none, index, index, two, none, np.array(WEIGHTS), matrix, two,
-        matrix, two, labels,
-    )  # fmt: skip
-    subproblem_kernel.violation(matrix, none, matrix, none, index, 0, none, none)
-    step = step_size(1.0, 1.0, 1.0, 1.0, 1.0, True)
-    subproblem_kernel.fill_program(
-        np.ones((2, 1)), np.ones((2, 1)), 0, np.zeros((3, 0)), none, step, np.ones((4, 1)), none
-    )
+    rows = Rows(matrix, none, none, 0, matrix, none, index, 0, index, none)
+    there = LinearRows(none, matrix, none, matrix, none, matrix, index, none, index)
+    subproblem_kernel.fill_rows(there, Terms(index, np.zeros((2, 0)), none, np.array(WEIGHTS)), rows)
+    subproblem_kernel.violation(rows, none, none)
+    size = StepSize(1.0, 1.0, 1.0, True)
+    subproblem_kernel.fill_program(np.ones((4, 1)), rows, none.copy(), none.copy(), size, np.array(PROGRAM), 1.0)
     subproblem_kernel.work(none, none, index, none, index, none)
     three = np.zeros(3)
     subproblem_kernel.add_kinematic_hessian(matrix, np.zeros((0, 6)), none, three, three, three)

@@ -8,60 +8,19 @@ from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
 from wholebody.methods.qp.dense_kernel import dot, sort
 from wholebody.methods.qp.rows import LinearRows, Rows, StepSize, Terms
-from wholebody.methods.qp.settings import Weights
+from wholebody.methods.qp.settings import ProgramNumbers, Weights
 
 MOST_ROWS = 4096  # more than one contact ever has
 
 
-@compiled()
-def sort_rows(
-    error: Array,
-    error_jacobian: Array,
-    value: Array,
-    value_jacobian: Array,
-    gap: Array,
-    gap_jacobian: Array,
-    gap_contact: Indices,
-    clearance: Array,
-    number: Indices,
-    kind: Indices,
-    bound: Array,
-    share: Array,
-    weights: Array,
-    soft: Array,
-    soft_values: Array,
-    elastic: Array,
-    elastic_values: Array,
-    labels: Indices,
-) -> None:
-    """`fill_rows` for a call from Python, which gives the parts of `LinearRows`, of `Terms` and of `Rows`.
-
-    See `active_set_kernel.solve_growing` for what records would cost.
-    """
-    there = LinearRows(error, error_jacobian, value, value_jacobian, gap, gap_jacobian, gap_contact, clearance, number)
-    rows = rows_in(soft, soft_values, elastic, elastic_values, labels, len(error), 0)
-    fill_rows(there, Terms(kind, bound, share, weights), rows)
-
-
-@compiled(inner=True, forceinline=True)
-def rows_in(
-    soft: Array, soft_values: Array, elastic: Array, elastic_values: Array, labels: Indices, goals: int, contacts: int
-) -> Rows:
-    """`Rows` in arrays: (2, m) errors and weights, (2, k) violations and weights, (2, k) contacts and keys."""
-    return Rows(
-        soft, soft_values[0], soft_values[1], goals, elastic, elastic_values[0], labels[0], contacts, labels[1],
-        elastic_values[1],
-    )  # fmt: skip
-
-
-@compiled(inner=True, forceinline=True)
+@compiled(forceinline=True)
 def fill_rows(there: LinearRows, given: Terms, rows: Rows) -> None:
     """Sort the rows of a linearisation into soft and elastic ones, as `Rows` has them, whose arrays are filled."""
     errors, values, gaps, clearance = there.error, there.value, there.gap, there.clearance
     error_jacobian, value_jacobian, gap_jacobian = there.error_jacobian, there.value_jacobian, there.gap_jacobian
     number, gap_contact, kind, bound, share = there.number, there.gap_contact, given.kind, given.bound, given.share
-    elastic_weight, nv = rows.elastic_weight, rows.soft.shape[1]
-    weights = Weights(given.weights[0], given.weights[1], given.weights[2], given.weights[3], given.weights[4])
+    elastic_weight, nv, w = rows.elastic_weight, rows.soft.shape[1], given.weights
+    weights = Weights(w[0], w[1], w[2], w[3], w[4])
     soft, soft_error, soft_weight, elastic = rows.soft, rows.soft_error, rows.soft_weight, rows.elastic
     violated, contact, key = rows.elastic_violation, rows.contact, rows.key
     goals, square = len(errors), 0.0
@@ -102,20 +61,13 @@ def fill_rows(there: LinearRows, given: Terms, rows: Rows) -> None:
 
 
 @compiled()
-def violation(
-    soft: Array,
-    soft_error: Array,
-    elastic: Array,
-    violations: Array,
-    contact: Indices,
-    contacts: int,
-    share: Array,
-    displacement: Array,
-) -> tuple[float, float, float, float]:
+def violation(rows: Rows, share: Array, displacement: Array) -> tuple[float, float, float, float]:
     """The figures of `Violation` after a displacement: (nv,), or empty for none.
 
     `share` (g,) are the goals' weights. Elastic rows of the contact -1 do not count.
     """
+    soft, soft_error, elastic = rows.soft, rows.soft_error, rows.elastic
+    violations, contact, contacts = rows.elastic_violation, rows.contact, rows.contacts
     goals, moves = len(share), len(displacement) > 0
     goal, hold, left, total, worst = 0.0, 0.0, 0.0, 0.0, np.zeros(contacts)
     for r in range(len(soft_error)):
@@ -138,32 +90,29 @@ def violation(
     return np.sqrt(goal), np.sqrt(hold), total, np.sqrt(left)
 
 
-@compiled()
+@compiled(forceinline=True)
 def fill_program(
-    measure: Array, box: Array, goals: int, soft: Array, violations: Array, size: Array, columns: Array, least: Array
+    columns: Array, rows: Rows, target: Array, least: Array, step: StepSize, given: Array, scale: float
 ) -> None:
-    """Fill in the numbers of a program that are not rows or weights, as `Subproblem.program` says.
+    """Fill in the numbers of a program that are not rows or weights.
 
     Args:
-        measure: (2, nv) gradient and curvature of the measures.
-        box: (2, nv) bounds of the step.
-        goals: number of their rows.
-        soft: (3, m) errors and weights of the soft rows, and what is added to the errors; the last become the targets.
-        violations: (k,) of the elastic rows.
-        size: (11,) the fields of `StepSize`.
-        columns: (4, nv) become diagonal, linear, lower and upper.
-        least: (k,) become the least values of the elastic rows.
+        columns: (4, nv) curvature and gradient of the measures, and bounds of the step; they become diagonal, linear,
+            lower and upper.
+        rows: of the program.
+        target: (m,) what is added to the errors; it becomes the targets of the soft rows.
+        least: (k,) becomes the least values of the elastic rows.
+        step: its size.
+        given: (9,) `settings.ProgramNumbers`.
+        scale: what the measures are multiplied by.
     """
-    step = StepSize(
-        size[0], size[1], size[2], size[3], size[4], size[5] > 0.0, size[6], size[7], size[8], size[9], size[10]
-    )
-    gradient, curvature = measure[0], measure[1]
-    soft_error, soft_weight, target = soft[0], soft[1], soft[2]
+    numbers = ProgramNumbers(given[0], given[1], given[2], given[3], given[4], given[5], given[6], given[7], given[8])
     diagonal, linear, lower, upper = columns[0], columns[1], columns[2], columns[3]
-    largest, square, farthest, heaviest_error = 0.0, 0.0, 0.0, 0.0
-    for i in range(box.shape[1]):
-        largest = max(largest, step.scale * curvature[i])
-    floor = largest * step.least_curvature
+    soft_error, soft_weight, violations, goals = rows.soft_error, rows.soft_weight, rows.elastic_violation, rows.goals
+    largest, square, farthest, heaviest_error, box = 0.0, 0.0, 0.0, 0.0, numbers.box * step.radius
+    for i in range(len(diagonal)):
+        largest = max(largest, scale * diagonal[i])
+    floor = largest * numbers.least_curvature
     if floor == 0.0:
         floor = 1.0
     for r in range(goals):
@@ -176,23 +125,23 @@ def fill_program(
             error *= factor
             heaviest_error = max(heaviest_error, soft_weight[r] * abs(error))
         target[r] = -(error + target[r])
-    for i in range(box.shape[1]):
-        entry = max(step.scale * curvature[i], floor)
-        linear[i] = step.scale * gradient[i] if step.measures else 0.0
-        entry = entry / step.gain if step.measures else step.proximal * entry
+    for i in range(len(diagonal)):
+        entry = max(scale * diagonal[i], floor)
+        linear[i] = scale * linear[i] if step.measures else 0.0
+        entry = entry / step.gain if step.measures else numbers.proximal_share * entry
         diagonal[i] = max(entry, abs(linear[i]) / step.radius)
-        lower[i] = min(max(box[0, i], -step.box), step.box)
-        upper[i] = min(max(box[1, i], -step.box), step.box)
+        lower[i] = min(max(lower[i], -box), box)
+        upper[i] = min(max(upper[i], -box), box)
     if step.pull > 0.0:
-        for i in range(box.shape[1]):
-            diagonal[i] += step.damping * step.lever * heaviest_error
+        for i in range(len(diagonal)):
+            diagonal[i] += step.damping * numbers.lever * heaviest_error
     else:
         # half way between joints that move alike, which takes the fewest steps, and as the measures would have them
         middle = _middle(diagonal)
-        for i in range(box.shape[1]):
+        for i in range(len(diagonal)):
             diagonal[i] += step.damping * square * np.sqrt(diagonal[i] / middle)
     for r in range(len(violations)):
-        least[r] = min(violations[r], step.overlap)
+        least[r] = min(violations[r], numbers.error_clamp * step.radius)
 
 
 @compiled(inner=True)

@@ -1,15 +1,8 @@
-"""A step near the goals in two parts, and where the part along the constraints leads.
+"""A step near the goals in a normal and a tangential part, and where the tangential ones lead: docs/theory/qp.md.
 
-On the face of a program's active set its answer x is the sum of a *normal* part n, which meets the rows, and a
-*tangential* part t, which reduces the measures along them (Byrd 1987; Omojokun 1989):
-
-    n = the program's answer with g = 0 on that face,    t = x - n,    n' H t = 0,
-
-where H = D + S' S is the measures' curvature. So t reduces the measures by t' H t / 2, and by more where a bound holds
-x. Because H does not know how the
-constraints are curved, the tangential parts of one step after the other form a linear sequence, or grow where the
-measures curve downwards along the constraints. The normal parts follow the square of the step and have no law of their
-own; they would spoil an extrapolation.
+The measures' curvature H does not know how the constraints are curved, so the tangential parts of one step after the
+other form a linear sequence, or grow where the measures curve downwards along the constraints. The normal parts follow
+the square of the step and have no law of their own; they would spoil an extrapolation.
 """
 
 from __future__ import annotations

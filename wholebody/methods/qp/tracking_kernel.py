@@ -6,123 +6,117 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
-from wholebody.methods.qp.active_set_kernel import grow, limits_of
+from wholebody.methods.qp.active_set_kernel import grow
 from wholebody.methods.qp.dense_kernel import dot
 from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram, Room
-from wholebody.methods.qp.rows import LinearRows, Rows, StepParts, Terms
+from wholebody.methods.qp.rows import (
+    NUMBERS,
+    Bodies,
+    LinearRows,
+    PackedRows,
+    Rows,
+    StepParts,
+    StepRoom,
+    StepSize,
+    Terms,
+)
+from wholebody.methods.qp.settings import Corrections, StepNumbers
 from wholebody.methods.qp.subproblem_kernel import fill_program, fill_rows
-from wholebody.methods.qp.turning_kernel import bodies_in, moved
+from wholebody.methods.qp.turning_kernel import moved
+
+
+@compiled(inner=True, forceinline=True)
+def fixed_terms(fixed: Array, places: Indices, goals: int) -> Terms:
+    """The terms among what does not change; see `solve`."""
+    count, end = places[0], NUMBERS + goals
+    bound = fixed[end : end + 2 * count].reshape((2, count))
+    return Terms(places[1 : count + 1], bound, fixed[NUMBERS:end], fixed[20:25])
+
+
+@compiled(inner=True, forceinline=True)
+def fixed_bodies(fixed: Array, places: Indices, goals: int, columns: Array, placement: Array) -> Bodies:
+    """The joints and pieces among what does not change, where they are; see `solve`."""
+    wide, pieces, first = len(columns), len(placement), 1 + places[0]
+    joints, own = places[first : len(places) - pieces], NUMBERS + goals + 2 * places[0]
+    count, room = len(joints) - 2 * wide, own + pieces
+    return Bodies(
+        columns, joints[:wide], joints[wide : 2 * wide], joints[2 * wide :], places[len(places) - pieces :], placement,
+        fixed[own:room], fixed[room : room + 18 * count].reshape((3, count, 6)),
+    )  # fmt: skip
 
 
 @compiled(error_model="numpy")
 def solve(
-    value: Array,
-    jacobian: Array,
-    gap: Array,
-    gap_contact: Indices,
-    clearance: Array,
-    number: Indices,
-    measure: Array,
-    box: Array,
-    q: Array,
-    before: Array,
-    after: Array,
-    kind: Indices,
-    bound: Array,
-    share: Array,
-    held: Mask,
-    pushed: Indices,
-    columns: Array,
-    joints: Indices,
-    placement: Array,
-    reach: Array,
-    twists: Array,
-    floats: Array,
-    integers: Indices,
-    masks: Mask,
-    numbers: Array,
-    measures: bool,
+    at: PackedRows, columns: Array, placement: Array, pushed: Indices, fixed: Array, places: Indices, room: StepRoom,
     hot: bool,
-    least_damping: float,
-) -> tuple[bool, int, float, float, float, float, float, float, float, float]:
+) -> tuple[bool, int, float, float, float, float, float, float, float, float]:  # fmt: skip
     """Sort the rows of a linearisation, build the program of a step and solve it from the last active set.
 
-    It takes arrays, not records; see `active_set_kernel.solve_growing` for what a record costs at a call.
+    What does not change comes in two arrays, not in records: at a call from Python a record costs 0.35 us for each of
+    its arrays, an array 0.15 us.
 
     Args:
-        value: (g + c,) errors of goals and values of constraints; see `PackedLinearisation`, like the next eight.
-        jacobian: (g + c + r, n).
-        gap: (r,).
-        gap_contact: (r,).
-        clearance: (r,).
-        number: (contacts,) pairs of the contacts.
-        measure: (2, n + 1).
-        box: (2, n).
-        q: (nq,) the posture.
-        before: (nq + m + 2,) where the last step ended: the posture, the errors of its soft rows there to first order,
-            the residual of its goals, and 1 where there was such a step.
-        after: (nq + m + 2,) the same of this step, but for the posture, where the program is solved.
-        kind: (c,) see `Terms`, like the next two.
-        bound: (2, c).
-        share: (g,).
-        held: (2, n) bounds that held the last program's answer; those that hold this one's where it is solved.
-        pushed: keys of the last program's elastic rows that pushed, in ascending order.
-        columns: see `turning_kernel.bodies_in`, like the next four.
-        joints: of columns and pieces.
-        placement: (p, 4, 3).
-        reach: (p,).
-        twists: (3, njoints, 6) room.
-        floats: room, which `parts` lays out, like the next two.
-        integers: (5 k,).
-        masks: (2 n + 2 k,).
-        numbers: see `step_program.numbers_of`.
-        measures: whether they count.
+        at: the linearisation.
+        columns: of the joint Jacobian, see `Bodies`.
+        placement: (p, 4, 3) of the pieces.
+        pushed: keys of the elastic rows that pushed in the last program, in ascending order.
+        fixed: `step_program.numbers_of`; weights of the goals, bounds of the constraints, reach of the pieces; room of
+            `Bodies`; and two rows (nq + m + 2,) of what is remembered: where the last step ended, its posture, the
+            errors of its soft rows there to first order, the residual of its goals, and 1 where there was such a step;
+            the same of this step, but for the posture, where the program is solved.
+        places: number and kinds of constraints, see `Terms`; place and joint of each column, parents of joints, and
+            joints of pieces, see `Bodies`.
+        room: for the program; the first masks are the bounds that held the last answer.
         hot: whether to solve the program, not only to build it.
-        least_damping: of goals, where the last step does not ask for more.
 
     Returns:
         Whether the program is solved; how many elastic rows push; longest way and largest turn of the pieces; largest
         violation of an elastic row; least room that a contact row has after the step, and largest violation of an
         elastic row then; least clearance asked of a contact; the damping, and what the answer asks for.
     """
-    n, goals, contacts = box.shape[1], len(share), len(number)
+    value, jacobian, clearance, q = at.value, at.jacobian, at.clearance, at.q
+    goals = len(value) - places[0]
+    given = fixed_terms(fixed, places, goals)
+    kind, n, contacts = given.kind, at.box.shape[1], len(at.number)
     equal, one_sided = 0, 0
     for c in range(len(kind)):
         equal += kind[c] == 0
         one_sided += (kind[c] == 3) * 2 + (kind[c] == 1) + (kind[c] == 2)
     m, terms, last = goals + equal, goals + len(kind), len(q)
-    own = parts(floats, integers, masks, n, goals, m, one_sided + len(gap), one_sided + contacts)
-    rows, x, given = own.rows, own.x, Terms(kind, bound, share, numbers[20:25])
+    memory = fixed[len(fixed) - 2 * (last + m + 2) :].reshape((2, last + m + 2))
+    before, after = memory[0], memory[1]
+    size = StepSize(fixed[0], fixed[1], fixed[2], fixed[3] > 0.0, fixed[4])
+    own = parts(room, n, goals, m, one_sided + len(at.gap), one_sided + contacts)
+    rows, x = own.rows, own.x
     there = LinearRows(
-        value[:goals], jacobian[:goals], value[goals:], jacobian[goals:terms], gap, jacobian[terms:], gap_contact,
-        clearance, number,
+        value[:goals], jacobian[:goals], value[goals:], jacobian[goals:terms], at.gap, jacobian[terms:], at.gap_contact,
+        clearance, at.number,
     )  # fmt: skip
     fill_rows(there, given, rows)
     target, soft, soft_error, elastic, violations, key = (
         own.program.target, rows.soft, rows.soft_error, rows.elastic, rows.elastic_violation, rows.key,
     )  # fmt: skip
-    at_lower, at_upper = own.active.lower, own.active.upper
     error = 0.0
     for r in range(goals):
         error += value[r] * value[r]
     error = max(np.sqrt(error), 1e-12)
-    damping = _run_ahead_of(before, q, rows, own.soft[2], measures, numbers[17:20], error, least_damping)
-    numbers[3], numbers[5] = damping, measures
-    fill_program(measure, box, goals, own.soft, violations, numbers[:11], own.columns, own.program.least)
+    damping = _run_ahead_of(before, q, rows, target, size, fixed[26:29], error)
+    for i in range(n):
+        own.columns[0, i], own.columns[1, i] = at.measure[1, i], at.measure[0, i]
+        own.columns[2, i], own.columns[3, i] = at.box[0, i], at.box[1, i]
+    damped = StepSize(size.radius, size.pull, damping, size.measures, size.gain)
+    fill_program(own.columns, rows, target, own.program.least, damped, fixed[5:14], fixed[25])
     least_asked, worst = np.inf, 0.0
     for c in range(contacts):
         least_asked = min(least_asked, clearance[c])
     for violated in violations:
         worst = max(worst, violated)
-    for i in range(n):
-        at_lower[i], at_upper[i] = held[0, i], held[1, i]
     rounds = -1
+    limits = Corrections(fixed[14], int(fixed[15]), int(fixed[16]), int(fixed[17]), int(fixed[18]), fixed[19])
     if hot:
-        rounds = grow(own.program, rows.key, pushed, own.active, limits_of(numbers[11:17]), own.room, x)
+        rounds = grow(own.program, rows.key, pushed, own.active, limits, own.room, x)
     if rounds < 0:
         return False, 0, 0.0, 0.0, worst, -np.inf, np.inf, least_asked, damping, 0.0
-    for i in range(n):
-        held[0, i], held[1, i] = at_lower[i], at_upper[i]
     count = _sorted_keys(key, own.active.elastic, own.pushing)
     left = 0.0
     for r in range(m):
@@ -138,19 +132,19 @@ def solve(
         missed = max(missed, -ahead)
         if j >= one_sided:
             spare = min(spare, ahead)
-    asked = numbers[17] * min(1.0, left / error) if left > numbers[18] else 0.0
-    way, turn = moved(x, bodies_in(columns, joints, placement, reach, twists))
+    asked = fixed[26] * min(1.0, left / error) if left > fixed[27] else 0.0
+    way, turn = moved(x, fixed_bodies(fixed, places, goals, columns, placement))
     return True, count, way, turn, worst, spare, missed, least_asked, damping, asked
 
 
 @compiled(inner=True, forceinline=True)
 def _run_ahead_of(
-    before: Array, q: Array, rows: Rows, shift: Array, measures: bool, numbers: Array, error: float, least: float
+    before: Array, q: Array, rows: Rows, shift: Array, size: StepSize, numbers: Array, error: float
 ) -> float:
     """Write what is added to the errors of the soft rows, as the last step was curved; returns the damping.
 
     `numbers` are damping, error below which a goal rests, and how far what is held is run ahead of at most; `error` is
-    the norm of the goals' errors, `least` the damping at least.
+    the norm of the goals' errors.
     """
     damping, rest, curved = numbers[0], numbers[1], numbers[2]
     soft_error, goals = rows.soft_error, rows.goals
@@ -161,15 +155,15 @@ def _run_ahead_of(
     for r in range(goals, m):  # what is held: a step much shorter than the last one is curved much less
         shift[r] = min(max(shift[r], -curved), curved)
     if not known:
-        return least
+        return size.damping
     # what a goal that rests is missed by, because the last step was curved; a goal that moves is not run ahead of
-    resting = measures
+    resting = size.measures
     for r in range(goals):
         resting = resting and abs(shift[r]) < rest
     if not resting:
         shift[:goals] = 0.0
     own: float = damping * min(1.0, before[last + m] / error)
-    return max(least, own)
+    return max(size.damping, own)
 
 
 @compiled(inner=True, forceinline=True)
@@ -197,9 +191,7 @@ def _sorted_keys(key: Indices, pushing: Mask, keys: Indices) -> int:
 
 
 @compiled()
-def run_ahead(
-    curved: Array, soft_error: Array, goals: int, q: Array, moved: float, most: float, straight: float, before: Array
-) -> bool:
+def run_ahead(curved: Array, soft_error: Array, goals: int, q: Array, numbers: StepNumbers, before: Array) -> bool:
     """Write into `before` what makes the next program run ahead of what is held as a displacement curves it.
 
     Args:
@@ -207,14 +199,13 @@ def run_ahead(
         soft_error: (m,) errors of the last program's soft rows.
         goals: how many of them are goals'.
         q: (nq,) the posture.
-        moved: how much a goal that was not known has moved at least, so that it does not count as one that rests.
-        most: how far it is run ahead at most.
-        straight: see the answer.
+        numbers: of steps.
         before: (nq + m + 2,) see `solve`.
 
     Returns:
         Whether a row is to run ahead by more than `straight` farther, or less far, than it did.
     """
+    most, moved = numbers.curved, 2.0 * numbers.resting  # a goal that was not known does not count as one that rests
     last, known = len(q), _is_known(before, q)
     if not known:  # its goals are asked for as without a step before
         for i in range(last):
@@ -228,14 +219,13 @@ def run_ahead(
         bow = curved[r - goals]
         largest = max(largest, abs(min(max(bow, -most), most) - predicted))
         before[last + r] = soft_error[r] - bow
-    return largest > straight
+    return largest > numbers.straight
 
 
 @compiled(inner=True, forceinline=True)
-def parts(
-    floats: Array, integers: Indices, masks: Mask, n: int, goals: int, m: int, k: int, contacts: int
-) -> StepParts:
+def parts(room: StepRoom, n: int, goals: int, m: int, k: int, contacts: int) -> StepParts:
     """The parts of the room for n variables, m soft rows, of which some are goals', and k elastic rows."""
+    floats, integers, masks = room.floats, room.integers, room.masks
     a = 5 * n
     b = a + 3 * m
     c = b + m * n
@@ -251,7 +241,7 @@ def parts(
         floats[d + k : d + 2 * k], columns[2], columns[3],
     )  # fmt: skip
     return StepParts(
-        floats[:n], columns, soft_values, rows, program,
+        floats[:n], columns, rows, program,
         ActiveSet(masks[:n], masks[n : 2 * n], masks[2 * n :][:k]), integers[2 * k : 3 * k],
         Room(floats[d + 3 * k :], integers[3 * k : 5 * k], masks[2 * n + k :][:k]),
     )  # fmt: skip

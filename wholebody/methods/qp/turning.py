@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Indices
 from wholebody.geometry.contact_rows import BAND, LEVER_DISTANCE
-from wholebody.methods.qp.rows import Rows
+from wholebody.methods.qp.rows import Bodies, Near, Rows, Seen
 from wholebody.methods.qp.settings import TRACKING
 from wholebody.scene.workspace import Workspace
 from wholebody.terms.linearisation import PackedLinearisation
@@ -29,21 +29,26 @@ class Turning:
         points = [swept.points for swept in table.swept]
         reach = [np.linalg.norm(own, axis=1).max() if len(own) else reach
                  for own, reach in zip(points, table.reach, strict=True)]  # fmt: skip
-        point = np.array([len(own) == 1 for own in points], dtype=bool)
-        self._swept = np.array([reach, point], dtype=float).reshape(2, -1)
-        self._lengths = np.array([
-            TRACKING.room, BAND, LEVER_DISTANCE, TRACKING.off, TRACKING.inside, TRACKING.unseen,
-        ])  # fmt: skip
-        place = state.spread(np.arange(state.model.nv, dtype=float)).astype(np.intp)
-        self.joints = np.concatenate([place, state.column_joint, state.parents, table.joint])
-        self.twists = np.empty((3, workspace.model.njoints, 6))
+        self._reach = np.array(reach, dtype=float)
+        self._single = np.array([len(own) == 1 for own in points], dtype=bool)
+        self._seen = Seen(TRACKING.room, BAND, LEVER_DISTANCE, TRACKING.off, TRACKING.inside, TRACKING.unseen)
+        place: Indices = state.spread(np.arange(state.model.nv, dtype=float)).astype(np.intp)
+        self.joints: tuple[Indices, Indices, Indices, Indices] = (
+            place,
+            state.column_joint,
+            state.parents,
+            np.asarray(table.joint),
+        )
+        self._twists = np.empty((3, workspace.model.njoints, 6))
+
+    def bodies(self, placements: Array, reach: Array | None = None) -> Bodies:
+        """The joints where the state is, and the pieces at their placements; `reach` (p,) is another one of these."""
+        far = self._workspace.table.reach if reach is None else reach
+        return Bodies(self._workspace.state.columns, *self.joints, placements, far, self._twists)
 
     def motion(self, at: PackedLinearisation, displacement: Array) -> tuple[float, float]:
         """Longest way of any point of any piece, metres, and largest turn, to first order in the displacement (nv,)."""
-        way, turn = self._kernel.motion(
-            displacement, self._workspace.state.columns, self.joints, at.contacts.placements,
-            self._workspace.table.reach, self.twists,
-        )  # fmt: skip
+        way, turn = self._kernel.moved(displacement, self.bodies(at.contacts.placements))
         return way, turn
 
     def linearisation_error(self, at: PackedLinearisation, rows: Rows, displacement: Array) -> float:
@@ -58,12 +63,9 @@ class Turning:
             0 where every pair keeps its distance to that, and more than 1 where one may not.
         """
         contacts = at.contacts
-        share: float = self._kernel.linearisation_error(
-            displacement, self._workspace.state.columns, self.joints, contacts.placements, self._swept, self._lengths,
-            self.twists, contacts.pair, contacts.distance, contacts.normal, at.clearance, rows.elastic,
-            rows.elastic_violation, rows.contact, rows.contacts - len(contacts.distance),
-        )  # fmt: skip
-        return share
+        near = Near(contacts.pair, contacts.distance, contacts.normal, at.clearance)
+        bodies = self.bodies(contacts.placements, self._reach)
+        return float(self._kernel.linearisation_error(displacement, bodies, self._single, self._seen, near, rows))
 
 
 @lru_cache(maxsize=1)
@@ -71,12 +73,14 @@ def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
     from wholebody.methods.qp import turning_kernel
 
-    none, index, columns, places = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros((1, 6)), np.zeros((0, 4, 3))
-    joints, twists = np.zeros(3, dtype=np.intp), np.zeros((3, 1, 6))
-    turning_kernel.motion(np.zeros(1), columns, joints, places, none, twists)
+    none, index, three = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros((0, 3))
+    joint, matrix = np.zeros(1, dtype=np.intp), np.zeros((0, 1))
+    bodies = Bodies(np.zeros((1, 6)), joint, joint, joint, index, np.zeros((0, 4, 3)), none, np.zeros((3, 1, 6)))
+    rows = Rows(matrix, none, none, 0, matrix, none, index, 0, index, none)
+    turning_kernel.moved(np.zeros(1), bodies)
     turning_kernel.linearisation_error(
-        np.zeros(1), columns, joints, places, np.zeros((2, 0)), np.ones(6), twists, index.reshape(0, 2), none,
-        np.zeros((0, 3)), none, np.zeros((0, 1)), none, index, 0,
+        np.zeros(1), bodies, np.zeros(0, dtype=bool), Seen(*np.ones(6).tolist()),
+        Near(index.reshape(0, 2), none, three, none), rows,
     )  # fmt: skip
     return turning_kernel
 

@@ -6,31 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Mask
 from wholebody.base.compiled import compiled
 from wholebody.methods.qp.dense_kernel import dot
-from wholebody.methods.qp.rows import Bodies, Seen
+from wholebody.methods.qp.rows import Bodies, Near, Rows, Seen
 
 
-@compiled()
-def motion(
-    displacement: Array, columns: Array, joints: Indices, placement: Array, reach: Array, twists: Array
-) -> tuple[float, float]:
-    """`moved` for a call from Python; see `bodies_in` for all but the displacement (nv,)."""
-    return moved(displacement, bodies_in(columns, joints, placement, reach, twists))
-
-
-@compiled(inner=True, forceinline=True)
-def bodies_in(columns: Array, joints: Indices, placement: Array, reach: Array, twists: Array) -> Bodies:
-    """`Bodies` whose integers are one array: place and joint of each column, parents of joints, joints of pieces."""
-    wide, pieces = len(columns), len(reach)
-    return Bodies(
-        columns, joints[:wide], joints[wide : 2 * wide], joints[2 * wide : len(joints) - pieces],
-        joints[len(joints) - pieces :], placement, reach, twists,
-    )  # fmt: skip
-
-
-@compiled(inner=True, forceinline=True)
+@compiled(forceinline=True)
 def moved(displacement: Array, bodies: Bodies) -> tuple[float, float]:
     """Longest way of any point of any piece [m], and largest turn [rad], to first order in a displacement (nv,)."""
     places, column_joint, joint = bodies.place, bodies.column_joint, bodies.joint
@@ -62,23 +44,7 @@ def moved(displacement: Array, bodies: Bodies) -> tuple[float, float]:
 
 
 @compiled()
-def linearisation_error(
-    displacement: Array,
-    columns: Array,
-    joints: Indices,
-    placement: Array,
-    swept: Array,
-    lengths: Array,
-    twists: Array,
-    pair: Indices,
-    distance: Array,
-    normal: Array,
-    asked: Array,
-    elastic: Array,
-    violation: Array,
-    contact: Indices,
-    first: int,
-) -> float:
+def linearisation_error(displacement: Array, bodies: Bodies, single: Mask, seen: Seen, near: Near, rows: Rows) -> float:
     """Largest share of what is unseen by which a pair that may end too near can be nearer than its rows say.
 
     Unseen is what a pair may end nearer than its rows say: what is asked of it, within bounds. 0 where no pair can be
@@ -90,45 +56,35 @@ def linearisation_error(
 
     Args:
         displacement: (nv,) of the step.
-        columns: see `Bodies`, as `placement` and `twists`.
-        joints: see `bodies_in`.
-        placement: (p, 4, 3).
-        swept: (2, p) of the swept points of each piece: distance about its place, infinite for a half-space; and
-            whether it has a single one, so that its turn does not matter.
-        lengths: the numbers of `Seen`.
-        twists: (3, njoints, 6) room.
-        pair: (k, 2) of the contacts; see `Contacts`, as the next two.
-        distance: (k,).
-        normal: (k, 3).
-        asked: (k or more,) their clearances.
-        elastic: (r, nv) rows; see `Rows`, as the next two.
-        violation: (r,).
-        contact: (r,).
-        first: label of the first contact.
+        bodies: where it begins; `reach` is that of the swept points of each piece, infinite for a half-space.
+        single: (p,) whether a piece has a single swept point, so that its turn does not matter.
+        seen: bounds.
+        near: the contacts.
+        rows: of the program.
     """
-    count, bodies = len(distance), bodies_in(columns, joints, placement, swept[0], twists)
+    pair, distance, asked, joint = near.pair, near.distance, near.asked, bodies.joint
+    count = len(distance)
     _second_order(displacement, bodies)
-    twist, change, joint, reach = bodies.twists[0], bodies.twists[1], bodies.joint, swept[0]
-    seen = Seen(lengths[0], lengths[1], lengths[2], lengths[3], lengths[4], lengths[5])
+    twist, change, placement, first = bodies.twists[0], bodies.twists[1], bodies.placement, rows.contacts - count
     room = np.empty(count)
     room[:] = np.inf
-    for r in range(len(violation)):
-        c = contact[r] - first
+    for r in range(len(rows.contact)):
+        c = rows.contact[r] - first
         if c >= 0:
-            room[c] = min(room[c], dot(elastic[r], displacement) - violation[r])
+            room[c] = min(room[c], dot(rows.elastic[r], displacement) - rows.elastic_violation[r])
     worst, vectors = 0.0, np.empty((5, 3))
     for c in range(count):
         nearer, way = np.inf, np.inf
-        round_piece = swept[1, pair[c, 0]] > 0.0 or swept[1, pair[c, 1]] > 0.0
+        round_piece = single[pair[c, 0]] or single[pair[c, 1]]
         for side in range(2):
             # a plane that moves with one piece, and the points of the other one; a single point has no plane
             p = pair[c, side]
             own, carrier = joint[p], joint[pair[c, 1 - side]]
-            if round_piece and not swept[1, p] > 0.0:
+            if round_piece and not single[p]:
                 continue
-            piece = Moved(placement[p, 3], reach[p], twist[own], change[own])
+            piece = Moved(placement[p, 3], bodies.reach[p], twist[own], change[own])
             gone, bend = _seen_from(
-                piece, twist[carrier], change[carrier], normal[c], 1.0 - 2.0 * side, seen.off, vectors
+                piece, twist[carrier], change[carrier], near.normal[c], 1.0 - 2.0 * side, seen.off, vectors
             )
             if bend < nearer:
                 nearer, way = bend, gone

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.base.records import with_values
 from wholebody.methods.qp.active_set import compiled_kernel, room_for
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram, Room, work_size
 from wholebody.methods.qp.settings import CORRECTIONS
@@ -28,50 +27,42 @@ class WorkingSet:
         self.solver = solver
         self._kernel = compiled_kernel()
         self._room: Room | None = None
-        self._limits = np.array(CORRECTIONS, dtype=float)
         self.held: Mask | None = None
         self.reset()
 
     def solve(self, program: QuadraticProgram, key: NDArray[np.intp]) -> QPSolution:
-        """Solve a program by growing its set of elastic rows until no other row is violated.
+        """Solve a program from the active set of the one before; the solver does where that does not settle.
 
-        The answer is the full program's: rows left out are satisfied, and would not push.
+        The set of elastic rows grows until no other row is violated: rows left out are satisfied, and would not push.
 
         Args:
             program: the full program.
             key: (k,) names of its elastic rows.
         """
-        if self.hot:
-            answer = self._from_the_last(program, key)
-            if answer is not None:
-                return answer
-            self.held = None  # correcting the same set once more would end the same
-        return self._round_by_round(program, key)
+        answer = self._corrected(program, key) if self.solver.hot_start else None
+        if answer is None and self.solver.hot_start and self.held is not None:
+            self.reset()  # the last set may have led astray
+            answer = self._corrected(program, key)
+        if answer is None:
+            answer = self.solver.solve(program)
+        self.held = np.array([answer.active.lower, answer.active.upper])
+        self.pushing = np.sort(key[answer.active.elastic])
+        self.solver.count(answer.by)
+        return answer
 
     def reset(self) -> None:
         """Drop the guess."""
         self.held = None
         self.pushing = np.zeros(0, dtype=np.intp)
 
-    @property
-    def hot(self) -> bool:
-        """Whether the next program is to begin from the answer of the last."""
-        return self.held is not None and self.solver.hot_start
-
-    def _from_the_last(self, program: QuadraticProgram, key: NDArray[np.intp]) -> QPSolution | None:
+    def _corrected(self, program: QuadraticProgram, key: NDArray[np.intp]) -> QPSolution | None:
         """The answer by the active set of the program before, corrected; None where that does not settle."""
         x: Array = np.empty(program.size)
-        assert self.held is not None
-        active = ActiveSet(self.held[0].copy(), self.held[1].copy(), np.empty(len(key), dtype=bool))
+        lower, upper = np.zeros((2, program.size), dtype=bool) if self.held is None else self.held.copy()
+        active = ActiveSet(lower, upper, np.empty(len(key), dtype=bool))
         program.check_shapes(active)
-        room = self.room(program)
-        rounds = self._kernel.solve_growing(
-            *program, key, self.pushing, *active, room.chosen, room.places, room.work, self._limits, x
-        )
-        if rounds < 0:
-            return None
-        self._remember(active, key)
-        return QPSolution(x, active, True, 0, self.solver.count([ACTIVE_SET]))
+        rounds = self._kernel.grow(program, key, self.pushing, active, CORRECTIONS, self.room(program), x)
+        return None if rounds < 0 else QPSolution(x, active, True, 0, ACTIVE_SET)
 
     def room(self, program: QuadraticProgram) -> Room:
         """Room of the compiled loops for a program, kept from one to the next."""
@@ -80,33 +71,3 @@ class WorkingSet:
         if room is None or size > len(room.work) or len(program.least) > len(room.chosen):
             room = self._room = room_for(program, 2)
         return room
-
-    def _round_by_round(self, program: QuadraticProgram, key: NDArray[np.intp]) -> QPSolution:
-        """The answer where nothing is known, or the solver has to be asked."""
-        pushing: Mask = (key[:, None] == self.pushing).any(axis=1)  # of a few keys: np.isin would sort all
-        chosen = (program.least > CORRECTIONS.near) | pushing
-        lower, upper = (None, None) if self.held is None else self.held
-        closed: list[str] = []
-        iterations = 0
-        for attempt in range(CORRECTIONS.rounds + 1):
-            if attempt == CORRECTIONS.rounds:
-                chosen[:] = True
-            smaller = program.with_elastic(chosen)
-            guess = None if lower is None or upper is None else ActiveSet(lower, upper, pushing[chosen])
-            answer = self.solver.solve(smaller, guess)
-            closed.append(answer.by)
-            iterations += answer.iterations
-            missed = (program.elastic @ answer.x < program.least - 1e-9) & ~chosen
-            lower, upper = answer.active.lower, answer.active.upper
-            pushing = np.zeros(len(key), dtype=bool)
-            pushing[chosen] = answer.active.elastic
-            if not missed.any():
-                break
-            chosen |= missed
-        active = ActiveSet(answer.active.lower, answer.active.upper, pushing)
-        self._remember(active, key)
-        return with_values(answer, active=active, iterations=iterations, by=self.solver.count(closed))
-
-    def _remember(self, active: ActiveSet, key: NDArray[np.intp]) -> None:
-        self.held = np.array([active.lower, active.upper])
-        self.pushing = np.sort(key[active.elastic])

@@ -107,8 +107,9 @@ class _Walk:
     def __init__(self, problem: Problem) -> None:
         self.state = State(problem.scene.model)
         self.postures = np.vstack([problem.start, random_postures(problem.scene.model, 3, seed=0)])
-        if problem.scene.figure.root == "free":
-            self.postures[:, :7] = problem.start[:7]
+        for root in problem.scene.figure.roots.values():
+            first = int(problem.scene.model.joints[root].idx_q)
+            self.postures[:, first : first + 7] = problem.start[first : first + 7]
 
     def start(self) -> State:
         return self.state.update(self.postures[0])

@@ -10,7 +10,7 @@ import pinocchio as pin
 from wholebody.assessment.posture import assess
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Indices
-from wholebody.figures.description import ROOT_JOINT
+from wholebody.figures.description import is_root
 from wholebody.figures.figure import Figure
 from wholebody.geometry.large_models import geometry_model
 from wholebody.methods.simplification.active_joints import ActiveJoints, active_joints
@@ -173,7 +173,9 @@ def _smaller_figure(problem: Problem, part: ActiveJoints | None) -> tuple[Figure
     if part is None or part.moving[1:].all():
         return scene.figure, scene.geometry
     names = scene.model.names
-    keep = ["root" if names[j] == ROOT_JOINT else names[j] for j in np.flatnonzero(part.moving).tolist()]
+    keep = [
+        names[j].removesuffix("_joint") if is_root(names[j]) else names[j] for j in np.flatnonzero(part.moving).tolist()
+    ]
     figure = scene.figure.reduced(keep, problem.start)
     locked = [j for j in range(1, scene.model.njoints) if not part.moving[j]]
     _, geometries = pin.buildReducedModel(scene.model, [scene.geometry], locked, problem.start)

@@ -9,6 +9,7 @@ from pathlib import Path
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, one_line
 from wholebody.figures.figure import Figure
+from wholebody.figures.joined import one_figure
 from wholebody.motion.files import archive, bvh, columns, gltf, joint_profile
 from wholebody.motion.files.base import Frames, Motion
 
@@ -35,7 +36,10 @@ FBX = "FBX is not read; Blender turns it into what is: File > Import > FBX, then
 def write_motion(motion: Motion, path: str | os.PathLike[str]) -> Path:
     """Write a clip in the format that the ending of the file's name says; see `Clip.write`."""
     path = checked_path(path, "path")
-    return WRITERS[_ending(path, WRITERS, "written")](motion, path)
+    ending = _ending(path, WRITERS, "written")
+    if ending not in (".npz", ".glb"):
+        one_figure(motion.figure, f"{one_line(path.name)} holds one figure, and the clip's figure")
+    return WRITERS[ending](motion, path)
 
 
 def check_ending(path: str | os.PathLike[str]) -> Path:
@@ -54,7 +58,7 @@ def read_frames(path: str | os.PathLike[str], figure: Figure) -> Frames:
 def _ending(path: Path, known: Collection[str], done: str, others: Collection[str] = ()) -> str:
     """The ending of a file's name, one of some; the error names `others` too, which `wb.read_clip` takes before."""
     ending = path.suffix.lower()
-    if ending == ".fbx":
+    if ending == ".fbx" and done == "read":
         raise FileFormatError(f"{one_line(path.name)}: {FBX}")
     if ending not in known:
         raise FileFormatError(

@@ -5,7 +5,7 @@ Robots have the visuals of their links, and where there are none the figure's pi
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -69,6 +69,8 @@ class JointTree:
         times = dt * np.arange(len(q), dtype=np.float64)
         self._times = self.builder.accessor(times, "<f4", bounded=True) if len(q) > 1 else None
         turns, places = keys_of(model, q)
+        ends = zip(places[0], turns[0], strict=True)
+        self._first = [pin.XYZQUATToSE3(np.concatenate(each)).homogeneous for each in ends]
         self._nodes = [self.builder.node(JOINT + model.names[0], None, UPWARD)]
         for joint in range(1, model.njoints):
             keys = turns[:, joint], places[:, joint]
@@ -120,6 +122,7 @@ class JointTree:
         bones: list[int] = []
         held = [(self._model.getJointId(prefix + joint), offset) for joint, offset in places]
         whole = {number: (first, second) for number, first, second in surface.halves}
+        known = dict[int, Array]()
         for number, (bone, (joint, offset)) in enumerate(zip(surface.bones, held, strict=True)):
             called = f"{prefix}{bone.segment}"
             if number in whole:
@@ -128,9 +131,13 @@ class JointTree:
                 node = self.builder.moving_node(f"{called} half", bones[first], keys, self._times)
             else:
                 node = self.builder.node(called, self._nodes[joint], offset)
+                known.setdefault(joint, bone.bind @ np.linalg.inv(offset))
             bones.append(node)
-        inverses = np.linalg.inv(np.array([bone.bind for bone in surface.bones])) @ np.linalg.inv(UPWARD)
-        skin = self.builder.skin(name, bones, inverses)
+        under = [k for k, joint in enumerate(self._model.names) if k and joint.startswith(prefix)]
+        bound = self._bound(known)
+        binds = np.array([bone.bind for bone in surface.bones] + [bound[joint] for joint in under])
+        nodes = [*bones, *(self._nodes[joint] for joint in under)]
+        skin = self.builder.skin(name, nodes, np.linalg.inv(binds) @ np.linalg.inv(UPWARD))
         parts = dict[Color, list[Any]]()
         for patch in surface.patches:
             parts.setdefault((*patch.color, 1.0) if color is None else color, []).append(patch)
@@ -152,6 +159,18 @@ class JointTree:
             primitives.append(self.builder.primitive(vertices, faces, self.builder.material(paint), normals, **more))
         mesh = self.builder.mesh(f"body {name}", primitives)
         self.builder.node(f"body {name}", mesh=mesh, skin=skin)
+
+    def _bound(self, known: Mapping[int, Array]) -> list[Array]:
+        """Placements (4, 4) of the joints where a skin is bound: as they carry bones, others as in the first frame.
+
+        No vertex follows a joint itself. But Blender takes the posture of rest from the parts that a skin names, and
+        moves the vertices where a parent is not among them.
+        """
+        found = [np.eye(4)]
+        for joint in range(1, self._model.njoints):
+            above = found[self._model.parents[joint]]
+            found.append(known.get(joint, above @ self._first[joint]))
+        return found
 
     def _between(self, first: tuple[int, Array], second: tuple[int, Array]) -> tuple[Array, Array]:
         """Half of the turn of a second part in a first, and its place there, of joints and placements in them."""

@@ -50,7 +50,7 @@ class NodeMotion(NamedTuple):
             unit = "metres"
             if limb_pairs(parents, offsets) and not 0.5 < size < 5.0:  # m, from foot to head: exporters forget the unit
                 unit = recognised_unit(parents, offsets)
-                notes.append(f"lengths are in {unit}, though the format has metres")
+                notes += [f"lengths are in {unit}, though the format has metres"] if unit != "metres" else []
         scale = UNITS[unit]
         rotations = turn @ (rigid(worlds[:, :, :3, :3]) @ np.swapaxes(bound, 1, 2)) @ turn.T
         try:

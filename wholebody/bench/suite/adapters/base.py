@@ -125,7 +125,11 @@ class Outside(SolvesAnew, ABC, Generic[Built]):
 
     def accepts(self, problem: Problem) -> str | None:
         """None where the tool can express all terms; else the sentence that names those that it cannot."""
-        return refusal(self.name, self.unsupported(problem))
+        return refusal(self.name, self._refused(problem))
+
+    def _refused(self, problem: Problem) -> list[str]:
+        several = problem.scene.figure.root == "several"
+        return [*self.unsupported(problem), *(["several figures (its model is of one)"] if several else [])]
 
     def prepare(self, problem: Problem) -> None:
         """Build what the tool needs; InputError where it cannot express the problem, or the scene changed."""
@@ -134,7 +138,7 @@ class Outside(SolvesAnew, ABC, Generic[Built]):
     def ready(self, problem: Problem) -> Built:
         """The same, and return it."""
         problem.check_fresh()
-        refused = self.unsupported(problem)
+        refused = self._refused(problem)
         if refused:
             raise UnsupportedTermError(self.name, refused)
         asked = self.depends_on(problem)

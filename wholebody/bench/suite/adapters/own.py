@@ -18,10 +18,9 @@ from wholebody.figures.state import State, Wrench
 from wholebody.methods.base import Method
 from wholebody.methods.qp.active_set import guess_active_set
 from wholebody.methods.qp.method import QP
-from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
+from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver
-from wholebody.methods.qp.solvers.qpsolvers_solver import GUESS_TOLERANCE
 from wholebody.methods.qp.steps import QPStep
 from wholebody.tasks.base import Goal, Surroundings, filled
 
@@ -99,8 +98,8 @@ class Unfinished(OSQPSolver):
 
     name = "osqp, unfinished"
 
-    def solve(self, program: QuadraticProgram, guess: ActiveSet | None) -> QPSolution:
-        """Minimise, not quite; a guess is not used."""
+    def solve(self, program: QuadraticProgram) -> QPSolution:
+        """Minimise, not quite."""
         return self.solve_cold(program)
 
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
@@ -108,7 +107,7 @@ class Unfinished(OSQPSolver):
         workspace = self.workspace(program)
         used = workspace.run(5)  # OSQP takes 25 to some hundreds for programs of a reach
         x = workspace.x().clip(program.lower, program.upper)
-        return QPSolution(x, guess_active_set(program, x, GUESS_TOLERANCE), False, used, self.name)
+        return QPSolution(x, guess_active_set(program, x, 1e-4), False, used, self.name)
 
 
 class UnfinishedQP(QP):

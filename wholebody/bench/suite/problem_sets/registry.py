@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from wholebody.base.errors import InputError, UnknownNameError
-from wholebody.bench.suite.problem_sets import balance, drivers, grips, hands, reaching, robots
+from wholebody.bench.suite.problem_sets import balance, drivers, grips, hands, pairs, reaching, robots
 from wholebody.bench.suite.problem_sets.case import Pose, ProblemSet, numbers
 
 
@@ -43,11 +43,12 @@ NAMED = _sets(
         "robots": robots.described,
         "drivers": drivers.posed,
         "hands": grips.posed,
+        "two_figures": pairs.posed,
     }
 )
 """Sets that take part where they are named: distributions that nothing was tuned on, of which the robots need files
-that are not a part of this package; free arms; and drivers and hands, whose contacts most other tools and files
-lack."""
+that are not a part of this package; free arms; drivers and hands, whose contacts most other tools and files lack; and
+two figures, where most tools know one robot."""
 
 TUNED_ON = MappingProxyType({name: numbers(name).beside for name in NAMED if numbers(name).beside})
 """Those distributions -> the set of the same question that constants were tuned on."""

@@ -19,6 +19,7 @@ from wholebody.base.errors import InputError
 from wholebody.bench.suite.problem_sets.things import shape_of
 from wholebody.bench.suite.published.rebuilt import VERSION, model_of
 from wholebody.figures.figure import Figure
+from wholebody.figures.joined import one_figure
 from wholebody.figures.urdf.writing import add_joint, exact, urdf_axis
 
 Meshes = dict[str, str]
@@ -83,6 +84,7 @@ def body_files(figure: Figure, name: str, meshes: Meshes) -> BodyFiles:
 
     Raises InputError where a joint is neither a hinge, nor a slide, nor a free root; or joints follow each other.
     """
+    one_figure(figure, f"{name}: a published body; the figure")
     if figure.followers:
         raise InputError(f"{name}: joints of it follow others, which a published body does not say; leave it out")
     model = figure.model

@@ -21,9 +21,10 @@ from wholebody.methods.qp.active_set import last_resort, solve_from, violated_se
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram, SparseForm
 from wholebody.methods.qp.settings import CORRECTIONS
 from wholebody.methods.qp.solvers.base import ACTIVE_SET, QPSolver
-from wholebody.methods.qp.solvers.split_form import SCALING, compiled_kernel, read_active, slots_for
+from wholebody.methods.qp.solvers.split_form import SCALING, compiled_kernel, read_active
 
 ROUNDS = (25, 50, 100, 200, 400)  # iterations, until an active set read off the multipliers settles
+SLOTS = 8  # elastic rows come in multiples of this, so that sizes seldom change; more slots = slower iterations
 EXTENSION = "osqp.ext_builtin"
 
 
@@ -46,10 +47,6 @@ class OSQPSolver(QPSolver):
         extension()
         compiled_kernel()
 
-    def uncorrected(self) -> Array | None:
-        """See `QPSolver.uncorrected`."""
-        return None if self._workspace is None else self._workspace.x()
-
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """Minimise; see `QPSolver.solve_cold`."""
         workspace = self.workspace(program)
@@ -57,10 +54,11 @@ class OSQPSolver(QPSolver):
         # of them with a hot start: more take several times as long as semismooth Newton steps
         for limit in ROUNDS[:2] if self.hot_start else ROUNDS:
             iterations += workspace.run(limit)
+            near = self.uncorrected = workspace.x()
             solution = solve_from(program, workspace.active(), CORRECTIONS.of_guess)
             if solution is not None:
                 return with_values(solution, iterations=iterations, by=self.name)
-        return last_resort(program, workspace.x(), iterations)
+        return last_resort(program, near, iterations)
 
     def workspace(self, program: QuadraticProgram) -> Workspace:
         """The workspace with a program in it, set up anew where its pattern does not fit."""
@@ -101,7 +99,7 @@ class Workspace:
         """Set up for programs of one size; the pattern includes that of the workspace before, of the same size."""
         n, m = program.size, len(program.target)
         self.n, self.m, self.k = n, m, 0
-        self.slots = slots_for(program, 0)
+        self.slots = SLOTS * -(-max(len(program.least), 1) // SLOTS)
         self.pattern: NDArray[np.bool_] = program.rows != 0.0
         if before is not None and before.pattern.shape == self.pattern.shape:
             self.pattern = self.pattern | before.pattern

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib import import_module
-from importlib.util import find_spec
 from types import MappingProxyType
 
 from wholebody.base.checks import shown
@@ -12,33 +10,24 @@ from wholebody.base.errors import InputError, MissingPackageError, UnknownNameEr
 from wholebody.methods.qp.active_set import compiled_kernel
 from wholebody.methods.qp.solvers.base import QPSolver
 
-NATIVE: Mapping[str, tuple[str, str]] = MappingProxyType(
-    {
-        "daqp": ("daqp", "DAQPSolver"),
-        "quadprog": ("quadprog", "QuadprogSolver"),
-        "proxqp": ("proxsuite", "ProxQPSolver"),
-        "piqp": ("piqp", "PIQPSolver"),
-    }
+PACKAGES: Mapping[str, str] = MappingProxyType(
+    {"daqp": "daqp", "quadprog": "quadprog", "proxqp": "proxsuite", "piqp": "piqp"}
 )
-"""Solvers that are asked by their own interfaces: name -> module that it needs, class of ours."""
+"""Packages of solvers that are known, whether they are installed or not."""
 
 
 def solver_names() -> tuple[str, ...]:
     """Names that `make_solver` takes on this machine: "osqp", "active_set" and what is installed beside."""
-    names = ["osqp", "active_set"]
-    names += [name for name, (module, _) in NATIVE.items() if find_spec(module) is not None]
-    if find_spec("qpsolvers") is not None:
-        from qpsolvers import available_solvers
+    from qpsolvers import available_solvers
 
-        names += sorted(set(available_solvers) - set(names))
-    return tuple(names)
+    return ("osqp", "active_set", *sorted(set(available_solvers) - {"osqp"}))
 
 
 def make_solver(name: str, hot_start: bool = True) -> QPSolver:
     """A QP solver by name, for the programs of one run.
 
     Args:
-        name: one of `solver_names`.
+        name: one of `solver_names`; all but the first two are those of qpsolvers.
         hot_start: see `QPSolver`.
 
     Raises:
@@ -57,12 +46,9 @@ def make_solver(name: str, hot_start: bool = True) -> QPSolver:
         from wholebody.methods.qp.solvers.osqp_solver import ActiveSetSolver
 
         return ActiveSetSolver(hot_start)
-    if name in NATIVE:
-        module, kind = NATIVE[name]
-        if find_spec(module) is None:
-            raise MissingPackageError(f"the QP solver {name} is not installed; install it with: pip install {module}")
-        solver: QPSolver = getattr(import_module(f"{__package__}.{name}_solver"), kind)(hot_start)
-        return solver
+    if name not in solver_names() and name in PACKAGES:
+        package = PACKAGES[name]
+        raise MissingPackageError(f"the QP solver {name} is not installed; install it with: pip install {package}")
     if name not in solver_names():
         raise UnknownNameError("QP solver", name, solver_names())
     from wholebody.methods.qp.solvers.qpsolvers_solver import QpsolversSolver

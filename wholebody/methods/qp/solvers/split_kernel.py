@@ -1,4 +1,4 @@
-"""The filling of split forms, dense and sparse, as compiled loops: see `split_form`."""
+"""The filling of the sparse split form as compiled loops: see `split_form`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.compiled import compiled
-from wholebody.methods.qp.quadratic_program import QuadraticProgram, Scaling, SparseForm, SplitForm
+from wholebody.methods.qp.quadratic_program import QuadraticProgram, Scaling, SparseForm
 
 
 @compiled()
@@ -17,28 +17,6 @@ def within(rows: Array, pattern: Mask) -> bool:
             if rows[i, c] != 0.0 and not pattern[i, c]:
                 return False
     return True
-
-
-@compiled(error_model="numpy")
-def fill(program: QuadraticProgram, scaling: Scaling, form: SplitForm) -> None:
-    """Write a program's numbers into a split form of its size, in which all else is as `empty_form` left it."""
-    n, m, k, scale = len(program.diagonal), len(program.target), len(program.least), scaling.x
-    for i in range(n):
-        form.linear[i], form.diagonal[i] = program.linear[i] / scale, program.diagonal[i] / (scale * scale)
-        form.box_lower[i], form.box_upper[i] = scale * program.lower[i], scale * program.upper[i]
-    for r in range(m):
-        root = np.sqrt(min(program.weight[r], scaling.heaviest))
-        for i in range(n):
-            form.matrix[r, i] = program.rows[r, i] * (root / scale)
-        form.matrix[r, n + r] = -root / np.sqrt(program.weight[r])
-        form.lower[r] = form.upper[r] = root * program.target[r]
-    for j in range(len(form.lower) - m):
-        row = m + j
-        root = np.sqrt(min(program.elastic_weight[j], scaling.heaviest)) if j < k else 0.0
-        for i in range(n):
-            form.matrix[row, i] = program.elastic[j, i] * (root / scale) if j < k else 0.0
-        form.matrix[row, n + row] = root / np.sqrt(program.elastic_weight[j]) if j < k else 1.0
-        form.lower[row] = root * program.least[j] if j < k else scaling.inactive
 
 
 @compiled(error_model="numpy")

@@ -1,0 +1,134 @@
+"""All answers of a goal against closed forms: an arm of three hinges has four postures for a point, two of them up."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.base.errors import InputError
+from wholebody.bench.suite.problem_sets.robots import known_arm
+
+UPPER, FORE, HIGH = 0.5, 0.4, 0.3  # m: lengths of an arm that turns on a post, lifts and bends
+
+ARM = f"""<robot name="arm"><link name="post"/><link name="turret"/>
+<link name="upper"><collision><origin xyz="{0.5 * UPPER} 0 0" rpy="0 1.5707963 0"/>
+  <geometry><cylinder radius="0.02" length="{UPPER - 0.1}"/></geometry></collision></link>
+<link name="fore"><collision><origin xyz="{0.5 * FORE} 0 0" rpy="0 1.5707963 0"/>
+  <geometry><cylinder radius="0.02" length="{FORE - 0.1}"/></geometry></collision></link><link name="tip"/>
+<joint name="turn" type="revolute"><parent link="post"/><child link="turret"/><origin xyz="0 0 {HIGH}"/>
+  <axis xyz="0 0 1"/>
+  <limit lower="-3.1" upper="3.1" effort="1" velocity="1"/></joint>
+<joint name="lift" type="revolute"><parent link="turret"/><child link="upper"/><axis xyz="0 -1 0"/>
+  <limit lower="-3.1" upper="3.1" effort="1" velocity="1"/></joint>
+<joint name="bend" type="revolute"><parent link="upper"/><child link="fore"/><origin xyz="{UPPER} 0 0"/>
+  <axis xyz="0 -1 0"/>
+  <limit lower="-2.9" upper="2.9" effort="1" velocity="1"/></joint>
+<joint name="end" type="fixed"><parent link="fore"/><child link="tip"/><origin xyz="{FORE} 0 0"/></joint></robot>"""
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory: pytest.TempPathFactory) -> wb.Figure:
+    path = tmp_path_factory.mktemp("arm") / "arm.urdf"
+    path.write_text(ARM)
+    return wb.load(path)
+
+
+def postures(target: tuple[float, float, float]) -> np.ndarray:
+    """All (k, 3) postures whose tip is at a place: to the front or over the back, elbow up or down."""
+    x, y, z = target
+    reach, height = np.hypot(x, y), z - HIGH
+    cosine = (reach**2 + height**2 - UPPER**2 - FORE**2) / (2.0 * UPPER * FORE)
+    found = []
+    for turn, out in ((np.arctan2(y, x), reach), (np.arctan2(-y, -x), -reach)):
+        for bend in (np.arccos(cosine), -np.arccos(cosine)):
+            lift = np.arctan2(height, out) - np.arctan2(FORE * np.sin(bend), UPPER + FORE * np.cos(bend))
+            found.append((turn, (lift + np.pi) % (2.0 * np.pi) - np.pi, bend))
+    return np.array(found)
+
+
+def same(found: list[np.ndarray], expected: np.ndarray) -> bool:
+    """Whether two sets of postures are the same."""
+    return len(found) == len(expected) and all(min(np.abs(q - other).max() for q in found) < 1e-4 for other in expected)
+
+
+TARGET = (0.45, 0.3, 0.55)
+
+
+def test_an_arm_has_all_of_its_postures(arm: wb.Figure) -> None:
+    expected = postures(TARGET)
+    for q in expected:
+        assert arm.placement(q, "tip").translation == pytest.approx(TARGET, abs=1e-9)
+    problem = wb.Problem(wb.Scene(arm), np.array((0.2, 0.1, 0.3)), goals=[wb.Point("tip", TARGET)])
+    found = wb.solutions(problem)
+    assert same([answer.q for answer in found], expected)
+    assert found.complete
+    assert found.found == 4
+    measures = [answer.assessment.measure for answer in found]
+    weights = arm.effort_weights
+    assert measures == pytest.approx(sorted(weights @ (q - problem.start) ** 2 for q in expected), rel=1e-4)
+    assert "4 distinct answers" in str(found)
+    best = wb.solutions(problem, most=1)
+    assert len(best) == 1
+    assert best[0].assessment.measure == pytest.approx(measures[0], rel=1e-6)
+    again = wb.solutions(problem)
+    assert [tuple(answer.q) for answer in again] == [tuple(answer.q) for answer in found]
+
+
+def test_what_is_in_the_way_leaves_the_others(arm: wb.Figure) -> None:
+    expected = postures(TARGET)
+    up = max(expected, key=lambda q: arm.placement(q, "fore").translation[2])
+    elbow = arm.placement(up, "fore").translation
+    scene = wb.Scene(arm).add(wb.Sphere(0.06), name="ball", at=tuple(0.5 * (elbow + (0.0, 0.0, HIGH))))
+    problem = wb.Problem(scene, np.array((0.2, -0.5, 0.3)), goals=[wb.Point("tip", TARGET)])
+    free = [q for q in expected if not len(scene.contacts(q, 0.0).distance)]
+    assert 0 < len(free) < 4
+    assert same([answer.q for answer in wb.solutions(problem)], np.array(free))
+
+
+def test_whole_turns_are_no_other_answers() -> None:
+    """A UR5 with joints of two turns has up to eight branches (Hawkins 2013); each is found once."""
+    figure, ready = known_arm("ur5")
+    tool = figure.placement(np.array((0.4, -1.2, 1.4, -1.1, -1.3, 0.2)), "tool")
+    problem = wb.Problem(wb.Scene(figure), ready, goals=[wb.Frame("tool", tool)])
+    found = wb.solutions(problem, most=100, starts=120)
+    assert 2 <= len(found) <= 8
+    for k, one in enumerate(found):
+        for other in found[:k]:
+            apart = (one.q - other.q + np.pi) % (2.0 * np.pi) - np.pi
+            assert np.abs(apart).max() > 0.2
+
+
+def test_out_of_reach_there_are_none(arm: wb.Figure) -> None:
+    problem = wb.Problem(wb.Scene(arm), goals=[wb.Point("tip", (2.0, 0.0, 0.5))])
+    found = wb.solutions(problem, starts=10)
+    assert (len(found), found.descents, found.starts, found.complete) == (0, 0, 10, False)
+
+
+def test_a_person_has_distinct_answers() -> None:
+    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+    problem = wb.Problem(
+        scene, goals=[wb.Point("right_palm", (0.45, -0.25, 1.2))],
+        constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")],
+    )  # fmt: skip
+    found = wb.solutions(problem, starts=6)
+    assert len(found) >= 1
+    assert all(wb.assess(problem, answer.q).holds(1e-4) for answer in found)
+    assert found[0].assessment.measure <= wb.solve(problem).assessment.measure * 1.01
+
+
+WRONG = {
+    "most": ({"most": 0}, "most"),
+    "apart": ({"apart": -1.0}, "apart"),
+    "starts": ({"starts": 0}, "starts"),
+    "method": ({"method": "newton"}, "give wb.QP"),
+    "time_limit": ({"time_limit": float("nan")}, "time_limit"),
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_mistakes_are_named(what: str, arm: wb.Figure) -> None:
+    given, words = WRONG[what]
+    problem = wb.Problem(wb.Scene(arm), goals=[wb.Point("tip", TARGET)])
+    with pytest.raises(InputError, match=words):
+        wb.solutions(problem, **given)

@@ -1,0 +1,277 @@
+"""Several figures as one: side by side in one world, or one mounted on a frame of another."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base import checks
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.errors import InputError
+from wholebody.base.records import with_values
+from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, ExcludedPair, Member
+from wholebody.figures.motion_ranges import CoupledRange, EllipticRange, MotionRange
+from wholebody.figures.self_pairs import carriers_above
+from wholebody.figures.state import State
+from wholebody.geometry.large_models import geometry_model, pairs_of
+from wholebody.geometry.proximity import PairTable, Proximity
+
+TOUCHING = 1e-3  # m: what is mounted and its carrier are not tested against each other where they start this near
+
+
+Parts: TypeAlias = tuple[pin.Model, pin.GeometryModel, Description, pin.GeometryModel | None]
+
+
+class _Part(NamedTuple):
+    """A figure in a model of several.
+
+    Attributes:
+        figure: as it is alone.
+        joints: index in the model of each of its joints; of its world, the joint that carries that.
+        frames: the same of its frames.
+        world: where its world is in the joint that carries it.
+        prefix: what its names begin with.
+    """
+
+    figure: Articulated
+    joints: tuple[int, ...]
+    frames: tuple[int, ...]
+    world: pin.SE3
+    prefix: str
+
+
+def check_single(figure: Articulated, name: str) -> None:
+    """Refuse by an InputError what is no one figure, or meets things with pieces that it has for them alone."""
+    if figure.root == "several":
+        raise InputError(f"{name!r} is several figures already; give each of them its own name")
+    if figure.outer:
+        raise InputError(
+            f"{name!r} has detail {figure.detail!r}, whose pieces are too coarse to meet another figure; load it with "
+            "detail='capsules' or 'hulls'"
+        )
+
+
+def joined_parts(members: Mapping[str, Member]) -> Parts:
+    """Model, pieces, named parts and what is drawn of figures side by side; see `figures.join`."""
+    model, parts = pin.Model(), list[_Part]()
+    for name, (figure, at) in members.items():
+        model, part = _with(model, figure, f"{name}/", 0, pin.SE3.Identity() if figure.roots else at)
+        parts.append(part)
+    between = [_between(parts, first, second) for second in range(len(parts)) for first in range(second)]
+    description = with_values(
+        _merged(parts), postures=_postures(members), members=members, prefixes=tuple(part.prefix for part in parts)
+    )
+    return model, _geometry(parts, between), description, _visual(parts)
+
+
+def mounted_parts(base: Articulated, other: Articulated, frame: int, prefix: str, at: pin.SE3) -> Parts:
+    """The same of a figure with another one on a frame of it; see `Figure.mounted`."""
+    for one in (base, other):
+        check_single(one, one.name)
+    figure = other.reduced(other.joints) if other.roots else other
+    model, part = _with(pin.Model(base.model), figure, prefix, frame, at)
+    joints = (0, *(model.getJointId(joint) for joint in list(base.model.names)[1:]))
+    frames = tuple(model.getFrameId(one.name, one.type) for one in base.model.frames)
+    parts = [_Part(base, joints, frames, pin.SE3.Identity(), ""), part]
+    held: dict[str, Any] = {"base": base, "other": figure, "prefix": prefix}
+    postures = {one: partial(_mounted_posture, posture=one, **held) for one in base.postures}
+    rest = _on_model(model, posture=base.postures[0], **held)
+    tested, excluded = _pairs_of_mount(model, _geometry(parts, []), parts, rest)
+    known = _merged(parts)
+    description = with_values(known, postures=postures, excluded=(*known.excluded, *excluded))
+    return model, _geometry(parts, [tested]), description, _visual(parts)
+
+
+def _with(model: pin.Model, figure: Articulated, prefix: str, frame: int, at: pin.SE3) -> tuple[pin.Model, _Part]:
+    """A model with a figure's joints on a frame of it too, and the figure as a part of it."""
+    own = pin.Model(figure.model)
+    for k in range(1, own.njoints):
+        own.names[k] = prefix + (ROOT_JOINT if k in figure.roots.values() else own.names[k])
+    for k in range(1, own.nframes):
+        own.frames[k].name = prefix + own.frames[k].name
+    seat, carrier = model.frames[frame], int(model.frames[frame].parentJoint)
+    world = seat.placement * at
+    made = pin.appendModel(model, own, frame, at)
+    joints = (carrier, *(made.getJointId(name) for name in list(own.names)[1:]))
+    # of a reduced figure Pinocchio puts the masses of what was locked to the wrong places
+    for k in range(1, model.njoints):
+        made.inertias[made.getJointId(model.names[k])] = model.inertias[k]
+    for k in range(1, own.njoints):
+        made.inertias[joints[k]] = own.inertias[k]
+    seated = made.getJointId(model.names[carrier])
+    made.inertias[seated] = model.inertias[carrier] + world.act(own.inertias[0])
+    frames = (frame, *(made.getFrameId(one.name, one.type) for one in list(own.frames)[1:]))
+    return made, _Part(figure, (seated, *joints[1:]), frames, world, prefix)
+
+
+def _geometry(parts: Sequence[_Part], between: Sequence[Indices]) -> pin.GeometryModel:
+    """The pieces of all parts, one part after the other, with their pairs and those between two parts."""
+    pieces, pairs = list[pin.GeometryObject](), [np.zeros((0, 2), dtype=np.intp)]
+    for part in parts:
+        pairs.append(pairs_of(part.figure.geometry) + len(pieces))
+        pieces += _placed(part, part.figure.geometry)
+    return geometry_model(pieces, np.concatenate([*pairs, *between]))
+
+
+def _visual(parts: Sequence[_Part]) -> pin.GeometryModel | None:
+    """What is drawn of all parts; None where that is their pieces."""
+    if all(part.figure.visual is part.figure.geometry for part in parts):
+        return None
+    return geometry_model([piece for part in parts for piece in _placed(part, part.figure.visual)])
+
+
+def _placed(part: _Part, geometry: pin.GeometryModel) -> list[pin.GeometryObject]:
+    """Copies of the pieces of a part in the model of all."""
+    made = []
+    for piece in geometry.geometryObjects:
+        copied = pin.GeometryObject(piece)
+        copied.name = part.prefix + piece.name
+        copied.parentJoint, copied.parentFrame = part.joints[piece.parentJoint], part.frames[piece.parentFrame]
+        if piece.parentJoint == 0:
+            copied.placement = part.world * piece.placement
+        made.append(copied)
+    return made
+
+
+def _between(parts: Sequence[_Part], first: int, second: int) -> Indices:
+    """(k, 2) every pair of pieces of two parts, but of those that one joint carries."""
+    begin = np.cumsum([0, *(part.figure.geometry.ngeoms for part in parts)])
+    joints = [[part.joints[piece.parentJoint] for piece in part.figure.geometry.geometryObjects] for part in parts]
+    a, b = np.meshgrid(*(np.arange(len(joints[k])) for k in (first, second)), indexing="ij")
+    kept = np.array(joints[first], dtype=np.intp)[a] != np.array(joints[second], dtype=np.intp)[b]
+    return np.column_stack([a[kept] + begin[first], b[kept] + begin[second]])
+
+
+def _pairs_of_mount(
+    model: pin.Model, geometry: pin.GeometryModel, parts: Sequence[_Part], rest: Array
+) -> tuple[Indices, tuple[ExcludedPair, ...]]:
+    """Pairs (k, 2) of what carries and what is mounted, and those that are not tested, with the reason."""
+    pieces = geometry.geometryObjects
+    joint = np.array([piece.parentJoint for piece in pieces], dtype=np.intp)
+    above = carriers_above(model, joint)
+    seat = parts[1].joints[0]
+    pairs = _between(parts, 0, 1)
+    probe = geometry_model(list(pieces), pairs)
+    near = Proximity(PairTable(model, probe)).query(State(model).update(rest).data, TOUCHING).pair
+    touching = {(a, b) for a, b in near.tolist() if joint[a] in (seat, above[seat])}
+    why = []
+    for a, b in pairs.tolist():
+        neighbours = above[joint[a]] == joint[b] or above[joint[b]] == joint[a]
+        why.append("neighbours" if neighbours else "touch where it is mounted" if (a, b) in touching else "")
+    kept = np.array([not reason for reason in why], dtype=bool)
+    told = [
+        ExcludedPair(pieces[a].name, pieces[b].name, reason)
+        for (a, b), reason in zip(pairs.tolist(), why, strict=True)
+        if reason
+    ]
+    return pairs[kept], tuple(told)
+
+
+def _merged(parts: Sequence[_Part]) -> Description:
+    """The named parts of all, each with the prefix of its part; without postures."""
+    known = [_described(part) for part in parts]
+
+    def all_of(field: str) -> dict[str, Any]:
+        return {name: value for one in known for name, value in getattr(one, field).items()}
+
+    def listed(field: str) -> tuple[Any, ...]:
+        return tuple(value for one in known for value in getattr(one, field))
+
+    return Description(
+        groups=all_of("groups"), chains=all_of("chains"), frames=listed("frames"), segments=listed("segments"),
+        postures={}, cones=all_of("cones"), collision_groups=all_of("collision_groups"), effort=all_of("effort"),
+        excluded=listed("excluded"), ranges=all_of("ranges"), root_effort=listed("root_effort"), notes=listed("notes"),
+    )  # fmt: skip
+
+
+def _described(part: _Part) -> Description:
+    old: Description = part.figure.describe()
+    prefix, figure = part.prefix, part.figure
+
+    def named(names: Sequence[str]) -> tuple[str, ...]:
+        return tuple(prefix + name for name in names)
+
+    groups = {prefix + name: named(joints) for name, joints in old.groups.items()}
+    if prefix:
+        groups[prefix[:-1]] = named(figure.joints)
+    return with_values(
+        old,
+        groups=groups,
+        chains={prefix + name: Chain(named(joints), prefix + tip) for name, (joints, tip) in old.chains.items()},
+        frames=named(old.frames),
+        segments=named(old.segments),
+        cones={
+            prefix + name: with_values(cone, reference=prefix + cone.reference, limb=prefix + cone.limb)
+            for name, cone in old.cones.items()
+        },
+        collision_groups={prefix + name: prefix + group for name, group in old.collision_groups.items()},
+        effort={prefix + name: weight for name, weight in old.effort.items()},
+        excluded=tuple(ExcludedPair(prefix + a, prefix + b, why) for a, b, why in old.excluded),
+        ranges={prefix + name: _named_range(one, prefix) for name, one in old.ranges.items()},
+        root_effort=old.root_effort[: 2 * len(figure.roots)],
+        notes=tuple(f"{prefix[:-1]}: {note}" if prefix else note for note in old.notes),
+    )
+
+
+def _named_range(part: MotionRange, prefix: str) -> MotionRange:
+    if isinstance(part, CoupledRange):
+        return CoupledRange({prefix + joint: factor for joint, factor in part.joints.items()}, part.bound)
+    if isinstance(part, EllipticRange):
+        axes = (with_values(axis, joints=tuple(prefix + joint for joint in axis.joints)) for axis in part.axes)
+        return EllipticRange(tuple(axes))
+    return with_values(part, reference=prefix + part.reference, limb=prefix + part.limb)
+
+
+def _postures(members: Mapping[str, Member]) -> dict[str, Callable[[Articulated], Array]]:
+    """The named postures: that of all first postures, those that several may have, and those of each."""
+    figures = {name: member.figure for name, member in members.items()}
+    first = next(iter(figures.values())).postures[0]
+    found: dict[str, Callable[[Articulated], Array]] = {first: partial(_joined_posture, chosen={})}
+    for posture in dict.fromkeys(posture for figure in figures.values() for posture in figure.postures):
+        chosen = {name: posture for name, figure in figures.items() if posture in figure.postures}
+        found.setdefault(posture, partial(_joined_posture, chosen=chosen))
+    for name, figure in figures.items():
+        for posture in figure.postures:
+            found[f"{name}/{posture}"] = partial(_joined_posture, chosen={name: posture})
+    return found
+
+
+def posture_of_all(figure: Articulated, postures: Mapping[str, str | Array]) -> Array:
+    """A posture (nq,) of joined figures from one of each, by name or as an array; see `Figure.posture`."""
+    q = np.array(pin.neutral(figure.model))
+    for name in postures:
+        checks.known(name, figure.members, "figure", "posture")
+    for name, (one, at) in figure.members.items():
+        given = postures.get(name, one.postures[0])
+        if isinstance(given, str):
+            own = one.posture(given)
+            for joint in one.roots.values():
+                idx = int(one.model.joints[joint].idx_q)
+                own[idx : idx + 7] = pin.SE3ToXYZQUAT(at * pin.XYZQUATToSE3(own[idx : idx + 7]))
+        else:
+            own = checks.posture(given, one.model.nq, f"posture of {name!r}")
+        figure.part(name, q)[:] = own
+    return q
+
+
+def _joined_posture(figure: Articulated, chosen: Mapping[str, str]) -> Array:
+    return np.asarray(figure.posture(chosen))
+
+
+def _mounted_posture(made: Articulated, base: Articulated, posture: str, other: Articulated, prefix: str) -> Array:
+    """A posture of what carries, by name, with what is mounted in its first one."""
+    return _on_model(made.model, base, posture, other, prefix)
+
+
+def _on_model(model: pin.Model, base: Articulated, posture: str, other: Articulated, prefix: str) -> Array:
+    q = pin.neutral(model)
+    for figure, own, before in ((base, base.posture(posture), ""), (other, other.neutral, prefix)):
+        for k in range(1, figure.model.njoints):
+            source = figure.model.joints[k]
+            target = model.joints[model.getJointId(before + figure.model.names[k])]
+            q[target.idx_q : target.idx_q + target.nq] = own[source.idx_q : source.idx_q + source.nq]
+    return np.asarray(q)

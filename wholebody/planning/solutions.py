@@ -1,0 +1,136 @@
+"""`solutions`: the distinct answers of one problem, by their measure, and whether there seem to be more."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
+from typing import overload
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base import checks
+from wholebody.base.arrays import Array
+from wholebody.methods.inputs import TIME_LIMIT, check_problem
+from wholebody.methods.qp.method import QP
+from wholebody.methods.starts import all_found, restarts, throughout
+from wholebody.problem import Problem
+from wholebody.solution import Solution
+
+FEW = 20  # degrees of freedom up to which starts are spread over the whole range of every joint at once
+LEAST = 12  # descents before a search counts as complete
+
+
+@dataclass(frozen=True)
+class Solutions(Sequence[Solution]):
+    """Answers of one problem, each at least `apart` from all others in some joint; that of the least measure first.
+
+    Attributes:
+        answers: solved, as many as were asked for at most.
+        found: how many distinct answers there were, those that were not asked for too.
+        descents: how many descents ended in a posture that solves the problem.
+        starts: how many were made.
+        complete: whether all answers count as found, by the rule of `methods.starts.all_found`: an estimate, no proof.
+    """
+
+    answers: tuple[Solution, ...] = field(repr=False)
+    found: int
+    descents: int
+    starts: int
+    complete: bool
+
+    def __len__(self) -> int:
+        """Return the number of answers."""
+        return len(self.answers)
+
+    @overload
+    def __getitem__(self, index: int) -> Solution: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Solution, ...]: ...
+    def __getitem__(self, index: int | slice) -> Solution | tuple[Solution, ...]:
+        """Return an answer, or some of them."""
+        return self.answers[index]
+
+    def __str__(self) -> str:
+        more = "the search seems complete" if self.complete else "there may be more"
+        lines = [f"{self.found} distinct answers of {self.descents} descents from {self.starts} starts; {more}"]
+        lines += [f"  {number}: measure {answer.assessment.measure:.4g}" for number, answer in enumerate(self.answers)]
+        return "\n".join(lines)
+
+
+def solutions(
+    problem: Problem,
+    most: int = 8,
+    apart: float = 0.2,
+    *,
+    method: QP | None = None,
+    starts: int = 300,
+    seed: int = 0,
+    time_limit: float | None = None,
+) -> Solutions:
+    """Return distinct answers of a problem: local minima of its measures that meet its goals and keep what must hold.
+
+    Descents begin at the problem's start and at random postures, for up to 20 degrees of freedom all over the limits
+    (a Latin hypercube), otherwise as far from the start as other starts of `QP`. Measures count from the problem's
+    start. The search ends where all answers count as found, or after as many starts or seconds.
+
+    Args:
+        problem: as for `wb.solve`.
+        most: how many answers are returned, those of the least measure.
+        apart: least difference of two answers in some degree of freedom, radians or metres, whole turns of hinges left
+            out; of two that are nearer the one of the lesser measure is kept.
+        method: settings of the descents; `QP()` if left out.
+        starts: most descents.
+        seed: of the random postures.
+        time_limit: seconds after which no descent begins; None for no limit.
+
+    Raises:
+        InputError: a value of the wrong kind or out of range, or the scene changed after the problem was stated.
+    """
+    check_problem(problem, "solutions: problem")
+    most = checks.whole(most, "solutions: most", 1, 10_000)
+    starts = checks.whole(starts, "solutions: starts", 1, 100_000)
+    apart = checks.number(apart, "solutions: apart", 1e-6, 100.0, "rad or m")
+    seed = checks.whole(seed, "solutions: seed", 0, 2**32 - 1)
+    method = QP() if method is None else checks.instance(method, QP, "solutions: method", "give wb.QP(...)")
+    ends = np.inf if time_limit is None else time.perf_counter() + TIME_LIMIT(time_limit, "solutions: time_limit")
+    known: list[Solution] = []
+    begun = descents = 0
+    for answer in method.minima(problem, _starts(problem, starts, seed)):
+        begun += 1
+        if answer.solved:
+            descents += 1
+            known = _with(problem, known, answer, apart)
+        if all_found(len(known), descents, LEAST) or time.perf_counter() > ends:
+            break
+    ordered = sorted(known, key=lambda answer: answer.assessment.measure)
+    return Solutions(tuple(ordered[:most]), len(known), descents, begun, all_found(len(known), descents, LEAST))
+
+
+def _starts(problem: Problem, count: int, seed: int) -> Iterator[Array]:
+    """The start, and random postures (nq,)."""
+    state, rng = problem.scene.state(problem.start), np.random.default_rng(seed)
+    spread = throughout if problem.scene.model.nv <= FEW else restarts
+    others = spread(problem, state, problem.start, rng, count - 1) if count > 1 else iter(())
+    return chain([problem.scene.figure.clamp(problem.start)], others)
+
+
+def _with(problem: Problem, known: list[Solution], answer: Solution, apart: float) -> list[Solution]:
+    """The answers known with another one, of which those of the least measure stay that are apart."""
+    kept = list[Solution]()
+    for one in sorted([*known, answer], key=lambda each: each.assessment.measure):
+        if all(_difference(problem.scene.model, one.q, other.q) >= apart for other in kept):
+            kept.append(one)
+    return kept
+
+
+def _difference(model: pin.Model, one: Array, other: Array) -> float:
+    """Greatest difference of two postures (nq,) in a degree of freedom; a whole turn of a hinge is none."""
+    way = np.asarray(pin.difference(model, one, other))
+    hinges = [
+        joint.idx_v for joint in model.joints[1:] if joint.nv == 1 and joint.shortname().startswith("JointModelR")
+    ]
+    way[hinges] -= 2.0 * np.pi * np.round(way[hinges] / (2.0 * np.pi))
+    return float(np.abs(way).max(initial=0.0))
