@@ -84,13 +84,13 @@ def test_the_avatar_has_the_proportions_of_its_person():
 @pytest.mark.parametrize(
     ("proportions", "error", "words"),
     [
-        ({"sitting_height": 1.2}, InputError, r"12\.\d standard deviations from that of men of 1.754 m"),
+        ({"sitting_height": 1.2}, InputError, r"12\.\d standard deviations from that of men of 1.755 m"),
         ({"sitting_height": 93}, InputError, "sitting_height is 93; give a number between 0 and 3 m"),
         ({"sitting_height": math.nan}, InputError, "sitting_height is nan"),
         (
             {"sitting_height": 0.97, "eye_height_sitting": 0.79},
             InputError,
-            "standard deviations from that of men of 1.754 m and .* kg with the others; give .* m, or change another",
+            "standard deviations from that of men of 1.755 m and .* kg with the others; give .* m, or change another",
         ),
         ({"siting_height": 0.93}, UnknownNameError, "sitting_height"),
         (0.93, InputError, "give metres by dimension"),

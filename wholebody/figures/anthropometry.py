@@ -38,6 +38,9 @@ _ENDS = {
 """Joints at the ends of segments whose length is a size."""
 
 
+MEDIAN = {"male": (1.755, 84.6), "female": (1.626, 66.8)}
+"""Stature, metres, and mass, kilograms, of half of all 4,082 men and 1,986 women of ANSUR II."""
+
 OVERHEAD = "overhead_reach_sitting"
 """The dimension that says how far the shoulder rises; one man in seven stretches farther than the model can."""
 
@@ -183,8 +186,8 @@ def make_person(
     Args:
         sex: "male" or "female".
         stature: metres; the median of the sex if left out.
-        mass: kilograms; if left out, the median of the sex, or the mass that is likely for the stature and proportions
-            that were given.
+        mass: kilograms; if left out, the median of the sex, or the mass that is likely for a stature that was given and
+            the proportions.
         percentile: 1 to 99: stature and mass, unless one of them is given, are this percentile of the sex; the other
             dimensions are likely for them, and not of this percentile.
         age: years, 17 to 69, for the ranges of motion, and for dimensions that change with it; those of all adults if
@@ -207,11 +210,11 @@ def make_person(
         stature = people.quantile("stature", share) if stature is None else stature
         mass = people.quantile("mass", share) if mass is None else mass
     years = {} if age is None else {"age": AGE(age, "age")}
-    follows = mass is None and (stature is not None or stated)
-    height = STATURE(people.quantile("stature", 0.5) if stature is None else stature, "stature")
+    follows = mass is None and stature is not None
+    height = STATURE(MEDIAN[people.sex][0] if stature is None else stature, "stature")
     if follows:
         mass = people.likely({"stature": height, **years, **stated})["mass"]
-    weight = MASS(people.quantile("mass", 0.5) if mass is None else mass, "mass")
+    weight = MASS(MEDIAN[people.sex][1] if mass is None else mass, "mass")
     # kg of body mass indices, kg / m^2, outside of which nobody lives; most likely a unit is wrong
     low, high = 13.0 * height**2, 50.0 * height**2
     if not low <= weight <= high:
