@@ -68,7 +68,9 @@ def track(name: str, steps: int = 200) -> Track:
     if steps < 2:
         raise InputError(f"a reach of {steps} steps has no way; give --steps 2 or more")
     figure = wb.load("human")
-    start = figure.posture("standing")
+    # arms that hang are nearer to the trunk than the clearance
+    abducted = dict.fromkeys(("left_shoulder_abduction", "right_shoulder_abduction"), 0.3)
+    start = figure.with_joints(figure.posture("standing"), abducted)
     tip, thorax = (figure.placement(start, name).translation for name in ("right_index_tip", "thorax"))
     by_way = np.vstack([tip, given.free_m])
     free = smooth_way(by_way, 400)
