@@ -225,7 +225,7 @@ def test_a_touch_reaches_the_least_measure_in_few_iterations() -> None:
 
 
 def test_joints_that_move_together_take_few_iterations() -> None:
-    """162 by newton and 16 by qp with the diagonal that bounds the second derivative of `Rhythm` in place of its squares."""
+    """With the diagonal that bounds the second derivative of `Rhythm`, in place of its squares, 162 and 16."""
     scene = wb.Scene(wb.load("human"))
     start = scene.figure.posture("arms_forward")
     palm = scene.state(start).frame(scene.frame_id("left_palm")).translation
