@@ -56,7 +56,7 @@ def test_size_and_encoding_are_bounded(tmp_path: Path) -> None:
     with pytest.raises(FileFormatError, match="is larger than 5e-06 MB"):
         files.read_bytes(path, "file", 5)
     path.write_bytes(b"one\ntw\xffo")
-    with pytest.raises(FileFormatError, match="line 2: is not UTF-8 text"):
+    with pytest.raises(FileFormatError, match="line 2: this is not UTF-8 text"):
         files.read_text(path)
 
 

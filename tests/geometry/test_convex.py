@@ -228,8 +228,8 @@ def test_files_agree_and_scale_and_turn(tmp_path: Path) -> None:
         ("a.obj", b"v 0 0 0\nv 1 0 0\nv nan 1 0\nf 1 2 3\n", "finite"),
         ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "cannot be read"),
         ("a.stl", b"solid x", "no triangles"),
-        ("a.glb", b"xx", "cannot be read"),
-        ("a.gltf", b"{}", "no triangles"),
+        ("a.glb", b"xx", "is no glTF 2"),
+        ("a.gltf", b"{}", "is no glTF 2"),
         ("a.dwg", b"xx", "not among"),
     ],
 )

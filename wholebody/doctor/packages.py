@@ -50,7 +50,7 @@ EXTRAS = {
     "drake": "drake",
     "optik-py": "optik",
     "pytracik": "tracik",
-    "EAIK": "eaik",
+    "eaik": "eaik",
     "embodik": "embodik",
 }
 """Optional packages: distribution -> the extra that installs it."""

@@ -8,7 +8,7 @@ from wholebody.base.imports import exported
 
 if TYPE_CHECKING:
     from wholebody.planning.planner import Plan, plan
-    from wholebody.planning.solutions import Solutions, solutions
+    from wholebody.planning.distinct import Solutions, solutions
     from wholebody.planning.timing import Pace
 
 __all__ = ["Pace", "Plan", "Solutions", "plan", "solutions"]
@@ -17,7 +17,7 @@ __getattr__, __dir__ = exported(
     __name__,
     {
         "wholebody.planning.planner": "Plan plan",
-        "wholebody.planning.solutions": "Solutions solutions",
+        "wholebody.planning.distinct": "Solutions solutions",
         "wholebody.planning.timing": "Pace",
     },
 )

@@ -56,7 +56,7 @@ def _arm(placed: bytes, turned: bytes) -> Arm | None:
         at = at + turn @ placed_at[3]
         turn = turn @ placed_at[:3].T
         axes[k], points[k] = turn @ turns[k], at
-    end, there = np.vstack([turn.T, at]), np.arange(size)
+    end, there = np.ascontiguousarray(np.vstack([turn.T, at])), np.arange(size)
     for held, backwards, kind in product(HELD if size == 7 else (-1,), (0, 1), (THREE_PARALLEL, PARALLEL, CROSSING)):
         joints, sign = (there[::-1].copy(), -1.0) if backwards else (there, 1.0)
         place = size - 1 - held if backwards and held >= 0 else held

@@ -299,7 +299,7 @@ def least(found: Array, lower: Array, upper: Array, nearest: Array, effort: Arra
 def _within(q: Array, lower: Array, upper: Array, nearest: Array, slack: float) -> float:
     effort = 0.0
     for i in range(len(q)):
-        angle = q[i] + FULL * np.round((nearest[0, i] - q[i]) / FULL)
+        angle = q[i] + FULL * np.floor((nearest[0, i] - q[i]) / FULL + 0.5)
         if angle > upper[i] + slack:
             angle -= FULL * np.ceil((angle - upper[i] - slack) / FULL)
         elif angle < lower[i] - slack:
