@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -120,3 +121,55 @@ def test_the_nearest_posture_of_a_tree_is_that_of_all_differences() -> None:
     at = rng.uniform(figure.limits.lower, figure.limits.upper)
     assert tree.nearest(at) == int(np.argmin(np.linalg.norm(drawn - at, axis=1)))
     np.testing.assert_array_equal(tree.path(5), drawn[:6])
+
+
+TURNTABLE = """<robot name="bar"><link name="base"/>
+<link name="bar"><collision><origin xyz="0.5 0 0"/><geometry><box size="0.9 0.05 0.05"/></geometry></collision></link>
+<joint name="turn" type="continuous"><parent link="base"/><child link="bar"/><axis xyz="0 0 1"/>
+<limit effort="1" velocity="3"/></joint></robot>"""
+
+
+def test_a_joint_without_limits_goes_the_long_way_round(tmp_path: Path, least_distance: Distance) -> None:
+    """A post stands on the short way, so the bar turns by more than half a turn."""
+    path = tmp_path / "bar.urdf"
+    path.write_text(TURNTABLE)
+    figure = wb.load(path)
+    scene = wb.Scene(figure).add(wb.Sphere(0.1), name="post", at=(0.3, 0.8, 0.0))
+    end = np.asarray(pin.integrate(figure.model, figure.neutral, np.array([2.5])))
+    found = wb.plan(scene, figure.neutral, end)
+    check(found, figure.neutral, end, Pace())
+    assert found.length == pytest.approx(2.0 * np.pi - 2.5, rel=0.05)
+    assert least_along(scene, found.clip.q, least_distance) >= -1e-6
+
+
+def test_a_free_root_keeps_to_the_usual_speed(free_bodies: Callable[..., wb.Figure]) -> None:
+    """Pinocchio's limit of a free root is the largest number that there is."""
+    figure = free_bodies(wb.Box((0.2, 0.2, 0.2)))
+    end = figure.neutral.copy()
+    end[0] += 10.0
+    found = wb.plan(wb.Scene(figure), figure.neutral, end)
+    check(found, figure.neutral, end, Pace())
+    assert np.abs(np.diff(found.clip.q[:, 0])).max() * 60.0 == pytest.approx(2.0, rel=0.01)
+
+
+def test_what_is_frozen_stays_and_a_goal_that_moves_it_is_refused() -> None:
+    scene = wb.Scene(wb.load("human"))
+    figure, given = scene.figure, [wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Freeze("left_arm")]
+    start = figure.posture("standing")
+    found = wb.plan(scene, start, wb.Point("right_index_tip", (0.3, -0.3, 1.2)), constraints=given)
+    assert found.solved, found.message
+    frozen = figure.dofs(["left_arm"])
+    away = [pin.difference(figure.model, start, q)[frozen] for q in found.clip.q]
+    assert np.abs(away).max() < 1e-4
+    raised = figure.with_joints(start, {"left_elbow_flexion": 1.0})
+    with pytest.raises(wb.InputError, match="frozen"):
+        wb.plan(scene, start, raised, constraints=given)
+
+
+def test_the_first_motion_is_tried_whatever_the_limit_of_time_and_goals_come_in_any_list() -> None:
+    problem, end = shelf(8)
+    assert wb.plan(problem.scene, problem.start, end, time_limit=0.0).message == "the straight motion"
+    found = wb.plan(problem.scene, problem.start, (goal for goal in problem.goals))
+    assert found.solved
+    with pytest.raises(wb.InputError, match="goal is empty"):
+        wb.plan(problem.scene, problem.start, [])

@@ -15,7 +15,7 @@ import pinocchio as pin
 from wholebody.assessment.motion import frames_passed_through
 from wholebody.assessment.posture import assess
 from wholebody.base import checks
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Mask
 from wholebody.base.errors import InputError
 from wholebody.base.runner import processor_time
 from wholebody.figures.self_pairs import random_postures
@@ -89,7 +89,8 @@ def plan(
         clearance: least distance of every pair, metres; pairs that are nearer at an end may be as near on the way.
         pace: limits of velocity and acceleration, and the time step; None for `wb.planning.Pace()`.
         seed: of the random postures.
-        time_limit: seconds of the processor after which the search ends.
+        time_limit: seconds of the processor after which the search ends. Free roots are looked for within a metre of
+            the way between the ends.
 
     Raises:
         InputError: the start or the goal overlaps something, or misses a limit or a constraint, or an argument is not
@@ -105,18 +106,24 @@ def plan(
     problem = Problem(scene, start, goals=goals, constraints=constraints, clearance=clearance)
     _check_end(problem, problem.start, "start")
     ends = _answers(problem, rng) if goals else iter([_End(_posture(problem, goal))])
-
-    def ended() -> bool:
-        return processor_time() - began > limit
-
+    found = None
     with problem.borrow() as workspace:
         tracked = bool(problem.constraints or problem.bounds or scene.figure.followers)
         local: LocalPlanner = TrackedMotions(problem) if tracked else Geodesics(problem, workspace)
-        path, message = _Search(problem, local, ends, rng, ended).shortest()
-        if path is None:
-            clip = Clip(scene.figure, problem.start[None], pace.dt, "plan")
-            return Plan(clip, False, message, seconds=processor_time() - began)
-        found = _smoothed(problem, local, path, pace)
+        ready = processor_time()  # what is compiled or built at the first plan is no part of the search
+
+        def ended() -> bool:
+            return processor_time() - ready > limit
+
+        search = _Search(problem, local, ends, rng, ended)
+        path, message = search.shortest()
+        while path is not None:
+            found = _smoothed(problem, local, path, pace)
+            if found.solved or ended():
+                break
+            path, _ = search.shortest()
+    if found is None:
+        found = Plan(Clip(scene.figure, problem.start[None], pace.dt, "plan"), False, message)
     return replace(found, message=message if found.solved else found.message, seconds=processor_time() - began)
 
 
@@ -124,8 +131,12 @@ def _goals(goal: Any) -> tuple[Goal, ...]:
     """The goals, where these are given; none for a posture."""
     if isinstance(goal, Goal):
         return (goal,)
-    several = isinstance(goal, (list, tuple)) and any(isinstance(one, Goal) for one in goal)
-    return tuple(goal) if several else ()
+    if isinstance(goal, (str, np.ndarray)) or not isinstance(goal, Iterable):
+        return ()
+    listed = tuple(goal)
+    if not listed:
+        raise InputError("plan: goal is empty; give goals or a posture")
+    return listed if any(isinstance(one, Goal) for one in listed) else ()
 
 
 def _posture(problem: Problem, goal: Any) -> Array:
@@ -138,9 +149,29 @@ def _posture(problem: Problem, goal: Any) -> Array:
 def _check_end(problem: Problem, q: Array, what: str) -> None:
     judged = assess(problem, q)
     found = {"things": judged.penetration, "limits": judged.limit_violation, "constraints": judged.constraint_violation}
+    found["what is frozen at the start"] = _moved(problem, q[None])
     for name, by in found.items():
         if not by <= KEPT:
             raise InputError(f"plan: the {what} is {by:.3g} m or rad beyond {name}; give a posture of wb.solve")
+
+
+def _frozen(problem: Problem) -> Mask:
+    """Which degrees of freedom (nv,) the bounds keep where they start."""
+    found: Mask = np.zeros(problem.scene.model.nv, dtype=bool)
+    if problem.bounds:
+        state = problem.scene.state(problem.start)
+        for bound in problem.bounds:
+            low, high = bound.bounds(state, None)
+            found |= (low == 0.0) & (high == 0.0)
+    return found
+
+
+def _moved(problem: Problem, q: Array) -> float:
+    """By how much postures (n, nq) move what is frozen, radians and metres."""
+    frozen, model = _frozen(problem), problem.scene.model
+    if not frozen.any():
+        return 0.0
+    return float(np.max([np.abs(pin.difference(model, problem.start, each)[frozen]).max() for each in q]))
 
 
 class _End(NamedTuple):
@@ -167,7 +198,9 @@ def _drawn(problem: Problem, near: Array, spread: float, rng: np.random.Generato
         first = int(figure.model.joints[root].idx_q)
         drawn[first : first + 7] = near[first : first + 7]
         drawn[first : first + 3] += rng.uniform(-ROOM, ROOM, 3)
-    return np.asarray(pin.interpolate(figure.model, near, drawn, spread))
+    away = spread * np.asarray(pin.difference(figure.model, near, drawn))
+    away[_frozen(problem)] = 0.0
+    return np.asarray(pin.integrate(figure.model, near, away))
 
 
 class _Search:
@@ -190,7 +223,7 @@ class _Search:
     def shortest(self) -> tuple[list[Array] | None, str]:
         """The shortest of some paths, with shortcuts, and how it was found; or None and why there is none."""
         model, best, most, size, runs = self._problem.scene.model, None, np.inf, 0, 0
-        while runs < self._local.searches and size < ENOUGH and not self._ended():
+        while not runs or (runs < self._local.searches and size < ENOUGH and not self._ended()):
             path, trees = self._path()
             runs, size = runs + 1, size + trees.size
             if path is None:
@@ -203,7 +236,7 @@ class _Search:
         if best is not None:
             return best, f"the shortest of {runs} searches"
         if not self._reached:
-            return None, f"no posture meets the goals: {self._said or 'the time is over'}"
+            return None, f"no posture meets the goals: {self._said}"
         return None, "no motion was found within the time limit"
 
     def _path(self) -> tuple[list[Array] | None, RRTConnect]:
@@ -212,7 +245,7 @@ class _Search:
         trees = RRTConnect(self._local, model, start)
         for reached in self._reached:
             trees.add_end(reached)
-        while not self._ended():
+        while rounds == 0 or not self._ended():
             if rounds % ROUNDS == 0 or not self._reached:
                 end = next(self._ends, None)
                 if end is None and not self._reached:
@@ -222,11 +255,11 @@ class _Search:
                     continue
                 if end is not None and end.q is not None:
                     self._local.admit(end.q)
+                    self._reached.append(end.q)
                     way, met = self._local.towards(start, end.q)
                     if met:
                         return [start, *way[:-1], end.q], trees
                     trees.add_end(end.q)
-                    self._reached.append(end.q)
             rounds += 1
             near = self._reached[self._rng.integers(len(self._reached))]
             middle = np.asarray(pin.interpolate(model, start, near, self._rng.uniform()))
@@ -245,12 +278,24 @@ def _smoothed(problem: Problem, local: LocalPlanner, path: list[Array], pace: Pa
     return found if found.solved else _judged(problem, local.settled(even)[0], pace)
 
 
+def _between(problem: Problem, end: Array) -> Problem:
+    """The problem with clearances of pairs that are nearer at an end (nq,) as they are there."""
+    result, least = problem.with_start(problem.start), np.array(problem.clearances)
+    with problem.borrow() as workspace:
+        near = workspace.near(end, problem.clearance + KEPT)
+    least[near.number] = np.minimum(least[near.number], np.maximum(near.distance, 0.0))
+    result.clearances = least
+    return result
+
+
 def _judged(problem: Problem, path: Array, pace: Pace) -> Plan:
     """The motion along a path (m, nq) as fast as it may be, and what it is worth, from its postures alone."""
     scene = problem.scene
     q, use = Timing(scene.figure, path, pace).within()
-    judgements = [assess(problem, frame) for frame in q]
-    worst = float(np.max([(one.penetration, one.limit_violation, one.constraint_violation) for one in judgements]))
+    asked = _between(problem, q[-1])
+    judgements = [assess(asked, frame) for frame in q]
+    found = [(one.limit_violation, one.constraint_violation, one.clearance_violation) for one in judgements]
+    worst = max(float(np.max(found)), _moved(problem, q))
     faults = [
         f"a frame misses what must hold by {worst:.3g} m or rad" if not worst <= KEPT else "",
         f"velocities reach {use.velocity:.3g} of their limits" if not use.velocity <= OVER else "",

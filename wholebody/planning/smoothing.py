@@ -50,32 +50,35 @@ def resampled(model: pin.Model, path: Sequence[Array], count: int) -> Array:
     return np.array([path[0], *found, path[-1]])
 
 
+def places(model: pin.Model, path: Sequence[Array] | Array) -> Array:
+    """(n, nv) differences of postures (n, nq) from the first; joints that turn without limits go on beyond pi."""
+    found = np.array([pin.difference(model, path[0], q) for q in path])
+    turning = [joint.idx_v for joint in model.joints[1:] if (joint.nq, joint.nv) == (2, 1)]
+    found[:, turning] = np.unwrap(found[:, turning], axis=0)
+    return found
+
+
 def smooth(model: pin.Model, path: Array, local: LocalPlanner) -> Array:
     """A smooth path (n, nq) beside a free one: a Gaussian filters it, less so where that would not be free."""
-    places = _places(model, path)
-    wide, share, found = _filtered(places, SPREAD * len(path)), np.ones(len(path)), path
+    free = places(model, path)
+    wide, share, found = _filtered(free, SPREAD * len(path)), np.ones(len(path)), path
     for _ in range(MIXTURES):
         share[[0, -1]] = 0.0
-        found, blocked = local.settled(_postures(model, path, places + share[:, None] * (wide - places)))
+        found, blocked = local.settled(_postures(model, path, free + share[:, None] * (wide - free)))
         if not blocked.any():
             break
         near = gaussian_filter1d(np.convolve(blocked, [1.0, 1.0]), 0.5 * SPREAD * len(path), mode="nearest")
         share *= 1.0 - 0.6 * near / near.max()
-    return local.settled(_postures(model, path, _filtered(_places(model, found), CORNER)))[0]
+    return local.settled(_postures(model, path, _filtered(places(model, found), CORNER)))[0]
 
 
-def _filtered(places: Array, spread: float) -> Array:
+def _filtered(free: Array, spread: float) -> Array:
     """A Gaussian of a width in points filters (n, nv); reflections about both ends keep these in place."""
-    count = len(places)
-    mirrored = np.concatenate([2.0 * places[0] - places[:0:-1], places, 2.0 * places[-1] - places[-2::-1]])
+    count = len(free)
+    mirrored = np.concatenate([2.0 * free[0] - free[:0:-1], free, 2.0 * free[-1] - free[-2::-1]])
     return np.asarray(gaussian_filter1d(mirrored, spread, axis=0, mode="nearest")[count - 1 : 2 * count - 1])
 
 
-def _places(model: pin.Model, path: Array) -> Array:
-    """(n, nv) differences of postures (n, nq) from the first."""
-    return np.array([pin.difference(model, path[0], q) for q in path])
-
-
-def _postures(model: pin.Model, path: Array, places: Array) -> Array:
+def _postures(model: pin.Model, path: Array, away: Array) -> Array:
     """The postures (n, nq) of such differences, between the ends of a path."""
-    return np.array([path[0], *(pin.integrate(model, path[0], place) for place in places[1:-1]), path[-1]])
+    return np.array([path[0], *(pin.integrate(model, path[0], place) for place in away[1:-1]), path[-1]])

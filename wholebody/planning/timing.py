@@ -18,8 +18,10 @@ from wholebody.assessment.motion import velocities
 from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
+from wholebody.planning.smoothing import places
 
 SLOWINGS = 10  # of a motion whose frames exceed a limit, which the derivatives keep
+UNLIMITED = 1e9  # rad/s, m/s: no limit; that of a free root is the largest number
 USUAL_SPEED = 2.0  # rad/s, m/s: of joints without a limit of their own
 
 
@@ -54,10 +56,9 @@ class Pace:
         """(nv,) largest velocities; a limit of the figure of 0 counts as none."""
         checks.instance(figure, Figure, "fastest: figure", "load one with wb.load('human')")
         own = np.array(figure.model.velocityLimit, dtype=float).reshape(-1)
-        own = np.where((own > 0.0) & np.isfinite(own), own, np.inf)
-        return (
-            np.minimum(own, self.velocity) if self.velocity is not None else np.where(np.isinf(own), USUAL_SPEED, own)
-        )
+        usual = USUAL_SPEED if self.velocity is None else self.velocity
+        own = np.where((own > 0.0) & (own < UNLIMITED), own, usual)
+        return own if self.velocity is None else np.minimum(own, self.velocity)
 
 
 class Timing:
@@ -67,8 +68,7 @@ class Timing:
         """Find the fastest timing."""
         self._figure, self._path, self._pace = figure, path, pace
         knots = np.arange(len(path))
-        places = np.array([pin.difference(figure.model, path[0], q) for q in path])
-        self._spline = make_interp_spline(knots, places, k=min(3, len(path) - 1))
+        self._spline = make_interp_spline(knots, places(figure.model, path), k=min(3, len(path) - 1))
         limits = pace.fastest(figure), np.full(figure.model.nv, pace.acceleration)
         self._b = squared_rates(self._spline(knots, 1), self._spline(knots, 2), *limits)
         self._rate = np.sqrt(self._b)
@@ -82,8 +82,8 @@ class Timing:
         gap = np.clip(np.searchsorted(at, times, side="right") - 1, 0, len(rate) - 2)
         since = times - at[gap]
         share = np.clip(rate[gap] * since + 0.25 * (self._b[gap + 1] - self._b[gap]) * since**2, 0.0, 1.0)
-        places = self._spline(gap + share)[1:-1]
-        found = [self._figure.clamp(np.asarray(pin.integrate(model, path[0], place))) for place in places]
+        between = self._spline(gap + share)[1:-1]
+        found = [self._figure.clamp(np.asarray(pin.integrate(model, path[0], place))) for place in between]
         return np.array([path[0], *found, path[-1]])
 
     def within(self) -> tuple[Array, Use]:
