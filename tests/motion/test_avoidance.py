@@ -210,8 +210,8 @@ def test_progress_is_told_and_ends_it(planar_arm: Callable[..., Figure]) -> None
 
 
 def arm_into_trunk(human: Figure, frames: int = 30) -> wb.Clip:
-    """The right forearm sinks into the trunk, 10 cm deep, and comes out again."""
-    q0 = human.posture("standing")
+    """The right forearm sinks into the trunk, 10 cm deep, and comes out again; the left arm is clear of it."""
+    q0 = human.with_joints(human.posture("standing"), {"left_shoulder_abduction": 0.4})
     wave = np.sin(np.pi * np.arange(frames) / (frames - 1)) ** 2
     turned = {"right_elbow_flexion": 1.5, "right_shoulder_rotation": 0.9, "right_shoulder_abduction": -0.1}
     values = human.joint_values(q0)

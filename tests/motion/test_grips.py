@@ -46,7 +46,7 @@ def between_hands(clip: wb.Clip) -> np.ndarray:
 
 
 def test_hands_that_are_held_too_near_part_to_the_clearance(human: Figure) -> None:
-    clip = hands_together(human, -0.225, frames=7)
+    clip = hands_together(human, -0.215, frames=7)
     found = wb.avoid(clip, method=wb.motion.Trajectory(clearance=0.003), constraints=[GRIP])
     assert found.report.solved, found.report.message
     assert found.report.beside > between_hands(clip).max() + 0.003
@@ -54,7 +54,7 @@ def test_hands_that_are_held_too_near_part_to_the_clearance(human: Figure) -> No
 
 @pytest.mark.parametrize("method", ["trajectory", "bisection"])
 def test_hands_that_are_held_in_each_other_part_by_their_depth(human: Figure, method: str) -> None:
-    clip = hands_together(human, -0.225)
+    clip = hands_together(human, -0.215)
     depth = between_hands(clip)
     assert 0.003 < depth.max() < 0.02
     found = wb.avoid(clip, method=method, constraints=[GRIP])
@@ -76,7 +76,7 @@ def test_grips_that_do_not_overlap_stay_where_they_are(human: Figure) -> None:
 
 
 def test_shifts_are_smooth_and_end_before_the_clip_does(human: Figure) -> None:
-    clip = hands_together(human, -0.225, frames=61)
+    clip = hands_together(human, -0.215, frames=61)
     shifts = grip_shifts(wb.Scene(human), clip.q, DT, GRIP)
     length = np.linalg.norm(shifts, axis=1)
     assert not length[[0, -1]].any()
@@ -84,13 +84,15 @@ def test_shifts_are_smooth_and_end_before_the_clip_does(human: Figure) -> None:
 
 
 def test_hands_that_pass_each_other_between_two_frames_part_there_too(human: Figure) -> None:
-    """One hand goes past the other; no frame is where they are nearest."""
+    """One hand goes past the other, palms to the ground; no frame is where they are nearest."""
     raised = human.model.joints[human.joint_id("left_shoulder_flexion")].idx_q
+    turned = {"shoulder_abduction": -0.172, "elbow_pronation": -1.3}
     base = human.with_joints(
-        human.posture("arms_forward"), {f"{side}_shoulder_abduction": -0.22 for side in ("left", "right")}
+        human.posture("arms_forward"),
+        {f"{side}_{name}": angle for side in ("left", "right") for name, angle in turned.items()},
     )
     q = np.tile(base, (6, 1))
-    q[:, raised] += 0.12 * (np.arange(6) - 2.5)
+    q[:, raised] += 0.1 * (np.arange(6) - 2.5)
     clip = wb.Clip(human, q, DT)
     before = wb.check(clip)
     assert (before.colliding, before.dips) == (0, 1)
