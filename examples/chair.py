@@ -14,8 +14,8 @@ from presenting import OAK, command_line, picture, report
 import wholebody as wb
 
 BACKWARDS = (0.0, 0.0, 1.0, 0.0)  # half a turn about z: the mesh has its backrest in front
-SCALE = 0.852  # of the mesh: the seat is as high as the thighs of a man who sits with his soles on the floor
-HIPS = 0.024  # m: in front of the middle of the chair, so that the back is close to the backrest
+SCALE = 0.8585  # of the mesh: the seat is as high as the thighs of a man who sits with his soles on the floor
+HIPS = 0.034  # m: in front of the middle of the chair, so that the back is close to the backrest
 PALM = (0.067, 0.0, -0.34)  # m: on the thigh, in its axes
 
 
@@ -33,7 +33,7 @@ def add_chair(scene: wb.Scene) -> None:
         scene.add(wb.Mesh(path, scale=SCALE, up="y"), name="chair", at=(0, 0, 0, *BACKWARDS), color=OAK)
         return
     print("chair.obj is not present (WHOLEBODY_DATA names its folder): the chair is made of boxes")
-    scene.add(wb.Box((0.40, 0.50, 0.04)), name="seat", at=(0.08, 0.0, 0.4062), color=OAK)
+    scene.add(wb.Box((0.40, 0.50, 0.04)), name="seat", at=(0.08, 0.0, 0.4094), color=OAK)
     scene.add(wb.Box((0.03, 0.50, 0.50)), name="backrest", at=(-0.132, 0.0, 0.65), color=OAK)
     for number, (x, y) in enumerate(((-0.12, 0.22), (-0.12, -0.22), (0.25, 0.22), (0.25, -0.22)), start=1):
         scene.add(wb.Box((0.04, 0.04, 0.386)), name=f"leg {number}", at=(x, y, 0.193), color=OAK)

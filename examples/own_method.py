@@ -58,7 +58,7 @@ class JacobianTranspose(SolvesAnew):
 def main() -> None:
     """Reach with a hand, and compare with the QP method."""
     problem = wb.Problem(
-        wb.Scene(wb.load("human")), "standing", goals=[wb.Point("right_palm", (0.5, -0.3, 1.2))],
+        wb.Scene(wb.load("human")), "standing", goals=[wb.Point("right_palm", (0.5, -0.3, 1.1))],
         constraints=[wb.Freeze("root")], range_of_motion=False,
     )  # fmt: skip
     for method in (JacobianTranspose(), wb.QP()):

@@ -15,7 +15,7 @@ import wholebody as wb
 from wholebody.tracking import Dragged, drag_along, judge_drag, read_path, spread
 
 SEAT = 0.4262  # m: its top; buttocks touch it when the hips are as high as the knees
-SEATED = (-0.41, 0.0, 0.4885)  # m: of the pelvis, a tenth of a millimetre over the seat
+SEATED = (-0.41, 0.0, 0.49065)  # m: of the pelvis, a tenth of a millimetre over the seat
 PATH = Path(__file__).parent / "tasks" / "sit_on_chair.csv"
 FRAMES = 240
 STAGES = (0.0, 0.3, 0.55, 0.8, 1.0)  # of the motion, in the picture
@@ -27,9 +27,9 @@ def build() -> wb.Problem:
     scene = wb.Scene(person)
     scene.add(wb.HalfSpace(), name="floor")
     scene.add(wb.Box((0.44, 0.48, 0.04)), name="seat", at=(-0.35, 0.0, SEAT - 0.02), color=OAK)
-    scene.add(wb.Box((0.03, 0.48, 0.36)), name="backrest", at=(-0.5465, 0.0, 0.82), color=OAK)
+    scene.add(wb.Box((0.03, 0.48, 0.36)), name="backrest", at=(-0.5525, 0.0, 0.82), color=OAK)
     for side, y in (("left", 0.22), ("right", -0.22)):
-        scene.add(wb.Box((0.03, 0.04, 1.0)), name=f"{side} post", at=(-0.5765, y, 0.5), color=OAK)
+        scene.add(wb.Box((0.03, 0.04, 1.0)), name=f"{side} post", at=(-0.5825, y, 0.5), color=OAK)
     for side, y in (("left", 0.22), ("right", -0.22)):
         scene.add(wb.Box((0.04, 0.04, 0.386)), name=f"{side} leg", at=(-0.15, y, 0.193), color=OAK)
     bent = {"hip_flexion": 0.1, "knee_flexion": 0.2, "ankle_dorsiflexion": 0.1}  # rad: the knees are unlocked
