@@ -342,3 +342,18 @@ def test_each_is_put_on_the_ground(pair: wb.Scene) -> None:
     lifted = q.copy()
     lifted[heights] += (0.2, -0.03)
     assert figure.grounded(lifted, pair) == pytest.approx(q, abs=1e-6)
+
+
+def test_a_name_is_that_of_one_figure_or_thing_alone(ben: wb.Figure) -> None:
+    with pytest.raises(InputError, match=r"a figure is named 'root'.*give it another name"):
+        wb.Scene({"root": ben})
+    scene = wb.Scene({"ben": ben}).add(wb.Box((0.1, 0.1, 0.1)), name="post", at=(1.0, 0.0, 0.5))
+    with pytest.raises(InputError, match="a figure is named 'root'"):
+        scene.add_figure(ben, name="root")
+    with pytest.raises(InputError, match="the scene has a thing 'post' already; give the figure another name"):
+        scene.add_figure(ben, name="post")
+    with pytest.raises(InputError, match="the scene already has a 'ben'; give the new object another name"):
+        scene.add(wb.Sphere(0.1), name="ben")
+    with pytest.raises(InputError, match="the scene already has a 'ben'; give the new object another name"):
+        scene.attach(wb.Sphere(0.1), to="ben/head", name="ben")
+    assert (set(scene.figure.members), set(scene.objects)) == ({"ben"}, {"post"})
