@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from wholebody.base.imports import exported
 
 if TYPE_CHECKING:
-    from wholebody.planning.planner import Plan, plan
     from wholebody.planning.distinct import Solutions, solutions
+    from wholebody.planning.planner import Plan, plan
     from wholebody.planning.timing import Pace
 
 __all__ = ["Pace", "Plan", "Solutions", "plan", "solutions"]
