@@ -119,6 +119,12 @@ def test_percentiles_are_of_the_stature() -> None:
     assert list(found) == ["male P5", "male P95"]
 
 
+def test_percentiles_that_are_nearly_alike_are_different_people() -> None:
+    found = wb.people(percentiles=[5, 5.0, 98.0000001, 98.0000002], sex="male")
+    assert list(found) == ["male P5", "male P98.0000001", "male P98.0000002"]
+    assert len({one["stature"] for one in found.values()}) == 3
+
+
 def test_boundary_manikins_are_people() -> None:
     found = wb.boundary(0.9, ["stature", "mass"], "female")
     assert len(found) == 1 + 4 + 4
@@ -132,6 +138,8 @@ def test_odd_populations_are_refused() -> None:
         wb.people(3, "tall")
     with pytest.raises(wb.InputError, match="leave one out"):
         wb.people(3, percentiles=[5])
+    with pytest.raises(wb.InputError, match=r"percentiles is empty; give some, such as \[5, 50, 95\]"):
+        wb.people(percentiles=[])
     with pytest.raises(wb.UnknownNameError, match="sitting_height"):
         wb.boundary(0.95, ["siting_height"])
     with pytest.raises(wb.InputError, match="confidence"):
