@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -12,6 +14,7 @@ import pytest
 import wholebody as wb
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.motion.stance import standing
+from wholebody.motion.standing_ground import Foothold
 
 DT, STRIDE, STEP = 1 / 60, 0.9, 0.5  # s; s from a step of a foot to its next; m from foot to foot
 THIGH, SHANK, ANKLE, TOE = 0.43, 0.42, 0.08, 0.16  # m
@@ -224,3 +227,39 @@ def test_wrong_grounds_are_one_sentence(human: wb.Figure, given: str, sentence: 
 def test_a_chart_is_drawn(tmp_path: Path) -> None:
     wb.motion.ground(walker(stairs, 2.0)[0]).chart(tmp_path / "ground.png")
     assert (tmp_path / "ground.png").stat().st_size > 5000
+
+
+def nowhere(count: int) -> dict[str, np.ndarray]:
+    return {"left_toe": np.full(count, np.nan)}
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"rests": nowhere(120)}, r"rests of left_toe are .*; give True or False for each frame"),
+        ({"rests": {"tail": np.ones(120, dtype=bool)}}, "rests: no role is called 'tail'"),
+        ({"rests": {"left_toe": [True], "left_ankle": [True, False]}}, r"left_toe 1, left_ankle 2\); give one for"),
+        ({"rests": None}, "rests is a NoneType, not a Mapping; give role to value"),
+        ({"footholds": ((0,),)}, r"footholds\[0\] is a tuple, not a Foothold; give one of wb.motion.ground"),
+        ({"footholds": (Foothold("left_toe", 5, 5, np.zeros(3), 0.0),)}, r"end is 5; give a whole number between 6"),
+        ({"footholds": (Foothold("left_toe", 0, 5, np.zeros(3), np.nan),)}, "height is nan; give a finite number"),
+        ({"lowest": {"left_toe": np.nan}}, "lowest of left_toe is nan; give a finite number"),
+        ({"lowest": np.full(3, np.nan)}, "lowest is a ndarray, not a Mapping"),
+        ({"levels": (np.nan,)}, "a level is nan; give a finite number"),
+        ({"tilt": np.nan}, "tilt is nan; give a finite number between 0 and 90 degrees"),
+        ({"uneven": "x"}, "uneven is 'x'; give True or False"),
+        ({"dt": 0.0}, "dt is 0"),
+    ],
+)
+def test_a_changed_ground_is_checked(change: dict[str, Any], sentence: str) -> None:
+    found = wb.motion.ground(walker(flat, 2.0)[0])
+    with pytest.raises((wb.InputError, wb.UnknownNameError), match=f"Ground: .*{sentence}") as told:
+        dataclasses.replace(found, **change)
+    assert "\n" not in str(told.value)
+
+
+def test_a_changed_ground_keeps_what_is_not_changed() -> None:
+    found = wb.motion.ground(walker(stairs, 2.0)[0])
+    again = dataclasses.replace(found, rests={role: mask.astype(float) for role, mask in found.rests.items()})
+    assert str(again) == str(found)
+    assert all(mask.dtype == bool for mask in again.rests.values())

@@ -133,6 +133,18 @@ def test_several_robots_stand_where_mujoco_has_them(tmp_path: Path) -> None:
     assert wb.read_scene(path, root="right").figure.joints == ("turn_right",)
 
 
+def test_names_that_figures_have_or_cannot_have_are_given_a_number(tmp_path: Path) -> None:
+    file = tmp_path / "cell.xml"
+    file.write_text(
+        """<mujoco><worldbody>
+        <body name="root"><joint name="a" range="-90 90"/><geom name="g" size="0.1"/></body>
+        <body name="arm/" pos="1 0 0"><joint name="b" range="-90 90"/><geom name="h" size="0.1"/></body>
+        <geom name="arm" size="0.1" pos="2 0 0"/></worldbody></mujoco>"""
+    )
+    scene = wb.read_scene(file)
+    assert (set(scene.figure.members), set(scene.objects)) == ({"root-2", "arm"}, {"arm-2"})
+
+
 def test_pairs_of_robots_that_are_not_tested_are_told(tmp_path: Path) -> None:
     path = tmp_path / "cell.xml"
     path.write_text(TWO.replace("EXCLUDED", '<contact><exclude body1="l1" body2="right"/></contact>'))

@@ -342,3 +342,35 @@ def test_each_is_put_on_the_ground(pair: wb.Scene) -> None:
     lifted = q.copy()
     lifted[heights] += (0.2, -0.03)
     assert figure.grounded(lifted, pair) == pytest.approx(q, abs=1e-6)
+
+
+def test_a_name_is_that_of_one_figure_or_thing_alone(ben: wb.Figure) -> None:
+    with pytest.raises(InputError, match=r"a figure is named 'root'.*give it another name"):
+        wb.Scene({"root": ben})
+    scene = wb.Scene({"ben": ben}).add(wb.Box((0.1, 0.1, 0.1)), name="post", at=(1.0, 0.0, 0.5))
+    with pytest.raises(InputError, match="a figure is named 'root'"):
+        scene.add_figure(ben, name="root")
+    with pytest.raises(InputError, match="the scene has a thing 'post' already; give the figure another name"):
+        scene.add_figure(ben, name="post")
+    with pytest.raises(InputError, match="the scene already has a 'ben'; give the new object another name"):
+        scene.add(wb.Sphere(0.1), name="ben")
+    with pytest.raises(InputError, match="the scene already has a 'ben'; give the new object another name"):
+        scene.attach(wb.Sphere(0.1), to="ben/head", name="ben")
+    assert (set(scene.figure.members), set(scene.objects)) == ({"ben"}, {"post"})
+
+
+def test_newton_takes_a_person_beside_an_arm_that_turns_without_end_and_slides(anna: wb.Figure, tmp_path: Path) -> None:
+    file = tmp_path / "arm.urdf"
+    file.write_text(
+        """<robot name="arm"><link name="base"/><link name="turned"/><link name="tip"/>
+        <joint name="turn" type="continuous"><parent link="base"/><child link="turned"/><axis xyz="0 0 1"/></joint>
+        <joint name="slide" type="prismatic"><parent link="turned"/><child link="tip"/><axis xyz="1 0 0"/>
+        <limit lower="0.1" upper="0.9" effort="1" velocity="1"/></joint></robot>"""
+    )
+    scene = wb.Scene({"anna": anna, "arm": (wb.load(file), (2.0, 0.0, 0.5))})
+    goals = [wb.Point("anna/right_palm", (0.4, -0.2, 1.2)), wb.Point("arm/tip", (2.0, 0.5, 0.5))]
+    problem = wb.Problem(scene, goals=goals, constraints=feet("anna/"))
+    assert any(isinstance(term, wb.tasks.RangeOfMotion) for term in problem.constraints)
+    solution = wb.solve(problem, "newton")
+    assert solution.status == "solved"
+    assert max(solution.assessment.goal_errors) < 1e-4

@@ -52,6 +52,43 @@ def test_those_who_do_not_fit_are_told_by_their_dimension() -> None:
     assert "men do not fit: stature over 1.8" in repr(found)
 
 
+def standing(figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:
+    """Somebody who stands where they are, with a hand forward."""
+    goals = [wb.Point("right_index_tip", (0.4, -0.2, 1.2))]
+    held = [wb.Hold("left_foot"), wb.Hold("right_foot")]
+    return wb.Problem(wb.Scene(figure), "standing", goals=goals, constraints=held)
+
+
+def test_who_is_solved_from_the_own_start_is_counted_where_that_of_another_is_refused() -> None:
+    # ccd holds a foot where it is at the start, and the feet of another are elsewhere
+    people = {f"{stature:.2f}": {"sex": "male", "stature": stature} for stature in (1.70, 1.71, 1.80)}
+    found = wb.accommodation(standing, people, method="ccd")
+    assert found.records.counts() == {"solved": 3}
+    assert found.share == 1.0
+
+
+def test_those_refused_are_in_no_share() -> None:
+    def task(figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:
+        if figure.describe().person.stature > 1.85:
+            raise wb.InputError("too tall for this task")
+        return upright_under(1.75)(figure, target, layout)
+
+    statures = (1.65, 1.70, 1.80, 1.90)
+    people = {f"{stature:.2f}": {"sex": "male", "stature": stature} for stature in statures}
+    people["woman"] = {"sex": "female", "stature": 1.88}
+    found = wb.accommodation(task, people)
+    assert found.tried == (False, True, True, True, False)
+    assert found.share == pytest.approx(2 / 3)
+    assert (found.by_sex["male"].tried, [*found.by_sex]) == (3, ["male"])
+    assert [(one.verdict, one.excluded) for one in found.exclusions] == [("fit", 1)]
+    assert "Accommodation of 3 people, 2 more refused: 67%" in repr(found)
+
+
+def test_a_task_that_refuses_everybody_is_refused() -> None:
+    with pytest.raises(wb.InputError, match="everybody is refused; the first, b: the task"):
+        wb.accommodation(lambda *given: None, {"a": {"sex": "male"}, "b": {"sex": "female"}})  # type: ignore[arg-type]
+
+
 SITTING = {  # dimension, sex, share of ANSUR II's people at or below a value, metres
     ("thigh_clearance", "male", 0.185): 0.65, ("thigh_clearance", "female", 0.185): 0.89,
     ("hip_breadth_sitting", "male", 0.440): 0.97, ("hip_breadth_sitting", "female", 0.440): 0.90,
@@ -82,6 +119,12 @@ def test_percentiles_are_of_the_stature() -> None:
     assert list(found) == ["male P5", "male P95"]
 
 
+def test_percentiles_that_are_nearly_alike_are_different_people() -> None:
+    found = wb.people(percentiles=[5, 5.0, 98.0000001, 98.0000002], sex="male")
+    assert list(found) == ["male P5", "male P98.0000001", "male P98.0000002"]
+    assert len({one["stature"] for one in found.values()}) == 3
+
+
 def test_boundary_manikins_are_people() -> None:
     found = wb.boundary(0.9, ["stature", "mass"], "female")
     assert len(found) == 1 + 4 + 4
@@ -95,6 +138,8 @@ def test_odd_populations_are_refused() -> None:
         wb.people(3, "tall")
     with pytest.raises(wb.InputError, match="leave one out"):
         wb.people(3, percentiles=[5])
+    with pytest.raises(wb.InputError, match=r"percentiles is empty; give some, such as \[5, 50, 95\]"):
+        wb.people(percentiles=[])
     with pytest.raises(wb.UnknownNameError, match="sitting_height"):
         wb.boundary(0.95, ["siting_height"])
     with pytest.raises(wb.InputError, match="confidence"):

@@ -25,8 +25,8 @@ def join(figures: Mapping[str, Figure | tuple[Figure, Any]]) -> Figure:
             matrix or a pin.SE3. That places a fixed root, and the named postures of a free one.
 
     Raises:
-        InputError: no figures, no figure, a name with a slash, a figure that was joined already or that meets things
-            with pieces of their own (detail "spheres"), or a placement that cannot be read.
+        InputError: no figures, no figure, a name with a slash, the name "root", a figure that was joined already or
+            that meets things with pieces of their own (detail "spheres"), or a placement that cannot be read.
     """
     if not isinstance(figures, Mapping) or not figures:
         raise InputError(
@@ -38,6 +38,8 @@ def join(figures: Mapping[str, Figure | tuple[Figure, Any]]) -> Figure:
         figure, at = given if isinstance(given, (tuple, list)) and len(given) == 2 else (given, (0.0, 0.0, 0.0))
         if "/" in checks.text(name, "the name of a figure"):
             raise InputError(f"the name of a figure is {checks.shown(name)}; leave the slash out: it ends a name")
+        if name == "root":
+            raise InputError("a figure is named 'root', which is that of a placement; give it another name")
         one = checks.instance(figure, Figure, f"figure {name!r}", "load one with wb.load('human')")
         check_single(one, name)
         members[name] = Member(one, placement(at, f"{name!r}: at"))

@@ -51,8 +51,9 @@ def retarget(
 
     Returns:
         A clip within the figure's joint limits, reach cones and speed limits. Feet, hands and knees that rest are held
-        where they came down, soles on the ground. The figure is free of itself, of the ground and of things where the
-        holds and limits leave room for it: `wb.check` says where not. With `ground=None` and no scene it may collide.
+        where they came down, soles on the ground. In every frame the figure is free of itself, of the ground and of
+        things where the holds and limits leave room for it. Between frames parts may pass through each other: what
+        `wb.check` tells of either, `wb.avoid` mends. With `ground=None` and no scene the figure may collide.
 
     Raises:
         UnknownNameError: a name that does not exist.

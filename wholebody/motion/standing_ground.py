@@ -5,22 +5,24 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.errors import InputError
 from wholebody.base.files import checked_target
 from wholebody.base.records import with_values
 from wholebody.motion.footholds import RestLimits, resting, speeds
-from wholebody.motion.roles import skeleton_roles
+from wholebody.motion.roles import ROLES, skeleton_roles
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
 from wholebody.motion.windows import long_runs, runs
 
 FEET = ("ankle", "toe")
 OTHERS = ("hand", "wrist", "knee")
 APART, SPREAD = 0.04, 0.06  # m: between two levels of a floor; within one level, by errors of a recording
+LARGEST, MOST_FRAMES = 1e6, 10**9  # m: greatest height; frames
 NEAR_GROUND = 0.12  # m: highest place of a knee's or wrist's joint above the ground on which it rests
 
 
@@ -43,7 +45,9 @@ class Foothold(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """The ground of a recording.
+    """The ground of a recording. `dataclasses.replace` makes a changed one.
+
+    `wb.retarget` uses `footholds` (role, frames and height), `rests` and `lowest`; the others describe what was found.
 
     Attributes:
         footholds: in the order of time.
@@ -63,9 +67,31 @@ class Ground:
     uneven: bool
     dt: float
 
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        Raises:
+            InputError: a value of the wrong kind or range.
+            UnknownNameError: a role that no joint has.
+        """
+        listed = checks.listed(self.footholds, "Ground: footholds", "those of wb.motion.ground(motion)")
+        checks.settle(self, "footholds", tuple(_foothold(one, k) for k, one in enumerate(listed)))
+        rests = {role: _rest(mask, role) for role, mask in _by_role(self.rests, "rests").items()}
+        if len({len(mask) for mask in rests.values()}) > 1:
+            lengths = ", ".join(f"{role} {len(mask)}" for role, mask in rests.items())
+            raise InputError(f"Ground: rests have different numbers of frames ({lengths}); give one for each frame")
+        checks.settle(self, "rests", rests)
+        lowest = _by_role(self.lowest, "lowest").items()
+        checks.settle(self, "lowest", {role: _height(height, f"lowest of {role}") for role, height in lowest})
+        levels = checks.listed(self.levels, "Ground: levels", "(0.0, 0.15)")
+        checks.settle(self, "levels", tuple(_height(one, "a level") for one in levels))
+        checks.settle(self, "tilt", checks.number(self.tilt, "Ground: tilt", 0.0, 90.0, "degrees"))
+        checks.settle(self, "uneven", checks.flag(self.uneven, "Ground: uneven"))
+        checks.settle(self, "dt", checks.time_step(self.dt, "Ground: dt"))
+
     def below(self, frames: int) -> Array:
         """(frames,) height of the ground under the body, between footholds and over time, metres."""
-        frames = checks.whole(frames, "below: frames", 0, 10**9)
+        frames = checks.whole(frames, "below: frames", 0, MOST_FRAMES)
         feet = [each for each in self.footholds if each.role in self.lowest]
         total, count = np.zeros(frames), np.zeros(frames)
         for each in feet:
@@ -103,6 +129,39 @@ class Ground:
         seen.legend(fontsize=7)
         drawing.savefig(target)
         return os.fspath(target)
+
+
+def _height(value: object, what: str) -> float:
+    return checks.number(value, f"Ground: {what}", -LARGEST, LARGEST, "m")
+
+
+def _by_role(given: object, what: str) -> Mapping[str, Any]:
+    """A mapping whose names are roles."""
+    found = checks.instance(given, Mapping, f"Ground: {what}", "give role to value, as wb.motion.ground(motion) has")
+    for role in found:
+        checks.known(role, ROLES, "role", f"Ground: {what}")
+    return found
+
+
+def _rest(given: object, role: str) -> Mask:
+    """True or false for each frame; zeros and ones too."""
+    if isinstance(given, np.ndarray) and given.ndim == 1 and given.dtype == bool:
+        return given
+    entries = checks.listed(given, f"Ground: rests of {role}", "True or False for each frame")
+    if not all(isinstance(one, (bool, np.bool_, int, float, np.number)) and one in (0, 1) for one in entries):
+        raise InputError(f"Ground: rests of {role} are {checks.shown(given)}; give True or False for each frame")
+    return np.array(entries, dtype=bool)
+
+
+def _foothold(given: object, number: int) -> Foothold:
+    """A checked foothold."""
+    what = f"Ground: footholds[{number}]"
+    one = checks.instance(given, Foothold, what, "give one of wb.motion.ground(motion), or one._replace(height=0.1)")
+    checks.known(one.role, ROLES, "role", what)
+    first = checks.whole(one.first, f"{what}: first", 0, MOST_FRAMES - 1)
+    end = checks.whole(one.end, f"{what}: end", first + 1, MOST_FRAMES)
+    place = checks.numbers(one.place, (3,), f"{what}: place")
+    return Foothold(one.role, first, end, place, _height(one.height, f"footholds[{number}]: height"))
 
 
 NOTHING = Ground((), {}, {}, (0.0,), 0.0, False, 1.0)

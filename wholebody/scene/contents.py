@@ -154,7 +154,7 @@ class SceneContents(checks.FixedAttributes):
         known = {other: (member.figure, member.at) for other, member in self.figure.members.items()}
         made = join({**known, name: (figure if root is None else welded(figure), at)})
         with self._lock:
-            if taken := next((thing for thing in self._objects if thing in made.segments), None):
+            if taken := next((thing for thing in self._objects if thing == name or thing in made.segments), None):
                 raise InputError(f"add_figure: the scene has a thing {taken!r} already; give the figure another name")
             object.__setattr__(self, "figure", made)
             self._changed()
@@ -290,7 +290,7 @@ class SceneContents(checks.FixedAttributes):
         return self._free_name(checks.text(name, "the name of an object"))
 
     def _free_name(self, name: str) -> str:
-        if name in self._objects or name in self.figure.segments:
+        if name in self._objects or name in self.figure.segments or name in self.figure.members:
             raise InputError(
                 f"the scene already has a {name!r}; give the new object another name, or move() the old one"
             )

@@ -161,11 +161,12 @@ def _untested_between(compiled: Compiled, robots: Sequence[int]) -> list[str]:
 
 
 def _figure_name(body: str) -> str:
-    """The name of a figure: that of its body, whose slashes would end it."""
-    return body.strip("/").replace("/", "-")
+    """The name of a figure: that of its body, whose slashes would end it; "root" is that of a placement."""
+    name = body.strip("/").replace("/", "-")
+    return "root-2" if name == "root" else name
 
 
 def _free_name(scene: Scene, name: str) -> str:
     """The name, with a number if the figure or another thing has it."""
-    taken = {*scene.objects, *scene.figure.segments, *scene.figure.frames}
+    taken = {*scene.objects, *scene.figure.members, *scene.figure.segments, *scene.figure.frames}
     return name if name not in taken else next(f"{name}-{k}" for k in range(2, 10**6) if f"{name}-{k}" not in taken)

@@ -17,7 +17,7 @@ from wholebody.ergonomics.vision import sight
 from wholebody.methods.base import Method
 from wholebody.studies.many import SolveProgress
 from wholebody.studies.populations import people as sampled
-from wholebody.studies.records import Records
+from wholebody.studies.records import CANCELLED, ENDED, REFUSED, Records
 from wholebody.studies.study import TaskFunction, Variant, loaded_person, study
 from wholebody.studies.study_files import TaskFile
 from wholebody.tasks import inputs
@@ -82,6 +82,8 @@ class Accommodation:
         reaches: whether each person meets the goals.
         fits: whether each person does so without overlap and with all constraints.
         sees: whether each person sees the point; None where none was given.
+
+    Who was refused has no posture, and is neither in shares nor in exclusions; see `tried`.
     """
 
     records: Records
@@ -92,6 +94,11 @@ class Accommodation:
     sees: tuple[bool, ...] | None
 
     @property
+    def tried(self) -> tuple[bool, ...]:
+        """Whether each person has a posture; without one the problem was refused, or its process ended."""
+        return tuple(one.q is not None for one in self.records)
+
+    @property
     def accommodated(self) -> tuple[bool, ...]:
         """Whether each person reaches, fits and, if asked, sees."""
         seen = (True,) * len(self.fits) if self.sees is None else self.sees
@@ -99,28 +106,35 @@ class Accommodation:
 
     @property
     def share(self) -> float:
-        """Share of the people that reach, fit and, if asked, see."""
-        return float(np.mean(self.accommodated))
+        """Share of those tried that reach, fit and, if asked, see; NaN where nobody was tried."""
+        return self._of_tried(self.accommodated)
 
     @property
     def by_sex(self) -> dict[str, Share]:
-        """The share of each sex."""
-        sexes = dict.fromkeys(self.sexes)
-        return {sex: _share([good for good, own in zip(self.accommodated, self.sexes, strict=True) if own == sex])
-                for sex in sexes}  # fmt: skip
+        """The share of each sex of which somebody was tried."""
+        found: dict[str, list[bool]] = {}
+        for good, sex, tried in zip(self.accommodated, self.sexes, self.tried, strict=True):
+            if tried:
+                found.setdefault(sex, []).append(good)
+        return {sex: _share(good) for sex, good in found.items()}
 
     @property
     def exclusions(self) -> tuple[Exclusion, ...]:
         """The dimension that best tells those left out from the others, of each sex and verdict, the most first."""
-        found = []
+        found, tried = [], self.tried
         for sex in dict.fromkeys(self.sexes):
             for verdict, good in (("reach", self.reaches), ("fit", self.fits), ("see", self.sees or ())):
-                own = [k for k, one in enumerate(self.sexes) if one == sex and self.dimensions[k]]
+                own = [k for k, one in enumerate(self.sexes) if one == sex and tried[k] and self.dimensions[k]]
                 out = [k for k in own if good and not good[k]]
                 rest = [k for k in own if self.accommodated[k]]
                 if out and rest:
                     found.append(self._told(sex, verdict, out, rest))
         return tuple(sorted(found, key=lambda one: -one.excluded))
+
+    def _of_tried(self, good: tuple[bool, ...]) -> float:
+        """Share of those tried."""
+        held = [one for one, tried in zip(good, self.tried, strict=True) if tried]
+        return sum(held) / len(held) if held else math.nan
 
     def _told(self, sex: str, verdict: str, out: list[int], rest: list[int]) -> Exclusion:
         """The dimension and the bound with the greatest difference of shares beyond it (Youden 1950)."""
@@ -140,9 +154,13 @@ class Accommodation:
 
     def __repr__(self) -> str:
         parts = [("reach", self.reaches), ("fit", self.fits), *([("see", self.sees)] if self.sees is not None else [])]
-        words = ", ".join(f"{np.mean(values):.0%} {name}" for name, values in parts)
+        words = ", ".join(f"{self._of_tried(values):.0%} {name}" for name, values in parts)
         shares = ", ".join(f"{sex} {share}" for sex, share in self.by_sex.items() if sex)
-        lines = [f"Accommodation of {len(self.records)} people: {self.share:.0%}" + (f"; {shares}" if shares else "")]
+        counts = self.records.counts()
+        told = "".join(f", {counts[one]} more {one}" for one in (REFUSED, ENDED, CANCELLED) if one in counts)
+        lines = [
+            f"Accommodation of {sum(self.tried)} people{told}: {self.share:.0%}" + (f"; {shares}" if shares else "")
+        ]
         lines += [f"  {words}{self.records.remarks()}", *(f"  {one}" for one in self.exclusions)]
         return "\n".join(lines)
 
@@ -180,7 +198,7 @@ def accommodation(
         progress: see `study`.
 
     Raises:
-        InputError: a value of the wrong kind or range.
+        InputError: a value of the wrong kind or range, or everybody is refused.
         UnknownNameError: there is no such task file or method.
         FileFormatError: the task file cannot be read.
     """
@@ -196,6 +214,8 @@ def accommodation(
     records = study(
         task, people=population, method=method, jobs=jobs, warm_start=True, folder=folder, progress=progress
     )
+    if all(one.outcome == REFUSED for one in records):
+        raise InputError(f"accommodation: everybody is refused; the first, {records[0].name}: {records[0].message}")
     reaches = tuple(one.q is not None and one.goal_error <= REACHED and one.goal_angle <= REACHED for one in records)
     # m, rad: by which limits, constraints and distances may be violated by somebody who fits
     fits = tuple(

@@ -333,9 +333,9 @@ def _solved(make: Make, method: Method, q: Array | None) -> dict[str, Any]:
     try:
         problem = check_problem(make(), "the task's answer")
         if q is not None and q.shape == problem.start.shape:
-            warm = method.solve(begun_at(problem, q))
-            if warm.solved:
-                return answer_of(warm)
+            warm = _warm_answer(problem, method, q)
+            if warm is not None:
+                return warm
         return answer_of(method.solve(problem))
     except WholebodyError as error:
         told = str(error)
@@ -344,13 +344,24 @@ def _solved(make: Make, method: Method, q: Array | None) -> dict[str, Any]:
     return {"outcome": REFUSED, "message": told, "q": None}
 
 
+def _warm_answer(problem: Problem, method: Method, q: Array) -> dict[str, Any] | None:
+    """What a record says of a problem solved from another's answer (nq,); None where it is not solved, or refused.
+
+    A start may be refused that is another's answer where the problem's own is not: a hold elsewhere at the start.
+    """
+    try:
+        solution = method.solve(begun_at(problem, q))
+    except WholebodyError:
+        return None
+    return answer_of(solution) if solution.solved else None
+
+
 def _solve_from(given: Sequence[_Start], method: Method) -> list[dict[str, Any] | None]:
     """Solve problems from others' answers (nq,): what their records say; None for one that is not solved."""
     answers: list[dict[str, Any] | None] = []
     for make, q in given:
         problem = check_problem(make(), "the task's answer")
-        solution = warmed(method).solve(begun_at(problem, q))
-        answers.append(answer_of(solution) if solution.solved else None)
+        answers.append(_warm_answer(problem, warmed(method), q))
     return answers
 
 

@@ -51,10 +51,13 @@ def people(
         shares = [
             PERCENTILE(one, "people: percentiles") for one in checks.listed(percentiles, "people: percentiles", "[5]")
         ]
+        if not shares:
+            raise InputError("people: percentiles is empty; give some, such as [5, 50, 95], or leave it out")
+        named = {f"P{_digits(share)}": share for share in shares}
         return {
-            f"{own} P{share:g}": {"sex": own, "stature": population(own).quantile("stature", 0.01 * share)}
+            f"{own} {name}": {"sex": own, "stature": population(own).quantile("stature", 0.01 * share)}
             for own in sexes
-            for share in shares
+            for name, share in named.items()
         }
     most = checks.whole(100 if count is None else count, "people: count", 1, MOST)
     rng = checks.whole(seed, "people: seed", 0, 2**32 - 1)
@@ -63,6 +66,11 @@ def people(
         drawn = population(own).sample(most, np.random.default_rng([rng, own == "male"]))
         found.update({f"{own} {number}": _options(own, values) for number, values in enumerate(drawn, 1)})
     return found
+
+
+def _digits(share: float) -> str:
+    """A percentile in as many digits as tell it from every other."""
+    return f"{share:g}" if float(f"{share:g}") == share else repr(share)
 
 
 def boundary(

@@ -86,9 +86,9 @@ def convert(arguments: argparse.Namespace) -> int:
     "skeletons' motions for a figure",
     """\
 Turn the motion of a skeleton (BVH, glTF, AMASS) into a clip of a figure of any proportions: directions of limbs as
-recorded, within joint limits, speed limits and reach cones, smooth, what rests held on the ground, free of itself and
-the floor. A table has the errors of bones; `wholebody clip check` says what is left. Several files are written into a
-folder; what it holds already is not made again.""",
+recorded, within joint limits, speed limits and reach cones, smooth, what rests held on the ground, in every frame
+free of itself and the floor. A table has the errors of bones; `wholebody clip check` says what is left, between frames
+too. Several files are written into a folder; what it holds already is not made again.""",
     *MOTIONS,
     option(
         "out", type=Path, metavar="OUT", help="the file to write: .npz, .bvh, .csv, .txt or .glb; of several a folder"

@@ -31,12 +31,13 @@ from wholebody.tasks import (
     Plane,
     Point,
     Posture,
+    RangeOfMotion,
     ReachCones,
     Relative,
     StepLimit,
 )  # fmt: skip
 from wholebody.tasks.answers import is_own
-from wholebody.tasks.base import Goal
+from wholebody.tasks.base import Constraint, Goal
 from wholebody.tasks.checks import undefined
 from wholebody.tasks.residuals import PlacementResidual
 
@@ -94,7 +95,7 @@ def constraint_equations(problem: Problem, bodies: FigureBodies) -> EquationSet:
         elif isinstance(term, ReachCones):
             result.add(_cones(bodies, term, label), ONE_SIDED)
         else:
-            _check_own(bodies, label)
+            _check_own(bodies, label, term)
             for rows, role in zip(constraint_rows(bodies, term, label), (HARD, ONE_SIDED), strict=True):
                 if rows is not None:
                     result.add(rows, role)
@@ -176,10 +177,17 @@ def _local(bodies: FigureBodies, frame: int) -> Any:
     return bodies.model.frames[frame].placement
 
 
-def _check_own(bodies: FigureBodies, label: str) -> None:
-    """Refuse a term of a user's class if the figure's tangent is not a function of its bodies here."""
-    if bodies.uncharted:
-        reason = f"its rows need turning joints and one free root, and {bodies.uncharted[0]!r} is neither"
+def _check_own(bodies: FigureBodies, label: str, term: Constraint | None = None) -> None:
+    """Refuse a term of a user's class if the figure's tangent is not a function of its bodies here.
+
+    Ranges of motion are of their own figures' joints: those of another figure do not matter to them.
+    """
+    uncharted = bodies.uncharted
+    if isinstance(term, RangeOfMotion) and bodies.figure.members:
+        whose = {name.partition("/")[0] for name in term.row_names}
+        uncharted = tuple(name for name in uncharted if name.partition("/")[0] in whose)
+    if uncharted:
+        reason = f"its rows need joints that turn between limits and free roots, and {uncharted[0]!r} is neither"
         raise UnsupportedTermError("newton", [f"{label} ({reason})"])
 
 
