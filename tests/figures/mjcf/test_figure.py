@@ -266,3 +266,14 @@ def test_joints_that_are_parked_without_a_shape_are_no_robot(tmp_path: Path) -> 
 def test_what_mujoco_reads_of_files_that_are_not_quite_xml_is_read(tmp_path: Path) -> None:
     head = "\ufeff<?xml version='1.0'?>\n<!-- <robot> -->\n"
     assert wb.load(written(tmp_path, head + ARM + "\n</mujoco>\n")).joints == ("swing", "roll", "slide")
+
+
+def test_what_mujoco_warns_of_leaves_no_log_in_the_callers_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    body = '<body pos="nan 0 1"><joint/><geom size="0.1"/></body>'
+    path = written(tmp_path, f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    with pytest.raises(InputError, match="not finite"):
+        wb.load(path)
+    assert list(tmp_path.iterdir()) == [path]

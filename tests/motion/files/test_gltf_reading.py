@@ -248,3 +248,23 @@ def test_sparse_keyframes_are_read_between(tmp_path: Path) -> None:
     angle = np.linspace(0.0, 1.0, 61)
     np.testing.assert_allclose(motion.positions[:, 2, 1], -1.5 * np.sin(angle), atol=1e-6)
     np.testing.assert_allclose(motion.positions[:, 2, 2], 1.5 * np.cos(angle), atol=1e-6)
+
+
+KINDS = ("revolute", "continuous", "prismatic", "planar", "floating", "fixed")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("axis", ["0 0 1", "0.6 0 0.8"])
+def test_each_kind_of_joint_is_read_again(kind: str, axis: str, tmp_path: Path) -> None:
+    (tmp_path / "robot.urdf").write_text(
+        f'<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="{kind}"><parent link="a"/>'
+        f'<child link="b"/><origin xyz="0.1 0.2 0.3" rpy="0.3 0.2 0.1"/><axis xyz="{axis}"/>'
+        '<limit lower="-1" upper="1" effort="1" velocity="9"/></joint></robot>'
+    )
+    figure = wb.load(tmp_path / "robot.urdf", root="free")
+    random = np.random.default_rng(4)
+    moves = random.uniform(-1.0, 1.0, (3, figure.model.nv))
+    clip = wb.Clip(figure, np.array([pin.integrate(figure.model, figure.neutral, move) for move in moves]), 0.1, "c")
+    again = wb.read_clip(clip.write(tmp_path / "c.glb"), figure)
+    for q, given in zip(again.q, clip.q, strict=True):
+        assert pin.difference(figure.model, q, given) == pytest.approx(0.0, abs=1e-5)

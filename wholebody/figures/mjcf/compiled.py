@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -187,8 +189,7 @@ def _compile(path: Path) -> tuple[Any, tuple[str, ...]]:
         return spec.compile()
 
     wrong = (ValueError, mujoco.FatalError)
-    with warnings.catch_warnings():  # they tell of simulations
-        warnings.simplefilter("ignore")
+    with _unlogged(mujoco):
         try:
             return read(textures=True), ()
         except wrong as error:
@@ -197,6 +198,19 @@ def _compile(path: Path) -> tuple[Any, tuple[str, ...]]:
             return read(textures=False), (f"textures are left out: {reason}",)
         except wrong as error:
             raise FileFormatError(f"{path}: MuJoCo cannot read it ({_said(error)}); correct the file") from None
+
+
+@contextmanager
+def _unlogged(mujoco: Any) -> Iterator[None]:
+    """Without MuJoCo's warnings, which tell of simulations: as Python's, and in a MUJOCO_LOG.TXT in this folder."""
+    handler = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda message: None)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        mujoco.set_mju_user_warning(handler)
 
 
 def _said(error: Exception) -> str:

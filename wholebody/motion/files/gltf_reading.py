@@ -198,4 +198,7 @@ def _values(made: Any, turned: Rotation, moved: Array, along: Array, ends: list[
         return angle[:, None] if made.nq == 1 else np.stack([np.cos(angle), np.sin(angle)], axis=1)
     if made.nv == 6:
         return np.hstack([moved, turned.as_quat()])
+    if made.shortname() == "JointModelPlanar":
+        angle = turned.as_rotvec()[:, 2]
+        return np.stack([moved[:, 0], moved[:, 1], np.cos(angle), np.sin(angle)], axis=1)
     return turned.as_quat() if made.nq == 4 and made.nv == 3 else None
