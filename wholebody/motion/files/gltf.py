@@ -18,6 +18,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
+from wholebody.figures.joining import joint_in
 from wholebody.figures.link_pieces import triangles_of
 from wholebody.figures.link_visuals import Color, Drawn, drawn_of
 from wholebody.figures.surface import Surface, surface_of
@@ -91,7 +92,7 @@ class JointTree:
         """Add what is drawn of links; a prefix stands before their joints' names; all in a colour if there is one."""
         for number, one in enumerate(drawn):
             name, paint = f"visual {prefix}{one.link}:{number}", one.color if color is None else color
-            self.piece(name, self._model.getJointId(prefix + one.joint), one.placement, one.shape, paint)
+            self.piece(name, joint_in(self._model, prefix, one.joint), one.placement, one.shape, paint)
 
     def piece(self, name: str, joint: int, placement: Array, shape: Any, color: Any) -> None:
         """Add coal's shape, or vertices (n, 3) and faces (m, 3), at a placement (4, 4) in a joint."""
@@ -120,7 +121,7 @@ class JointTree:
             color: of all of it; each patch's own if None.
         """
         bones: list[int] = []
-        held = [(self._model.getJointId(prefix + joint), offset) for joint, offset in places]
+        held = [(joint_in(self._model, prefix, joint), offset) for joint, offset in places]
         whole = {number: (first, second) for number, first, second in surface.halves}
         known = dict[int, Array]()
         for number, (bone, (joint, offset)) in enumerate(zip(surface.bones, held, strict=True)):
