@@ -83,7 +83,7 @@ def test_a_figure_whose_root_is_fixed_stands_among_others(assembled: bool) -> No
     drawn = next(figure for figure in bodies.drawn if figure.prefix == "a/")
     assert isinstance(drawn.visual, Skin)
     alone = seated.model.createData()
-    pin.framesForwardKinematics(seated.model, alone, seated.neutral)
+    pin.framesForwardKinematics(seated.model, alone, pin.neutral(seated.model))
     for bone, (joint, offset) in zip(drawn.visual.surface.bones, drawn.visual.places, strict=True):
         shown = keyframe.transforms[drawn.nodes[joint]] @ offset
         if bone.parent is None and bone.segment in seated.segments:

@@ -46,7 +46,7 @@ def write(motion: Motion, path: Path) -> Path:
     figure = motion.figure
     if len(motion.q) * figure.model.njoints > 20_000_000:  # keyframes, about 600 MB
         raise InputError(f"{motion.name}: {len(motion.q)} frames are too many for one glTF file; write parts of it")
-    tree = JointTree(figure.model, motion.q, motion.dt)
+    tree = JointTree(figure.model, motion.q, motion.dt, clip=True)
     drawn = tree.draw(figure)
     for piece in figure.geometry.geometryObjects:
         link = figure.model.frames[piece.parentFrame].name
@@ -65,10 +65,11 @@ class JointTree:
         builder: of the file.
     """
 
-    def __init__(self, model: Any, q: Array, dt: float) -> None:
+    def __init__(self, model: Any, q: Array, dt: float, *, clip: bool = False) -> None:
+        """Place the joints; one posture is no animation, but a `clip` of one frame has its keyframe."""
         self.builder, self._model, self._q = GltfBuilder(), model, q
         times = dt * np.arange(len(q), dtype=np.float64)
-        self._times = self.builder.accessor(times, "<f4", bounded=True) if len(q) > 1 else None
+        self._times = self.builder.accessor(times, "<f4", bounded=True) if len(q) > 1 or clip else None
         turns, places = keys_of(model, q)
         ends = zip(places[0], turns[0], strict=True)
         self._first = [pin.XYZQUATToSE3(np.concatenate(each)).homogeneous for each in ends]
