@@ -284,5 +284,7 @@ def test_frames_and_counts_without_end_are_refused(end: float, count: int, tmp_p
         tree["accessors"][times] = {"componentType": 5126, "count": count, "type": "SCALAR"}
     tree["buffers"][0]["uri"] = "data:," + base64.b64encode(data[28 + length :]).decode()
     (tmp_path / "turn.gltf").write_text(json.dumps(tree))
-    with pytest.raises(FileFormatError, match="10000000 are the most" if count > 2 else "at most 1000000"):
+    with pytest.raises(
+        FileFormatError, match="10000000 are the most" if count > 2 else "turn.gltf: .* at most 1000000"
+    ):
         read_skeleton(tmp_path / "turn.gltf")

@@ -88,7 +88,7 @@ def rigid(matrices: Array) -> Array:
     return np.asarray(u @ vt)
 
 
-def steps_of(times: Array, longest: float) -> tuple[Array, float, bool]:
+def steps_of(times: Array, longest: float, title: str) -> tuple[Array, float, bool]:
     """Times of frames, their step, and whether keyframes are at equal steps up to `longest`; otherwise every 1/60 s."""
     keys = np.unique(np.asarray(times, dtype=float))
     keys = keys[np.r_[True, np.diff(keys) > 1e-4]]  # s: rounding of single precision
@@ -101,7 +101,7 @@ def steps_of(times: Array, longest: float) -> tuple[Array, float, bool]:
     if not even:
         count = max(1, round(span * 60.0))
     if count >= MOST_FRAMES:
-        raise FileFormatError(f"{count + 1} frames between the first and the last key; give at most {MOST_FRAMES}")
+        raise FileFormatError(f"{title}: {count + 1} frames; give at most {MOST_FRAMES}")
     return np.linspace(keys[0], keys[-1], count + 1), rounded_step(span / count), even
 
 
