@@ -148,3 +148,8 @@ def test_a_file_that_is_not_there_is_told_with_its_neighbours(tmp_path: Path) ->
 def test_a_path_that_is_too_long_is_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(WholebodyError):
         read_task(tmp_path / ("a/" * 3000) / "task.toml")
+
+
+def test_a_list_without_figures_is_none(write: Callable[[str], Path]) -> None:
+    with pytest.raises(WholebodyError, match=r"there is no \[figure\] table"):
+        read_task(write("figure = []\n"))

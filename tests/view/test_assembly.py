@@ -12,9 +12,11 @@ from PIL import Image
 import wholebody as wb
 from wholebody.view import Viewer
 from wholebody.view.bodies import Bodies
+from wholebody.view.gltf import scene_glb
 from wholebody.view.scene_graph import Keyframe
+from wholebody.view.skin import Skin
 from wholebody.view.style import LOOK
-from wholebody.view.viewed_scene import ViewedAssembly
+from wholebody.view.viewed_scene import ViewedAssembly, ViewedScene
 
 
 @pytest.fixture(scope="module")
@@ -63,3 +65,28 @@ def test_a_picture_shows_clothes_and_the_color_that_was_given(
     red, green, blue = (values[..., k] for k in range(3))
     assert ((blue > green + 25) & (green > red + 15)).sum() > 300  # anna's shirt
     assert ((green > red + 60) & (green > blue + 60)).sum() > 800  # ben
+
+
+@pytest.mark.parametrize("assembled", [False, True])
+def test_a_figure_whose_root_is_fixed_stands_among_others(assembled: bool) -> None:
+    human = wb.load("human")
+    seated = human.reduced(["right_arm"])
+    scene: ViewedScene = wb.Scene({"a": (seated, (1.0, 2.0, 0.0)), "b": human})
+    if assembled:
+        scene = ViewedAssembly(wb.Assembly().figure("a", seated).figure("b", human))
+    at = np.zeros(3) if assembled else np.array([1.0, 2.0, 0.0])
+    bodies, data = Bodies(scene, (), False), scene.model.createData()
+    q = pin.neutral(scene.model)
+    pin.forwardKinematics(scene.model, data, q)
+    keyframe = Keyframe()
+    bodies.pose(keyframe, data)
+    drawn = next(figure for figure in bodies.drawn if figure.prefix == "a/")
+    assert isinstance(drawn.visual, Skin)
+    alone = seated.model.createData()
+    pin.framesForwardKinematics(seated.model, alone, pin.neutral(seated.model))
+    for bone, (joint, offset) in zip(drawn.visual.surface.bones, drawn.visual.places, strict=True):
+        shown = keyframe.transforms[drawn.nodes[joint]] @ offset
+        if bone.parent is None and bone.segment in seated.segments:
+            own = alone.oMf[seated.frame_id(bone.segment)].translation
+            assert shown[:3, 3] == pytest.approx(at + own, abs=1e-9)
+    assert scene_glb(scene, bodies, q[None], 0.1, "two")

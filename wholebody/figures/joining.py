@@ -68,6 +68,14 @@ def joined_parts(members: Mapping[str, Member]) -> Parts:
     return model, _geometry(parts, between), description, _visual(parts)
 
 
+def joint_in(model: pin.Model, prefix: str, joint: str) -> int:
+    """Index in the model of several figures of a joint of one of them, whose names begin with `prefix` there.
+
+    What a fixed root carries hangs on the world of the whole model.
+    """
+    return int(model.getJointId(prefix + joint)) if joint != model.names[0] else 0
+
+
 def mounted_parts(base: Articulated, other: Articulated, frame: int, prefix: str, at: pin.SE3) -> Parts:
     """The same of a figure with another one on a frame of it; see `Figure.mounted`."""
     for one in (base, other):

@@ -26,6 +26,9 @@ TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: 
 
 SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
+MOST = 10_000_000
+"""Rows of an array that has no part of the buffer: nothing but its own count bounds them."""
+
 T = TypeVar("T")
 Color: TypeAlias = tuple[float, float, float, float]
 
@@ -116,9 +119,13 @@ class GltfDocument:
         fields = self.tree["accessors"][index]
         size, kind = SIZES[fields["type"]], np.dtype(TYPES[fields["componentType"]])
         count = int(fields["count"])
-        found: NDArray[Any] = np.zeros((count, size), kind)
+        found: NDArray[Any]
         if "bufferView" in fields:
             found = self._view(fields["bufferView"], kind, size, count, fields.get("byteOffset", 0))
+        elif 0 <= count <= MOST:
+            found = np.zeros((count, size), kind)
+        else:
+            raise ValueError(f"{count} values are said to be zero; {MOST} are the most")
         if "sparse" in fields:
             sparse = fields["sparse"]
             at, new = sparse["indices"], sparse["values"]

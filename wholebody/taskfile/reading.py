@@ -55,7 +55,7 @@ class Contents(NamedTuple):
 def read_contents(path: Path) -> Contents:
     """Read a task file and check every table, key and value."""
     contents = contents_of(path, "task file", TOP, TABLES)
-    if "figure" not in contents.tables:
+    if not contents.tables.get("figure"):
         raise contents.top.where.fault('there is no [figure] table; add [figure] with name = "human"')
     return contents
 

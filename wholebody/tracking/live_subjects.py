@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
+from wholebody.figures.joining import joint_in
 from wholebody.geometry.shapes import HalfSpace
 from wholebody.methods.base import Method
 from wholebody.methods.newton.assembly import Assembly
@@ -126,8 +127,8 @@ class LiveAssembly:
         for name, figure in figures.items():
             for frame in handle_frames({*figure.frames, *figure.segments}):
                 own = figure.model.frames[figure.frame_id(frame)]
-                joint = model.getJointId(f"{name}/{figure.model.names[own.parentJoint]}")
-                self.handles[f"{name}/{frame}"] = Handle(int(joint), own.placement)
+                joint = joint_in(model, f"{name}/", str(figure.model.names[own.parentJoint]))
+                self.handles[f"{name}/{frame}"] = Handle(joint, own.placement)
 
     def drag(self, q: Array, followed: str, place: Array, held: Collection[str], method: Method) -> Drag[Any]:
         """As of a problem; the method is Newton's, whatever is asked."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
+from wholebody.figures.joining import joint_in
 from wholebody.figures.surface import surface_of
 from wholebody.geometry.pieces import box_corners
 from wholebody.view import drawing, style
@@ -124,10 +125,10 @@ class Bodies:
         """The figures that have a surface or visuals; their joints' nodes join the carriers."""
         scene = self.scene
         skinned: tuple[str, ...] = ()
+        members = getattr(scene.figure, "members", {})
         if isinstance(scene, ViewedAssembly):
             figures = scene.figures
         else:
-            members = getattr(scene.figure, "members", {})
             figures = {name: (one.figure, None) for name, one in members.items() if surface_of(one.figure) is not None}
             skinned = tuple(f"{name}/" for name in figures)
             figures |= {"": (scene.figure, None)}  # what has no surface, where it stands among the others
@@ -135,7 +136,7 @@ class Bodies:
             surface = surface_of(figure)
             visual: Skin | LinkVisuals | None = None
             if surface is not None:
-                visual = Skin(surface, figure)
+                visual = Skin(surface, figure, members[name].at.homogeneous if name in members else np.eye(4))
             elif isinstance(figure, Figure) and figure.visual is not figure.geometry:
                 visual = LinkVisuals(figure, skinned)
             if visual is None:
@@ -144,7 +145,7 @@ class Bodies:
             folder = f"{LOOK.figure_node}/{node(name)}" if name else LOOK.figure_node
             nodes = {joint: f"{folder}/{node(joint)}" for joint in visual.joints}
             for joint, path in nodes.items():
-                self.carriers[path] = int(self.scene.model.getJointId(f"{prefix}{joint}"))
+                self.carriers[path] = joint_in(scene.model, prefix, joint)
             yield DrawnFigure(prefix, f"{folder}/body", visual, nodes, color)
 
     def _thing_color(self, thing: str, number: int, piece: Any) -> Color:

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from wholebody.base.arrays import Array
 from wholebody.figures.surface import Surface
 from wholebody.view import commands
 from wholebody.view.scene_graph import SceneGraph
@@ -33,9 +34,11 @@ class Skin:
         joints: names of the joints that carry bones.
     """
 
-    def __init__(self, surface: Surface, figure: Any) -> None:
+    def __init__(self, surface: Surface, figure: Any, at: Array) -> None:
+        """Find the bones of a figure; `at` (4, 4) is where its world is, on which those of a fixed root hang."""
         self.surface = surface
-        self.places = surface.attached(figure)
+        world = figure.model.names[0]
+        self.places = [(joint, at @ offset if joint == world else offset) for joint, offset in surface.attached(figure)]
         self.joints = tuple(dict.fromkeys(name for name, _ in self.places))
 
     def build(self, graph: SceneGraph, root: str, carriers: Mapping[str, str], color: Color | None) -> list[Skinned]:

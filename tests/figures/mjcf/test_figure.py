@@ -277,3 +277,11 @@ def test_what_mujoco_warns_of_leaves_no_log_in_the_callers_folder(
     with pytest.raises(InputError, match="not finite"):
         wb.load(path)
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_declarations_and_two_bytes_a_letter_do_not_hide_what_a_file_is(arm: Path, tmp_path: Path) -> None:
+    declared = written(tmp_path, '<?xml version="1.0"?><!DOCTYPE a [<!ENTITY x "y">]>\n' + ARM)
+    assert wb.load(declared).joints == wb.load(arm).joints
+    (tmp_path / "wide.xml").write_bytes(ARM.encode("utf-16"))
+    with pytest.raises(FileFormatError, match="MuJoCo cannot read it"):
+        wb.load(tmp_path / "wide.xml")

@@ -48,6 +48,7 @@ def test_groups_states_and_pairs_are_read(tmp_path: Path) -> None:
     assert reasons[frozenset(("l0:0", "l3:0"))] == "the SRDF disables them: Never"
     assert len(figure.geometry.collisionPairs) == len(plain.geometry.collisionPairs) - 1
     assert any("'elsewhere' is not in the URDF" in note for note in figure.notes)
+    assert "SRDF: group 'hand' names the joint 'gone', which is not in the URDF" in figure.notes
     more = (
         '<virtual_joint name="v" type="floating" parent_frame="w" child_link="l0"/><passive_joint name="j4"/></robot>'
     )

@@ -268,3 +268,23 @@ def test_each_kind_of_joint_is_read_again(kind: str, axis: str, tmp_path: Path) 
     again = wb.read_clip(clip.write(tmp_path / "c.glb"), figure)
     for q, given in zip(again.q, clip.q, strict=True):
         assert pin.difference(figure.model, q, given) == pytest.approx(0.0, abs=1e-5)
+
+
+@pytest.mark.parametrize(("end", "count"), [(1e9, 2), (1.0, 10**13)])
+def test_frames_and_counts_without_end_are_refused(end: float, count: int, tmp_path: Path) -> None:
+    builder = GltfBuilder()
+    times = builder.accessor([0.0, end], "<f4", bounded=True)
+    turns = Rotation.from_rotvec([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]).as_quat()
+    root = builder.moving_node("root", None, (turns, np.zeros((2, 3))), times)
+    builder.node("tip", root, np.eye(4))
+    data = builder.glb("turn")
+    length = int.from_bytes(data[12:16], "little")
+    tree = json.loads(data[20 : 20 + length])
+    if count > 2:
+        tree["accessors"][times] = {"componentType": 5126, "count": count, "type": "SCALAR"}
+    tree["buffers"][0]["uri"] = "data:," + base64.b64encode(data[28 + length :]).decode()
+    (tmp_path / "turn.gltf").write_text(json.dumps(tree))
+    with pytest.raises(
+        FileFormatError, match="10000000 are the most" if count > 2 else "turn.gltf: .* at most 1000000"
+    ):
+        read_skeleton(tmp_path / "turn.gltf")

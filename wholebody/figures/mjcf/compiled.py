@@ -7,6 +7,7 @@ frames of their bodies.
 
 from __future__ import annotations
 
+import codecs
 import re
 import warnings
 from collections.abc import Iterator
@@ -33,8 +34,11 @@ RGB = 1
 
 def is_mjcf(path: Path) -> bool:
     """Whether the first element of a file is <mujoco>. MuJoCo also reads files that are not quite XML."""
-    text = read_bytes(path, "URDF or MJCF", 64 * 2**20).decode("utf-8-sig", "replace")
-    first = re.match(r"(?:\s|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>)*<([\w:.-]+)", text, re.DOTALL)
+    data = read_bytes(path, "URDF or MJCF", 64 * 2**20)
+    wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    text = data.decode("utf-16" if wide else "utf-8-sig", "replace")
+    declared = r"<!DOCTYPE[^>\[]*(?:\[.*?\]\s*)?>"
+    first = re.match(rf"(?:\s|<\?.*?\?>|<!--.*?-->|{declared})*<([\w:.-]+)", text, re.DOTALL)
     return first is not None and first[1] == "mujoco"
 
 

@@ -61,6 +61,7 @@ class _Reader:
     def __init__(self, path: Path, robot: Element, model: pin.Model, links: tuple[str, ...]) -> None:
         self._path, self._robot, self._model, self._links = path, robot, model, links
         self.groups = {str(group.get("name")): group for group in robot.findall("group")}
+        self._virtual = {str(joint.get("name")) for joint in robot.findall("virtual_joint")}
         self.notes: list[str] = []
         self._movable = {
             name: index
@@ -74,6 +75,9 @@ class _Reader:
         for part in group:
             name = str(part.get("name"))
             if part.tag == "joint":
+                if not self._model.existFrame(name) and name not in self._virtual:
+                    said = f"names the joint {shown(name)}, which is not in the URDF"
+                    self.notes.append(f"SRDF: group {shown(inside[-1])} {said}")
                 found |= {name} & self._movable.keys()
             elif part.tag == "link" and self._known(name):
                 found |= {self._model.names[self._carrier(name)]} & self._movable.keys()

@@ -37,7 +37,7 @@ def write_motion(motion: Motion, path: str | os.PathLike[str]) -> Path:
     """Write a clip in the format that the ending of the file's name says; see `Clip.write`."""
     path = checked_path(path, "path")
     ending = _ending(path, WRITERS, "written")
-    if ending not in (".npz", ".glb"):
+    if ending != ".npz":
         one_figure(motion.figure, f"{one_line(path.name)} holds one figure, and the clip's figure")
     return WRITERS[ending](motion, path)
 

@@ -18,6 +18,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
+from wholebody.figures.joining import joint_in
 from wholebody.figures.link_pieces import triangles_of
 from wholebody.figures.link_visuals import Color, Drawn, drawn_of
 from wholebody.figures.surface import Surface, surface_of
@@ -45,7 +46,7 @@ def write(motion: Motion, path: Path) -> Path:
     figure = motion.figure
     if len(motion.q) * figure.model.njoints > 20_000_000:  # keyframes, about 600 MB
         raise InputError(f"{motion.name}: {len(motion.q)} frames are too many for one glTF file; write parts of it")
-    tree = JointTree(figure.model, motion.q, motion.dt)
+    tree = JointTree(figure.model, motion.q, motion.dt, clip=True)
     drawn = tree.draw(figure)
     for piece in figure.geometry.geometryObjects:
         link = figure.model.frames[piece.parentFrame].name
@@ -64,10 +65,11 @@ class JointTree:
         builder: of the file.
     """
 
-    def __init__(self, model: Any, q: Array, dt: float) -> None:
+    def __init__(self, model: Any, q: Array, dt: float, *, clip: bool = False) -> None:
+        """Place the joints; one posture is no animation, but a `clip` of one frame has its keyframe."""
         self.builder, self._model, self._q = GltfBuilder(), model, q
         times = dt * np.arange(len(q), dtype=np.float64)
-        self._times = self.builder.accessor(times, "<f4", bounded=True) if len(q) > 1 else None
+        self._times = self.builder.accessor(times, "<f4", bounded=True) if len(q) > 1 or clip else None
         turns, places = keys_of(model, q)
         ends = zip(places[0], turns[0], strict=True)
         self._first = [pin.XYZQUATToSE3(np.concatenate(each)).homogeneous for each in ends]
@@ -91,7 +93,7 @@ class JointTree:
         """Add what is drawn of links; a prefix stands before their joints' names; all in a colour if there is one."""
         for number, one in enumerate(drawn):
             name, paint = f"visual {prefix}{one.link}:{number}", one.color if color is None else color
-            self.piece(name, self._model.getJointId(prefix + one.joint), one.placement, one.shape, paint)
+            self.piece(name, joint_in(self._model, prefix, one.joint), one.placement, one.shape, paint)
 
     def piece(self, name: str, joint: int, placement: Array, shape: Any, color: Any) -> None:
         """Add coal's shape, or vertices (n, 3) and faces (m, 3), at a placement (4, 4) in a joint."""
@@ -120,7 +122,7 @@ class JointTree:
             color: of all of it; each patch's own if None.
         """
         bones: list[int] = []
-        held = [(self._model.getJointId(prefix + joint), offset) for joint, offset in places]
+        held = [(joint_in(self._model, prefix, joint), offset) for joint, offset in places]
         whole = {number: (first, second) for number, first, second in surface.halves}
         known = dict[int, Array]()
         for number, (bone, (joint, offset)) in enumerate(zip(surface.bones, held, strict=True)):

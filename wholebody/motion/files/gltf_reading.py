@@ -20,7 +20,6 @@ from wholebody.motion.files.gltf import JOINT
 from wholebody.motion.files.node_motion import NodeMotion, steps_of
 from wholebody.motion.files.nodes import wrapped
 from wholebody.motion.skeleton import SkeletonMotion
-from wholebody.tracking.tracks import MOST_FRAMES
 
 ENDINGS = (".glb", ".gltf")
 PATHS = ("translation", "rotation", "scale")
@@ -58,12 +57,10 @@ class Animated:
         samplers = animations[chosen]["samplers"]
         channels = [c for c in moving[chosen] if "node" in c["target"]]
         keys = [document.accessor(samplers[c["sampler"]]["input"])[:, 0] for c in channels]
-        times, self.dt, even = steps_of(np.concatenate(keys), self._longest)
+        times, self.dt, even = steps_of(np.concatenate(keys), self._longest, document.path.name)
         if not even:
             self.notes.append("keyframes are at unequal times or far apart; 60 frames a second are read between them")
         self.count = len(times)
-        if self.count > MOST_FRAMES:
-            raise FileFormatError(f"{document.path.name}: {self.count} frames; give at most {MOST_FRAMES}")
         self.moved: dict[int, tuple[Array, Array, Array]] = {}
         for channel, at in zip(channels, keys, strict=True):
             node, sampler = channel["target"]["node"], samplers[channel["sampler"]]

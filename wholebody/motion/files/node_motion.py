@@ -11,6 +11,7 @@ from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import FileFormatError, InputError
 from wholebody.motion.skeleton import UNITS, UP, SkeletonMotion, longest_way
 from wholebody.motion.structure import limb_pairs, recognised_unit
+from wholebody.tracking.tracks import MOST_FRAMES
 
 
 class NodeMotion(NamedTuple):
@@ -87,7 +88,7 @@ def rigid(matrices: Array) -> Array:
     return np.asarray(u @ vt)
 
 
-def steps_of(times: Array, longest: float) -> tuple[Array, float, bool]:
+def steps_of(times: Array, longest: float, title: str) -> tuple[Array, float, bool]:
     """Times of frames, their step, and whether keyframes are at equal steps up to `longest`; otherwise every 1/60 s."""
     keys = np.unique(np.asarray(times, dtype=float))
     keys = keys[np.r_[True, np.diff(keys) > 1e-4]]  # s: rounding of single precision
@@ -99,6 +100,8 @@ def steps_of(times: Array, longest: float) -> tuple[Array, float, bool]:
     even = (even or len(keys) == 2) and step <= longest
     if not even:
         count = max(1, round(span * 60.0))
+    if count >= MOST_FRAMES:
+        raise FileFormatError(f"{title}: {count + 1} frames; give at most {MOST_FRAMES}")
     return np.linspace(keys[0], keys[-1], count + 1), rounded_step(span / count), even
 
 
