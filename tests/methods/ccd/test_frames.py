@@ -186,13 +186,13 @@ def test_a_forearm_that_lies_on_a_table_keeps_its_direction_while_it_is_held_the
     for joint, angle in (("right_shoulder_flexion", shoulder), ("right_elbow_flexion", np.pi / 2 - shoulder)):
         start[avatar.model.joints[avatar.joint_id(joint)].idx_q] = angle
     elbow = avatar.placement(start, "right_forearm").translation
-    scene = wb.Scene(avatar).add(wb.Box((0.7, 0.5, 0.04)), name="table", at=(elbow[0] + 0.4, elbow[1], 1.0))
+    scene = wb.Scene(avatar).add(wb.Box((0.14, 0.5, 0.04)), name="table", at=(elbow[0] + 0.13, elbow[1], 1.0))
     low, high = 0.95, 1.25
     for _ in range(30):
-        scene.move("table", at=(elbow[0] + 0.4, elbow[1], 0.5 * (low + high)))
+        scene.move("table", at=(elbow[0] + 0.13, elbow[1], 0.5 * (low + high)))
         touches = len(scene.contacts(start, 1e-4).distance) > 0
         low, high = (low, 0.5 * (low + high)) if touches else (0.5 * (low + high), high)
-    scene.move("table", at=(elbow[0] + 0.4, elbow[1], low - 0.002))
+    scene.move("table", at=(elbow[0] + 0.13, elbow[1], low - 0.002))
     turns, q, rng = [], start, np.random.default_rng(0)
     for frame in range(45):
         wanted = start.copy()

@@ -83,7 +83,7 @@ def test_a_target_inside_a_thing_is_unreachable_and_nothing_is_violated(
     assert solution.assessment.goal_error > 0.1
 
 
-@pytest.mark.parametrize("offset", [(0.0, 0.0, 0.0), (0.0, 0.0, -0.06), (0.1, 0.0, -0.05)])
+@pytest.mark.parametrize("offset", [(0.0, 0.0, 0.0), (0.0, 0.0, -0.05), (0.1, 0.0, -0.05)])
 def test_a_start_inside_a_thing_is_left(
     human: wb.Figure, deepest: Callable[..., float], offset: tuple[float, float, float]
 ) -> None:

@@ -29,7 +29,7 @@ def test_the_effort_is_that_of_the_place_and_no_direction_lowers_it(case: int, t
 
 def test_a_palm_on_a_table_costs_what_its_place_does() -> None:
     """The palm's frame lies within a flat face of the hand, which has to lie on the table."""
-    scene = wb.Scene(wb.load("human")).add(wb.Box((0.67, 1.36, 0.03)), name="table", at=(0.76, -0.09, 0.79))
+    scene = wb.Scene(wb.load("human")).add(wb.Box((0.67, 1.36, 0.03)), name="table", at=(0.76, -0.09, 0.9))
     problem = wb.Problem(scene, goals=[wb.Touch("right_palm", "table")])
     solution = wb.solve(problem)
     assert solution.status == "solved"
