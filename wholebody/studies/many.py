@@ -358,11 +358,7 @@ def _warm_answer(problem: Problem, method: Method, q: Array) -> dict[str, Any] |
 
 def _solve_from(given: Sequence[_Start], method: Method) -> list[dict[str, Any] | None]:
     """Solve problems from others' answers (nq,): what their records say; None for one that is not solved."""
-    answers: list[dict[str, Any] | None] = []
-    for make, q in given:
-        problem = check_problem(make(), "the task's answer")
-        answers.append(_warm_answer(problem, warmed(method), q))
-    return answers
+    return [_warm_answer(check_problem(make(), "the task's answer"), warmed(method), q) for make, q in given]
 
 
 def fingerprint(*asked: Any) -> str:
