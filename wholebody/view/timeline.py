@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import gzip
 import json
 import math
 from functools import cache
@@ -45,7 +43,7 @@ def timeline(found: ClipCheck, scene: Scene | None = None) -> str:
     every = math.ceil(len(clip) / MOST_POSTURES)
     with Viewer(scene, title=clip.name) as viewer, Scratch() as folder:
         viewer.play(clip.q[::every], clip.dt * every)
-        page = viewer.save(folder / "clip.html").read_bytes()
+        page = viewer.save(folder / "clip.html").read_text("utf-8")
     return (
         _environment()
         .get_template("timeline.html.jinja")
@@ -54,7 +52,7 @@ def timeline(found: ClipCheck, scene: Scene | None = None) -> str:
             clip=clip,
             contacts=found.contacts,
             data=_json(_data(found)),
-            picture=base64.b64encode(gzip.compress(page, mtime=0)).decode("ascii"),
+            page=page,
         )
     )
 
