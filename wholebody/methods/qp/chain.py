@@ -9,7 +9,7 @@ keeps every clearance is an answer; the others are rejected.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from wholebody import tasks
 from wholebody.base.arrays import Array
+from wholebody.base.pool import Pool
 from wholebody.base.records import with_values
 from wholebody.figures.description import Limits
 from wholebody.figures.figure import Figure
@@ -90,19 +91,19 @@ class PlainChain:
         self.held = -1 if self.arm is None or self.arm.held < 0 else int(self.arm.joints[self.arm.held])
 
     def angles(self, q: Array) -> Array:
-        """Values (n,) of the joints at a posture (nq,)."""
-        values: Array = q[self._idx_q]
+        """Values (..., n) of the joints at postures (..., nq)."""
+        values: Array = q[..., self._idx_q]
         if len(self._round):
-            values[self._round] = np.arctan2(q[self._idx_q[self._round] + 1], values[self._round])
+            values[..., self._round] = np.arctan2(q[..., self._idx_q[self._round] + 1], values[..., self._round])
         return values
 
     def posture(self, values: Array, at: Array) -> Array:
-        """A posture (nq,) with values (n,) of the joints."""
+        """Postures (..., nq) with values (..., n) of the joints."""
         q: Array = at.copy()
-        q[self._idx_q] = values
+        q[..., self._idx_q] = values
         if len(self._round):
-            turned = values[self._round]
-            q[self._idx_q[self._round]], q[self._idx_q[self._round] + 1] = np.cos(turned), np.sin(turned)
+            turned = values[..., self._round]
+            q[..., self._idx_q[self._round]], q[..., self._idx_q[self._round] + 1] = np.cos(turned), np.sin(turned)
         return q
 
     def goals(self, entries: list[Entry]) -> Goals:
@@ -133,15 +134,24 @@ class PlainChain:
         limits, but not farther than half a turn from the nearest posture.
         """
         assert self.arm is not None
-        lower, upper, held, values = self.chain.lower, self.chain.upper, self.held, _ONE
-        if held >= 0:
-            near = nearest[0, held]
-            low, high = max(lower[held], near - np.pi), min(upper[held], near + np.pi)
-            values = low + (high - low) * _SHARES
+        lower, upper, values = self.chain.lower, self.chain.upper, self.held_values(nearest[0])
         found, effort = self.angles_of(goals.tables[0], values), np.empty((len(values), BRANCHES))
         order = np.empty(effort.size, dtype=np.intp)
         count = closed_form_kernel().least(found.reshape(*effort.shape, -1), lower, upper, nearest, effort, order)
         return Branches(found, effort.ravel(), found[order[:count]])
+
+    def is_exact(self, entries: Sequence[Entry]) -> bool:
+        """Whether the goals are one placement of a frame that the closed form has the postures of."""
+        return self.arm is not None and [entry.integers[1:] for entry in entries] == [(0, 1, 1, 0)]
+
+    def held_values(self, nearest: Array) -> Array:
+        """Values (v,) of the joint that the closed form holds, not farther than half a turn from values (n,)."""
+        if (held := self.held) < 0:
+            return _ONE
+        near = nearest[held]
+        low, high = max(self.chain.lower[held], near - np.pi), min(self.chain.upper[held], near + np.pi)
+        values: Array = low + (high - low) * _SHARES
+        return values
 
     def angles_of(self, goal: Array, held: Array | None = None) -> Array:
         """Values (8 v, n) of all branches for a goal (36,), NaN for none, with (v,) values of a joint that is held."""
@@ -180,6 +190,16 @@ class Chains:
             plain = bool(path) and all(_is_plain(model.joints[joint]) for joint in path)
             self._chains[joints] = PlainChain(model, self._limits, tuple(path)) if plain else None
         return self._chains[joints]
+
+    def carrying(self, entries: Sequence[Entry]) -> PlainChain | None:
+        """The chain that carries the frames of goals."""
+        return self.of(frozenset(joint for entry in entries for joint in entry.integers[:2]))
+
+
+def chains_of(problem: Problem) -> Pool[Chains]:
+    """What runs on a problem's scene borrow."""
+    built, limits = problem.scene.built, problem.scene.figure.limits
+    return built.pool(Chains, lambda: Chains(built.model, limits))
 
 
 def branches(figure: Figure, frame: str, placement: pin.SE3, at: Array) -> Array:
@@ -232,12 +252,11 @@ def from_seeds(problem: Problem, workspace: Workspace, budget: Budget, control: 
     Returns:
         None where the figure or the terms are others than those of the module's head, or nothing was found.
     """
-    entries, built = goal_entries(problem), problem.scene.built
+    entries = goal_entries(problem)
     if entries is None:
         return None
-    limits = problem.scene.figure.limits
-    with built.pool(Chains, lambda: Chains(built.model, limits)).borrow() as chains:
-        chain = chains.of(frozenset(joint for entry in entries for joint in entry.integers[:2]))
+    with chains_of(problem).borrow() as chains:
+        chain = chains.carrying(entries)
         return None if chain is None else _Seeded(problem, chain, entries, workspace, budget, control).run()
 
 
@@ -251,14 +270,14 @@ class _Seeded:
         self.problem, self.chain, self.workspace, self.budget, self.control = problem, chain, workspace, budget, control
         self.at = problem.scene.figure.clamp(problem.start)
         self.start = chain.angles(self.at)
-        self.distance = _distance(problem, chain, self.at) if budget.measures else None
+        self.distance = distance_of(problem, chain, self.at) if budget.measures else None
         self.nearest = np.zeros((2, len(self.start)))
         self.nearest[0] = self.start
         if self.distance is not None:
             self.nearest[0] = chain.angles(self.distance.reference)
             self.nearest[1] = self.distance.weights[chain.idx_v]
         self.goals, self.room = chain.goals(entries), chain.room(sum(entry.rows for entry in entries))
-        self.exact = chain.arm is not None and [entry.integers[1:] for entry in entries] == [(0, 1, 1, 0)]
+        self.exact = chain.is_exact(entries)
         self.finite = self.exact and chain.held < 0  # ends are isolated, and the closed form has all of them
         self.trace: list[TraceEntry] = []
         self.least = np.inf  # effort of an end that does not keep its clearances
@@ -323,13 +342,16 @@ class _Seeded:
         return float(self.nearest[1].dot(away * away))
 
     def _is_free(self, q: Array) -> bool:
-        """Whether every pair keeps its clearance at a posture (nq,)."""
-        clearances = self.problem.clearances
-        near = self.workspace.near_views(q, float(np.maximum.reduce(clearances, initial=0.0)))
-        return not len(near.number) or not (near.distance < clearances[near.number]).any()
+        return is_free(self.workspace, q, self.problem.clearances)
 
 
-def _distance(problem: Problem, chain: PlainChain, at: Array) -> SquaredDistance | None:
+def is_free(workspace: Workspace, q: Array, clearances: Array) -> bool:
+    """Whether every pair keeps its clearance (pairs,) at a posture (nq,)."""
+    near = workspace.near_views(q, float(np.maximum.reduce(clearances, initial=0.0)))
+    return not len(near.number) or not (near.distance < clearances[near.number]).any()
+
+
+def distance_of(problem: Problem, chain: PlainChain, at: Array) -> SquaredDistance | None:
     """The measure, where it is one squared distance that the other joints cannot reduce; else None."""
     measures = problem.measures
     if len(measures) != 1 or type(measures[0]) not in (tasks.Effort, tasks.Displacement):
