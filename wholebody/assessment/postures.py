@@ -11,7 +11,6 @@ import pinocchio as pin
 from wholebody.assessment.all_pairs import all_pairs
 from wholebody.base.arrays import Array
 from wholebody.problem import Problem
-from wholebody.tasks.base import Goal
 from wholebody.tasks.inputs import WORLD, Place
 from wholebody.tasks.point import Point
 
@@ -98,7 +97,7 @@ def _numbers(goal: Any) -> tuple[Array, Array, Array]:
     return _UNMOVED, goal.residual.target, goal.residual.undo.rotation
 
 
-def _errors(model: pin.Model, goal: Goal | Any, joints: Array, asked: Sequence[Array]) -> tuple[Array, Array]:
+def _errors(model: pin.Model, goal: Any, joints: Array, asked: Sequence[Array]) -> tuple[Array, Array]:
     """Distances and angles (k,) of a goal from its targets, with the joints (k, njoints, 4, 3) of a model there."""
     offset, target, undo = asked
     if type(goal) is Point:

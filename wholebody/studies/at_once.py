@@ -24,7 +24,7 @@ def at_once(problems: Sequence[Problem], method: Any, jobs: int) -> Iterator[tup
     sender = Sender()
 
     def there(batches: list[Any], full: bool) -> Job:
-        return Job(batches, sent_to, (_run_all, sender.sent(batches, full)))
+        return Job(batches, sent_to, (_run_all, sender.sent(batches, full)), 0.0)
 
     batches = method.batches(problems, LARGEST)
     for batch, answers, error in shared(batches, jobs, lambda batch: batch.run(), there):

@@ -180,8 +180,8 @@ def run_cases(runs: Sequence[Sequence[Case]], running: Running, store: RecordSto
 
     over = tell is not None and tell(SolveProgress(len(done), len(order), None)) is True
     if not over:
-        alone = [run[0] for run in numbered if len(run) == 1 and run[0] not in done]
-        with closing(_at_once(alone, order, running)) as answers:
+        single = [run[0] for run in numbered if len(run) == 1 and run[0] not in done]
+        with closing(_at_once(single, order, running)) as answers:
             over = any(keep(k, replace(order[k].record, **answer)) for k, answer in answers)
     waiting = [run for run in numbered if any(k not in done for k in run)]
     # The first of each run begin at each other's answers, one after the other, and the rest of a run at its first: so

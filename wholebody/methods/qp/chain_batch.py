@@ -13,14 +13,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wholebody.assessment.postures import Judged, Numbers, judged
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.errors import InputError
 from wholebody.methods.conclusion import assessed_tolerance
-from wholebody.methods.qp.chain import PlainChain, chains_of, distance_of, goal_entries, is_free
+from wholebody.methods.qp.chain import chains_of, distance_of, goal_entries, is_free, small_chain
 from wholebody.methods.qp.chain import compiled_kernel as chain_kernel
 from wholebody.methods.qp.closed_form import compiled_kernel as closed_form_kernel
 from wholebody.methods.qp.closed_form_kernel import CROSSING, Arm
 from wholebody.methods.qp.multistart import Budget
+from wholebody.methods.qp.plain_chain import PlainChain
 from wholebody.methods.qp.settings import SEEDS
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
@@ -35,7 +36,7 @@ class Answers(NamedTuple):
 
     solved: Mask  # (k,)
     q: Array  # (k, nq) postures
-    iterations: Array  # (k,)
+    iterations: Indices  # (k,)
     judged: Judged
     seconds: float  # on the clock, for all
 
@@ -131,7 +132,7 @@ class _Descents:
             (batch.tables, goals.entries), held, nearest, self.ends, self.found, self.counts,
         )  # fmt: skip
 
-    def answers(self, workspace: Workspace) -> tuple[Array, Array, Mask]:
+    def answers(self, workspace: Workspace) -> tuple[Array, Indices, Mask]:
         """Postures (k, nq), descents (k,), and which (k,) are free and of the least effort."""
         q, solved = self.at.copy(), np.zeros(len(self.at), dtype=bool)
         iterations = np.zeros(len(q), dtype=np.intp)
@@ -158,4 +159,9 @@ def compiled_kernel() -> Any:
 
     chain_kernel()
     closed_form_kernel()
+    chain, room = small_chain()
+    chain_batch_kernel.reach_all(
+        (chain, _NO_ARM, room), np.zeros(4), (np.zeros((0, 0, 36)), np.zeros((0, 6), dtype=np.int64)),
+        np.zeros((0, 1)), np.zeros((0, 2, 2, 1)), np.zeros((0, 1, 1)), np.zeros((0, 1, 4)), np.zeros(0, dtype=np.intp),
+    )  # fmt: skip
     return chain_batch_kernel
