@@ -124,7 +124,7 @@ def _shape(scene: Scene, piece: Any, path: Path) -> tuple[ElementTree.Element, p
         ElementTree.SubElement(inner, "box", size=exact(np.array([edge, edge, 0.25 * edge])))
         shift = _slab(scene, piece, 0.125 * edge)
     elif kind == "hull":
-        path.writeexact(hull_obj(piece.geometry), encoding="utf-8")
+        path.write_text(hull_obj(piece.geometry), encoding="utf-8")
         ElementTree.SubElement(inner, "mesh", filename=str(path))
     else:
         raise InputError(
