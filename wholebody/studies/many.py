@@ -11,8 +11,8 @@ from typing import Any, NamedTuple, TypeVar
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array
-from wholebody.base.batches import run_batch, shared
-from wholebody.base.errors import InputError, WholebodyError, one_line
+from wholebody.base.batches import fingerprint, run_batch, shared
+from wholebody.base.errors import WholebodyError, one_line
 from wholebody.base.runner import EndedError, Job
 from wholebody.methods.base import Method
 from wholebody.methods.inputs import check_problem
@@ -22,7 +22,6 @@ from wholebody.studies.records import ENDED, REFUSED, Records, RecordStore, Solv
 from wholebody.studies.sending import Sender, Sent
 from wholebody.studies.starting import begun_at, warmed
 from wholebody.tasks.answers import is_own
-from wholebody.version import __version__
 
 MOST_JOBS = 4096
 LONGEST = 1e7  # s: a greater deadline of a solve is a mistake
@@ -359,20 +358,6 @@ def _warm_answer(problem: Problem, method: Method, q: Array) -> dict[str, Any] |
 def _solve_from(given: Sequence[_Start], method: Method) -> list[dict[str, Any] | None]:
     """Solve problems from others' answers (nq,): what their records say; None for one that is not solved."""
     return [_warm_answer(check_problem(make(), "the task's answer"), warmed(method), q) for make, q in given]
-
-
-def fingerprint(*asked: Any) -> str:
-    """Fingerprint of a request.
-
-    Raises:
-        InputError: it cannot be sent to another process.
-    """
-    import joblib
-
-    try:
-        return str(joblib.hash((*asked, __version__)))
-    except Exception as error:  # whatever an object of the user's own raises
-        raise InputError(f"what is given cannot be sent to another process ({one_line(str(error))})") from None
 
 
 @dataclass(frozen=True)
