@@ -292,7 +292,8 @@ def _sources(given: Sequence[Any], figure: Figure | None, what: str) -> dict[str
                 f"{what}: {checks.shown(path.name)} is a file; say of which figure: figure=wb.load('human')"
             )
         check_figure(figure, what)
-        found.append((path.stem, path))
+        same = sum(Path(other).stem == path.stem for other in given if not isinstance(other, Clip)) > 1
+        found.append((f"{path.parent.name} {path.stem}" if same else path.stem, path))
     twice = first_twice(name for name, _ in found)
     if twice is not None:
         raise InputError(f"{what}: two clips are named {checks.shown(twice)}; give each another name")

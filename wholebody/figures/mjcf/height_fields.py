@@ -7,6 +7,7 @@ from itertools import groupby
 import numpy as np
 
 from wholebody.base.arrays import Array
+from wholebody.base.errors import FileFormatError
 from wholebody.figures.mjcf.compiled import Compiled
 
 FLAT = 1e-9  # m: a cell whose four corners are nearer than this to one plane is one prism
@@ -23,6 +24,12 @@ def height_field(compiled: Compiled, geom: int) -> list[Array]:
     half_x, half_y, top, below = (float(value) for value in model.hfield_size[field])
     first = int(model.hfield_adr[field])
     heights = top * np.array(model.hfield_data[first : first + rows * columns], dtype=float).reshape(rows, columns)
+    if not np.isfinite(heights).all():
+        row, column = np.argwhere(~np.isfinite(heights))[0]
+        raise FileFormatError(
+            f"{compiled.path}: a height field has {heights[row, column]} in row {row}, column {column}; give finite "
+            "heights"
+        )
     x, y = np.linspace(-half_x, half_x, columns), np.linspace(-half_y, half_y, rows)
     grid = np.stack([*np.meshgrid(x, y), heights], axis=2)
     bend = heights[:-1, :-1] - heights[:-1, 1:] - heights[1:, :-1] + heights[1:, 1:]
