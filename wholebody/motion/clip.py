@@ -310,8 +310,13 @@ class Clip:
         instance(track, Track, "Clip.from_track: track", "make one with Track.of(figure, q, dt)").check(figure)
         return cls(figure, track.q, track.dt, track.name)
 
-    def write(self, path: str | os.PathLike[str]) -> Path:
+    def write(self, path: str | os.PathLike[str], *, bare: bool = False) -> Path:
         """Write the clip to a file, whose path it returns; the ending of its name chooses the format.
+
+        Args:
+            path: the file.
+            bare: of a CSV, numbers alone: a line a frame, root and joints in the figure's order, as Unitree's LAFAN1
+                files are, and as the tools take them that make data for training of these.
 
         Raises:
             FileFormatError: an ending that is not known.
@@ -319,7 +324,7 @@ class Clip:
         """
         from wholebody.motion.files import write_motion
 
-        return write_motion(self, path)
+        return write_motion(self, path, bare=bare)
 
 
 def column_name(figure: Figure, column: int) -> str:
