@@ -19,7 +19,7 @@ from wholebody.cli.arguments import Parser
 from wholebody.version import __version__
 
 COMMANDS = (
-    *("pose", "show", "figure", "demo", "interact", "drag", "world", "clip"),
+    *("pose", "show", "figure", "demo", "gallery", "interact", "drag", "world", "clip"),
     *("study", "reach", "assess", "bench", "doctor", "completion"),
 )
 """Each is a module of this folder, whose `run` is the command."""
