@@ -9,7 +9,7 @@ import pytest
 import wholebody as wb
 from wholebody.bench.suite.problem_sets.robots import known_arm
 from wholebody.figures.description import Limits
-from wholebody.methods.qp.chain import branches
+from wholebody.methods.qp.chain import branches, goal_entries
 from wholebody.methods.qp.plain_chain import PlainChain
 
 X, Y, Z = np.eye(3)
@@ -101,3 +101,30 @@ def test_the_answer_of_six_joints_is_the_least_of_all_branches():
             assert answer.solved
             assert answer.assessment.measure == pytest.approx(min(holding), rel=1e-5)
     assert free >= 4
+
+
+def test_no_posture_of_seven_joints_that_is_free_takes_less_effort():
+    """Against ten thousand values of the joint that the closed form holds; elbows at their limits are among them."""
+    figure, rng = known_arm("panda")[0], np.random.default_rng(5)
+    scene, least = wb.Scene(figure), []
+    lower, upper = figure.limits.lower, figure.limits.upper
+    chain = PlainChain(figure.model, figure.limits, tuple(range(1, 8)))
+    for _ in range(25):
+        start = rng.uniform(lower, upper)
+        place = figure.placement(rng.uniform(lower, upper), "tool")
+        problem = wb.Problem(scene, start, goals=[wb.Frame("tool", place)])
+        solution = wb.solve(problem)
+        assert solution.solved, solution.message
+        weights = problem.measures[0].distance.weights
+        values = np.linspace(lower[chain.held], upper[chain.held], 10_000)
+        found = chain.angles_of(chain.goals(goal_entries(problem)).tables[0], values)
+        found += 2.0 * np.pi * np.round((start - found) / (2.0 * np.pi))
+        inside = ((found >= lower) & (found <= upper)).all(axis=1)
+        effort = np.where(inside, (found - start) ** 2 @ weights, np.inf)
+        for k in effort.argsort()[: min(2000, inside.sum())]:
+            if wb.assess(problem, found[k]).holds(1e-6):
+                least.append(solution.assessment.measure / effort[k])
+                break
+    assert len(least) > 20
+    assert np.median(least) < 1.0001
+    assert np.quantile(least, 0.9) < 1.01
