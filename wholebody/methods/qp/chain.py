@@ -43,11 +43,12 @@ class Met(NamedTuple):
     stationary: bool  # whether the measures are stationary too
     # (nq,) an end of far less effort that does not keep its clearances; None where there is none
     blocked: Array | None = None
+    reached: bool = True  # False where no posture meets the goals: it is one that comes near them
 
     @property
     def complete(self) -> bool:
         """Whether no descent from here can lead to less."""
-        return self.stationary and self.blocked is None
+        return self.stationary and self.blocked is None and self.reached
 
 
 def chains_of(problem: Problem) -> Pool[Chains]:
@@ -153,6 +154,8 @@ class _Seeded:
                 met = self._ended(branches.least, enough)
             if met is not None and not met.stationary and self.distance is not None:
                 met = self._along(met)
+            if met is None and self.finite:
+                return self._nearest() if self._is_out_of_reach() else None
             if (met is not None and met.blocked is None) or self.finite or self.control.over:
                 return met
             # What blocks an end may leave postures of its branch free. All samples meet the goals.
@@ -171,6 +174,30 @@ class _Seeded:
             if q is not None:
                 return Met(q, tuple(self.trace), False)
         return None
+
+    def _is_out_of_reach(self) -> bool:
+        """Whether all postures of six joints at the goal and at those nearby are beyond limits or far inside things."""
+        chain, problem = self.chain, self.problem
+        found = chain.loosely_met(self.goals, self.budget.seed)
+        if len(found) and problem.scene.model.nv > len(self.start):
+            return False  # others may make room
+        for values in found:
+            near = self.workspace.near_views(chain.posture(values, self.at), float(problem.clearances.max(initial=0.0)))
+            if not (near.distance < problem.clearances[near.number] - SEEDS.deep).any():
+                return False
+        return True
+
+    def _nearest(self) -> Met:
+        """Where descents from the first seeds come nearest to the goals with everything held."""
+        seeds = next(self.chain.seeds(self.start, self.budget.seed, SEEDS.together))
+        given = self.goals.tables[None], self.goals, np.array([[self.nearest, self.nearest]]), self._asked(1)
+        begin = self.at
+        found, _ = self.chain.descents(*given, seeds[None], len(seeds))
+        for k in found[0, :, 0].argsort():
+            if self._is_free(q := self.chain.posture(seeds[k], self.at)):
+                begin = q
+                break
+        return Met(begin, tuple(self.trace), False, reached=False)
 
     def _asked(self, enough: int) -> Array:
         """See `chain_kernel.reach`."""

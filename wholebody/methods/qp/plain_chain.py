@@ -11,16 +11,19 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices
+from wholebody.base.records import with_values
 from wholebody.figures.description import Limits
 from wholebody.methods.qp.chain_kernel import Chain, Goals, Room
 from wholebody.methods.qp.closed_form import Branches, closed_form
 from wholebody.methods.qp.closed_form import compiled_kernel as closed_form_kernel
-from wholebody.methods.qp.closed_form_kernel import BRANCHES, CROSSING, Arm
+from wholebody.methods.qp.closed_form_kernel import BRANCHES, CROSSING, SLACK, Arm
 from wholebody.methods.qp.settings import SEEDS
 from wholebody.terms.entries import Entry
 
+LOOSE = 1e-2  # a share of lengths, and rad
+NEARBY = 1e-3  # m, rad
 FIRST = 16  # ends of a closed form's branches that the compiled loop has room for
-_NO_ARM = Arm(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, dtype=np.intp), -1, CROSSING, 0, np.zeros((4, 3)))
+_NO_ARM = Arm(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, dtype=np.intp), -1, CROSSING, 0, np.zeros((4, 3)), SLACK)
 _ONE = np.zeros(1)
 _SHARES = np.linspace(0.0, 1.0, SEEDS.samples)
 
@@ -109,6 +112,25 @@ class PlainChain:
         order = np.empty(effort.size, dtype=np.intp)
         count = closed_form_kernel().least(found.reshape(*effort.shape, -1), lower, upper, nearest, effort, order)
         return Branches(found, effort.ravel(), found[order[:count]])
+
+    def loosely_met(self, goals: Goals, seed: int) -> Array:
+        """Postures (k, n) that six joints meet a placement or one nearby with, or nearly so; none is a proof.
+
+        Limits are wider and links longer by a hundredth, and the placement is moved to and fro by a hundred times what
+        a solve is off by: where it is singular, other postures meet these.
+        """
+        assert self.arm is not None
+        arm, rng, found = with_values(self.arm, slack=LOOSE), np.random.default_rng(seed), list[Array]()
+        half, middle = 0.5 * (self.chain.upper - self.chain.lower), 0.5 * (self.chain.upper + self.chain.lower)
+        for shift in np.vstack([np.zeros(6), rng.uniform(-NEARBY, NEARBY, (12, 6))]):
+            table, angles = goals.tables[0].copy(), np.empty((1, BRANCHES, len(half)))
+            table[24:27] += shift[:3]
+            table[27:] = (pin.exp3(shift[3:]) @ table[27:].reshape(3, 3)).ravel()
+            closed_form_kernel().branches(arm, table, _ONE, angles)
+            away = np.remainder(angles[0] - middle + np.pi, 2.0 * np.pi) - np.pi
+            within = (np.abs(away) <= half + LOOSE).all(axis=1)  # not for NaN
+            found.append(middle + np.clip(away[within], -half, half))
+        return np.concatenate(found)
 
     def is_exact(self, entries: Sequence[Entry]) -> bool:
         """Whether the goals are one placement of a frame that the closed form has the postures of."""
