@@ -54,7 +54,7 @@ def _warm_answer(problem: Problem, method: Method, q: Array) -> dict[str, Any] |
     A start may be refused that is another's answer where the problem's own is not: a hold elsewhere at the start.
     """
     try:
-        solution = method.solve(begun_at(problem, q))
+        solution = warmed(method).solve(begun_at(problem, q))
     except WholebodyError:
         return None
     return answer_of(solution) if solution.solved else None
