@@ -92,7 +92,7 @@ class Multistart:
         return self._best
 
     def run(self, begin: Array | None = None, other: Array | None = None, within_reach: bool = True) -> LocalSolution:
-        """The best posture (nq,), by attempts from `begin` and by a descent from `other`; the closest if out of reach."""
+        """The best posture (nq,) of attempts from `begin` and a descent from `other`; the closest if out of reach."""
         begin, self._out_of_reach = self._start if begin is None else begin, not within_reach
         closest = self._closest(self._at_most(SEARCH.coming_near))
         self._search(begin) if within_reach else self._accept(closest.run(begin), self.how)
