@@ -69,6 +69,7 @@ if TYPE_CHECKING:
         Discomfort,
         Displacement,
         Effort,
+        Force,
         Frame,
         Freeze,
         Goal,
@@ -117,6 +118,7 @@ __all__ = [
     "Ellipsoid",
     "Figure",
     "FileFormatError",
+    "Force",
     "Frame",
     "Freeze",
     "Goal",
@@ -217,8 +219,8 @@ _MODULES = {
     "wholebody.studies.reach_map": "reach_map",
     "wholebody.studies.study": "study",
     "wholebody.taskfile": "read_task write_task",
-    "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Frame Freeze Goal "
-    "Hold Measure Orientation Plane Point Posture PotentialEnergy RangeOfMotion ReachCones Relative Rhythm "
+    "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Force Frame Freeze "
+    "Goal Hold Measure Orientation Plane Point Posture PotentialEnergy RangeOfMotion ReachCones Relative Rhythm "
     "RotationEffort StepLimit Grasp Lean Sit Stand Touch",
     "wholebody.terms.derivatives": "check_derivatives",
     "wholebody.tracking.drag": "Drag",
