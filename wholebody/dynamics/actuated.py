@@ -23,7 +23,7 @@ MOST = 1e9  # N m/rad, N/m, N m s/rad, N s/m
 class Actuated:
     """A figure whose joints follow a tracker through springs and dampers, and yield to what they meet.
 
-    Equation 6 of Schmidl and Lin for each freedom, in the units of torque: I q'' = -K (q - tracked) - R (q' - tracked').
+    Equation 6 of Schmidl and Lin for each freedom, as torques: I q'' = -K (q - tracked) - R (q' - tracked').
     A freedom with a spring also bears the figure's own weight there; one without is free, and all of them a ragdoll.
 
     Attributes:

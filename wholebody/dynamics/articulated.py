@@ -34,8 +34,7 @@ SHORTEST = 5e-4  # s: steps do not end earlier at an impact
 PARTED = 0.2  # share of an overlap that a step removes
 FASTEST = 0.5  # m/s, at most
 
-Place = pin.SE3
-Moved = Mapping[str, tuple[Place, Place]]
+Moved = Mapping[str, tuple[pin.SE3, pin.SE3]]
 
 
 class Points(NamedTuple):
@@ -292,14 +291,14 @@ class Articulated:
                 self.impulses[name] = self.impulses.get(name, np.zeros(3)) + push
         return impulse
 
-    def _move(self, time: float, segments: Mapping[str, int]) -> dict[str, tuple[Place, Place]]:
+    def _move(self, time: float, segments: Mapping[str, int]) -> dict[str, tuple[pin.SE3, pin.SE3]]:
         """Move the joints; the ways of the segments."""
         before = self._placements(segments)
         self.q = np.asarray(pin.integrate(self._model, self.q, time * self.velocity))
         after = self._placements(segments)
         return {name: (before[name], after[name]) for name in segments}
 
-    def _placements(self, segments: Mapping[str, int]) -> dict[str, Place]:
+    def _placements(self, segments: Mapping[str, int]) -> dict[str, pin.SE3]:
         state = self._workspace.state.update(self.q)
         return {name: pin.SE3(state.frame(number)) for name, number in segments.items()}
 

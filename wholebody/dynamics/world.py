@@ -35,7 +35,6 @@ from wholebody.scene.workspace import NotCopyable
 from wholebody.tracking.frame import FRAME, Frame
 from wholebody.tracking.loop import FrameLoop, invalid_reason
 
-
 Advance = tuple[Array, Frame, Mapping[str, Array], EngineFrame | None]
 """The posture that was wanted, the frame, impulses on things, and what the things did."""
 
@@ -121,9 +120,10 @@ class World(NotCopyable):
         first = scene.figure.posture(scene.figure.postures[0]) if start is None else start
         self._loop = FrameLoop(scene, first, overlap=overlap, dt=self.dt, seed=seed, touching=self._bodies)
         self.engine = RigidBodies(scene, start=self._loop.shown) if self._bodies else None
-        yields = isinstance(spring, Actuated)
-        self._articulated = Articulated(scene, self._loop.shown, spring, self.engine) if yields else None
-        self._coupling = Coupling(scene.model, self._loop.shown, None if yields else spring)
+        self._articulated = None
+        if isinstance(spring, Actuated):
+            self._articulated, spring = Articulated(scene, self._loop.shown, spring, self.engine), None
+        self._coupling = Coupling(scene.model, self._loop.shown, spring)
         self._tracked: Array = self._loop.shown
         self._workspace, self.time = scene.workspace(), 0.0
         self._revision = scene.revision
@@ -133,7 +133,10 @@ class World(NotCopyable):
         owners = self._workspace.owners
         self._owner_of = {piece: name for piece, name in enumerate(owners) if name in self._bodies}
         self._surfaces = {
-            (piece, name): self._surface(owner, name) for piece, owner in enumerate(owners) for name in self._bodies
+            (piece, name): self._surface(owner, name)
+            for piece, owner in enumerate(owners)
+            for name in self._bodies
+            if owner != name
         }
 
     @property
