@@ -14,7 +14,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask, brief
 from wholebody.figures.figure import Figure
 from wholebody.geometry.pieces import swept_points
 from wholebody.motion.posture_fit import CLEARANCE
@@ -44,6 +44,8 @@ class HeldPoint:
         place: (3,) in the joint's frame, metres.
         edge: whether it is on the edge of a sole, so that its height alone counts: soles come down flat.
     """
+
+    __repr__ = brief
 
     role: str
     foot: str

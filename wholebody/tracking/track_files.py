@@ -171,7 +171,8 @@ def _columns(place: str, first: list[str], wanted: list[str]) -> list[str]:
     else:
         lacked = missing if len(missing) == len(wanted) - 1 else []
     if lacked:
-        raise InputError(f"{place}: the columns lack {', '.join(lacked[:4])}; {len(missing)} are missing")
+        more = f" and {len(lacked) - 4} more" if len(lacked) > 4 else ""
+        raise InputError(f"{place}: the columns lack {', '.join(lacked[:4])}{more}; add them")
     return names
 
 

@@ -18,7 +18,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
 from wholebody.figures.state import State
 from wholebody.methods.qp.quadratic_program import QuadraticProgram, work_size
-from wholebody.methods.qp.rows import NUMBERS, PackedRows, Rows, StepParts, StepRoom, StepSize, Terms
+from wholebody.methods.qp.rows import NUMBERS, Rows, StepParts, StepRoom, StepSize, Terms
 from wholebody.methods.qp.settings import CORRECTIONS, PROGRAM, STEP, WEIGHTS
 from wholebody.methods.qp.solvers.base import ACTIVE_SET
 from wholebody.methods.qp.subproblem import Subproblem
@@ -85,8 +85,9 @@ class StepProgram:
             np.zeros(18 * state.model.njoints + 2 * length),
         ])  # fmt: skip
         self._share = self._fixed[NUMBERS : NUMBERS + self.goals]
-        self._memory = self._fixed[len(self._fixed) - 2 * length :].reshape(2, length)
+        self._before, self._after = self._fixed[len(self._fixed) - 2 * length :].reshape(2, length)
         """See `tracking_kernel.solve`, like the arrays before."""
+        self._ended_at = self._before[: state.model.nq]
         self._sizes, self._laid_out = (0, 0), dict[tuple[int, int], StepParts]()
         self.take(dt)
         self._grow(64)
@@ -103,7 +104,7 @@ class StepProgram:
         Returns:
             Whether they are of the same classes and frames; if not, nothing is done.
         """
-        self._memory[0, -1], self._curving, self._bend = 0.0, False, 0.0
+        self._before[-1], self._curving, self._bend = 0.0, False, 0.0
         return self._holds.take([constraints[k] for k in self._holding])
 
     def solve(self, at: PackedLinearisation, measures: bool) -> Answer:
@@ -136,15 +137,14 @@ class StepProgram:
             displacement: (nv,).
             whole: whether that is the last program's answer as it was.
         """
-        before, after = self._memory
         if not (whole and self._settled):
-            rows, program = self._parts.rows, self._parts.program
+            rows, program, after = self._parts.rows, self._parts.program, self._after
             gone = rows.soft @ displacement
             left = (gone - program.target)[: self.goals]
             after[len(q) : -2] = rows.soft_error + gone
             after[-2], after[-1] = sqrt(left @ left), 1.0
-        before[:] = after
-        before[: len(q)] = q
+        self._before[:] = self._after
+        self._ended_at[:] = q
 
     @property
     def rows(self) -> Rows:
@@ -207,12 +207,12 @@ class StepProgram:
         if self._mixed:
             self._share[:] = given.share
         self._fixed[2], self._fixed[3] = least_damping, measures
-        rows_at = PackedRows(
-            at.value, at.jacobian, at.gap, at.gap_contact, at.clearance, at.measure, at.box, at.q, contacts.number
-        )
+        arrays = (
+            at.value, at.jacobian, at.gap, at.gap_contact, at.clearance, at.measure, at.box, at.q, contacts.number,
+        )  # fmt: skip
         solved, count, motion, turn, worst, spare, missed, least, damping, asked = self._kernel.solve(
-            rows_at, self._workspace.state.columns, contacts.placements, working.pushing, self._fixed, self._places,
-            self._room, working.solver.hot_start,
+            arrays, self._workspace.state.columns, contacts.placements, working.pushing, self._fixed, self._places,
+            self._buffers, working.solver.hot_start,
         )  # fmt: skip
         self._settled = solved
         if solved:
@@ -240,7 +240,7 @@ class StepProgram:
         state, rows = self._there.update(pin.integrate(self._there.model, at.q, displacement)), self._parts.rows
         there = self._holds.at(state)[self._among] - self._asked
         curved = there - (rows.soft_error + rows.soft @ displacement)[self.goals :]
-        other: bool = self._kernel.run_ahead(curved, rows.soft_error, self.goals, at.q, STEP, self._memory[0])
+        other: bool = self._kernel.run_ahead(curved, rows.soft_error, self.goals, at.q, STEP, self._before)
         return other
 
     @property
@@ -261,6 +261,7 @@ class StepProgram:
         self._room = StepRoom(
             np.zeros(room), np.zeros(5 * elastic, dtype=np.intp), np.zeros(2 * (n + elastic), dtype=bool)
         )
+        self._buffers = tuple(self._room)
         self._x, self._last = self._room.floats[:n], self._room.masks[: 2 * n].reshape(2, n)
         self._laid_out.clear()
 
@@ -294,9 +295,9 @@ def compiled_kernel() -> Any:
     compiled_turning()
     none, index = np.zeros(0), np.zeros(0, dtype=np.intp)
     tracking_kernel.solve(
-        PackedRows(none, np.zeros((0, 1)), none, index, none, np.zeros((2, 2)), np.zeros((2, 1)), none, index),
+        (none, np.zeros((0, 1)), none, index, none, np.zeros((2, 2)), np.zeros((2, 1)), none, index),
         np.zeros((1, 6)), np.zeros((0, 4, 3)), index, np.append(numbers_of(1.0), np.zeros(18 + 4)),
-        np.zeros(4, dtype=np.intp), StepRoom(np.zeros(5 + work_size(1, 0, 0)), index, np.zeros(2, dtype=bool)), False,
+        np.zeros(4, dtype=np.intp), (np.zeros(5 + work_size(1, 0, 0)), index, np.zeros(2, dtype=bool)), False,
     )  # fmt: skip
     tracking_kernel.run_ahead(none, none, 0, none, STEP, np.zeros(2))
     return tracking_kernel
