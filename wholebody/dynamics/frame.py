@@ -12,6 +12,7 @@ import pinocchio as pin
 from wholebody.base import checks
 from wholebody.base.arrays import Array, brief
 from wholebody.base.errors import InputError
+from wholebody.base.records import with_values
 from wholebody.geometry.placement import placement
 
 
@@ -102,7 +103,7 @@ def one_frame(frames: Sequence[EngineFrame], ends: Sequence[float]) -> EngineFra
         return None
     starts = [0.0, *ends[:-1]]
     events = [
-        event._replace(time=start + event.time)
+        with_values(event, time=start + event.time)
         for start, one in zip(starts, frames, strict=True)
         for event in one.events
     ]
@@ -110,7 +111,8 @@ def one_frame(frames: Sequence[EngineFrame], ends: Sequence[float]) -> EngineFra
     for one in frames:
         for name, wrench in one.wrenches.items():
             wrenches[name] = wrenches.get(name, np.zeros(6)) + wrench
-    return frames[-1]._replace(
+    return with_values(
+        frames[-1],
         events=tuple(events),
         impulses={name: wrench[:3] for name, wrench in wrenches.items()},
         deepest=max(one.deepest for one in frames),
