@@ -34,6 +34,7 @@ from wholebody.version import __version__  # noqa: E402
 if TYPE_CHECKING:
     from wholebody import dynamics, ergonomics, figures, methods, motion, planning, studies, taskfile
     from wholebody.assessment.posture import Assessment, assess
+    from wholebody.dynamics.actuated import Actuated
     from wholebody.dynamics.world import World
     from wholebody.figures import Figure, load
     from wholebody.geometry.shapes import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere, Torus
@@ -99,6 +100,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "QP",
+    "Actuated",
     "Assembly",
     "Assessment",
     "Axis",
@@ -193,6 +195,7 @@ __all__ = [
 _ROOMS = ("dynamics", "ergonomics", "figures", "methods", "motion", "planning", "studies", "taskfile")
 _MODULES = {
     "wholebody.assessment.posture": "Assessment assess",
+    "wholebody.dynamics.actuated": "Actuated",
     "wholebody.dynamics.world": "World",
     "wholebody.figures": "Figure load",
     "wholebody.geometry.shapes": "Box Capsule Cylinder Ellipsoid HalfSpace Hull Mesh Shape Sphere Torus",

@@ -29,6 +29,7 @@ TOGETHER = (
         "wholebody.geometry.proximity",
         "wholebody.geometry.continuous.moved_pairs",
         "wholebody.geometry.continuous.swept_depth",
+        "wholebody.dynamics.impulse_kernel",
         "wholebody.methods.ccd.limbs",
         "wholebody.methods.ccd.sweep",
         "wholebody.methods.newton.linear_algebra",
