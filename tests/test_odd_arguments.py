@@ -684,7 +684,12 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "people(percentiles)", Call(wb.people, {"percentiles": [5, 95]})
     yield "boundary", Call(wb.boundary, {"confidence": 0.9, "dimensions": ["stature"], "sex": "male"})
     counted = {"task": path / "person.toml", "sees": (1.0, 0.0, 1.0), "people": wb.people(1, "male")}
-    yield "accommodation", Call(partial(wb.accommodation, jobs=1, progress=lambda told: True), counted)
+
+    def accommodation(people: Any, **others: Any) -> Any:
+        some = counted["people"] if people is None else people  # which stands for a hundred people
+        return wb.accommodation(people=some, jobs=1, progress=lambda told: True, **others)
+
+    yield "accommodation", Call(accommodation, counted)
     upright, work = person.figure.neutral, wb.ergonomics.Work(load=5.0)
     posed = {"figure": person.figure, "q": upright, "work": work}
     for judge in (wb.ergonomics.rula, wb.ergonomics.reba, wb.ergonomics.owas):

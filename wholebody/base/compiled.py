@@ -23,7 +23,7 @@ TOGETHER = (
         "wholebody.methods.qp.subproblem",
     ),
     ("wholebody.dynamics.step_program",),
-    ("wholebody.terms.linearisation", "wholebody.methods.qp.chain_batch"),
+    ("wholebody.terms.linearisation", "wholebody.methods.qp.plain_chain"),
     (
         "wholebody.geometry.contact_rows",
         "wholebody.geometry.proximity",

@@ -349,8 +349,13 @@ class Clip(Shown):
         chart.legend(loc="outside right upper", fontsize="x-small")
         return chart
 
-    def write(self, path: str | os.PathLike[str]) -> Path:
+    def write(self, path: str | os.PathLike[str], *, bare: bool = False) -> Path:
         """Write the clip to a file, whose path it returns; the ending of its name chooses the format.
+
+        Args:
+            path: the file.
+            bare: of a CSV, numbers alone: a line a frame, root and joints in the figure's order, as Unitree's LAFAN1
+                files are, and as the tools take them that make data for training of these.
 
         Raises:
             FileFormatError: an ending that is not known.
@@ -358,7 +363,7 @@ class Clip(Shown):
         """
         from wholebody.motion.files import write_motion
 
-        return write_motion(self, path)
+        return write_motion(self, path, bare=bare)
 
 
 def column_name(figure: Figure, column: int) -> str:

@@ -10,8 +10,7 @@ from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
 from wholebody.base import checks
-from wholebody.base.batches import run_batch, shared
-from wholebody.base.errors import InputError, one_line
+from wholebody.base.batches import fingerprint, run_batch, shared
 from wholebody.base.runner import EndedError, Job
 from wholebody.methods.base import Method
 from wholebody.methods.inputs import check_problem
@@ -22,7 +21,6 @@ from wholebody.studies.records import ENDED, Records, RecordStore, SolveRecord
 from wholebody.studies.sending import Sender, sent_to
 from wholebody.studies.solving import Make, Run, Start, solve_from, solve_runs
 from wholebody.tasks.answers import is_own
-from wholebody.version import __version__
 
 MOST_JOBS = 4096
 LONGEST = 1e7  # s: a greater deadline of a solve is a mistake
@@ -318,20 +316,6 @@ def _is_quick(cases: Iterable[Case], running: Running) -> bool:
     """Whether nobody else's code can end or hold up the process that solves these."""
     quick = running.seconds is None and running.cluster is None
     return quick and all(isinstance(case.make, _Given) and not case.make.is_own for case in cases)
-
-
-def fingerprint(*asked: Any) -> str:
-    """Fingerprint of a request.
-
-    Raises:
-        InputError: it cannot be sent to another process.
-    """
-    import joblib
-
-    try:
-        return str(joblib.hash((*asked, __version__)))
-    except Exception as error:  # whatever an object of the user's own raises
-        raise InputError(f"what is given cannot be sent to another process ({one_line(str(error))})") from None
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,8 @@ from wholebody.base.errors import FileFormatError
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, check_concavity
 from wholebody.figures.mjcf.compiled import Compiled, is_mjcf
+from wholebody.figures.mjcf.geoms import SHAPES, geom_shape, visual_of
 from wholebody.figures.mjcf.model import RobotModel, robot_model
-from wholebody.figures.mjcf.shapes import SHAPES, geom_shape
-from wholebody.figures.mjcf.visuals import visual_of
 from wholebody.figures.robot_figure import Robot, check_size, geometry_of_links, robot_figure
 from wholebody.figures.urdf.figure import SAMPLES, urdf_figure
 
