@@ -47,9 +47,9 @@ docs: $(VENV)/.docs ## build the documentation into site/, with every link check
 compare: $(VENV)/.compare ## add the other tools and QP solvers that `wholebody bench` can be compared with
 	$(BIN)/wholebody doctor
 
-wheel: $(VENV)/.test ## build the wheel into dist/
+wheel: $(VENV)/.test ## build the source archive into dist/, and the wheel from it
 	rm -rf dist
-	$(BIN)/python -m build --wheel --no-isolation --outdir dist .
+	$(BIN)/python -m build --no-isolation --outdir dist .
 
 lock: $(VENV)/.lock ## choose the newest versions that work together and write them to requirements/
 	$(CHOOSE) --extra placo --output-file requirements/run.txt

@@ -17,6 +17,7 @@ from typing import Any, ClassVar
 from weakref import WeakKeyDictionary
 
 from wholebody.base import runner
+from wholebody.base.compiled import compile_all
 from wholebody.base.runner import ONE_THREAD
 
 # Before numpy is loaded, and for workers and child processes too. Threads of linear algebra wait by computing, which
@@ -240,7 +241,8 @@ def emptied_caches(request: pytest.FixtureRequest) -> Iterator[None]:
 
 
 def _start_warm(environment: Mapping[str, str]) -> runner.Started:
-    """Start a process as `runner.start_process` does, as a fork of this one."""
+    """Start a process as `runner.start_process` does, as a fork of this one, which has all loops compiled."""
+    compile_all()  # a second to read back, the first time; each fork would need it for itself
     ours, theirs = socket.socketpair()
     output = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the process)
     arguments = (theirs, output.fileno(), environment, os.getpid())

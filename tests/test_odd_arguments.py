@@ -400,6 +400,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "simplify", Call(wb.simplify, {"problem": ask, "lock": True})
     part = wb.simplify(ask)
     yield "Simplified.posture", Call(part.posture, {"q": part.problem.start})
+    yield "Solution.plot", Call(wb.solve(part.problem).plot, {})
     yield "Simplified.restored", Call(part.restored, {"solution": wb.solve(part.problem)})
     judged = wb.assess(ask, q)
     yield "Assessment.holds", Call(judged.holds, {"tolerance": 0.1})
@@ -582,6 +583,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Clip.part", Call(wb.Clip(pair_of, [pair_of.neutral], 0.1).part, {"name": "two"})
     yield "Clip.with_q", Call(clip.with_q, {"q": [q], "name": "other"})
     yield "Clip.from_track", Call(wb.Clip.from_track, {"track": track, "figure": arm})
+    yield "Clip.plot", Call(clip.plot, {"joints": arm.joints[:2]})
     yield "Clip.write", Call(clip.write, {"path": path / "clip.npz"})
     for method in ("mirrored", "velocities", "accelerations"):
         yield f"Clip.{method}", Call(getattr(wb.Clip(hand, [hand.neutral], 0.1), method), {})  # type: ignore[arg-type]
@@ -669,18 +671,25 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     mapped = wb.reach_map(**grid)
     for write, ending in ((mapped.save, "npz"), (mapped.to_vtk, "vtk"), (mapped.picture, "png"), (mapped.html, "html")):
         yield f"ReachMap.{write.__name__}", Call(write, {"path": path / f"reach.{ending}"})
+    yield "ReachMap.plot", Call(mapped.plot, {})
     yield "ReachMap.counts", Call(mapped.counts, {})
     kept = wb.studies.Records([wb.studies.SolveRecord("a")])
     yield "Records.counts", Call(kept.counts, {})
     yield "Records.remarks", Call(kept.remarks, {})
     yield "Records.rows", Call(kept.rows, {})
+    yield "Records.plot", Call(kept.plot, {})
     yield "Records.chart", Call(kept.chart, {"path": path / "records.png"})
     yield "Records.to_csv", Call(kept.to_csv, {"path": path / "records.csv"})
     yield "people", Call(wb.people, {"count": 2, "sex": "male", "seed": 1})
     yield "people(percentiles)", Call(wb.people, {"percentiles": [5, 95]})
     yield "boundary", Call(wb.boundary, {"confidence": 0.9, "dimensions": ["stature"], "sex": "male"})
     counted = {"task": path / "person.toml", "sees": (1.0, 0.0, 1.0), "people": wb.people(1, "male")}
-    yield "accommodation", Call(partial(wb.accommodation, jobs=1, progress=lambda told: True), counted)
+
+    def accommodation(people: Any, **others: Any) -> Any:
+        some = counted["people"] if people is None else people  # which stands for a hundred people
+        return wb.accommodation(people=some, jobs=1, progress=lambda told: True, **others)
+
+    yield "accommodation", Call(accommodation, counted)
     upright, work = person.figure.neutral, wb.ergonomics.Work(load=5.0)
     posed = {"figure": person.figure, "q": upright, "work": work}
     for judge in (wb.ergonomics.rula, wb.ergonomics.reba, wb.ergonomics.owas):
@@ -770,6 +779,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     pair = {"before": clip, "after": clip}
     for measure in (measures.deviation, measures.jerk_ratio, measures.foot_sliding):
         yield measure.__name__, Call(measure, pair)
+    yield "ClipCheck.plot", Call(wb.check(clip).plot, {})
     yield "ClipCheck.as_dict", Call(wb.check(clip).as_dict, {})
     yield "spread", Call(tracking.spread, {"corners": places, "frames": 3, "dt": 0.1})
     yield "circle", Call(tracking.circle, {"center": at, "radius": 0.1, "normal": at})

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 from wholebody.assessment.posture import Assessment
 from wholebody.base.arrays import Array
+from wholebody.base.charts import Shown, new_chart
 
+SMALLEST = 1e-9  # m or rad: what is drawn of a zero on a logarithmic axis
 Status = Literal["solved", "unreachable", "infeasible", "stalled"]
 
 
@@ -32,7 +34,7 @@ class TraceEntry:
 
 
 @dataclass(frozen=True, repr=False)
-class Solution:
+class Solution(Shown):
     """The answer of a method.
 
     Attributes:
@@ -64,6 +66,20 @@ class Solution:
     def solved(self) -> bool:
         """Whether the status is "solved"."""
         return self.status == "solved"
+
+    def plot(self) -> Any:
+        """Draw the trace, a matplotlib figure: goal error and violation, and the measures, by iteration."""
+        chart, axes = new_chart(1, 2, (8.0, 2.6))
+        missed, cost = axes[0]
+        numbers = range(1, len(self.trace) + 1)
+        for name, word in (("goal_error", "goal error"), ("violation", "violation")):
+            values = [max(getattr(entry, name), SMALLEST) for entry in self.trace]
+            missed.semilogy(numbers, values, marker=".", label=f"{word} [m, rad]")
+        cost.plot(numbers, [entry.measure for entry in self.trace], marker=".", color="C2", label="measures")
+        for axis in axes[0]:
+            axis.set_xlabel("iteration")
+            axis.legend(fontsize="small")
+        return chart
 
     def __repr__(self) -> str:
         return (

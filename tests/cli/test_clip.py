@@ -82,6 +82,12 @@ def test_a_robot_goes_about_where_that_is_asked(walk: Path, tmp_path: Path) -> N
     assert way[-1] - way[0] == pytest.approx(0.5 * 0.8 / _leg(human), abs=0.05)
     assert main(given) == 0
     assert wb.read_clip(out, wb.load(tmp_path / "legs.urdf")).q.shape == (12, 6)
+    given = ["clip", "retarget", str(tmp_path / "walk.bvh"), "--to", str(tmp_path / "legs.urdf"), "--ground", "auto"]
+    table = tmp_path / "walk.csv"
+    assert main([*given, "--rate", "40", "--bare", "--out", str(table)]) == 0
+    rows = np.loadtxt(table, delimiter=",")
+    assert rows.shape == (round(clip.duration * 40) + 1, 13)
+    assert rows[-1, 0] - rows[0, 0] == pytest.approx(0.5 * 0.8 / _leg(human), abs=0.05)
 
 
 def _leg(human: wb.Figure) -> float:
@@ -181,6 +187,12 @@ def test_play_shows_what_the_body_wears_on_a_floor_below_it(
         (["convert", "bend.npz", "out.bvh", "--dt", "0"], "dt is 0"),
         (["retarget", "bend.npz", "out.npz"], "bend.npz: is no skeleton"),
         (["play", "bend.npz", "--out", "out.doc"], "cannot be written as .doc; give the name the ending .gif or"),
+        (["avoid", "bend.npz", "--scene", "none.toml", "--sex", "female"], "leave out --figure"),
+        (["avoid", "bend.npz", "bend.npz", "--scene", "none.toml"], "--scene is for one motion"),
+        (["retarget", "bend.bvh"], "name it with --out"),
+        (["retarget", "bend.bvh", "--to", "g1.urdf", "--figure", "h1.urdf", "--out", "o.npz"], "one and the same"),
+        (["retarget", "bend.bvh", "--bare", "--out", "o.npz"], "ending .csv"),
+        (["retarget", "bend.bvh", "--rate", "0", "--out", "o.csv"], "--rate is 0"),
         (["play", "bend.npz", "--pictures", "0", "--out", "out.png"], "--pictures is 0"),
     ],
 )

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.csv_rows import csv_rows
+from tests.saved_page import unpacked
 from tests.task_text import box, figure, point, table
 from wholebody.cli import main
 
@@ -51,7 +52,7 @@ def test_a_line_by_newton_prints_a_table_and_writes_all_files(
     assert max(float(row["deepest mm"]) for row in rows) < 0.1
     assert max(float(row["between mm"]) for row in rows) < 1.0
     assert "| reach | newton" in (out / "reach-newton.md").read_text()
-    assert "animation" in (out / "reach-newton.html").read_text(encoding="utf-8")
+    assert "animation" in unpacked(out / "reach-newton.html")
 
 
 def test_a_circle_by_ccd(task: Path, tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.csv_rows import csv_rows
+from tests.saved_page import unpacked
 from wholebody.cli import main
 from wholebody.tracking import SCENES
 
@@ -31,7 +32,7 @@ def test_a_run_prints_a_table_and_writes_numbers_chart_and_animation(
     assert [int(row["frame"]) for row in rows] == list(range(100))
     assert max(float(row["tracked deepest mm"]) for row in rows) > 5.0
     assert max(float(row["deepest mm"]) for row in rows) < 0.1
-    page = (out / "hand_on_table-qp.html").read_text(encoding="utf-8")
+    page = unpacked(out / "hand_on_table-qp.html")
     assert "ghosts" in page
     page = (out / "hand_on_table-qp.md").read_text()
     assert "| hand_on_table | qp | 100 |" in page

@@ -20,7 +20,7 @@ from wholebody.cli.main import main
     "page",
     [
         "README.md",
-        "docs/quickstart.md",
+        "docs/index.md",
         "docs/guide.md",
         "docs/figures.md",
         "docs/interaction.md",

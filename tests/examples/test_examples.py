@@ -27,6 +27,7 @@ OTHERS = (
     *("sit_on_chair", "four_bar", "assemble_shelf", "free_a_clip"),
     *("four_bar_among_obstacles", "scissor_lift", "carry_together", "take_a_seat", "lift_a_box"),
     *("reach_map", "study_of_people", "own_method", "two_arms_one_bar", "person_and_arm"),
+    *("boundary_people", "branches_of_an_arm", "dominoes", "driver", "hold_a_pole", "plan_for_an_arm"),
 )
 REST_ON = {("pelvis", "pouch"), ("lower_lumbar", "pouch")}  # what the figure wears lies on it
 
@@ -448,3 +449,43 @@ def test_a_study_finds_that_the_tall_man_reaches_more(example: Example, tmp_path
     assert left["small woman, high"] > 0.01
     assert all(one.solved for one in records if one.factors["person"] == "tall man")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_planned_motion_is_free_between_its_ends(example: Example, tmp_path: Path) -> None:
+    module = example("plan_for_an_arm")
+    found = module.main(out=tmp_path, pictures=False)
+    assert found.solved
+    scene, first, last = module.build()
+    np.testing.assert_allclose(found.clip.q[[0, -1]], [first.q, last.q], atol=1e-9)
+    assert assess_motion(scene, found.clip.q, found.clip.dt).depth.max() <= 1e-4
+
+
+def test_branches_of_an_arm_differ_and_reach_one_place(example: Example, tmp_path: Path) -> None:
+    module = example("branches_of_an_arm")
+    problem, found = module.build(), module.main(out=tmp_path, pictures=False)
+    assert len(found) == 4
+    for answer in found:
+        np.testing.assert_allclose(places(problem, answer.q)("grip").translation, (0.45, 0.20, 0.38), atol=1e-5)
+    for one, other in itertools.combinations(found, 2):
+        assert np.abs(one.q - other.q).max() > 0.4
+
+
+def test_every_domino_falls(example: Example, tmp_path: Path) -> None:
+    assert example("dominoes").main(out=tmp_path, pictures=False) == 12
+
+
+@pytest.mark.parametrize("name", ["driver", "hold_a_pole"])
+def test_hands_hold_what_they_are_told(name: str, example: Example) -> None:
+    problem = example(name).build()
+    solution = wb.solve(problem)
+    assert solution.solved
+    least, where = deepest(problem, solution.q)
+    assert least > -1e-5, where
+
+
+def test_the_men_at_the_edge_differ_as_they_are_told(example: Example) -> None:
+    people = wb.boundary(0.95, example("boundary_people").DIMENSIONS, sex="male")
+    wide, middle, narrow = (
+        people[f"male boundary {k}"]["proportions"]["hip_breadth_sitting"] for k in example("boundary_people").CHOSEN
+    )
+    assert narrow < middle - 0.03 < wide - 0.06  # m

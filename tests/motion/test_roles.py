@@ -28,6 +28,7 @@ KNOWN = {
     "Motive": "Skeleton_Hip Skeleton_LThigh Skeleton_LShin Skeleton_LFoot Skeleton_LUArm Skeleton_LFArm Skeleton_LHand",
     "Mixamo": "mixamorig:Hips mixamorig:LeftUpLeg mixamorig:LeftLeg mixamorig:LeftFoot mixamorig:LeftArm "
     "mixamorig:LeftForeArm mixamorig:LeftHand",
+    "SMPL-X": "pelvis left_hip left_knee left_ankle left_shoulder left_elbow left_wrist",
     "SMPL": "Pelvis L_Hip L_Knee L_Ankle L_Shoulder L_Elbow L_Wrist",
 }
 

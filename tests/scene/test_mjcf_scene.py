@@ -62,6 +62,15 @@ def test_a_urdf_is_no_scene(tmp_path: Path) -> None:
         wb.read_scene(tmp_path / "robot.xml")
 
 
+def test_a_height_that_is_no_number_is_refused_with_its_place(tmp_path: Path) -> None:
+    (tmp_path / "terrain.xml").write_text(
+        '<mujoco><asset><hfield name="h" nrow="2" ncol="3" size="1 1 1 0.1" elevation="0 0 0 0 nan 0"/></asset>'
+        '<worldbody><geom type="hfield" hfield="h"/><body><freejoint/><geom size="0.1"/></body></worldbody></mujoco>'
+    )
+    with pytest.raises(wb.FileFormatError, match=r"terrain\.xml: a height field has nan in row \d, column 1"):
+        wb.read_scene(tmp_path / "terrain.xml")
+
+
 def test_a_height_field_is_as_high_as_mujoco_has_it(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     heights = rng.random((6, 9))

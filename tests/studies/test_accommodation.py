@@ -103,6 +103,22 @@ def test_shares_of_built_bodies_are_those_of_people(sex: str) -> None:
             assert np.mean([body[name] <= value for body in bodies]) == pytest.approx(share, abs=0.03), name
 
 
+def under_a_desk(figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:
+    """Somebody who sits as people are measured, with a desk 185 mm over the seat."""
+    scene = wb.Scene(figure).add(wb.Box((0.40, 0.6, 0.04)), name="seat", at=(0.2, 0.0, 0.58))
+    scene.add(wb.Box((0.03, 0.6, 0.6)), name="back", at=(-0.015, 0.0, 1.0))
+    scene.add(wb.Box((0.6, 1.2, 0.03)), name="desk", at=(0.6, 0.0, 0.8))
+    return wb.Problem(scene, "sitting", constraints=[wb.Sit(on="seat", back="back", erect=True)])
+
+
+def test_who_sits_as_people_are_measured_fits_by_the_thighs() -> None:
+    thighs = (0.183, 0.187)  # m: of men; the desk leaves 0.185
+    people = {f"{1e3 * one:g}": {"sex": "male", "proportions": {"thigh_clearance": one}} for one in thighs}
+    found = wb.accommodation(under_a_desk, people)
+    fits = {one.factors["person"]: good for one, good in zip(found.records, found.fits, strict=True)}  # type: ignore[index]
+    assert fits == {"183": True, "187": False}
+
+
 def test_people_are_the_same_for_the_same_seed_and_load_as_drawn() -> None:
     first, again, other = (wb.people(3, "female", seed=seed) for seed in (4, 4, 5))
     assert first == again

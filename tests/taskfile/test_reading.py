@@ -153,3 +153,19 @@ def test_a_path_that_is_too_long_is_one_sentence(tmp_path: Path) -> None:
 def test_a_list_without_figures_is_none(write: Callable[[str], Path]) -> None:
     with pytest.raises(WholebodyError, match=r"there is no \[figure\] table"):
         read_task(write("figure = []\n"))
+
+
+@pytest.mark.parametrize(
+    ("second", "sentence"),
+    [
+        ('called = "ben"\ndetail = "spheres"', "figure 2: 'ben' has detail 'spheres'"),
+        ('called = "a/b"', "figure 2: the name of a figure is 'a/b'"),
+    ],
+)
+def test_a_fault_of_one_of_several_figures_is_told_there(tmp_path: Path, second: str, sentence: str) -> None:
+    (tmp_path / "two.toml").write_text(
+        f'[[figure]]\nname = "human"\ncalled = "anna"\n[[figure]]\nname = "human"\n{second}'
+    )
+    with pytest.raises(WholebodyError) as caught:
+        read_task(tmp_path / "two.toml")
+    assert str(caught.value).startswith(f"two.toml:4, {sentence}")

@@ -18,8 +18,14 @@ CASES = {
     "piece on an edge": (wb.Touch("right_hand:2", "thing"), 2),
     "segment across an edge": (wb.Touch("right_hand", "thing"), 7),  # no face has the normal of two edges that cross
     "palm on a box": (wb.Grasp("right", "thing"), 5),
-    "piece on a board": (wb.Touch("right_hand:2", "thing"), None),  # long steps leave the first feasible posture
+    "piece on a board": (wb.Touch("right_hand:2", "thing"), "board"),  # long steps leave the first feasible posture
+    "grip of a rod": (wb.Grasp("right", "thing", "power"), "rod"),  # a goal for the palm leads to another minimum
 }
+
+
+def rod() -> wb.Scene:
+    at = (0.3934426, -0.40877454, 0.88666683, 0.76362315, -0.41693545, 0.4695218, 0.15031229)
+    return wb.Scene(wb.load("human", sex="male")).add(wb.Capsule(0.036356054, 0.73367978), name="thing", at=at)
 
 
 def board() -> wb.Scene:
@@ -46,7 +52,8 @@ def effort_there(problem: wb.Problem, q: Array, goals: list[wb.Goal]) -> float:
 @pytest.mark.parametrize("name", CASES)
 def test_a_contact_costs_no_more_than_its_place(name: str) -> None:
     term, seed = CASES[name]
-    problem = wb.Problem(board() if seed is None else turned_box(seed), goals=[term])
+    things = {"board": board, "rod": rod}
+    problem = wb.Problem(things[seed]() if seed in things else turned_box(seed), goals=[term])
     solution = wb.solve(problem)
     assert solution.status == "solved"
     assert solution.assessment.optimality < STATIONARY

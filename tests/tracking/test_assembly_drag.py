@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from tests.saved_page import unpacked
 
 
 def _slider() -> wb.Assembly:
@@ -74,7 +75,7 @@ def test_the_viewer_takes_an_assembly(tmp_path: object) -> None:
     with wb.Viewer(made) as viewer:
         viewer.show(made.q)
         viewer.play([made.q, made.q], 0.1)
-        page = viewer.save(f"{tmp_path}/one.html").read_text(encoding="utf-8")
+        page = unpacked(viewer.save(f"{tmp_path}/one.html"))
     assert "lamp" in page
     with pytest.raises(wb.InputError, match="shape"):
         viewer.show(made.q[:7])

@@ -12,8 +12,7 @@ import pytest
 import wholebody as wb
 from wholebody.assessment.motion import assess_motion
 from wholebody.tasks import ReachCones
-from wholebody.tracking import SCENES, Recording, Track, build_scene, follow, gallery, judge
-from wholebody.tracking.scenes import InteractionScene
+from wholebody.tracking import SCENES, InteractionScene, Recording, Track, build_scene, follow, gallery, judge
 
 BEFORE, AFTER = 7, 19
 

@@ -102,7 +102,7 @@ def test_files_give_back_what_was_written(hand: wb.Figure, tmp_path: Path) -> No
         (lambda lines: [lines[0].replace("root_qw", "time_2"), *lines[1:]], "line 1: no column is called 'time_2'"),
         (
             lambda lines: [",".join(line.split(",")[:1] + line.split(",")[2:]) for line in lines],
-            "columns lack root_x; 1",
+            "columns lack root_x",
         ),
         (lambda lines: [line.replace(".", "\0").replace(",", ";").replace("\0", ",") for line in lines], "semicolons"),
         (lambda lines: [*lines[:3], lines[3] + ",1.0", *lines[4:]], "line 4: 27 values for 26 columns"),

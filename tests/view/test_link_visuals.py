@@ -16,8 +16,7 @@ import wholebody as wb
 from wholebody.figures.link_visuals import FINE, MANY, mesh_parts
 from wholebody.geometry.meshes import read_mesh, read_parts
 from wholebody.view import style
-from wholebody.view.bodies import Bodies
-from wholebody.view.link_visuals import LinkVisuals
+from wholebody.view.bodies import Bodies, LinkVisuals
 from wholebody.view.scene_graph import Keyframe, SceneGraph
 from wholebody.view.style import LOOK
 

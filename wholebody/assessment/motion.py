@@ -17,7 +17,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.assessment.all_pairs import AllPairs, all_pairs
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State, root_freedoms
 from wholebody.geometry.continuous.sweep import Sweep
@@ -44,6 +44,8 @@ class MotionAssessment:
         velocity: (n - 1, nv) from posture to posture, radians and metres a second.
         jerk: (n - 3,) root of the mean square of the third difference of the joint angles over time, rad/s^3.
     """
+
+    __repr__ = brief
 
     depth: Array
     overlapping: Counts

@@ -14,9 +14,10 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager
 from multiprocessing.connection import wait
 from typing import Any, TypeVar
 
-from wholebody.base.errors import MissingPackageError, WholebodyError
+from wholebody.base.errors import InputError, MissingPackageError, WholebodyError, one_line
 from wholebody.base.records import with_values
 from wholebody.base.runner import ONE_THREAD, Child, EndedError, Job, Outcome, end_with, interrupt_ignored, run_jobs
+from wholebody.version import __version__
 
 T = TypeVar("T")
 
@@ -195,6 +196,20 @@ def _in_own_child(sent: _Sent) -> tuple[int, Any, tuple[int, str] | None]:
         return number, child.call(function, *arguments, seconds=seconds), None
     except EndedError as error:
         return number, None, (error.code, error.said)
+
+
+def fingerprint(*asked: Any) -> str:
+    """Fingerprint of a request.
+
+    Raises:
+        InputError: it cannot be sent to another process.
+    """
+    import joblib
+
+    try:
+        return str(joblib.hash((*asked, __version__)))
+    except Exception as error:  # whatever an object of the user's own raises
+        raise InputError(f"what is given cannot be sent to another process ({one_line(str(error))})") from None
 
 
 def threads(cluster: str) -> int:

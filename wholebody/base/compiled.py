@@ -22,8 +22,8 @@ TOGETHER = (
         "wholebody.methods.qp.step_program",
         "wholebody.methods.qp.subproblem",
     ),
-    ("wholebody.dynamics.step_program", "wholebody.methods.qp.closed_form"),
-    ("wholebody.terms.linearisation", "wholebody.methods.qp.chain"),
+    ("wholebody.dynamics.step_program",),
+    ("wholebody.terms.linearisation", "wholebody.methods.qp.chain_batch"),
     (
         "wholebody.geometry.contact_rows",
         "wholebody.geometry.proximity",

@@ -67,6 +67,7 @@ def _environment(templates: Path) -> Environment:
         "measured": sentence,
         "span": spanned,
         "strong": strong,
+        "tex": tex,
         "upfirst": upfirst,
         "words": words,
     }
@@ -92,6 +93,11 @@ def spanned(found: Interval, spec: str, scale: float = 1.0, unit: str = "", ends
 def strong(count: int) -> str:
     """A count in bold print, unless it is zero."""
     return f"**{count}**" if count else "0"
+
+
+def tex(text: str) -> str:
+    """A text in which LaTeX reads no command."""
+    return re.sub(r"([&%$#_{}])", r"\\\1", text)
 
 
 def upfirst(text: str) -> str:

@@ -8,12 +8,14 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from wholebody.base.files import parsed_toml
 from wholebody.bench import plot_style
 from wholebody.bench.statistics import Interval
 from wholebody.bench.tables import sentence
@@ -99,6 +101,13 @@ def shown(figure: Figure) -> str:
     if isinstance(figure, float):
         return "" if not isfinite(figure) else f"{figure:.0f}" if abs(figure) >= 1000.0 else f"{figure:.3g}"
     return str(figure)
+
+
+@cache
+def texts() -> dict[str, Any]:
+    """What `texts.toml` holds by name: what reports say above their tables, and figures that others published."""
+    file = Path(__file__).with_name("texts.toml")
+    return parsed_toml(file.read_text("utf-8"), file.name)
 
 
 def report(about: str, tables: Mapping[str, Sequence[Row]], facts: Mapping[str, str], notes: Sequence[str] = ()) -> str:

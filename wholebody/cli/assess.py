@@ -56,10 +56,12 @@ def run(arguments: argparse.Namespace) -> int:
     described: dict[str, Any] = {"assessment": judged.summary()}
     scores = None
     if arguments.ergonomics:
+        from wholebody.ergonomics.angles import check_person
         from wholebody.ergonomics.assessment import ergonomics_of
         from wholebody.ergonomics.work import Work
         from wholebody.motion.strength import Strength
 
+        check_person(task.problem.scene.figure, "--ergonomics")
         told = {name: getattr(arguments, name) for name in FLAGS}
         seated = None if arguments.seated is None else arguments.seated == "yes"
         work = Work(arguments.load, coupling=arguments.coupling, seated=seated, **told)

@@ -6,10 +6,12 @@ import argparse
 import logging
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
 from io import TextIOWrapper, UnsupportedOperation
+from typing import Any
 
 from wholebody.base.errors import WholebodyError
 from wholebody.base.imports import raise_again
@@ -17,7 +19,7 @@ from wholebody.cli.arguments import Parser
 from wholebody.version import __version__
 
 COMMANDS = (
-    *("pose", "show", "figure", "demo", "interact", "drag", "world", "clip"),
+    *("pose", "show", "figure", "demo", "gallery", "interact", "drag", "world", "clip"),
     *("study", "reach", "assess", "bench", "doctor", "completion"),
 )
 """Each is a module of this folder, whose `run` is the command."""
@@ -77,7 +79,16 @@ def _run(given: list[str]) -> int:
     arguments = parser([name for name in COMMANDS if name in given[:1]] or COMMANDS).parse_args(given)
     raise_again()
     _tell_progress()
-    return int(arguments.run(arguments))
+    with warnings.catch_warnings():
+        warnings.showwarning = _told
+        return int(arguments.run(arguments))
+
+
+def _told(
+    message: Warning | str, category: type[Warning], filename: str, lineno: int, file: Any = None, line: Any = None
+) -> None:
+    """Say a warning of the library as a sentence, without its place in Python; others as Python does."""
+    _say(str(message) if category is UserWarning else warnings.formatwarning(message, category, filename, lineno, line))
 
 
 def _ready() -> bool:

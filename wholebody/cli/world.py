@@ -12,8 +12,8 @@ from wholebody.cli.command import command, flag
 if TYPE_CHECKING:
     from wholebody.bench.rows import Row
     from wholebody.dynamics.overlaps import Overlap
-    from wholebody.dynamics.scenes import WorldScene
     from wholebody.dynamics.world import WorldFrame
+    from wholebody.tracking import InteractionScene
 
 
 @command(
@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if all(row["deepest mm"] <= 0.1 and not row["not avoided"] for row in rows) else 1  # mm
 
 
-def _scene(name: str, arguments: argparse.Namespace) -> WorldScene:
+def _scene(name: str, arguments: argparse.Namespace) -> InteractionScene:
     """The scene of a name, or that of a task file, whose figure stands as the file starts."""
     from wholebody.base.files import title_of
     from wholebody.dynamics.scenes import build_world_scene, standing_scene
@@ -73,7 +73,7 @@ def _scene(name: str, arguments: argparse.Namespace) -> WorldScene:
     return build_world_scene(name, frames=arguments.frames, seed=arguments.seed)
 
 
-def _run_one(scene: WorldScene, arguments: argparse.Namespace, facts: dict[str, str]) -> Row:
+def _run_one(scene: InteractionScene, arguments: argparse.Namespace, facts: dict[str, str]) -> Row:
     from wholebody.bench.measure.frames import frame_panels, world_rows
     from wholebody.bench.rows import chart
     from wholebody.bench.tables import write_rows
@@ -104,7 +104,7 @@ def _run_one(scene: WorldScene, arguments: argparse.Namespace, facts: dict[str, 
 
 
 def _animation(
-    scene: WorldScene, frames: list[WorldFrame], pushed: list[tuple[Overlap, ...]], out: Path, picture: bool
+    scene: InteractionScene, frames: list[WorldFrame], pushed: list[tuple[Overlap, ...]], out: Path, picture: bool
 ) -> list[float]:
     """Write the animation, with PD_g of what the spring wanted; the seconds that each frame takes to draw."""
     import time

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.base.errors import InputError
 from wholebody.geometry.placement import placement
 
@@ -69,6 +69,8 @@ class EngineFrame(NamedTuple):
 @dataclass
 class FrameRecord:
     """A frame while it is being made; attributes as in `EngineFrame`."""
+
+    __repr__ = brief
 
     stops: int  # early ends of steps that are left
     impulse: Array  # (n, 3) of each body

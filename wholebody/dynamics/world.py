@@ -126,6 +126,10 @@ class World(NotCopyable):
             (piece, name): self._surface(owner, name) for piece, owner in enumerate(owners) for name in self._bodies
         }
 
+    def __repr__(self) -> str:
+        """One line."""
+        return f"World of {self.scene.figure.name!r} and {len(self._bodies)} bodies, {1e3 * self.dt:g} ms a frame"
+
     @property
     def q(self) -> Array:
         """(nq,) the posture that is shown."""

@@ -121,7 +121,7 @@ def check_person(figure: object, what: str) -> Figure:
     person = one_figure(figure, what)
     lacking = sorted(NAMES - {*person.segments, *person.frames})
     if lacking:
-        raise InputError(f"{what}: {person.name} has no {checks.some(lacking)}; load a person with wb.load('human')")
+        raise InputError(f"{what}: {person.name} has no {checks.some(lacking)}; take a person, the figure 'human'")
     return person
 
 

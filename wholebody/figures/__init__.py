@@ -1,5 +1,6 @@
 """Figures: people, avatars, hands and robots."""
 
+from wholebody.figures.adjustable import adjustable
 from wholebody.figures.denavit_hartenberg import DenavitHartenberg, denavit_hartenberg
 from wholebody.figures.description import Chain, JointCone, Limits
 from wholebody.figures.figure import Figure
@@ -16,6 +17,7 @@ __all__ = [
     "JointCone",
     "Limits",
     "ReachCone",
+    "adjustable",
     "denavit_hartenberg",
     "finger_angles",
     "join",

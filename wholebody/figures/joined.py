@@ -33,20 +33,23 @@ def join(figures: Mapping[str, Figure | tuple[Figure, Any]]) -> Figure:
             f"several figures are {checks.shown(figures)}; give them by name, such as "
             "{'anna': wb.load('human'), 'arm': (wb.load('arm.urdf'), (1, 0, 0))}"
         )
-    members: dict[str, Member] = {}
-    for name, given in figures.items():
-        figure, at = given if isinstance(given, (tuple, list)) and len(given) == 2 else (given, (0.0, 0.0, 0.0))
-        if "/" in checks.text(name, "the name of a figure"):
-            raise InputError(f"the name of a figure is {checks.shown(name)}; leave the slash out: it ends a name")
-        if name == "root":
-            raise InputError("a figure is named 'root', which is that of a placement; give it another name")
-        one = checks.instance(figure, Figure, f"figure {name!r}", "load one with wb.load('human')")
-        check_single(one, name)
-        members[name] = Member(one, placement(at, f"{name!r}: at"))
+    members = {name: member(name, given) for name, given in figures.items()}
     detail = {figure.detail for figure, _ in members.values()}
     model, geometry, description, visual = joined_parts(members)
     model.name = " and ".join(members)
     return Figure(model.name, model, geometry, detail.pop() if len(detail) == 1 else "own", description, visual)
+
+
+def member(name: str, given: Figure | tuple[Figure, Any]) -> Member:
+    """One of several figures, by its name and what `join` takes of it; an InputError where it cannot be one."""
+    figure, at = given if isinstance(given, (tuple, list)) and len(given) == 2 else (given, (0.0, 0.0, 0.0))
+    if "/" in checks.text(name, "the name of a figure"):
+        raise InputError(f"the name of a figure is {checks.shown(name)}; leave the slash out: it ends a name")
+    if name == "root":
+        raise InputError("a figure is named 'root', which is that of a placement; give it another name")
+    one = checks.instance(figure, Figure, f"figure {name!r}", "load one with wb.load('human')")
+    check_single(one, name)
+    return Member(one, placement(at, f"{name!r}: at"))
 
 
 def welded(figure: Figure) -> Figure:

@@ -1,4 +1,4 @@
-"""The URDF files and tasks in the package: their folders, and writing them."""
+"""The URDF files, tasks and example scripts in the package: their folders, and writing them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def urdf_folder() -> Path:
     Raises:
         WholebodyError: the installation lacks it.
     """
-    return _folder("urdf", "urdf", "human.urdf")
+    return _folder("urdf", "human.urdf")
 
 
 def urdf_path(name: str) -> Path:
@@ -40,16 +40,36 @@ def task_paths() -> dict[str, Path]:
     Raises:
         WholebodyError: the installation lacks them.
     """
-    return {path.stem: path for path in sorted(_folder("examples", "examples/tasks", "shelf.toml").glob("*.toml"))}
+    return _files("examples/tasks", "*.toml", "shelf.toml")
 
 
-def _folder(inside: str, beside: str, file: str) -> Path:
-    """The first of two folders, in the package and beside it, that has a file."""
+def script_paths() -> dict[str, Path]:
+    """Return the packaged example scripts by name: inside an installed package, or among the examples of a checkout.
+
+    Raises:
+        WholebodyError: the installation lacks them.
+    """
+    found = _files("examples", "*.py", "shelf.py")
+    del found["presenting"]
+    return found
+
+
+def client_paths() -> dict[str, Path]:
+    """Return the packaged clients of published problems by name, as `script_paths` does, and raises."""
+    return _files("examples/clients", "*.py", "plain_pinocchio.py")
+
+
+def _files(name: str, pattern: str, file: str) -> dict[str, Path]:
+    return {path.stem: path for path in sorted(_folder(name, file).glob(pattern))}
+
+
+def _folder(name: str, file: str) -> Path:
+    """A folder that has a file: in the package, or beside it."""
     package = Path(__file__).resolve().parents[1]
-    for folder in (package / inside, package.parent / beside):
+    for folder in (package / name, package.parent / name):
         if (folder / file).is_file():
             return folder
-    raise WholebodyError(f"there is no {inside} folder in or beside {package}; install wholebody again")
+    raise WholebodyError(f"there is no {name} folder in or beside {package}; install wholebody again")
 
 
 def write_human(path: str | os.PathLike[str], person: Person, hands: str = "rigid") -> None:

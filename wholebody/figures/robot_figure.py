@@ -77,7 +77,9 @@ def robot_figure(robot: Robot, samples: int, seed: int) -> Figure:
     postures = {"neutral": partial(_copied, q=rest.q)}
     if np.abs(rest.q - rest.zero).max(initial=0.0) > 1e-12:
         postures["zero"] = partial(_copied, q=rest.zero)
-    postures |= {name: partial(_copied, q=q) for name, q in robot.postures.items() if name not in postures}
+    called = {name: f"{name} of the file" if name in postures else name for name in robot.postures}
+    postures |= {called[name]: partial(_copied, q=q) for name, q in robot.postures.items()}
+    renamed = [f"posture {name!r} of the file is called {now!r}" for name, now in called.items() if now != name]
     description = Description(
         groups={**robot.groups, "all": tuple(name for name in list(model.names)[1:] if name != ROOT_JOINT)},
         chains=link_chains(model, links),
@@ -86,7 +88,7 @@ def robot_figure(robot: Robot, samples: int, seed: int) -> Figure:
         postures=postures,
         cones=robot.cones,
         excluded=(*excluded, *rest.excluded),
-        notes=(*robot.notes, *_told(rest)),
+        notes=(*robot.notes, *renamed, *_told(rest)),
     )
     return Figure(robot.name, model, geometry, "own", description, robot.visual)
 

@@ -89,7 +89,7 @@ def _bent(path: Path) -> list[tuple[Array, NDArray[np.int64], tuple[float, float
     from wholebody.geometry.gltf_document import GltfDocument
 
     check_file(path, "mesh")
-    _check_content(path)
+    check_content(path)
     document = GltfDocument(path)
     found = document.meshes() if document.tree.get("skins") else None
     if found == []:
@@ -116,7 +116,7 @@ def _read_scene(path: Path) -> tuple[Any, float]:
         raise FileFormatError(
             f"mesh {path}: {path.suffix or 'no suffix'} is not among {', '.join(SUFFIXES)}; convert the file"
         )
-    _check_content(path)
+    check_content(path)
     if path.suffix.lower() == ".dae" and find_spec("collada") is None:
         raise MissingPackageError(f"mesh {path}: reading COLLADA files needs pycollada: pip install pycollada")
     quiet = logging.getLogger("trimesh")
@@ -133,7 +133,7 @@ def _read_scene(path: Path) -> tuple[Any, float]:
         quiet.setLevel(level)
 
 
-def _check_content(path: Path) -> None:
+def check_content(path: Path) -> None:
     """Refuse what is no mesh whatever its name says: an empty file, a pointer of Git LFS, a web page, a cut STL."""
     size = path.stat().st_size
     if size == 0:

@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.base.checks import array, listed, path, shown
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range, Vector
@@ -235,6 +235,8 @@ class Hull(Shape):
         InputError: not such points, or none that span a solid.
     """
 
+    __repr__ = brief
+
     points: Array
 
     def __post_init__(self) -> None:
@@ -316,6 +318,8 @@ class Mesh(Shape):
         MissingPackageError: trimesh, or for a COLLADA file pycollada, is not installed.
         InputError: a value of the wrong kind, shape or range.
     """
+
+    __repr__ = brief
 
     source: str | PathLike[str] | tuple[ArrayLike, ArrayLike] | HasTriangles
     scale: Annotated[float, Range(1e-12, 1e12, wanted="metres for each unit of the file, such as 0.001")] = 1.0

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from wholebody.base.arrays import Array, Mask
+from wholebody.base.fields import Range
 from wholebody.figures.state import State
 from wholebody.methods.qp.method import QP
 from wholebody.motion.clip import Clip
@@ -26,6 +27,8 @@ from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks import Posture
 from wholebody.tasks.base import Bound, Constraint, Goal, filled
+
+CLEARANCE = Range(0.0, 0.5, "m")  # of a method that keeps one
 
 
 class AvoidProgress(NamedTuple):

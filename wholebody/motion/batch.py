@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array
-from wholebody.base.batches import run_batch
+from wholebody.base.batches import fingerprint, run_batch
 from wholebody.base.errors import InputError, WholebodyError
 from wholebody.base.files import is_file, read_bytes
 from wholebody.base.runner import Job
@@ -26,7 +26,6 @@ from wholebody.motion.measures import deviation, foot_sliding, jerk_ratio
 from wholebody.motion.reading import read_clip
 from wholebody.motion.worn_equipment import NOTHING, Worn, dressed, label
 from wholebody.tracking.tracks import check_figure
-from wholebody.version import __version__
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -293,7 +292,8 @@ def _sources(given: Sequence[Any], figure: Figure | None, what: str) -> dict[str
                 f"{what}: {checks.shown(path.name)} is a file; say of which figure: figure=wb.load('human')"
             )
         check_figure(figure, what)
-        found.append((path.stem, path))
+        same = sum(Path(other).stem == path.stem for other in given if not isinstance(other, Clip)) > 1
+        found.append((f"{path.parent.name} {path.stem}" if same else path.stem, path))
     twice = first_twice(name for name, _ in found)
     if twice is not None:
         raise InputError(f"{what}: two clips are named {checks.shown(twice)}; give each another name")
@@ -314,22 +314,13 @@ def _ways(methods: Sequence[Avoider]) -> dict[str, Avoider]:
 def _mark(source: Clip | Path, figure: Figure | None) -> str:
     """Fingerprint of a clip and its figure; a file that cannot be read is refused later, with its sentence."""
     if isinstance(source, Clip):
-        return _hash(source.q, source.dt, source.figure)
+        return fingerprint(source.q, source.dt, source.figure)
     try:
-        return _hash(read_bytes(source, "motion"), figure)
+        return fingerprint(read_bytes(source, "motion"), figure)
     except WholebodyError as error:
-        return _hash(str(error))
+        return fingerprint(str(error))
 
 
 def _fingerprint(mark: str, worn: Worn, method: Avoider, held: AvoidOptions) -> str:
     bytes_of_mesh = read_bytes(worn, "mesh") if isinstance(worn, str) and is_file(worn) else None
-    return _hash(mark, worn, bytes_of_mesh, method, held, __version__)
-
-
-def _hash(*values: Any) -> str:
-    import joblib
-
-    try:
-        return str(joblib.hash(values))
-    except Exception as error:  # whatever an object of the user's own raises
-        raise InputError(f"avoid_many: what is given cannot be sent to another process ({error})") from None
+    return fingerprint(mark, worn, bytes_of_mesh, method, held)

@@ -141,7 +141,7 @@ class BatchTable:
             rows = [AvoidedCase(**row) for row in found["cases"]]
             self._originals = {str(name): str(asked) for name, asked in found["originals"].items()}
         except (ValueError, TypeError, KeyError, AttributeError):
-            raise FileFormatError(f"{path}: is no table of wb.motion.avoid_many; give another folder") from None
+            raise FileFormatError(f"{path}: is no table of a batch of clips; give another folder") from None
         self._cases = {row.asked: row for row in rows}
 
 

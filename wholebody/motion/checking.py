@@ -10,6 +10,7 @@ import numpy as np
 
 from wholebody.assessment.motion import root_mean_square, third_differences, velocities
 from wholebody.base.arrays import Array
+from wholebody.base.charts import Shown, new_chart
 from wholebody.base.checks import function, instance, number
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
@@ -50,7 +51,7 @@ class Beyond:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ClipCheck:
+class ClipCheck(Shown):
     """What `check` found in a clip.
 
     Attributes:
@@ -131,6 +132,17 @@ class ClipCheck:
             f"{told}{first}\n{deepest}\n{len(self.limits)} joints beyond limits, {len(self.speeds)} too fast; feet "
             f"slide {1e3 * self.slid:.1f} mm at most; jerk {self.mean_jerk:.0f} rad/s^3"
         )
+
+    def plot(self) -> Any:
+        """Draw the depth of the eight deepest pairs over time, a matplotlib figure; of a free clip all at zero."""
+        chart, axes = new_chart(1, 1, (8.0, 2.6))
+        axis, times = axes[0, 0], self.clip.times
+        for each in self.contacts[:8]:
+            axis.plot(times, 1e3 * each.depth, label=each.names)
+        axis.axhline(1e3 * self.tolerance, color="0.6", linestyle="--", label="tolerance")
+        axis.set(xlabel="time [s]", ylabel="depth [mm]", xlim=(0.0, max(self.clip.duration, self.clip.dt)))
+        chart.legend(loc="outside right upper", fontsize="x-small")
+        return chart
 
     def __repr__(self) -> str:
         """One line."""

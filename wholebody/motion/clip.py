@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array, Indices
-from wholebody.base.checks import array, instance, number, shown, text, time_step
+from wholebody.base.charts import Shown, new_chart
+from wholebody.base.checks import array, instance, listed, number, shown, text, time_step
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.joined import one_figure
 from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.tracking.tracks import MOST_FRAMES, Track, check_figure, check_frames
 
+DRAWN = 8  # joints of `Clip.plot`
 MIRROR = np.diag([1.0, -1.0, 1.0])
 """Reflection at the plane y = 0."""
 
@@ -99,7 +103,7 @@ ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Clip:
+class Clip(Shown):
     """Postures of a figure at a fixed time step.
 
     Postures may be in collision and beyond joint limits: `wb.check` reports both, and `wb.avoid` removes collisions.
@@ -116,7 +120,7 @@ class Clip:
     """
 
     figure: Figure
-    q: Array = field(repr=False)
+    q: Array
     dt: float
     name: str = "clip"
 
@@ -137,6 +141,10 @@ class Clip:
         self.figure.warn_of_angles(q, self.name)
         q.setflags(write=False)
         object.__setattr__(self, "q", q)
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"Clip({self.name!r} of {self.figure.name!r}: {len(self)} frames, one each {self.dt:g} s)"
 
     def _normalise(self, q: Array) -> None:
         """Make quaternions, and cosines and sines of unlimited joints, of unit length."""
@@ -310,8 +318,44 @@ class Clip:
         instance(track, Track, "Clip.from_track: track", "make one with Track.of(figure, q, dt)").check(figure)
         return cls(figure, track.q, track.dt, track.name)
 
-    def write(self, path: str | os.PathLike[str]) -> Path:
+    def plot(self, joints: Sequence[str] | None = None) -> Any:
+        """Draw values of joints over time, a matplotlib figure.
+
+        Args:
+            joints: their names; None for the eight whose values range the farthest.
+
+        Raises:
+            InputError: no joint is named.
+            UnknownNameError: a joint that the figure does not have.
+        """
+        model, figure = self.figure.model, self.figure
+        names = self.names if joints is None else listed(joints, "plot: joints", "names of joints")
+        if not names:
+            raise InputError(
+                f"{self.name}: plot takes the names of one or more joints; leave them out for those that move most"
+            )
+        of = {name: model.joints[figure.joint_id(name)] for name in names}
+        if joints is None:
+            reach = {
+                name: float(np.ptp(self.q[:, one.idx_q : one.idx_q + one.nq], axis=0).max()) for name, one in of.items()
+            }
+            names = sorted(reach, key=lambda name: -reach[name])[:DRAWN]
+        chart, axes = new_chart(1, 1, (8.0, 3.2))
+        for name in names:
+            one = of[name]
+            for k in range(one.nq):
+                axes[0, 0].plot(self.times, self.q[:, one.idx_q + k], label=name if one.nq == 1 else f"{name}[{k}]")
+        axes[0, 0].set(xlabel="time [s]", ylabel="joint [rad, m]", title=self.name.replace("$", r"\$"))
+        chart.legend(loc="outside right upper", fontsize="x-small")
+        return chart
+
+    def write(self, path: str | os.PathLike[str], *, bare: bool = False) -> Path:
         """Write the clip to a file, whose path it returns; the ending of its name chooses the format.
+
+        Args:
+            path: the file.
+            bare: of a CSV, numbers alone: a line a frame, root and joints in the figure's order, as Unitree's LAFAN1
+                files are, and as the tools take them that make data for training of these.
 
         Raises:
             FileFormatError: an ending that is not known.
@@ -319,7 +363,7 @@ class Clip:
         """
         from wholebody.motion.files import write_motion
 
-        return write_motion(self, path)
+        return write_motion(self, path, bare=bare)
 
 
 def column_name(figure: Figure, column: int) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask, brief
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.joined import one_figure
@@ -254,6 +254,8 @@ class LoadChange:
         after: torques of the answer; both are those of `wb.motion.torques`.
         times: (m,) place of each frame of the answer in the frames before.
     """
+
+    __repr__ = brief
 
     before: Torques
     after: Torques

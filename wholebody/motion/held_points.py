@@ -14,7 +14,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask, brief
 from wholebody.figures.figure import Figure
 from wholebody.geometry.pieces import swept_points
 from wholebody.motion.posture_fit import CLEARANCE
@@ -23,7 +23,7 @@ from wholebody.motion.standing_ground import Foothold, Ground
 from wholebody.motion.structure import upright
 from wholebody.scene.scene import Scene
 
-STRONG, NEARING, SWING = 200.0, 10.0, 0.3  # weights of what rests, nearly does, and of a sole between; 1 of a bone
+STRONG, NEARING, SWING = 800.0, 10.0, 0.3  # weights of what rests, nearly does, and of a sole between; 1 of a bone
 LANDING = 3.0  # weight in the frame in which a point comes down, where contact decides
 BESIDE = np.array([0.1, 0.1, 1.0])  # shares of that weight: soles that meet come down beside each other
 STEP = 0.3  # m: a surface higher than this above the recording's ground is not what a sole comes down on
@@ -44,6 +44,8 @@ class HeldPoint:
         place: (3,) in the joint's frame, metres.
         edge: whether it is on the edge of a sole, so that its height alone counts: soles come down flat.
     """
+
+    __repr__ = brief
 
     role: str
     foot: str

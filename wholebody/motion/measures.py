@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -19,6 +19,7 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.checks import instance
 from wholebody.base.errors import InputError
+from wholebody.base.fields import Checked, Range
 from wholebody.figures.state import root_freedoms
 from wholebody.motion.checking import joint_jerk
 from wholebody.motion.clip import Clip
@@ -121,7 +122,7 @@ Hogan 1985, Journal of Neuroscience 5(7): 1688). Where the original is calmer, t
 
 
 @dataclass(frozen=True)
-class MotionBounds:
+class MotionBounds(Checked):
     """Bounds on jerk, speed and deviation of a changed clip: a term for the `constraints` of `wb.avoid`.
 
     `wb.avoid` asks for `MotionBounds()` where none is given. Jerk and speed are those of the joints, and apart from
@@ -141,19 +142,16 @@ class MotionBounds:
         InputError: a value out of range.
     """
 
-    jerk: float | None = 2.0
-    speed: float | None = 1.5
-    deviation: float | None = 0.75
+    jerk: Annotated[float, Range(1.0, 1e6)] | None = 2.0
+    speed: Annotated[float, Range(1.0, 1e6)] | None = 1.5
+    deviation: Annotated[float, Range(0.0, 1e6)] | None = 0.75
     keep_ends: bool = False
     largest: Array | None = field(init=False, default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Check the values."""
-        for name, least in (("jerk", 1.0), ("speed", 1.0), ("deviation", 0.0)):
-            if getattr(self, name) is not None:
-                checks.number(getattr(self, name), f"MotionBounds: {name}", least, 1e6)
+        super().__post_init__()
         checks.warn_of_degrees(self.deviation or 0.0, "MotionBounds: deviation")
-        checks.flag(self.keep_ends, "MotionBounds: keep_ends")
 
 
 class Excess(NamedTuple):

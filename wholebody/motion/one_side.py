@@ -11,7 +11,6 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.motion.avoider import Run
@@ -93,21 +92,23 @@ def kept_beside(run: Run, window: Window, q: Array, gaps: Iterable[int]) -> Arra
     return q
 
 
-def followed(run: Run, window: Window, middles: Iterable[int]) -> Iterator[Array]:
-    """Postures (n, nq) of a window, followed from the freed postures of its frames; the nearest to the original first.
+def followed(run: Run, window: Window, middle: int) -> Array:
+    """Postures (n, nq) of a window, followed from the freed posture of one of its frames to both ends.
 
-    Iterations keep the side on which they begin. Following ends where another start is nearer already.
+    Iterations keep the side on which they begin. Following ends on a side where it is calm for 0.25 s.
     """
-    best, others = _Followed(np.zeros(0), np.inf, -1), list[int]()
-    for middle in dict.fromkeys(middles):
-        found = _outwards(run, window, middle, best.apart)
-        if found.apart < best.apart:
-            best, found = found, best
-        if found.middle >= 0:
-            others.append(found.middle)
-    yield best.q
-    for middle in others:
-        yield _outwards(run, window, middle, np.inf).q
+    terms = run.terms
+    q = np.array(terms.q[window.first : window.end])
+    q[middle - window.first] = run.follower.freed(middle, terms.q[middle])
+    patience, calm, side = run.frames(0.25, 2), 0, 1
+    for frame, neighbour in outwards(window, middle):
+        if frame - neighbour != side:
+            calm, side = 0, frame - neighbour
+        if calm < patience:
+            here = run.follower.frame(frame, q[neighbour - window.first])
+            q[frame - window.first] = here
+            calm = calm + 1 if np.abs(here - terms.q[frame]).max() <= 1e-4 else 0
+    return q
 
 
 class _Beside(NamedTuple):
@@ -115,14 +116,6 @@ class _Beside(NamedTuple):
 
     q: Array
     joined: bool
-
-
-class _Followed(NamedTuple):
-    """Postures (n, nq), the sum of their squared deviations, and the frame that they were followed from."""
-
-    q: Array
-    apart: float
-    middle: int
 
 
 def _frames(runs: Sequence[range]) -> int:
@@ -166,24 +159,3 @@ def _beside(run: Run, q: Array, gap: int, side: int, passed: float, first: int =
             return
         here, frame = there, frame + side
         yield _Beside(here, not 0 <= frame < len(q) or dip_depth(workspace, here, q[frame]) <= passed)
-
-
-def _outwards(run: Run, window: Window, middle: int, most: float) -> _Followed:
-    """What following from a freed frame gives, until squared deviations exceed `most`; calm for 0.25 s ends a side."""
-    terms, model = run.terms, run.workspace.model
-    q = np.array(terms.q[window.first : window.end])
-    q[middle - window.first] = run.follower.freed(middle, terms.q[middle])
-    far = float((pin.difference(model, terms.q[middle], q[middle - window.first]) ** 2).sum())
-    patience, calm, side = run.frames(0.25, 2), 0, 1
-    for frame, neighbour in outwards(window, middle):
-        if frame - neighbour != side:
-            calm, side = 0, frame - neighbour
-        if calm >= patience:
-            continue
-        here = run.follower.frame(frame, q[neighbour - window.first])
-        q[frame - window.first] = here
-        calm = calm + 1 if np.abs(here - terms.q[frame]).max() <= 1e-4 else 0
-        far += float((pin.difference(model, terms.q[frame], here) ** 2).sum())
-        if far > most:
-            break
-    return _Followed(q, far, middle)

@@ -8,30 +8,26 @@ tracker, and what is left then, such as dips between frames, by the shared repai
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base import checks
 from wholebody.base.arrays import Array
-from wholebody.motion.avoider import MethodResult, Run
+from wholebody.base.fields import Checked
+from wholebody.motion.avoider import CLEARANCE, MethodResult, Run
 from wholebody.motion.faults import DEPTH, depth
 from wholebody.motion.windows import Window
 
 
 @dataclass(frozen=True)
-class PerFrame:
+class PerFrame(Checked):
     """Every frame by tracking, forward and backward, with a least distance of every pair, metres."""
 
     name: ClassVar[str] = "frames"
     dynamics: ClassVar[None] = None
 
-    clearance: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Check the settings."""
-        checks.settle(self, "clearance", checks.number(self.clearance, "PerFrame: clearance", 0.0, 0.5, "m"))
+    clearance: Annotated[float, CLEARANCE] = 0.0
 
     def avoid(self, run: Run) -> MethodResult:
         """Free a clip; see `wholebody.motion.avoider.Avoider`."""

@@ -27,14 +27,14 @@ from wholebody.motion.roles import Roles
 from wholebody.motion.structure import upright
 from wholebody.scene.workspace import Workspace
 
-FIRST, FREE, PASS, SWEEP = 60, 2, 3, 2  # most steps of a first frame, a free one, one of the first pass, one of a sweep
+FIRST, FREE, PASS, SWEEP = 60, 2, 3, 1  # most steps of a first frame, a free one, one of the first pass, one of a sweep
 EVERY, WORTH = 10, 0.8  # frames after which a free posture is sought anew, and the share of the cost that it is for
 STARTS = 4  # how often the first frame is solved, each time from where soles came down beside each other
-SWEEPS = 2  # more: less jerk, and half as fast at five
+SWEEPS = 6  # more: less jerk, and slower by a tenth each
 ANCHOR = 0.3  # weight of the place of the hips; 1 is that of a bone
 STAY = 0.03  # m/rad from the neutral posture, for what no goal determines
 CHANGE = 0.3  # weight of a change of the deviation in the first pass, in metres that limbs move
-BEND = 0.1  # s, weight of an acceleration of the deviation in sweeps, over the time step
+BEND = 0.5  # s, weight of an acceleration of the deviation in sweeps, over the time step
 GOES_ON, RETURN = 0.9, 0.3  # share of the last change that goes on; s in which a deviation that nothing needs goes back
 CALM, SPREAD = 0.02, 0.06  # s over which the free fit and the deviation of the first pass are smoothed
 LEAST_LEVER = 0.1  # m
@@ -199,7 +199,7 @@ class Run:
         goals = self._goals(frame, reference, BEND / self.dt * self.levers, held)
         before = found[frame - 1] if frame else None
         q = self._reached(before, reference)
-        for number in range(4 * SWEEP):  # more than the usual where cones, or contacts, are curved
+        for number in range(8 * SWEEP):  # more than the usual where cones, or contacts, are curved
             if number >= SWEEP and not (self.fitter.outside(q) or self.fitter.overlaps(q)):
                 break
             q = self.fitter.step(q, goals, most=self._room(q, before))

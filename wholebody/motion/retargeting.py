@@ -69,11 +69,12 @@ def retarget(
     roles = matched(motion, figure, names)
     if roles.told:
         told = ", ".join(f"{role} is {roles.joints[role]!r}" for role in roles.told)
-        warn(f"retarget: {motion.name}: by the structure of the skeleton {told}; name joints with names={{...}} if not")
+        mend = "name them by names= (or --names FILE.toml) if not"
+        warn(f"retarget: {motion.name}: by the structure of the skeleton {told}; {mend}")
     if roles.missing:
         warn(
             f"retarget: no joint of {motion.name} is known for {', '.join(roles.missing)}, so these follow nothing; "
-            'name them with names={"skeleton": {"left_wrist": "hand.L"}}'
+            'name them by names= (or --names FILE.toml): a table "skeleton" with left_wrist = "hand.L"'
         )
     found = _ground(motion, figure, ground, names)
     wanted = targets(motion, figure, roles, found, path=None if scene is None else 1.0)
@@ -95,7 +96,7 @@ def retarget(
             figure, Run(figure, wanted, roles, motion.dt, holds, workspace).run(progress), motion.dt, motion.name
         )
     if told := said_of(errors_of(motion, clip, roles)):
-        warn(f"retarget: {motion.name}: {told}; see wb.motion.bone_errors(motion, clip)")
+        warn(f"retarget: {motion.name}: {told}; bone_errors has them frame by frame")
     return clip
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, brief
 from wholebody.base.checks import array as checked_array
 from wholebody.base.checks import instance, listed, settle, text, time_step, whole
 from wholebody.base.errors import InputError
@@ -41,6 +41,8 @@ class SkeletonMotion:
     Raises:
         InputError: shapes do not fit, there is not one root, or a value is not finite.
     """
+
+    __repr__ = brief
 
     names: tuple[str, ...]
     parents: Indices

@@ -6,19 +6,25 @@ The measurements are Stobbe's (1982); the table is `figures/data/strength.csv`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array
+from wholebody.base.fields import Checked, Range
 from wholebody.figures.figure import Figure
 from wholebody.figures.tables import table
 
 PERCENTILES = (5.0, 50.0, 95.0)
 
 
+def _sex(value: Any, _: str) -> str:
+    return checks.known(value, ("male", "female"), "sex", "Strength")
+
+
 @dataclass(frozen=True)
-class Strength:
+class Strength(Checked):
     """Strength of a person, from measurements of static strength.
 
     Joints without a published value (clavicles, neck, wrists, toes, rotation of the hip, ...) have no limit. Strength
@@ -33,15 +39,8 @@ class Strength:
         UnknownNameError: another sex.
     """
 
-    percentile: float = 50.0
-    sex: str = "male"
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        checks.settle(
-            self, "percentile", checks.number(self.percentile, "Strength: percentile", PERCENTILES[0], PERCENTILES[-1])
-        )
-        checks.known(self.sex, ("male", "female"), "sex", "Strength")
+    percentile: Annotated[float, Range(PERCENTILES[0], PERCENTILES[-1])] = 50.0
+    sex: Annotated[str, _sex] = "male"
 
     def limits(self, figure: Figure) -> tuple[Array, Array]:
         """Least and largest torques (nv,) of a figure's joints, N m; infinite where none is published, as of a root."""

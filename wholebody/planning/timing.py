@@ -8,7 +8,7 @@ pass accelerates as much as these let it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -17,6 +17,7 @@ from scipy.interpolate import make_interp_spline
 from wholebody.assessment.motion import velocities
 from wholebody.base import checks
 from wholebody.base.arrays import Array
+from wholebody.base.fields import Checked, Range
 from wholebody.figures.figure import Figure
 from wholebody.planning.smoothing import places
 
@@ -26,7 +27,7 @@ USUAL_SPEED = 2.0  # rad/s, m/s: of joints without a limit of their own
 
 
 @dataclass(frozen=True)
-class Pace:
+class Pace(Checked):
     """How fast a planned motion may be.
 
     Attributes:
@@ -39,18 +40,9 @@ class Pace:
         InputError: a value out of range.
     """
 
-    velocity: float | None = None
-    acceleration: float = 10.0
-    dt: float = 1.0 / 60.0
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        if self.velocity is not None:
-            checks.settle(self, "velocity", checks.number(self.velocity, "Pace: velocity", 1e-3, 1e3, "rad/s"))
-        checks.settle(
-            self, "acceleration", checks.number(self.acceleration, "Pace: acceleration", 1e-3, 1e5, "rad/s^2")
-        )
-        checks.settle(self, "dt", checks.time_step(self.dt, "Pace: dt"))
+    velocity: Annotated[float, Range(1e-3, 1e3, "rad/s")] | None = None
+    acceleration: Annotated[float, Range(1e-3, 1e5, "rad/s^2")] = 10.0
+    dt: Annotated[float, checks.time_step] = 1.0 / 60.0
 
     def fastest(self, figure: Figure) -> Array:
         """(nv,) largest velocities; a limit of the figure of 0 counts as none."""

@@ -16,8 +16,7 @@ from wholebody.base.files import check_file
 from wholebody.figures.link_pieces import Concavity
 from wholebody.figures.mjcf.compiled import Compiled, is_mjcf, placement
 from wholebody.figures.mjcf.figure import mjcf_figure
-from wholebody.figures.mjcf.height_fields import height_field
-from wholebody.figures.mjcf.shapes import SHAPES
+from wholebody.figures.mjcf.geoms import SHAPES, height_field
 from wholebody.geometry.shapes import Box, Capsule, Compound, Cylinder, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
 from wholebody.scene.matter.body import Body
 from wholebody.scene.scene import Scene

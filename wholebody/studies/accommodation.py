@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +14,9 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.ergonomics.vision import sight
+from wholebody.figures.adjustable import ADJUSTABLE
 from wholebody.methods.base import Method
+from wholebody.methods.qp.method import QP
 from wholebody.studies.many import SolveProgress
 from wholebody.studies.populations import people as sampled
 from wholebody.studies.records import CANCELLED, ENDED, REFUSED, Records
@@ -22,6 +24,7 @@ from wholebody.studies.study import TaskFunction, Variant, loaded_person, study
 from wholebody.studies.study_files import TaskFile
 from wholebody.tasks import inputs
 
+BUDGET = 100  # programs of restarts for one person: who is left out takes 1 s in place of 3 s
 REACHED = 1e-3  # m, rad: by which a goal may be missed by somebody who reaches it
 
 
@@ -82,6 +85,8 @@ class Accommodation:
         reaches: whether each person meets the goals.
         fits: whether each person does so without overlap and with all constraints.
         sees: whether each person sees the point; None where none was given.
+        settings: joint of what is adjustable, such as "seat/slide", to its setting for each person, metres or radians;
+            NaN for who was refused. Empty where nobody is joined with an adjustable figure.
 
     Who was refused has no posture, and is neither in shares nor in exclusions; see `tried`.
     """
@@ -92,6 +97,7 @@ class Accommodation:
     reaches: tuple[bool, ...]
     fits: tuple[bool, ...]
     sees: tuple[bool, ...] | None
+    settings: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     @property
     def tried(self) -> tuple[bool, ...]:
@@ -162,6 +168,13 @@ class Accommodation:
             f"Accommodation of {sum(self.tried)} people{told}: {self.share:.0%}" + (f"; {shares}" if shares else "")
         ]
         lines += [f"  {words}{self.records.remarks()}", *(f"  {one}" for one in self.exclusions)]
+        for name, values in self.settings.items():
+            good = [value for value, held in zip(values, self.accommodated, strict=True) if held]
+            if good:
+                low, middle, high = np.percentile(good, (5, 50, 95))
+                lines.append(
+                    f"  {name} {low:.3f} to {high:.3f}, median {middle:.3f} (5th to 95th percentile of people)"
+                )
         return "\n".join(lines)
 
 
@@ -192,7 +205,8 @@ def accommodation(
         task: a task file, or a function, see `study`; its target and layout are None.
         people: by name, as `wb.people` and `wb.boundary` make them; `wb.people(100)` if left out.
         sees: (3,) a point that has to be seen without turning the head, metres; None for none.
-        method: name or settings, see `study`.
+        method: name or settings, see `study`; if left out with a function, "qp" with a smaller budget, as neighbours'
+            answers are starts.
         jobs: people at a time.
         folder: keeps the records, see `solve_many`.
         progress: see `study`.
@@ -211,6 +225,8 @@ def accommodation(
     who = {name: loaded_person(one) for name, one in given.items()}
     order = sorted(who, key=lambda name: ("", 0.0) if (one := who[name]) is None else (one.sex, one.stature))
     population = {name: given[name] for name in order}
+    if method is None and callable(task):
+        method = QP(budget=BUDGET)
     records = study(
         task, people=population, method=method, jobs=jobs, warm_start=True, folder=folder, progress=progress
     )
@@ -224,9 +240,9 @@ def accommodation(
         for one in records
     )
     seen = None
+    make = TaskFile(checks.path(task, "task")) if isinstance(task, (str, os.PathLike)) else task
+    variants = [Variant(make, person, None, None) for person in population.values()]
     if point is not None:
-        make = TaskFile(checks.path(task, "task")) if isinstance(task, (str, os.PathLike)) else task
-        variants = [Variant(make, person, None, None) for person in population.values()]
         seen = tuple(  # a problem that failed is not made again
             one.q is not None and _sees(variant, one.q, point) for variant, one in zip(variants, records, strict=True)
         )
@@ -235,7 +251,24 @@ def accommodation(
         {} if one is None else {"stature": one.stature, "mass": one.mass, **dict(one.dimensions), **one.built[1]}
         for one in persons
     )
-    return Accommodation(records, tuple("" if one is None else one.sex for one in persons), sizes, reaches, fits, seen)
+    sexes = tuple("" if one is None else one.sex for one in persons)
+    return Accommodation(records, sexes, sizes, reaches, fits, seen, _settings(variants, records))
+
+
+def _settings(variants: Sequence[Variant], records: Records) -> dict[str, tuple[float, ...]]:
+    """Settings of adjustable figures by joint, for each person."""
+    found: dict[str, list[float]] = {}
+    for k, (variant, one) in enumerate(zip(variants, records, strict=True)):
+        if one.q is None:
+            continue
+        figure = variant().scene.figure
+        movable = [f"{name}/" for name, member in figure.members.items() if member.figure.name == ADJUSTABLE]
+        if not movable:
+            break  # nor is there one for others
+        for joint, value in figure.joint_values(one.q).items():
+            if joint.startswith(tuple(movable)):
+                found.setdefault(joint, [math.nan] * len(records))[k] = value
+    return {joint: tuple(values) for joint, values in found.items()}
 
 
 def _sees(variant: Variant, q: Array, point: Array) -> bool:

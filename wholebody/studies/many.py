@@ -10,19 +10,17 @@ from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array
-from wholebody.base.batches import run_batch, shared
-from wholebody.base.errors import InputError, WholebodyError, one_line
+from wholebody.base.batches import fingerprint, run_batch, shared
 from wholebody.base.runner import EndedError, Job
 from wholebody.methods.base import Method
 from wholebody.methods.inputs import check_problem
 from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
-from wholebody.studies.records import ENDED, REFUSED, Records, RecordStore, SolveRecord, answer_of
-from wholebody.studies.sending import Sender, Sent
-from wholebody.studies.starting import begun_at, warmed
+from wholebody.studies.at_once import at_once
+from wholebody.studies.records import ENDED, Records, RecordStore, SolveRecord
+from wholebody.studies.sending import Sender, sent_to
+from wholebody.studies.solving import Make, Run, Start, solve_from, solve_runs
 from wholebody.tasks.answers import is_own
-from wholebody.version import __version__
 
 MOST_JOBS = 4096
 LONGEST = 1e7  # s: a greater deadline of a solve is a mistake
@@ -30,15 +28,7 @@ RUN = 16  # problems that warm-start one from the other: longer = fewer cold sta
 
 NEIGHBOURS = 4  # answers of others that are tried for one problem: more find more, and cost where there is no answer
 
-Make = Callable[[], Problem]
-
 T = TypeVar("T")
-
-_Start = tuple[Make, Any]
-"""A problem, and the posture (nq,) from which it is solved."""
-
-_Run = tuple[Any, Sequence[Make]]
-"""The posture (nq,) from which the first of some problems is tried, None for its own start; and the problems."""
 
 
 class SolveProgress(NamedTuple):
@@ -187,6 +177,10 @@ def run_cases(runs: Sequence[Sequence[Case]], running: Running, store: RecordSto
         return tell is not None and tell(SolveProgress(len(done), len(order), record)) is True
 
     over = tell is not None and tell(SolveProgress(len(done), len(order), None)) is True
+    if not over:
+        single = [run[0] for run in numbered if len(run) == 1 and run[0] not in done]
+        with closing(_at_once(single, order, running)) as answers:
+            over = any(keep(k, replace(order[k].record, **answer)) for k, answer in answers)
     waiting = [run for run in numbered if any(k not in done for k in run)]
     # The first of each run begin at each other's answers, one after the other, and the rest of a run at its first: so
     # all runs are of one family of postures, whatever `jobs` is.
@@ -200,6 +194,16 @@ def run_cases(runs: Sequence[Sequence[Case]], running: Running, store: RecordSto
     if not over and waiting:
         _from_neighbours(order, done, running, keep)
     return Records([done.get(k, order[k].record) for k in range(len(order))])
+
+
+def _at_once(
+    numbers: Sequence[int], order: Sequence[Case], running: Running
+) -> Generator[tuple[int, dict[str, Any]], None, None]:
+    """Cases with what their records say, of those that the method answers many of at a time."""
+    if not (hasattr(running.method, "batches") and _is_quick([order[k] for k in numbers], running)):
+        return
+    for place, answer in at_once([order[k].make() for k in numbers], running.method, running.jobs):
+        yield numbers[place], answer
 
 
 def _from_neighbours(
@@ -228,13 +232,13 @@ def _from_neighbours(
             return
 
 
-def _started(given: Mapping[int, _Start], running: Running, k: int) -> dict[str, Any] | None:
-    return _solve_from([given[k]], running.method)[0]
+def _started(given: Mapping[int, Start], running: Running, k: int) -> dict[str, Any] | None:
+    return solve_from([given[k]], running.method)[0]
 
 
-def _starting(given: Mapping[int, _Start], running: Running, sender: Sender, cases: list[int], full: bool) -> Job:
+def _starting(given: Mapping[int, Start], running: Running, sender: Sender, cases: list[int], full: bool) -> Job:
     sent = sender.sent([given[k] for k in cases], full)
-    return Job(cases, _sent_to, (_solve_from, sent, running.method), running.seconds or 0.0)
+    return Job(cases, sent_to, (solve_from, sent, running.method), running.seconds or 0.0)
 
 
 def _nearest(
@@ -264,15 +268,15 @@ def _run(
     """
     sender = Sender()
 
-    def made(run: Sequence[int]) -> _Run:
+    def made(run: Sequence[int]) -> Run:
         return begun.get(run[0]), [order[k].make for k in run]
 
     def here(run: Sequence[int]) -> Any:
-        return _solve_runs([made(run)], running.method)[0]
+        return solve_runs([made(run)], running.method)[0]
 
     def there(runs: list[Sequence[int]], full: bool) -> Job:
         given = sender.sent([made(run) for run in runs], full)
-        return Job(runs, _sent_to, (_solve_runs, given, running.method), (running.seconds or 0.0) * len(runs[0]))
+        return Job(runs, sent_to, (solve_runs, given, running.method), (running.seconds or 0.0) * len(runs[0]))
 
     with closing(_done(work, [order[k] for run in work for k in run], running, (here, there))) as outcomes:
         for run, answers, error in outcomes:
@@ -299,8 +303,7 @@ def _done(
         ways: how a part is done here, and the job that does parts elsewhere; see `shared`.
     """
     here, there = ways
-    quick = running.seconds is None and running.cluster is None
-    if quick and all(isinstance(case.make, _Given) and not case.make.is_own for case in cases):
+    if _is_quick(cases, running):
         yield from shared(work, running.jobs, here, there)
         return
     outcomes = run_batch((there([part], True) for part in work), running.jobs, running.cluster)
@@ -309,70 +312,10 @@ def _done(
             yield job.name[0], None if answer is None else answer[0], error
 
 
-def _sent_to(function: Callable[[Any, Method], Any], given: Sent, method: Method) -> Any:
-    """What a function answers to a value that was sent; None where this process has not seen a scene of it."""
-    try:
-        value = given.read()
-    except KeyError:
-        return None
-    return function(value, method)
-
-
-def _solve_runs(runs: Sequence[_Run], method: Method) -> list[list[dict[str, Any]]]:
-    """Solve the problems of runs: what their records say."""
-    answers: list[list[dict[str, Any]]] = []
-    for q, run in runs:
-        answers.append([])
-        for make in run:
-            answers[-1].append(_solved(make, method, q))
-            q = answers[-1][-1]["q"] if answers[-1][-1]["outcome"] == "solved" else None
-    return answers
-
-
-def _solved(make: Make, method: Method, q: Array | None) -> dict[str, Any]:
-    try:
-        problem = check_problem(make(), "the task's answer")
-        if q is not None and q.shape == problem.start.shape:
-            warm = _warm_answer(problem, method, q)
-            if warm is not None:
-                return warm
-        return answer_of(method.solve(problem))
-    except WholebodyError as error:
-        told = str(error)
-    except Exception as error:  # of a term or a task of the user's own
-        told = one_line(f"{type(error).__name__}: {error}")
-    return {"outcome": REFUSED, "message": told, "q": None}
-
-
-def _warm_answer(problem: Problem, method: Method, q: Array) -> dict[str, Any] | None:
-    """What a record says of a problem solved from another's answer (nq,); None where it is not solved, or refused.
-
-    A start may be refused that is another's answer where the problem's own is not: a hold elsewhere at the start.
-    """
-    try:
-        solution = method.solve(begun_at(problem, q))
-    except WholebodyError:
-        return None
-    return answer_of(solution) if solution.solved else None
-
-
-def _solve_from(given: Sequence[_Start], method: Method) -> list[dict[str, Any] | None]:
-    """Solve problems from others' answers (nq,): what their records say; None for one that is not solved."""
-    return [_warm_answer(check_problem(make(), "the task's answer"), warmed(method), q) for make, q in given]
-
-
-def fingerprint(*asked: Any) -> str:
-    """Fingerprint of a request.
-
-    Raises:
-        InputError: it cannot be sent to another process.
-    """
-    import joblib
-
-    try:
-        return str(joblib.hash((*asked, __version__)))
-    except Exception as error:  # whatever an object of the user's own raises
-        raise InputError(f"what is given cannot be sent to another process ({one_line(str(error))})") from None
+def _is_quick(cases: Iterable[Case], running: Running) -> bool:
+    """Whether nobody else's code can end or hold up the process that solves these."""
+    quick = running.seconds is None and running.cluster is None
+    return quick and all(isinstance(case.make, _Given) and not case.make.is_own for case in cases)
 
 
 @dataclass(frozen=True)

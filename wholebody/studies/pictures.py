@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import html
-import io
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from wholebody.base.arrays import Array
+from wholebody.base.charts import new_chart, png
 from wholebody.base.errors import InputError
 from wholebody.base.files import write
 
@@ -37,8 +37,8 @@ slider.addEventListener("input",show);show();
 """
 
 
-def draw_slices(found: Any, path: Path) -> Path:
-    """Draw the heights of a reach map beside each other, seen from above; returns the path."""
+def slices_chart(found: Any) -> Any:
+    """Draw the heights of a reach map beside each other, seen from above."""
     # heights in one picture; of more, some are left out evenly
     shown = np.unique(np.linspace(0, len(found.z) - 1, min(len(found.z), 24)).round().astype(int)).tolist()
     rows = -(-len(shown) // 6)  # columns
@@ -56,7 +56,7 @@ def draw_slices(found: Any, path: Path) -> Path:
     bar.set_label(MEANING, fontsize="x-small")
     bar.ax.tick_params(labelsize="x-small")
     chart.suptitle(f"{found.frame}: {found.share:.0%} of {found.verdict.size} places reached, seen from above")
-    return write(path, png(chart))
+    return chart
 
 
 def write_page(found: Any, path: Path) -> Path:
@@ -117,23 +117,6 @@ def _slice(axis: Any, found: Any, values: Array, k: int) -> Any:
     return image
 
 
-def new_chart(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, Any]:
-    """A chart and its axes; without pyplot, which keeps state of its own."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    chart = Figure(figsize=size, dpi=120, layout="constrained")
-    FigureCanvasAgg(chart)
-    return chart, chart.subplots(rows, columns, squeeze=False)
-
-
-def png(chart: Any) -> bytes:
-    """A chart as the bytes of a PNG file, the same for the same chart."""
-    stream = io.BytesIO()
-    chart.canvas.print_png(stream, metadata={"Software": None})  # `savefig` would draw twice, for the layout
-    return stream.getvalue()
-
-
 MOST = 100  # rows or columns; letters of more are too small to read
 WIDTH, HEIGHT = 0.9, 0.3  # inches of a cell
 
@@ -151,8 +134,8 @@ COLORS: Mapping[str, str] = MappingProxyType(
 """Of outcomes, by Okabe and Ito (2008), whose colours are also told apart by people who are colour-blind."""
 
 
-def draw_outcomes(records: Sequence[Any], path: Path) -> Path:
-    """Draw the outcomes of records as a table into a PNG file: targets are columns; returns the path."""
+def outcomes_chart(records: Sequence[Any]) -> Any:
+    """Draw the outcomes of records as a table: targets are columns."""
     from matplotlib.patches import Patch
 
     if unknown := {one.outcome for one in records} - COLORS.keys():
@@ -188,4 +171,4 @@ def draw_outcomes(records: Sequence[Any], path: Path) -> Path:
     seen = {one.outcome for one in records}
     patches = [Patch(facecolor=color, label=outcome) for outcome, color in COLORS.items() if outcome in seen]
     chart.legend(handles=patches, loc="outside right upper", fontsize="x-small", frameon=False)
-    return write(path, png(chart))
+    return chart

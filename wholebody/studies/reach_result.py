@@ -6,10 +6,12 @@ import io
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from wholebody.base.arrays import Array, Mask
+from wholebody.base.charts import Shown, png
 from wholebody.base.files import checked_target, write
 from wholebody.problem import Problem
 
@@ -18,7 +20,7 @@ VERDICTS = ("not tried", "reached", "missed", "excluded", "beyond", "inside")  #
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ReachMap:
+class ReachMap(Shown):
     """Which places of a grid a point of a frame reaches.
 
     Attributes:
@@ -120,11 +122,15 @@ class ReachMap:
             lines += [f"{value:.9g}" for value in values.flatten(order="F").tolist()]
         return write(file, "\n".join(lines) + "\n")
 
-    def picture(self, path: str | os.PathLike[str]) -> Path:
-        """Draw heat maps of all heights into a PNG file; returns the path."""
-        from wholebody.studies.pictures import draw_slices
+    def plot(self) -> Any:
+        """Draw heat maps of all heights, a matplotlib figure."""
+        from wholebody.studies.pictures import slices_chart
 
-        return draw_slices(self, checked_target(path, "picture: path", "a picture", (".png",)))
+        return slices_chart(self)
+
+    def picture(self, path: str | os.PathLike[str]) -> Path:
+        """Write `plot` into a PNG file; returns the path."""
+        return write(checked_target(path, "picture: path", "a picture", (".png",)), png(self.plot()))
 
     def html(self, path: str | os.PathLike[str]) -> Path:
         """Write a page with a slider over the heights, for any browser, without a network; returns the path."""

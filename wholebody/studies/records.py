@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
+from wholebody.base.charts import Shown, png
 from wholebody.base.errors import FileFormatError, InputError, MissingPackageError
 from wholebody.base.files import checked_target, make_folder, write
 from wholebody.solution import Solution
@@ -47,6 +48,8 @@ class SolveRecord:
         factors: what the case is made of, such as {"person": "F5", "target": "shelf"}.
         neighbour: name of the case whose answer was the start that led to the posture; "" where it was its own start.
     """
+
+    __repr__ = brief
 
     name: str
     outcome: str = CANCELLED
@@ -100,7 +103,7 @@ def answer_of(solution: Solution) -> dict[str, Any]:
     }
 
 
-class Records(Sequence[SolveRecord]):
+class Records(Shown, Sequence[SolveRecord]):
     """The records of many solves, in the order in which they were asked.
 
     Raises:
@@ -166,8 +169,8 @@ class Records(Sequence[SolveRecord]):
             return self.rows()
         return pandas.DataFrame(self.rows())
 
-    def chart(self, path: str | os.PathLike[str]) -> Path:
-        """Draw the outcomes as a table into a PNG file; returns the path.
+    def plot(self) -> Any:
+        """Draw the outcomes as a table, a matplotlib figure.
 
         Targets are columns, people and layouts are rows; without factors each record is a row. A cell has the colour of
         its outcome, and where it is not solved the distance that is left, in millimetres.
@@ -176,9 +179,13 @@ class Records(Sequence[SolveRecord]):
             InputError: there are no records, more than 100 rows or columns, two records of one name and factors, or an
                 outcome that no solve has.
         """
-        from wholebody.studies.pictures import draw_outcomes
+        from wholebody.studies.pictures import outcomes_chart
 
-        return draw_outcomes(self._records, checked_target(path, "chart: path", "a chart", (".png",)))
+        return outcomes_chart(self._records)
+
+    def chart(self, path: str | os.PathLike[str]) -> Path:
+        """Write `plot` into a PNG file, and raise the same; returns the path."""
+        return write(checked_target(path, "chart: path", "a chart", (".png",)), png(self.plot()))
 
     def to_csv(self, path: str | os.PathLike[str]) -> Path:
         """Write the rows as CSV; returns the path."""

@@ -6,6 +6,7 @@ import hashlib
 import io
 import pickle
 from collections import OrderedDict
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from wholebody.base.runner import packed
@@ -61,6 +62,15 @@ class Sender:
         pickler.persistent_id = leave_out
         pickler.dump(value)
         return Sent(into.getvalue(), scenes)
+
+
+def sent_to(function: Callable[..., Any], given: Sent, *others: Any) -> Any:
+    """What a function answers to a value that was sent; None where this process has not seen a scene of it."""
+    try:
+        value = given.read()
+    except KeyError:
+        return None
+    return function(value, *others)
 
 
 _SEEN: OrderedDict[str, Scene] = OrderedDict()

@@ -24,5 +24,6 @@ def begun_at(problem: Problem, q: Array) -> Problem:
 
 
 def warmed(method: Any) -> Any:
-    """Return the method without starts of its own, where it has such: those of the first solve led to nothing."""
-    return replace(method, restarts=0) if hasattr(method, "restarts") and is_dataclass(type(method)) else method
+    """Return the method without starts of its own and the search that goes with them, where it has such."""
+    held = {name: value for name, value in (("restarts", 0), ("budget", 0)) if hasattr(method, name)}
+    return replace(method, **held) if held and is_dataclass(type(method)) else method

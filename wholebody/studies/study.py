@@ -12,6 +12,7 @@ from math import prod
 from typing import Any
 
 from wholebody.base import checks
+from wholebody.base.batches import fingerprint
 from wholebody.base.errors import InputError
 from wholebody.base.files import read_bytes
 from wholebody.base.runner import packed
@@ -19,7 +20,7 @@ from wholebody.figures import Figure, load
 from wholebody.figures.anthropometry import Person, design_cases, make_person
 from wholebody.methods.base import Method
 from wholebody.problem import Problem
-from wholebody.studies.many import RUN, Case, Running, SolveProgress, fingerprint, run_cases, runs_of
+from wholebody.studies.many import RUN, Case, Running, SolveProgress, run_cases, runs_of
 from wholebody.studies.records import Records, RecordStore, SolveRecord
 from wholebody.studies.study_files import SIZE, TaskFile
 

@@ -17,6 +17,7 @@ from wholebody.base.errors import UnknownNameError
 from wholebody.base.files import is_file, is_folder, title_of
 from wholebody.base.records import with_values
 from wholebody.figures import Figure, join, load
+from wholebody.figures.joined import member
 from wholebody.geometry.placement import placement
 from wholebody.geometry.shapes import Mesh, Shape
 from wholebody.methods.base import Method
@@ -114,8 +115,9 @@ def _figure(contents: Contents) -> Figure:
         if called is None or called in found:
             raise entry.where.fault('write called = "anna", another name for each figure: its parts begin with it')
         found[called] = _loaded(entry), entry.values.get("at", (0.0, 0.0, 0.0))
-    with entries[0].where.named():
-        return join(found)
+        with entry.where.named():
+            member(called, found[called])
+    return join(found)
 
 
 def _loaded(entry: Entry) -> Figure:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass
+from typing import NamedTuple
 
 import coal
 import numpy as np
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Indices
 from wholebody.base.checks import shown
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
@@ -30,11 +31,16 @@ class Sit(ContactTerm):
     With a back, the trunk touches it, the pelvis is near it, and the figure looks away from it. Use it as a goal or as
     a constraint. Hold the feet, or add `Stand(on=..., balance=False)`.
 
+    Erect is as people are measured: hips, spine and neck are as in the figure's posture "sitting", and the pelvis is
+    square to the seat, so that thighs are level on a level one. What has to be free above the thighs or before the
+    knees is then what dimensions of sitting people say; who may slouch or tilt the thighs fits where less is free.
+
     Attributes:
         on: the seat: a thing, or a piece of one such as "chair:2".
         back: what the back is at; None for a stool.
         pelvis: the segment that sits.
         trunk: the last of the segments above the pelvis that may touch the back.
+        erect: whether hips, spine and neck are held as people are measured.
         weight: factor on the squared error, as a goal [1/m^2 and 1/rad^2].
     """
 
@@ -43,6 +49,7 @@ class Sit(ContactTerm):
     _: KW_ONLY
     pelvis: inputs.Name = "pelvis"
     trunk: inputs.Name = "thorax"
+    erect: bool = False
     weight: inputs.Weight = 1.0
 
     @property
@@ -68,12 +75,13 @@ class Sit(ContactTerm):
         root = inputs.root_of(scene, place)  # in the first posture it looks ahead, wherever that is
         left = rest.frame(place.frame).rotation.T @ rest.data.oMi[root].rotation[:, 1]
         parts: list[Part] = [Gap(bottom, thing, seat), over]
+        behind = [self.pelvis] if self.erect else []  # whoever sits erect has the buttocks at the back, too
         touches = owner_pairs(bottom.owners, thing.owners)
         if self.back is None:
             parts.append(Level(place, left, seat))
         else:
             at_back = surface(scene, self.back, where)
-            upper = joined(scene, self.trunk, _trunk(scene, place, trunk))
+            upper = joined(scene, self.trunk, [*behind, *_trunk(scene, place, trunk)])
             middle = seat.at(state)[0]
             side = face(scene, self.back, _level(middle - _middle(at_back, state, middle, where), where), state, where)
             to_left = _level(np.cross(UP, side.at(state)[1][2]), where)
@@ -82,7 +90,43 @@ class Sit(ContactTerm):
             parts += [Gap(upper, at_back, side), Near(lower, at_back, 0.06, side)]
             parts += [Facing(place, across(left), side, side.at(state)[1] @ to_left)]
             touches += owner_pairs([*upper.owners, *lower.owners], at_back.owners)
+        if self.erect:
+            ahead = rest.frame(place.frame).rotation.T @ rest.data.oMi[root].rotation[:, 0]
+            parts += [Level(place, ahead, seat), self._measured(scene, place, where)]
         return filled(self, parts=tuple(parts), touches=touches)
+
+    def _measured(self, scene: Surroundings, place: inputs.Place, where: str) -> AtAngles:
+        """Hips, spine and neck as in the posture of people who are measured."""
+        figure, body = scene.figure, self.pelvis.removesuffix("pelvis")
+        names = [f"{body}spine", f"{body}neck", *(f"{body}{side}_leg" for side in ("left", "right"))]
+        posture = f"{body}sitting"
+        if (not body and "sitting" not in figure.postures) or not set(names) <= set(figure.groups):
+            raise InputError(f"{where}: erect is for a person; leave it out, and hold joints by wb.Freeze")
+        joints = [one for name in names for one in figure.groups[name] if "_leg" not in name or "hip_" in one]
+        known = [scene.model.joints[figure.joint_id(one)] for one in joints]
+        idx_q, idx_v = (
+            np.array(each, dtype=np.intp) for each in zip(*((k.idx_q, k.idx_v) for k in known), strict=True)
+        )
+        return AtAngles(idx_q, idx_v, figure.posture(posture)[idx_q])
+
+
+class AtAngles(NamedTuple):
+    """Joints at angles: a row for each [rad]."""
+
+    idx_q: Indices  # (k,) of the joints in the posture
+    idx_v: Indices  # (k,) in the tangent vector
+    angles: Array  # (k,)
+
+    @property
+    def in_radians(self) -> tuple[bool, ...]:
+        """All are."""
+        return (True,) * len(self.idx_q)
+
+    def rows(self, state: State) -> tuple[Array, Array]:
+        """How far each is from its angle."""
+        moves = np.zeros((len(self.idx_v), state.model.nv))
+        moves[np.arange(len(self.idx_v)), self.idx_v] = 1.0
+        return state.q[self.idx_q] - self.angles, moves
 
 
 def upright(scene: Surroundings) -> State:

@@ -10,7 +10,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State, Wrench
 from wholebody.scene.scene import Scene
@@ -35,6 +35,8 @@ class DerivativeCheck:
         q: (nq,) the posture.
         agrees: whether all derivatives agree with finite differences.
     """
+
+    __repr__ = brief
 
     term: str
     error: float

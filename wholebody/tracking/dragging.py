@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wholebody.assessment.motion import deepened, jerk
 from wholebody.assessment.posture import assess
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.base.checks import array, function, instance, numbers
 from wholebody.base.errors import InputError
 from wholebody.methods.base import Method
@@ -46,6 +46,8 @@ class Dragged:
         paths: the way to each posture, as in `DragFrame`; empty where it is straight.
     """
 
+    __repr__ = brief
+
     q: Array
     targets: Array
     dt: float
@@ -73,6 +75,8 @@ class DragJudgement:
         limit_violation: largest violation of a joint limit at any posture, radians.
         jerk: (n - 1,) root of the mean square of the third difference of the joint angles over time, rad/s^3.
     """
+
+    __repr__ = brief
 
     error: Array
     depth: Array

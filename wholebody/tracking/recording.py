@@ -10,7 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.assessment.motion import OVERLAPS, assess_motion, cone_violation, frames_passed_through, root_mean_square
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.base.checks import instance
 from wholebody.figures.state import root_freedoms
 from wholebody.scene.scene import Scene
@@ -34,6 +34,8 @@ class Recording:
         paths: the way to each posture, as in `Frame`; empty where it is straight.
         moves: things that moved, with their placements at the ends of the frames.
     """
+
+    __repr__ = brief
 
     q: Array
     tracked: Array
@@ -90,6 +92,8 @@ class Judgement:
             frames until the shown posture was at the tracked one to 1 mrad; -1 if that did not happen before the next
             contact.
     """
+
+    __repr__ = brief
 
     depth: Array
     tracked_depth: Array

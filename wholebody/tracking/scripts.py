@@ -1,25 +1,31 @@
-"""Scripted trackers: smooth motion from posture to posture in given times, with the tremor of a tracked person."""
+"""Scenes with scripted trackers, from files: smooth motion from pose to pose, with the tremor of a tracked person."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import number, whole
+from wholebody.base.checks import known, number, whole
+from wholebody.base.files import parsed_toml
 from wholebody.figures import load
 from wholebody.figures.figure import Figure
+from wholebody.geometry import shapes
 from wholebody.methods.inputs import SEED
+from wholebody.scene.matter.body import BallJoint, Body, Hinge
+from wholebody.scene.scene import Scene
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.tracks import MOST_FRAMES, Track
 
 Place = tuple[float, float, float]
-Keys = list[tuple[float, Array]]
+Thing = Mapping[str, Any]
 
 STILL = ("hip", "knee", "ankle", "toe")
 """Parts of the names of joints without tremor, because the feet stand on the floor."""
@@ -27,28 +33,114 @@ WAVES = 5
 
 
 @dataclass(frozen=True)
-class ScenePlan:
-    """What a scene with a scripted tracker is made of; see `InteractionScene` and, for keys, `script`."""
+class InteractionScene:
+    """A scene with a tracker.
 
+    Attributes:
+        name, about: its name on the command line, and one sentence.
+        scene, track: figure and things, and the tracked postures.
+        rigid: whether the figure is displaced as a whole, such as a hand.
+        eye, target: position of the camera, and the point in the middle of the picture, metres; None for a camera that
+            sees the figure.
+        see_through: things to draw transparent.
+    """
+
+    name: str
     about: str
-    figure: str
-    keys: Callable[[Figure], Keys]
-    eye: Place
-    target: Place
+    scene: Scene
+    track: Track
+    rigid: bool = False
+    eye: Place | None = None
+    target: Place | None = None
     see_through: tuple[str, ...] = ()
 
-    def played(self, name: str, *, frames: int | None, seed: int, dt: float) -> tuple[Figure, Track]:
-        """The figure, and the script as its track; cut or repeated to a number of frames, unless that is None.
 
-        Raises InputError for fewer than one frame, or a seed or a time step out of range.
+class SceneFile:
+    """Scenes with scripted trackers, of a TOML file such as `tracking/scenes.toml`, which says what its tables mean.
+
+    Attributes:
+        scenes: descriptions of the scenes, by name.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Read the file."""
+        self._data = parsed_toml(path.read_text("utf-8"), path.name)
+        self.scenes: Mapping[str, str] = {name: plan["about"] for name, plan in self._data["scenes"].items()}
+
+    def build(self, name: str, *, frames: int | None = None, seed: int = 0, dt: float = FRAME) -> InteractionScene:
+        """Build a scene.
+
+        Args:
+            name: of the scene.
+            frames: number of frames; the script is cut, or repeated. By default the whole script once.
+            seed: of the tracked person's tremor.
+            dt: seconds from frame to frame.
+
+        Raises:
+            UnknownNameError: there is no such scene.
+            InputError: fewer than one frame, or a seed or a time step out of range.
         """
+        known(name, self.scenes, "scene")
         if frames is not None:
             frames = whole(frames, "frames", 1, MOST_FRAMES)
         SEED(seed, "seed")
         dt = number(dt, "dt", 1e-3, 1.0, "s")  # s: least and greatest from frame to frame
-        figure = load(self.figure)
-        track = script(figure, self.keys(figure), dt=dt, seed=seed, name=name)
-        return figure, track if frames is None else track.repeated(frames)
+        plan = self._data["scenes"][name]
+        figure = load(plan["figure"])
+        keys = plan["keys"] if "keys" in plan else self._data["scripts"][plan["script"]]
+        pose = _hand_at if plan["figure"] == "hand" else self._standing_at
+        track = script(figure, [(key[0], pose(figure, *key[1:])) for key in keys], dt=dt, seed=seed, name=name)
+        scene = self.furnish(Scene(figure), plan.get("room"))
+        self._put(scene, plan.get("things", ()))
+        eye, target = (tuple(plan[key]) for key in ("eye", "target"))
+        return InteractionScene(
+            name, plan["about"], scene, track if frames is None else track.repeated(frames), plan["figure"] == "hand",
+            eye, target, tuple(plan.get("see_through", ())),
+        )  # fmt: skip
+
+    def furnish(self, scene: Scene, room: str | None) -> Scene:
+        """The scene, to which a floor and the things of a room are added."""
+        scene.add(shapes.HalfSpace(), name="floor")
+        self._put(scene, self._data["rooms"][room] if room else ())
+        return scene
+
+    def _put(self, scene: Scene, things: Sequence[Thing]) -> None:
+        for thing in things:
+            given = dict(thing)
+            name, at, count, by = (given.pop(key, other) for key, other in
+                                   (("name", ""), ("at", ()), ("count", 0), ("by", 0.0)))  # fmt: skip
+            color = self._data["colors"].get(given.pop("color", ""))
+            joints = [kind(**given.pop(key)) for key, kind in (("hinge", Hinge), ("ball", BallJoint)) if key in given]
+            moving = {key: given.pop(key) for key in ("density", "mass", "velocity") if key in given}
+            shape = getattr(shapes, given.pop("shape"))(**given)
+            for place in range(max(count, 1)):
+                scene.add(
+                    shape, name=f"{name} {place + 1}" if count else name, at=(at[0] + by * place, *at[1:]),
+                    color=color, body=Body(joints=joints, **moving) if moving else None,
+                )  # fmt: skip
+
+    def _standing_at(self, figure: Figure, pose: str, at: Sequence[float], turn: float = 0.0) -> Array:
+        """The figure as it stands, at (x, y) and turned by degrees about z, in a pose; without a side both sides."""
+        values = {}
+        for name, angle in self._data["poses"][pose].items():
+            for joint in (name, f"left_{name}", f"right_{name}"):
+                if joint in figure.joints:
+                    values[joint] = math.radians(angle)
+        q, half = figure.with_joints(figure.posture("standing"), values), 0.5 * math.radians(turn)
+        q[:2], q[3:7] = at, (0.0, 0.0, math.sin(half), math.cos(half))
+        return figure.clamp(q)
+
+
+def _hand_at(figure: Figure, glove: str, at: Sequence[float], turn: float = 0.0, curl: float = 0.0) -> Array:
+    """The hand in a posture, its wrist at a place, turned by degrees about z, the index bent by radians."""
+    q = figure.posture(glove)
+    q[:3] = at
+    if turn:
+        turned = pin.utils.rotate("z", math.radians(turn)) @ pin.Quaternion(q[3:7]).toRotationMatrix()
+        q[3:7] = pin.Quaternion(turned).coeffs()
+    bent = {name: value + curl for name, value in figure.joint_values(q).items()
+            if "index" in name and "flexion" in name}  # fmt: skip
+    return figure.clamp(figure.with_joints(q, bent))
 
 
 def script(
@@ -72,21 +164,6 @@ def script(
         for s in np.arange(1, count + 1) / count:
             frames.append(np.asarray(pin.interpolate(figure.model, before, after, smooth(float(s)))))
     return Track.of(figure, _trembling(figure, np.array(frames), dt, np.random.default_rng(seed)), dt, name)
-
-
-def standing_at(figure: Figure, x: float, y: float, yaw: float, degrees: Mapping[str, float]) -> Array:
-    """The figure as it stands, at (x, y) and turned by yaw, some joints at other angles.
-
-    A name of a joint without a side means both sides.
-    """
-    values = {}
-    for name, angle in degrees.items():
-        for joint in (name, f"left_{name}", f"right_{name}"):
-            if joint in figure.joints:
-                values[joint] = math.radians(angle)
-    q = figure.with_joints(figure.posture("standing"), values)
-    q[0], q[1], q[3:7] = x, y, (0.0, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw))
-    return figure.clamp(q)
 
 
 def smooth(s: float) -> float:

@@ -47,6 +47,11 @@ def write_track(track: Track, path: str | os.PathLike[str]) -> Path:
     return write(path, text.getvalue())
 
 
+def write_numbers(track: Track, path: Path) -> Path:
+    """Write the postures of a track as CSV without names and times, as Unitree's LAFAN1 files are."""
+    return write(path, "".join(",".join(map(repr, q.tolist())) + "\n" for q in track.q))
+
+
 def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
     """Read a track of a figure; its columns may have any order.
 
@@ -171,7 +176,8 @@ def _columns(place: str, first: list[str], wanted: list[str]) -> list[str]:
     else:
         lacked = missing if len(missing) == len(wanted) - 1 else []
     if lacked:
-        raise InputError(f"{place}: the columns lack {', '.join(lacked[:4])}; {len(missing)} are missing")
+        more = f" and {len(lacked) - 4} more" if len(lacked) > 4 else ""
+        raise InputError(f"{place}: the columns lack {', '.join(lacked[:4])}{more}; add them")
     return names
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.base.checks import array, instance, known, listed, settle, shown, text, time_step, whole
 from wholebody.base.checks import posture as checked_posture
 from wholebody.base.errors import InputError, UnknownNameError
@@ -57,6 +57,8 @@ class Track:
     Raises:
         InputError: no frame, a time step that is not positive, or a value that is not finite; the frame is named.
     """
+
+    __repr__ = brief
 
     q: Array
     dt: float

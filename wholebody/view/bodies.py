@@ -11,15 +11,45 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.joining import joint_in
+from wholebody.figures.link_visuals import drawn_of
 from wholebody.figures.surface import surface_of
 from wholebody.geometry.pieces import box_corners
 from wholebody.view import drawing, style
 from wholebody.view.crowds import crowds
-from wholebody.view.link_visuals import LinkVisuals
 from wholebody.view.scene_graph import Keyframe, SceneGraph
 from wholebody.view.skin import Skin, Skinned
 from wholebody.view.style import LOOK, Color
 from wholebody.view.viewed_scene import ViewedAssembly, ViewedScene
+
+
+class LinkVisuals:
+    """The visuals of a figure. A link with a mesh that cannot be read is left out: its pieces are drawn.
+
+    Attributes:
+        drawn: the objects.
+        links, joints: names of the links that are drawn, and of the joints that carry them.
+    """
+
+    def __init__(self, figure: Any, skinned: tuple[str, ...] = ()) -> None:
+        """Read the visuals, but for links whose names begin with one of `skinned`: figures that have a surface."""
+        self.drawn = [one for one in drawn_of(figure) if not one.link.startswith(skinned)]
+        self.links = frozenset(one.link for one in self.drawn)
+        self.joints = tuple(dict.fromkeys(one.joint for one in self.drawn))
+
+    def build(self, graph: SceneGraph, carriers: Mapping[str, str], color: Color | None) -> list[Skinned]:
+        """Put the visuals below the nodes of their joints; all in one colour if there is one."""
+        found = []
+        for number, one in enumerate(self.drawn):
+            path = f"{carriers[one.joint]}/visual {number}"
+            shown = one.color if color is None else color
+            if isinstance(one.shape, tuple):
+                vertices, faces = one.shape
+                graph.put(path, drawing.mesh(vertices, faces, path, shown))
+            else:
+                graph.put(path, drawing.piece(one.shape, path, shown))
+            graph.place(path, one.placement)
+            found.append(Skinned(path, one.link, shown))
+        return found
 
 
 @dataclass(frozen=True)

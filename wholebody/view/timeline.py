@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import base64
-import gzip
 import json
 import math
-from functools import cache
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,10 +14,8 @@ from wholebody.base.files import Scratch
 from wholebody.motion.checking import ClipCheck
 from wholebody.motion.clip_contacts import Contact
 from wholebody.scene.scene import Scene
+from wholebody.view.templates import render
 from wholebody.view.viewer import Viewer
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
 
 MOST_POSTURES = 1200
 """Postures of the animation: of a longer clip each k-th frame is shown. More make the page larger, 3 kB each."""
@@ -45,18 +39,9 @@ def timeline(found: ClipCheck, scene: Scene | None = None) -> str:
     every = math.ceil(len(clip) / MOST_POSTURES)
     with Viewer(scene, title=clip.name) as viewer, Scratch() as folder:
         viewer.play(clip.q[::every], clip.dt * every)
-        page = viewer.save(folder / "clip.html").read_bytes()
-    return (
-        _environment()
-        .get_template("timeline.html.jinja")
-        .render(
-            check=found,
-            clip=clip,
-            contacts=found.contacts,
-            data=_json(_data(found)),
-            picture=base64.b64encode(gzip.compress(page, mtime=0)).decode("ascii"),
-        )
-    )
+        page = viewer.save(folder / "clip.html").read_text("utf-8")
+    data = _json(_data(found))
+    return render("timeline.html", check=found, clip=clip, contacts=found.contacts, data=data, page=page)
 
 
 def _data(found: ClipCheck) -> dict[str, Any]:
@@ -82,16 +67,3 @@ def _cells(contact: Contact) -> dict[str, Any]:
 def _json(value: Any) -> str:
     """JSON that may stand in a script of a page."""
     return json.dumps(value, separators=(",", ":")).replace("<", "\\u003c")
-
-
-@cache
-def _environment() -> Environment:
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
-
-    return Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
-        autoescape=select_autoescape(["html.jinja"]),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )

@@ -306,9 +306,11 @@ class Viewer:
             from wholebody.view.gltf import scene_glb
 
             postures, dt = self._motion or (np.array(self._seen[:1]), 1.0)
-            made = scene_glb(self._composition.scene, self._composition.bodies, postures, dt, self.title)
-            return write(place, made)
+            return write(place, scene_glb(self._composition.scene, self._composition.bodies, postures, dt, self.title))
         return write(place, static_page(drawn, self.title))
+
+    def __repr__(self) -> str:
+        return f"Viewer({self.title!r}), which shows {len(self._seen)} postures"
 
     def _repr_html_(self) -> str:
         """The scene in a notebook: a frame with the page that `save` writes; a sentence if nothing is shown yet."""
@@ -375,11 +377,9 @@ class Viewer:
             self._screenshots.close()
 
     def __enter__(self) -> Viewer:
-        """Return the viewer."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Close it."""
         self.close()
 
     def _live(self) -> Sender:
@@ -396,5 +396,5 @@ class Viewer:
         """Commands that draw the whole picture, with the camera on the present figure."""
         if not self._seen:
             raise InputError("nothing is shown yet; call show(q) or play(motion) first")
-        camera, kept = self._camera_command(), self._graph.store.commands()
-        return [camera if command.op == Op.CAMERA else command for command in kept]
+        camera = self._camera_command()
+        return [camera if command.op == Op.CAMERA else command for command in self._graph.store.commands()]

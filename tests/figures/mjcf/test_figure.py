@@ -191,6 +191,18 @@ WRONG = {
 }
 
 
+def test_a_pointer_in_place_of_a_mesh_and_a_keyframe_that_is_no_posture_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "hand.stl").write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n")
+    arm = '<body><joint name="j"/><geom type="mesh" mesh="hand"/></body>'
+    mesh = '<asset><mesh name="hand" file="hand.stl"/></asset>'
+    with pytest.raises(FileFormatError, match=r"hand\.stl: the file is a pointer of Git LFS"):
+        wb.load(written(tmp_path, f"<mujoco>{mesh}<worldbody>{arm}</worldbody></mujoco>"))
+    arm = '<body><joint name="j"/><geom size="0.1"/></body>'
+    key = '<keyframe><key name="up" qpos="nan"/></keyframe>'
+    with pytest.raises(FileFormatError, match="keyframe 'up' has values that are not finite"):
+        wb.load(written(tmp_path, f"<mujoco><worldbody>{arm}</worldbody>{key}</mujoco>"))
+
+
 @pytest.mark.parametrize("what", WRONG)
 def test_a_wrong_file_is_one_sentence(what: str, tmp_path: Path) -> None:
     text, words = WRONG[what]

@@ -56,6 +56,19 @@ def test_groups_states_and_pairs_are_read(tmp_path: Path) -> None:
     assert "SRDF: passive_joint, virtual_joint is not kept" in noted
 
 
+def test_no_state_of_an_srdf_is_lost(tmp_path: Path) -> None:
+    states = "".join(
+        f'<group_state name="{name}" group="arm"><joint name="j1" value="{value}"/></group_state>'
+        for name, value in (("neutral", 0.7), ("home", 0.2))
+    )
+    urdf, srdf = files(tmp_path, SRDF.replace("<disable_c", f"{states}<disable_c", 1))
+    figure = wb.load(urdf, srdf=srdf)
+    assert figure.joint_values(figure.posture("neutral of the file"))["j1"] == pytest.approx(0.7)
+    assert figure.joint_values(figure.posture("arm/home"))["j1"] == pytest.approx(0.2)
+    assert "posture 'neutral' of the file is called 'neutral of the file'" in figure.notes
+    assert "SRDF: state 'arm/home' is there twice; the last one is kept" in figure.notes
+
+
 def test_a_wrong_srdf_is_one_sentence(tmp_path: Path) -> None:
     urdf, srdf = files(tmp_path, SRDF.replace('value="0.5"', 'value="0,5"'))
     with pytest.raises(FileFormatError, match=r"state 'home': joint 'j1': .*'0,5'"):

@@ -15,9 +15,10 @@ from wholebody.figures.description import Limits
 from wholebody.figures.state import State
 from wholebody.methods.control import Control
 from wholebody.methods.damped_least_squares import DampedLeastSquares
-from wholebody.methods.qp.chain import Chains, PlainChain, compiled_kernel, from_seeds, goal_entries
+from wholebody.methods.qp.chain import compiled_kernel, from_seeds, goal_entries
 from wholebody.methods.qp.chain_kernel import Goals
 from wholebody.methods.qp.multistart import Budget
+from wholebody.methods.qp.plain_chain import Chains, PlainChain
 from wholebody.tasks.base import Goal
 from wholebody.terms.entries import RESIDUAL, Entry
 

@@ -9,7 +9,8 @@ import pytest
 import wholebody as wb
 from wholebody.bench.suite.problem_sets.robots import known_arm
 from wholebody.figures.description import Limits
-from wholebody.methods.qp.chain import PlainChain, branches
+from wholebody.methods.qp.chain import branches
+from wholebody.methods.qp.plain_chain import PlainChain
 
 X, Y, Z = np.eye(3)
 TILTED = np.array([0.6, 0.0, 0.8])

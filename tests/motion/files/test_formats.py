@@ -414,6 +414,9 @@ def test_an_archive_of_amass_stands_upright_and_faces_forward(tmp_path: Path, hu
     assert at["left_foot"][1] < at["left_ankle"][1] - 0.1
     assert at["left_hip"][0] > at["right_hip"][0] + 0.1
     assert len(wb.read_clip(amass(tmp_path / "b.npz"), human)) == 7
+    turned = np.tile([np.pi / 2] + [0.0] * 155, (7, 1))
+    shaped = wb.motion.read_skeleton(amass(tmp_path / "c.npz", poses=turned.reshape(7, 52, 3)))
+    np.testing.assert_array_equal(shaped.positions, motion.positions)
 
 
 class Unpacked:

@@ -102,6 +102,21 @@ def test_joint_centres_are_those_of_the_file(tmp_path: Path) -> None:
     assert np.median(errors) < 5.0
 
 
+def test_a_skin_without_matrices_is_bound_by_its_nodes(tmp_path: Path) -> None:
+    made = Foreign()
+    path = made.written(tmp_path / "walk.glb")
+    plain = read_skeleton(path)
+    data = path.read_bytes()
+    length = int.from_bytes(data[12:16], "little")
+    tree = json.loads(data[20 : 20 + length])
+    del tree["skins"][0]["inverseBindMatrices"]
+    content = json.dumps(tree, separators=(",", ":")).encode().ljust(length)
+    path.write_bytes(data[:20] + content + data[20 + length :])
+    motion = read_skeleton(path)
+    np.testing.assert_allclose(motion.positions, plain.positions, atol=1e-6)
+    assert motion.length() == pytest.approx(plain.length(), rel=1e-3)
+
+
 def test_nodes_without_a_body_are_read_where_they_rest(tmp_path: Path) -> None:
     made = Foreign(bound=False)
     motion = read_skeleton(made.written(tmp_path / "walk.glb"))

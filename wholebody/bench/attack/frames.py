@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations
+from itertools import combinations, product
 from pathlib import Path
 
-import coal
 import numpy as np
 import pinocchio as pin
 
@@ -16,7 +15,7 @@ from wholebody.bench.attack.case import Verdict, chosen
 from wholebody.bench.attack.judging import Pairs, apart, extent
 from wholebody.bench.attack.scenes import Body, Thing, body, clear, shape, somewhere, xyzquat
 from wholebody.bench.attack.solves import scene_of
-from wholebody.bench.suite.problem_sets.things import Occupied
+from wholebody.bench.suite.problem_sets.things import Occupied, coal_distance
 from wholebody.bench.suite.stability.bodies import planar_arm
 from wholebody.dynamics.world import World, WorldFrame
 from wholebody.tracking.loop import FrameLoop
@@ -172,13 +171,6 @@ def _sleeping(frame: WorldFrame) -> bool:
 
 def _distance(scene: wb.Scene, one: str, other: str) -> float:
     """Least distance of two things by coal, metres, negative where they overlap."""
-    first, second = (
-        [
-            (piece.geometry, coal.Transform3s(at.rotation, at.translation))
-            for piece in scene.objects[name].shape.pieces()
-            for at in [scene.objects[name].placement * piece.placement]
-        ]
-        for name in (one, other)
-    )
-    request = coal.DistanceRequest()
-    return min(float(coal.distance(*a, *b, request, coal.DistanceResult())) for a in first for b in second)
+    things = (scene.objects[name] for name in (one, other))
+    parts = ([(part.geometry, thing.placement * part.placement) for part in thing.shape.pieces()] for thing in things)
+    return min(coal_distance(*a, *b) for a, b in product(*parts))

@@ -167,7 +167,7 @@ def _reader(rng: np.random.Generator) -> Reader:
         return Reader(lambda path: wb.Mesh(path).pieces(), _stored({name: stored}))
     if kind == "track":
         files = _stored({"track.csv": "track.csv"} | ROBOT)
-        return Reader(lambda path: read_track(path, wb.load(path.with_name("robot.urdf"))), files)
+        return Reader(lambda path: read_track(path, wb.load(path.parent / "robot.urdf")), files)
     if kind == "result":
         return Reader(read_result, _stored({"result.json": "result.json"} | task))
     packaged = rng.random() < 0.15

@@ -10,24 +10,10 @@ import numpy as np
 
 from wholebody.bench.attack.case import KINDS, Case, Verdict
 from wholebody.bench.report import render
-from wholebody.bench.rows import Row, times
+from wholebody.bench.rows import Row, texts, times
 from wholebody.bench.rows import report as tables_of
 from wholebody.bench.statistics import wilson
 from wholebody.bench.tables import write_text
-
-ATTACKED = {
-    "solve": "solves, judged by coal over all pairs and by Pinocchio",
-    "stream": "streams of moving goals and things, every step and the way between two",
-    "sweep": "sweeps against a fine subdivision",
-    "contact": "contacts, against the effort of a point or frame at the place found",
-    "own-term": "solves and steps with terms of one's own that are not finite, or answer something odd",
-    "pairs": "things in each other, against every two pieces",
-    "sleeper": "sleeping bodies whose support slides, turns, jumps or leaves",
-    "weights": "goals of one frame with weights from 1 to 1e6, met in at most thrice the frames of equal ones",
-    "put": "things that are put into a figure that is shown, every frame free or told",
-    "file": "mutated tasks, tracks, results, robots and meshes",
-    "argument": "calls with odd arguments",
-}
 
 
 def row(case: Case, verdict: Verdict) -> Row:
@@ -49,7 +35,9 @@ def report(rows: Sequence[Row], facts: dict[str, str]) -> str:
         found = Counter(one["outcome"] for one in rows if one.tool == kind)
         outcomes = {name: found[name] for name in ("right", "refused", "gave up", "wrong")}
         most = 100.0 * wilson(found["wrong"], found.total())[1]
-        counts.append(Row(ATTACKED[kind], kind, {"cases": found.total(), **outcomes, "wrong at most %": most}))
+        counts.append(
+            Row(texts()["attacked"][kind], kind, {"cases": found.total(), **outcomes, "wrong at most %": most})
+        )
     spans = []
     for status in ("solved", "unreachable", "infeasible", "stalled"):
         spent = np.array([1e3 * one["seconds"] for one in rows if one.tool == "solve" and one["status"] == status])

@@ -14,6 +14,7 @@ from wholebody.bench.attack.case import chosen
 from wholebody.bench.attack.judging import Pairs
 from wholebody.bench.suite.problem_sets.things import Occupied
 from wholebody.figures.packaged_urdf import task_paths, urdf_path
+from wholebody.figures.urdf.writing import exact
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,7 @@ def _joint(number: int, parent: int, length: float, rng: np.random.Generator, sc
     ends = "" if kind == "continuous" else f'lower="{low!r}" upper="{high!r}" '
     return (
         f'  <joint name="joint{number}" type="{kind}"><parent link="link{parent}"/><child link="link{number}"/>'
-        f'<origin xyz="0 0 {length!r}" rpy="{_numbers(turn)}"/><axis xyz="{_numbers(axis)}"/>'
+        f'<origin xyz="0 0 {length!r}" rpy="{exact(turn)}"/><axis xyz="{exact(axis)}"/>'
         f'<limit {ends}effort="10" velocity="3"/></joint>'
     )
 
@@ -143,10 +144,6 @@ def _link(name: str, rng: np.random.Generator, scale: float, length: float) -> s
         f'  <link name="{name}">{inertial}<collision><origin xyz="0 0 {length / 2!r}"/>'
         f"<geometry>{shape}</geometry></collision></link>"
     )
-
-
-def _numbers(values: Array) -> str:
-    return " ".join(repr(float(value)) for value in values)
 
 
 @dataclass(frozen=True)

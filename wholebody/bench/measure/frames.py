@@ -8,26 +8,10 @@ from typing import Any
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.bench.rows import Figure, Panel, Row, report
+from wholebody.bench.rows import Figure, Panel, Row, report, texts
 from wholebody.dynamics.world import WorldFrame
 from wholebody.tracking.dragging import Dragged, DragJudgement
 from wholebody.tracking.recording import Judgement, Recording
-
-PAPER = tuple(
-    Row(
-        scene,
-        "paper",
-        {"frames": frames, "mean ms": ms, "joints": joints, "iterations": iterations, "IK %": ik,
-         "pairs": pairs, "queries %": queries},
-    )
-    for scene, frames, ms, joints, iterations, ik, pairs, queries in (
-        ("two arms", 1496, 14.63, 16, 3, 12.7, 3, 17.4),
-        ("self-collision", 2327, 15.99, 28, 5, 14.6, 5, 21.1),
-        ("two arms and leg", 2440, 17.47, 32, 6, 16.7, 6, 24.8),
-        ("arm in corner", 2146, 20.49, 40, 7, 18.5, 13, 31.3),
-    )
-)  # fmt: skip
-"""Table 2 of Schmidl and Lin, on a processor of 1.7 GHz."""
 
 
 def _run(case: str, tool: str, figures: Mapping[str, Figure], columns: Mapping[str, Any]) -> tuple[Row, list[Row]]:
@@ -137,17 +121,13 @@ def is_held(run: Row) -> bool:
     return bool(run["deepest mm"] <= 1.0 and not run["frames that pass"] and beyond < 1e-6)
 
 
+def _paper() -> list[Row]:
+    return [Row(scene, "paper", figures) for scene, figures in texts()["paper"].items()]
+
+
 def loop_report(rows: Sequence[Row], facts: Mapping[str, str]) -> str:
     """The table beside the paper's."""
-    about = (
-        "Joints and iterations are counted as the paper does: iterations are programs, goals of CCD or displacements "
-        "of a rigid hand, of frames in contact, and a joint counts once for each iteration that moves it. The paper's "
-        "frames include rendering. Pairs are the overlapping pairs of pieces of the tracked posture. \"Joints off\" "
-        "is the root mean square of the angles between shown and tracked posture; jerk is the third difference of the "
-        "joint angles, rad/s³. CPU is time that the processor worked on a frame. All is judged from the postures, "
-        "every pair by coal."
-    )  # fmt: skip
-    return report(about, {"": [*rows, *PAPER]}, facts)
+    return report(texts()["interact"], {"": [*rows, *_paper()]}, facts)
 
 
 def world_rows(
@@ -199,13 +179,7 @@ def world_rows(
 
 def world_report(rows: Sequence[Row], facts: Mapping[str, str]) -> str:
     """The table beside the paper's."""
-    about = (
-        "Joints and iterations count as in the paper of Schmidl and Lin: a program is an iteration, and moves all "
-        "joints. IK and queries are shares of the frame without drawing; queries are those of the figure, the "
-        "engine's are part of the rest. Pairs are the overlapping pairs of the posture that the spring wants. Drawing "
-        "is the time in which the commands of a live page are made. Times are those of the clock."
-    )
-    return report(about, {"": [*rows, *PAPER]}, facts)
+    return report(texts()["world_frames"], {"": [*rows, *_paper()]}, facts)
 
 
 def frame_panels(rows: Sequence[Row], *groups: Sequence[str]) -> list[Panel]:

@@ -7,7 +7,7 @@ from math import isfinite, nan
 
 import numpy as np
 
-from wholebody.bench.rows import Figure, Panel, Row, report, shares
+from wholebody.bench.rows import Figure, Panel, Row, report, shares, texts
 from wholebody.motion.batch_table import AvoidedCase
 
 FIGURES: Mapping[str, Callable[[AvoidedCase], float]] = {
@@ -41,19 +41,12 @@ def summary(cases: Sequence[AvoidedCase]) -> list[Row]:
 
 def motion_report(cases: Sequence[AvoidedCase], facts: Mapping[str, str]) -> str:
     """The summary as Markdown; `cases.csv` has every case."""
-    about = (
-        "Clips of a person at 30 Hz, each with each piece of equipment. Every frame is judged by all pairs, and every "
-        "motion between frames by sweeps (`wb.check`), whatever made it. Free: no frame and no motion deeper than 0.1 "
-        "mm, all joint limits hold, and no constraint is missed by more than 1 mm or 1 mrad. Deviation is from the "
-        "clip before: root of the mean square of the joint coordinates, and of the distances of the joints' centres. "
-        "Sliding: by how much standing feet slide more than before. Times are by the clock, without the judgement."
-    )
     notes = [
         f"{case.clip}, {case.equipment}, {case.method}: {case.outcome} ({case.message})"
         for case in cases
         if not case.frames
     ]
-    return report(about, {"": summary(cases)}, facts, notes)
+    return report(texts()["motion"], {"": summary(cases)}, facts, notes)
 
 
 def panels(cases: Sequence[AvoidedCase]) -> list[Panel]:

@@ -12,7 +12,7 @@ from wholebody.assessment.motion import pairs_along
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.bench.measure.track import SETTING, Track, judge
-from wholebody.bench.rows import Figure, Panel, Row, across, only, quiet, report, shares, times
+from wholebody.bench.rows import Figure, Panel, Row, across, only, quiet, report, shares, texts, times
 from wholebody.bench.statistics import BLOCK, quantile_ratio
 from wholebody.bench.suite.adapters.base import Tool
 from wholebody.bench.suite.adapters.registry import make_tool
@@ -203,26 +203,11 @@ def step_report(
     spent: Sequence[Row], judged: Sequence[Row], facts: Mapping[str, str], figures: bool, notes: Sequence[str]
 ) -> str:
     """The tables of the tracking steps; `figures` says whether reaches are of figures from files."""
-    human = (
-        "the standing human (55 degrees of freedom) among 20 convex objects (none in the reach alone), both feet held"
-    )
-    others = (
-        "figures from files: the tip of the longest chain follows the way that it takes along a motion free of "
-        "contact; free has 20 convex objects clear of it, contact goes to and fro with a block about the turning "
-        "point, alone has no objects; a free root is held, and pairs keep half of the least distance along the motion "
-        "if that is less"
-    )
-    about = (
-        f"Steps of {1e3 * SETTING.dt:g} ms by {others if figures else human}; joints drawn back to the start, "
-        f"clearance {1e3 * SETTING.clearance:g} mm, pairs nearer than {1e3 * SETTING.within:g} mm looked at, joints up "
-        f"to {SETTING.joint_speed:g} rad/s, root up to {SETTING.root_speed:g} m/s and {SETTING.root_turn:g} rad/s. "
-        f"Every tool makes every repeat once, in turns of {TURN} steps and in turning order, in one process; a first "
-        "round and the first step of each set-up are not counted. Distances, errors and limits are judged afterwards "
-        "from the postures, every pair by coal. Brackets hold 95 % intervals of the ratios to placo's steps, by the "
-        f"bootstrap: repeats are drawn, and steps in blocks of {BLOCK}, the same for both. {LEAST!r} are calls of C++ "
-        "alone, at the postures of the first tool: joint Jacobians, placements of the pieces, and the distances of the "
-        "pairs that are looked at."
-    )
+    about = texts()["step"].format(
+        who=texts()["step_figures" if figures else "step_human"], dt_ms=1e3 * SETTING.dt, turn=TURN, block=BLOCK,
+        clearance_mm=1e3 * SETTING.clearance, within_mm=1e3 * SETTING.within, joint_speed=SETTING.joint_speed,
+        root_speed=SETTING.root_speed, root_turn=SETTING.root_turn, least=LEAST,
+    )  # fmt: skip
     # Our method has the same answers with other QP solvers, whose times are in the CSV file.
     judged = [row for row in judged if not row.tool.startswith("wholebody/")] or judged
     met = [row for row in judged if not row.case.endswith("alone")]  # where something is in the way

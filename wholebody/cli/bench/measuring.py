@@ -11,7 +11,7 @@ from pathlib import Path
 from wholebody.base import checks
 from wholebody.base.errors import InputError
 from wholebody.base.files import make_folder
-from wholebody.bench.rows import Panel, Row, chart, only, report
+from wholebody.bench.rows import Panel, Row, chart, only, report, texts
 from wholebody.bench.tables import machine, write_rows
 from wholebody.cli.bench.command import Chart, listed, measuring, publish
 from wholebody.cli.command import count, option
@@ -91,13 +91,9 @@ def scaling(arguments: argparse.Namespace) -> None:
     if "newton" in methods:
         bodies = sizes["joints"] if arguments.quick else (*sizes["joints"], 500)
         rows += scaling.assembly_rows(bodies, repeats)
-    about = (
-        "A chain 2 m long that reaches for a place among boxes. What does not grow: 12 joints with ten segments of "
-        "one box each, ten things around. Solves and judgements are the least of the repeats by the clock, the rest "
-        "is the processor's time. An exponent e means time ~ size^e; it is the slope of a line through the logarithms "
-        "over the sizes from a tenth of the largest on (at least three)."
+    text = report(
+        texts()["scaling"], {"": scaling.exponents(rows)}, facts, [line for line in said if "left out" in line]
     )
-    text = report(about, {"": scaling.exponents(rows)}, facts, [line for line in said if "left out" in line])
     charts = _charts("scaling", scaling.panels(rows), "Time of a solve and of a step, as one size grows")
     publish("scaling", text, arguments, facts=facts, tables={"scaling": rows}, charts=charts)
 
@@ -178,19 +174,12 @@ def world(arguments: argparse.Namespace) -> int:
             rows.append(row)
             print(f"{row.case}, {row.tool}: {', '.join(f'{name} {value}' for name, value in row.figures.items())}")
             write_rows(arguments.out / f"world-{part}.csv", facts, rows)
-    about = (
-        "Things fly at a person of 55 degrees of freedom who is posed by qp, 60 frames a second; with swift limits "
-        "the person may move faster than the thing, so a free posture is within reach; human limits are 12 rad/s and "
-        "4 m/s. MuJoCo runs with its default contacts in steps of 1/480 s, Rapier with its defaults in steps of a "
-        "frame; depths are measured by coal at the end of every frame, energies are in parts of that at the start. "
-        "Times are the processor's."
-    )
     shown = dict(found)
     if "throws" in found:
         shown["throws"] = throw_summary(found["throws"])
     if "drops" in found:
         shown["drops"] = only(found["drops"], "median ms", "p99 ms", "deepest mm", "largest gain of energy")
-    publish("world", report(about, {WORLD[part]: rows for part, rows in shown.items()}, facts), arguments)
+    publish("world", report(texts()["world"], {WORLD[part]: rows for part, rows in shown.items()}, facts), arguments)
     return int(any(row["silent"] for row in found.get("throws", ())))
 
 

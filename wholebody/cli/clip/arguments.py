@@ -14,6 +14,7 @@ from wholebody.cli.command import Option, option
 if TYPE_CHECKING:
     from wholebody.figures import Figure
     from wholebody.motion.clip import Clip
+    from wholebody.scene.scene import Scene
 
 
 def _figure(parser: argparse.ArgumentParser) -> None:
@@ -37,6 +38,8 @@ EQUIPMENT = option(
     help="what the body wears: a ready name such as pack, names joined by +, or a mesh that is put on its back; "
     "repeated, each in turn",
 )  # fmt: skip
+
+SCENE = option("--scene", type=Path, metavar="TASK.toml", help="task file with the figure and its things")
 
 JOBS: tuple[Option, ...] = (
     option("--jobs", type=int, metavar="N", help="cases at a time (default: 1, or all of the cluster)"),
@@ -72,6 +75,20 @@ def figure_of(arguments: argparse.Namespace) -> Figure:
 
     root = {} if arguments.root is None else {"root": arguments.root}
     return load(arguments.figure, **person_options(arguments), **root)
+
+
+def scene_of(arguments: argparse.Namespace) -> Scene:
+    """Return the scene of the task file, or the figure alone; raises InputError for a figure beside a task file."""
+    from wholebody.base.errors import InputError
+    from wholebody.scene.scene import Scene
+
+    if arguments.scene is None:
+        return Scene(figure_of(arguments))
+    from wholebody.taskfile import read_task
+
+    if arguments.figure != "human" or arguments.root is not None or person_options(arguments):
+        raise InputError("--scene has a figure of its own; leave out --figure and the options of a person")
+    return read_task(arguments.scene).problem.scene
 
 
 def clip_of(arguments: argparse.Namespace) -> Clip:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.clip.arguments import EQUIPMENT, JOBS, MOTIONS, bar, figure_of, jobs_of
+from wholebody.cli.clip.arguments import EQUIPMENT, JOBS, MOTIONS, SCENE, bar, figure_of, jobs_of, scene_of
 from wholebody.cli.command import command, flag, option
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ ended goes on.""",
         help="how (default: trajectory); repeated, each in turn",
     ),
     EQUIPMENT,
+    SCENE,
     flag("--no-feet", "let feet slide that stand; without it they are held"),
     flag("--keep-ends", "keep the first and the last posture where free"),
     flag("--dynamics", "keep torques within the strength of a median person, and the balance within the feet"),
@@ -71,13 +72,13 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.motion.avoidance import avoid
     from wholebody.motion.files import check_ending
     from wholebody.motion.reading import read_clip
-    from wholebody.motion.worn_equipment import dressed
+    from wholebody.motion.worn_equipment import put_on
 
     (file,) = arguments.files
     jobs_of(arguments)  # one case needs no jobs; what is wrong with them is said all the same
     out = check_writable(check_ending(arguments.out or file.with_name(f"{file.stem}-free.npz")))
-    method, figure = _method(methods[0], arguments), figure_of(arguments)
-    scene, clip = dressed(figure, worn[0]), read_clip(file, figure)
+    method, scene = _method(methods[0], arguments), put_on(scene_of(arguments), worn[0])
+    clip = read_clip(file, scene.figure)
     with bar(clip.name) as tell:
         avoided = avoid(
             clip,
@@ -145,9 +146,12 @@ def _tell(console: Console, avoided: Avoided, written: Path) -> None:
 def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -> int:
     from rich.console import Console
 
+    from wholebody.base.errors import InputError
     from wholebody.motion.batch import BatchProgress, avoid_many
     from wholebody.motion.measures import MotionBounds
 
+    if arguments.scene is not None:
+        raise InputError("--scene is for one motion with one equipment by one method; give one of each")
     # letters that a line of a batch's table needs
     console, folder = Console(width=max(120, Console().width)), arguments.out or Path(FOLDER)
     ways = [_method(name, arguments) for name in methods]

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wholebody.cli.clip.arguments import EQUIPMENT, JOBS, MOTIONS, bar, figure_of, jobs_of
+from wholebody.cli.clip.arguments import EQUIPMENT, JOBS, MOTIONS, SCENE, bar, jobs_of, scene_of
 from wholebody.cli.command import command, flag, option
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ carries and with the things around it are told apart. Several motions, or pieces
     *MOTIONS,
     EQUIPMENT,
     *JOBS,
-    option("--scene", type=Path, metavar="TASK.toml", help="task file with the figure and its things"),
+    SCENE,
     option("--depth", type=float, metavar="MM", help="deepest overlap that is no contact (default: 0.1)"),
     flag("--json", "print everything as JSON instead of tables"),
     option("--html", type=Path, metavar="FILE", help="write a timeline to look at; opens without a network"),
@@ -62,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.html is not None:
         checked_target(arguments.html, "--html", "a page", (".htm", ".html"))
     (file,), worn = arguments.files, (*arguments.equipment, NOTHING)[0]
-    scene = put_on(_scene(arguments), worn)
+    scene = put_on(scene_of(arguments), worn)
     clip = read_clip(file, scene.figure)
     found = checked(clip, scene, depth)
     if arguments.json:
@@ -76,16 +76,6 @@ def run(arguments: argparse.Namespace) -> int:
             page = timeline(found, scene)
         print(f"wrote {write(arguments.html, page)}", file=sys.stderr if arguments.json else sys.stdout)
     return 0 if found.free and not found.limits else 1
-
-
-def _scene(arguments: argparse.Namespace) -> Scene:
-    from wholebody.scene.scene import Scene
-
-    if arguments.scene is None:
-        return Scene(figure_of(arguments))
-    from wholebody.taskfile import read_task
-
-    return read_task(arguments.scene).problem.scene
 
 
 def checked(clip: Clip, scene: Scene, depth: float) -> ClipCheck:
@@ -116,7 +106,7 @@ def _many(arguments: argparse.Namespace, depth: float) -> int:
     number(1e3 * depth, "--depth", 1e3 * SMALLEST, 1e3 * LARGEST, "mm")
     cases = [(file, worn) for file in arguments.files for worn in arguments.equipment or [NOTHING]]
     for worn in dict.fromkeys(worn for _, worn in cases):
-        put_on(_scene(arguments), worn)  # what does not fit is said before anything is checked
+        put_on(scene_of(arguments), worn)  # what does not fit is said before anything is checked
     work = (Job(case, _check_one, (arguments, *case, depth), 0.0) for case in cases)
     found: dict[tuple[Path, str], dict[str, Any]] = {}
     with bar("checking", len(cases)) as tell:
@@ -129,6 +119,8 @@ def _many(arguments: argparse.Namespace, depth: float) -> int:
     else:
         made = table("motion", "wears", "frames", "collide", "dips", "deepest mm", "at any time mm", "jerk rad/s^3")
         made.columns[1].justify = "left"
+        stems = [file.stem for file in arguments.files]
+        names = {file: file.stem if stems.count(file.stem) == 1 else str(file) for file in arguments.files}
         for file, worn in cases:
             one = found[file, worn]
             told = (
@@ -139,7 +131,7 @@ def _many(arguments: argparse.Namespace, depth: float) -> int:
                 if "refused" not in one
                 else (f"[red]{escape(one['refused'])}[/]",)
             )  # fmt: skip
-            made.add_row(escape(file.stem), escape(worn), *told)
+            made.add_row(escape(names[file]), escape(worn), *told)
         Console(width=max(WIDE, Console().width)).print(made)
     return 0 if all(one.get("free") and not one["limits"] for one in found.values()) else 1
 
@@ -152,7 +144,7 @@ def _check_one(arguments: argparse.Namespace, file: Path, worn: str, depth: floa
     from wholebody.motion.worn_equipment import put_on
 
     try:
-        scene = put_on(_scene(arguments), worn)
+        scene = put_on(scene_of(arguments), worn)
         return check(read_clip(file, scene.figure), scene, depth=depth).as_dict()
     except WholebodyError as error:
         return {"refused": str(error)}

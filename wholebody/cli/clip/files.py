@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from wholebody.base.arrays import Array
 
 
+BARE = flag("--bare", "CSV without names and times, as tools that train robots take it")
+
+
 @command(
     "info",
     "what a file of motion holds",
@@ -60,6 +63,7 @@ A skeleton that is not the figure's own is retargeted.""",
     *ONE_MOTION,
     option("out", type=Path, metavar="OUT", help="the file to write"),
     option("--dt", type=float, metavar="S", help="seconds from frame to frame (default: as it is)"),
+    BARE,
     flag("--mirror", "exchange left and right"),
     epilog="""\
 examples:
@@ -71,13 +75,13 @@ def convert(arguments: argparse.Namespace) -> int:
     from wholebody.base.files import check_writable
     from wholebody.motion.files import check_ending
 
-    check_writable(check_ending(arguments.out))
+    check_writable(check_ending(arguments.out, bare=arguments.bare))
     clip = clip_of(arguments)
     if arguments.dt is not None:
         clip = clip.resampled(arguments.dt)
     if arguments.mirror:
         clip = clip.mirrored()
-    print(f"wrote {clip.write(arguments.out)}: {len(clip)} frames, {clip.duration:.3f} s")
+    print(f"wrote {clip.write(arguments.out, bare=arguments.bare)}: {len(clip)} frames, {clip.duration:.3f} s")
     return 0
 
 
@@ -88,11 +92,13 @@ def convert(arguments: argparse.Namespace) -> int:
 Turn the motion of a skeleton (BVH, glTF, AMASS) into a clip of a figure of any proportions: directions of limbs as
 recorded, within joint limits, speed limits and reach cones, smooth, what rests held on the ground, in every frame
 free of itself and the floor. A table has the errors of bones; `wholebody clip check` says what is left, between frames
-too. Several files are written into a folder; what it holds already is not made again.""",
+too. A robot's .npz has the arrays that mjlab, BeyondMimic and GMR name. Several files are written into a folder; what
+it holds already is not made again. Without --out the last FILE is what is written.""",
     *MOTIONS,
-    option(
-        "out", type=Path, metavar="OUT", help="the file to write: .npz, .bvh, .csv, .txt or .glb; of several a folder"
-    ),
+    option("--to", metavar="FIGURE", help="another name of --figure; a robot goes about freely"),
+    option("--out", type=Path, metavar="OUT", help=".npz, .bvh, .csv, .txt or .glb; of several motions a folder"),
+    option("--rate", type=float, metavar="HZ", help="frames a second that are written (default: as recorded)"),
+    BARE,
     option("--names", type=Path, metavar="FILE.toml", help="which bone is which part"),
     option(
         "--ground", choices=("auto", "none"), default="auto", help="find where feet rest, or follow the skeleton alone"
@@ -103,11 +109,15 @@ too. Several files are written into a folder; what it holds already is not made 
     epilog="""\
 examples:
   wholebody clip retarget walk.bvh walk.npz --sex female --stature 1.62
-  wholebody clip retarget walk.bvh robot.npz --figure g1.urdf --names bones.toml
-  wholebody clip retarget walk.bvh run.bvh jump.bvh clips --jobs 4""",
+  wholebody clip retarget walk.bvh --to g1.urdf --ground auto --out walk.npz
+  wholebody clip retarget walk.bvh --to g1.urdf --rate 50 --bare --out walk.csv
+  wholebody clip retarget walk.bvh run.bvh jump.bvh --out clips --jobs 4""",
 )
 def retarget_motions(arguments: argparse.Namespace) -> int:
     """Read, retarget and write."""
+    if arguments.out is None and len(arguments.files) > 1:
+        arguments.out = arguments.files.pop()
+    _aim(arguments)
     if len(arguments.files) > 1:
         return _many(arguments)
     from wholebody.base.files import check_writable
@@ -115,7 +125,7 @@ def retarget_motions(arguments: argparse.Namespace) -> int:
     from wholebody.motion.reading import read_skeleton
     from wholebody.motion.retargeting import bone_errors, retarget
 
-    check_writable(check_ending(arguments.out))
+    check_writable(check_ending(arguments.out, bare=arguments.bare))
     motion = read_skeleton(arguments.files[0], unit=arguments.unit, up=arguments.up)
     figure = figure_of(arguments)
     with bar("retargeting") as tell:
@@ -124,8 +134,29 @@ def retarget_motions(arguments: argparse.Namespace) -> int:
             progress=lambda share: tell(share, "retargeting"),
         )  # fmt: skip
     _print_errors(bone_errors(motion, clip, arguments.names))
-    print(f"wrote {clip.write(arguments.out)}: {len(clip)} frames, {clip.duration:.3f} s, of {figure.name}")
+    if arguments.rate is not None:
+        clip = clip.resampled(1.0 / arguments.rate)
+    written = clip.write(arguments.out, bare=arguments.bare)
+    print(f"wrote {written}: {len(clip)} frames, {clip.duration:.3f} s, of {figure.name}")
     return 0
+
+
+def _aim(arguments: argparse.Namespace) -> None:
+    """Check where the motion goes, and make --to the figure; raises InputError for what does not go together."""
+    from wholebody.base.checks import TIME_STEP, number
+    from wholebody.base.errors import InputError
+
+    if arguments.out is None:
+        raise InputError("there is no file to write; name it with --out")
+    if arguments.rate is not None:
+        number(arguments.rate, "--rate", 1.0 / TIME_STEP[1], 1.0 / TIME_STEP[0], "Hz")
+    if arguments.to is None:
+        return
+    if arguments.figure != "human":
+        raise InputError("--to and --figure are one and the same; give one of them")
+    arguments.figure = arguments.to
+    if arguments.root is None and Path(arguments.to).suffix:
+        arguments.root = "free"
 
 
 def _print_errors(errors: Mapping[str, Array]) -> None:
@@ -147,8 +178,8 @@ def _many(arguments: argparse.Namespace) -> int:
     from wholebody.base.errors import InputError
     from wholebody.motion.batch import read_many
 
-    for given in ("names", "unit", "up"):
-        if getattr(arguments, given) is not None:
+    for given in ("names", "unit", "up", "rate", "bare"):
+        if getattr(arguments, given) not in (None, False):
             raise InputError(f"--{given} is for one file, and there are {len(arguments.files)}; give one at a time")
     figure, count = figure_of(arguments), len(arguments.files)
     with bar("retargeting", count) as tell:

@@ -23,6 +23,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError, InputError, MissingPackageError
 from wholebody.base.files import read_bytes
+from wholebody.geometry.meshes import check_content
 
 FREE, BALL, SLIDE, HINGE = range(4)
 """Types of joints, as MuJoCo numbers them."""
@@ -201,6 +202,9 @@ def _compile(path: Path) -> tuple[Any, tuple[str, ...]]:
         try:
             return read(textures=False), (f"textures are left out: {reason}",)
         except wrong as error:
+            for named in map(Path, re.findall("'([^']+)'", str(error))):
+                if named.is_file() and named != path:
+                    check_content(named)
             raise FileFormatError(f"{path}: MuJoCo cannot read it ({_said(error)}); correct the file") from None
 
 

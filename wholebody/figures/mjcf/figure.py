@@ -11,12 +11,12 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
+from wholebody.base.errors import FileFormatError
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, check_concavity
 from wholebody.figures.mjcf.compiled import Compiled, is_mjcf
+from wholebody.figures.mjcf.geoms import SHAPES, geom_shape, visual_of
 from wholebody.figures.mjcf.model import RobotModel, robot_model
-from wholebody.figures.mjcf.shapes import SHAPES, geom_shape
-from wholebody.figures.mjcf.visuals import visual_of
 from wholebody.figures.robot_figure import Robot, check_size, geometry_of_links, robot_figure
 from wholebody.figures.urdf.figure import SAMPLES, urdf_figure
 
@@ -97,6 +97,8 @@ def _postures(compiled: Compiled, robot: RobotModel) -> dict[str, Array]:
     found = {"reference": robot.posture(compiled, compiled.model.qpos0)}
     for key, name in enumerate(compiled.names["key"]):
         found[name] = robot.posture(compiled, compiled.model.key_qpos[key])
+    for name in [name for name, q in found.items() if not np.isfinite(q).all()]:
+        raise FileFormatError(f"{compiled.path}: keyframe {shown(name)} has values that are not finite; correct it")
     return {name: pin.normalize(robot.model, q) for name, q in found.items()}
 
 

@@ -109,7 +109,10 @@ class _Reader:
                 (value,) = numbers(joint, "value", place, 1)
                 made = self._model.joints[self._movable[known]]
                 q[made.idx_q : made.idx_q + made.nq] = (value,) if made.nq == 1 else (np.cos(value), np.sin(value))
-            found[name if names.count(name) == 1 else f"{state.get('group')}/{name}"] = q
+            called = name if names.count(name) == 1 else f"{state.get('group')}/{name}"
+            if called in found:
+                self.notes.append(f"SRDF: state {shown(called)} is there twice; the last one is kept")
+            found[called] = q
         return found
 
     def disabled(self) -> dict[frozenset[str], str]:

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, brief
 from wholebody.base.errors import InputError
 from wholebody.geometry.continuous.motion_bounds import MotionBounds
 from wholebody.geometry.large_models import pairs_of
@@ -47,6 +47,8 @@ class FirstContact:
         certain: true if the pair touches there; false if the queries ran out there: the motion is free so far and
             unknown beyond.
     """
+
+    __repr__ = brief
 
     fraction: float
     q: Array

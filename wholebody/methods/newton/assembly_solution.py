@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.methods.newton.batches import EquationSet, Role
 from wholebody.methods.newton.feasibility import FeasibilityResult
 from wholebody.methods.newton.system import System
@@ -39,6 +39,8 @@ class AssemblySolution:
             last as after it.
         message: one sentence that explains the status and names bodies.
     """
+
+    __repr__ = brief
 
     placements: dict[str, Any]
     status: Status

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -16,6 +16,7 @@ from wholebody.methods.conclusion import Ending, concluded, meets
 from wholebody.methods.control import Control, Progress
 from wholebody.methods.inputs import BUDGET, Iterations, Restarts, Seed, TimeLimit, Tolerance, check_problem
 from wholebody.methods.qp.chain import from_seeds
+from wholebody.methods.qp.chain_batch import Batch, batches
 from wholebody.methods.qp.multistart import Budget, Multistart
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.registry import make_solver
@@ -106,11 +107,7 @@ class QP(Checked):
             InputError: the scene changed after the problem was stated.
         """
         check_problem(problem, "QP.solve: problem")
-        began = time.perf_counter()
-        budget = Budget(
-            self.tolerance, self.iterations, self.budget, self.restarts, self.seed, self.measures,
-            self.restarts_for_measure,
-        )  # fmt: skip
+        began, budget = time.perf_counter(), self._budget
         with problem.borrow() as workspace, Control(self.time_limit, progress, LONGEST) as control:
             met = from_seeds(problem, workspace, budget, control)
             judgement = assess(problem, met.q) if met is not None and met.complete else None
@@ -125,6 +122,17 @@ class QP(Checked):
                     contradictions=search.contradictions, programs=search.solver.counted(),
                 )  # fmt: skip
         return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
+
+    def batches(self, problems: Sequence[Problem], largest: int) -> list[Batch]:
+        """Those of many problems that may be solved at once, in batches of at most so many: see `chain_batch`."""
+        return batches(problems, self._budget, largest) if self.time_limit is None else []
+
+    @property
+    def _budget(self) -> Budget:
+        return Budget(
+            self.tolerance, self.iterations, self.budget, self.restarts, self.seed, self.measures,
+            self.restarts_for_measure,
+        )  # fmt: skip
 
     def minima(self, problem: Problem, starts: Iterable[Array]) -> Iterator[Solution]:
         """For each start (nq,) the minimum of the measures that one descent from it leads to, without other starts.

@@ -1,8 +1,7 @@
 """Multistart: descents from one start after the other, each by a stage, until one meets the goals.
 
-A search is a list of attempts, made one after the other: starts, a stage that leads from a start to a posture, and how
-the answer is told. Where no attempt meets the goals, the posture closest to them is sought, and the measures are
-lowered there.
+A search is a list of attempts: starts, a stage that leads from a start to a posture, and how the answer is told. Where
+none meets the goals, the posture closest to them is sought, and the measures are lowered there.
 """
 
 from __future__ import annotations
@@ -19,6 +18,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
 from wholebody.methods.control import Control
+from wholebody.methods.qp.at_place import at_its_place
 from wholebody.methods.qp.before_contact import before_contact
 from wholebody.methods.qp.cancelling import posture_apart
 from wholebody.methods.qp.closest import ENDLESS, Closest
@@ -168,14 +168,12 @@ class Multistart:
 
     def _directly(self, start: Array) -> LocalSolution:
         """A descent; without measures by whole steps as long as these gain much."""
-        local = self._descent(self.budget.iterations, None, "", full_step=not self.budget.measures).run(start)
-        self.spent += local.iterations
+        local = self._ran(self._descent(self.budget.iterations, None, "", full_step=not self.budget.measures), start)
         return local
 
     def feasibility_first(self, start: Array) -> LocalSolution:
         """Find a feasible posture without measures, and descend with measures from there."""
-        local = self._feasibility(self.lineariser, self.budget.iterations, "feasibility").run(start)
-        self.spent += local.iterations
+        local = self._ran(self._feasibility(self.lineariser, self.budget.iterations, "feasibility"), start)
         if local.violation.worst > self.budget.tolerance or not self.budget.measures:
             return local
         self._accept(local, "by feasibility first")
@@ -202,27 +200,39 @@ class Multistart:
             return probe
         return self._descend(probe.q, "restart", most=max(self._left, 1))
 
+    def _to_the_place(self) -> None:
+        """Descend to the place of contacts that are met, where they do not bend, and if that is lower from there."""
+        there = at_its_place(self.problem, self.lineariser.state.update(self.best.q))
+        if there is None or self.control.over:
+            return
+        tolerance, workspace = self.budget.tolerance, self.lineariser.workspace
+        search = Multistart(there, workspace, self.solver, self.budget, self.control)
+        local = search._directly(self._start)
+        if local.violation.worst > tolerance:
+            local = search.feasibility_first(self._start)
+        self.spent += search.spent
+        self.trace += search.trace
+        if local.violation.worst <= tolerance and local.measure < SEARCH.lower * self.best.measure:
+            self._accept(self._descend(local.q), self.how)
+
     def _descend_again(self) -> bool:
-        """Where contacts are met by an end that is no local minimum of the measures, descend from beside it once more.
+        """Where contacts are met, descend at their place, then from beside a kink; whether the end is no minimum.
 
-        The answer is whether it is none even then.
-
-        Steps along a curved surface can end early, and so they do at a kink: two points touch at once, and the one that
-        counts as the contact is that which should leave. Beside the kink, along the gradient that nothing balances, the
-        other one is nearest. Only contacts are tested: the test takes a quarter of the time of a reach to a point.
+        Steps along a curved surface can end early, and at a kink: two points touch at once, and the one that counts as
+        the contact should leave. Beside the kink, along the gradient that nothing balances, the other one is nearest.
         """
         problem, tolerance = self.problem, self.budget.tolerance
         touches = any(hasattr(term, "touches") for term in (*problem.goals, *problem.constraints))
         if not (touches and self.budget.measures and self.best.violation.worst <= tolerance):
             return False
+        self._to_the_place()
         for share in (0.3, 1.0, 0.1):  # of that step: more leaves more kinks, and comes to other minima
             judged = assess(problem, self.best.q)
             if judged.optimality <= SEARCH.optimal or self.control.over:
                 return False
             way = -share * judged.first_order.residual
             start = problem.scene.figure.clamp(np.asarray(pin.integrate(problem.scene.model, self.best.q, way)))
-            local = self._descent(self.budget.iterations, None, "", tolerance=0.1 * tolerance).run(start)
-            self.spent += local.iterations
+            local = self._ran(self._descent(self.budget.iterations, None, "", tolerance=0.1 * tolerance), start)
             alike = local.violation.worst <= tolerance and local.measure <= 1.005 * self.best.measure
             if alike and assess(problem, local.q).optimality < judged.optimality:
                 self._best = local  # what it costs more was bought with the tolerance
@@ -231,10 +241,7 @@ class Multistart:
         return assess(problem, self.best.q).optimality > SEARCH.optimal
 
     def _restart_for_measure(self, count: int) -> None:
-        """Where all is met, search for a lower minimum of the measures from other starts, which are screened first.
-
-        A feasible posture costs a few programs, and its measure tells which minimum it is near; a descent costs many.
-        """
+        """Where all is met, seek a lower minimum from the best of some feasible postures, of few programs each."""
         tolerance = self.budget.tolerance
         if not (count and self.budget.measures and self.best.violation.worst <= tolerance):
             return
@@ -244,23 +251,24 @@ class Multistart:
         for q in chain([self._start], others):
             if self.control.over:
                 break
-            local = self._feasibility(self.lineariser, self._at_most(SEARCH.probe_programs), "for measure").run(q)
-            self.spent += local.iterations
+            local = self._ran(
+                self._feasibility(self.lineariser, self._at_most(SEARCH.probe_programs), "for measure"), q
+            )
             if local.violation.worst <= tolerance:
                 found.append(local)
         for local in sorted(found, key=lambda each: each.measure)[:count]:
             self._accept(self._descend(local.q, note="for measure"), "from a start for the measures")
 
     def _probe(self, start: Array, depth: float) -> LocalSolution:
-        """Test whether the goals can be met from a start, by few programs and without measures.
-
-        Args:
-            start: (nq,).
-            depth: by which pieces may be inside of each other, metres.
-        """
+        """Test by few programs whether the goals can be met from a start, pieces inside each other by a depth [m]."""
         most = max(min(self._left, SEARCH.probe_programs), 1)
         lineariser = self.lineariser if depth == 0.0 else self.lineariser.relaxed(depth)
-        local = self._feasibility(lineariser, most, "probe").run(start)
+        local = self._ran(self._feasibility(lineariser, most, "probe"), start)
+        return local
+
+    def _ran(self, stage: SQP | Feasibility | Closest, start: Array) -> LocalSolution:
+        """The end of a stage from a posture (nq,), whose iterations count."""
+        local = stage.run(start)
         self.spent += local.iterations
         return local
 
@@ -281,10 +289,9 @@ class Multistart:
             self._closest_from_best()
         if self.best.violation.left <= tolerance:
             return
-        best = self.best
-        if best.violation.left > tolerance and self.problem.measures and self.budget.measures:
-            local = self._stay(best)
-            if held(local, tolerance) and local.violation.left <= best.violation.left + tolerance:
+        if self.problem.measures and self.budget.measures:
+            local = self._stay(self.best)
+            if held(local, tolerance) and local.violation.left <= self.best.violation.left + tolerance:
                 self._best = local
 
     def _proven(self) -> bool:
@@ -304,17 +311,13 @@ class Multistart:
         given = (self.problem, self.lineariser.state, self._start, np.random.default_rng(self.budget.seed))
         few = self._moving() < SEARCH.few
         agreeing = SEARCH.agreeing_few if few else SEARCH.agreeing
-        others = (
-            throughout(*given, SEARCH.reach_trials_few - 1)
-            if few
-            else restarts(*given, SEARCH.reach_trials - 1, SEARCH.far)
-        )
+        starts = throughout(*given, SEARCH.reach_trials_few - 1) if few else None
+        others = starts or restarts(*given, SEARCH.reach_trials - 1, SEARCH.far)
         enough, programs = SEARCH.reached * tolerance, self._at_most(SEARCH.reach_trial_programs)
         alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
         reach = Closest(alone, enough, programs, problem=self.problem, contacts=False)
         for begin in chain([q], self.lineariser.defined(others)):
-            local = reach.run(begin)
-            self.spent += local.iterations
+            local = self._ran(reach, begin)
             if local.violation.worst <= enough or self.control.over:
                 if local.violation.worst <= enough and begin is not q:
                     self._through = [local.q]
@@ -336,8 +339,7 @@ class Multistart:
 
     def _closest_from_best(self) -> None:
         """Find the closest posture from the best one; where that is stationary no closer one is near."""
-        nearest = self._closest(self._at_most(SEARCH.coming_near)).run(self.best.q)
-        self.spent += nearest.iterations
+        nearest = self._ran(self._closest(self._at_most(SEARCH.coming_near)), self.best.q)
         if not nearest.converged:
             self._accept(nearest, self.how)
             nearest = self._descend(self.best.q, note="nearest", measures=False)
@@ -347,8 +349,7 @@ class Multistart:
     def _approach(self, begin: Array) -> None:
         """Find the closest posture from one (nq,); where constraints do not hold then, restore them."""
         tolerance = self.budget.tolerance
-        local = self._closest(self._at_most(SEARCH.coming_near)).run(begin)
-        self.spent += local.iterations
+        local = self._ran(self._closest(self._at_most(SEARCH.coming_near)), begin)
         if not held(local, tolerance) and local.violation.total < self.best.violation.total:
             local = self._descend(local.q, note="nearest", measures=False, most=SEARCH.coming_near)
         self._accept(local, self.how)
@@ -364,23 +365,21 @@ class Multistart:
         """Descend with the goals' errors to stay as they are: constraints are restored, then the measures improve."""
         nearest = self._goal_errors(local.q)
         most = self._at_most(SEARCH.staying) if held(local, self.budget.tolerance) else self.budget.iterations
-        stayed = self._descent(most, nearest, "nearest").run(local.q)
-        self.spent += stayed.iterations
+        stayed = self._ran(self._descent(most, nearest, "nearest"), local.q)
         left = float(np.linalg.norm(self._goal_errors(stayed.q)))
         violation = with_values(stayed.violation, goal=left, left=left)
         return with_values(stayed, violation=violation, converged=local.converged)
 
     def _goal_errors(self, q: Array) -> Array:
         state = self.lineariser.state.update(q)
-        return np.concatenate([np.zeros(0), *(np.atleast_1d(goal.error(state)) for goal in self.problem.goals)])
+        return np.hstack([np.zeros(0), *(goal.error(state) for goal in self.problem.goals)])
 
     def _descend(
         self, start: Array, note: str = "", *, measures: bool = True, most: int | None = None, full_step: bool = False
     ) -> LocalSolution:
         """Descend from a start; restore constraints that are violated at its end."""
         iterations = self.budget.iterations if most is None else min(most, self.budget.iterations)
-        local = self._descent(iterations, None, note, measures=measures, full_step=full_step).run(start)
-        self.spent += local.iterations
+        local = self._ran(self._descent(iterations, None, note, measures=measures, full_step=full_step), start)
         if (most is None or local.iterations < most) and not held(local, self.budget.tolerance):
             stayed = self._stay(local)
             local = stayed if better(stayed, local, self.budget.tolerance) else local

@@ -176,6 +176,8 @@ class SearchNumbers(NamedTuple):
     inside_probes: int = 5  # seeded starts for goals inside of things, which only look for the nearest posture
     staying: int = 40  # most programs that improve the measures at the nearest posture to goals that are not met
     optimal: float = 1e-2  # rad: first-order optimality of a contact's answer from which on it counts as none
+    # share of a contact's measures below which those at its place count as another minimum. Less: ends at kinks stay.
+    lower: float = 0.9995
     # how many starts for the measures are descended from where it is none after all. More: lower, slower.
     poor: int = 2
     # feasible postures that are looked for, for each that is descended from; more = lower measures, slower

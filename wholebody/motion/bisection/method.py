@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import ClassVar, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.base.checks import choice, listed, number, settle, text, whole
+from wholebody.base.checks import listed, text, whole
+from wholebody.base.fields import Checked, Range
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.methods.base import Method
@@ -25,11 +26,20 @@ from wholebody.tracking.tracks import MOST_FRAMES
 
 Kind = Literal["linear", "quadratic"]
 
+COUNT = Range(1, MOST_FRAMES, whole=True)
 FAR = 0.3  # rad, m: a prediction that goes farther may be a poor local answer, and others are tried
 
 
+def _frames(value: Any, what: str) -> tuple[int, ...]:
+    return tuple(whole(frame, what, 0, MOST_FRAMES) for frame in listed(value, what, "[0, 12, 40]"))
+
+
+def _names(value: Any, what: str) -> tuple[str, ...]:
+    return tuple(text(name, what) for name in listed(value, what, "['left_elbow']"))
+
+
 @dataclass(frozen=True)
-class Bisection:
+class Bisection(Checked):
     """Keyframe interpolation by recursive bisection, with posture prediction (Degenhardt 2014).
 
     Frames that overlap make groups. The middle frame of a group gets the posture of least effort from the original one
@@ -60,34 +70,20 @@ class Bisection:
     clearance: ClassVar[float] = 0.0
     dynamics: ClassVar[None] = None
 
-    evaluation: tuple[int, ...] | None = None
-    buffer: float = 50.0
-    least: int = 3
+    evaluation: Annotated[tuple[int, ...], _frames] | None = None
+    buffer: Annotated[float, Range(0.0, 1000.0, "percent")] = 50.0
+    least: Annotated[int, COUNT] = 3
     interpolation: Kind = "linear"
-    planes: tuple[str, ...] | None = None
-    frozen: tuple[str, ...] | None = None
-    room: float = 0.005
+    planes: Annotated[tuple[str, ...], _names] | None = None
+    frozen: Annotated[tuple[str, ...], _names] | None = None
+    room: Annotated[float, Range(0.0, 0.1, "m")] = 0.005
     method: str | Method = "qp"
-    character: float = 0.2
-    short: int = 25
+    character: Annotated[float, Range(0.0, 100.0)] = 0.2
+    short: Annotated[int, COUNT] = 25
 
     def __post_init__(self) -> None:
         """Check the settings."""
-        if self.evaluation is not None:
-            frames = listed(self.evaluation, "Bisection: evaluation", "[0, 12, 40]")
-            checked = tuple(whole(frame, "Bisection: evaluation", 0, MOST_FRAMES) for frame in frames)
-            object.__setattr__(self, "evaluation", checked)
-        settle(self, "buffer", number(self.buffer, "Bisection: buffer", 0.0, 1000.0, "percent"))
-        settle(self, "least", whole(self.least, "Bisection: least", 1, MOST_FRAMES))
-        choice(self.interpolation, ("linear", "quadratic"), "Bisection: interpolation")
-        for name in ("planes", "frozen"):
-            given = getattr(self, name)
-            if given is not None:
-                names = listed(given, f"Bisection: {name}", "['left_elbow']")
-                object.__setattr__(self, name, tuple(text(entry, f"Bisection: {name}") for entry in names))
-        settle(self, "room", number(self.room, "Bisection: room", 0.0, 0.1, "m"))
-        settle(self, "character", number(self.character, "Bisection: character", 0.0, 100.0))
-        settle(self, "short", whole(self.short, "Bisection: short", 1, MOST_FRAMES))
+        super().__post_init__()
         method_for_motions(self.method)
 
     def avoid(self, run: Run) -> MethodResult:

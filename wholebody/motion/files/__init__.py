@@ -6,8 +6,9 @@ import os
 from collections.abc import Callable, Collection
 from pathlib import Path
 
+from wholebody.base.checks import flag
 from wholebody.base.checks import path as checked_path
-from wholebody.base.errors import FileFormatError, one_line
+from wholebody.base.errors import FileFormatError, InputError, one_line
 from wholebody.figures.figure import Figure
 from wholebody.figures.joined import one_figure
 from wholebody.motion.files import archive, bvh, columns, gltf, joint_profile
@@ -33,19 +34,20 @@ READERS: dict[str, Callable[[Path, Figure], Frames]] = {
 FBX = "FBX is not read; Blender turns it into what is: File > Import > FBX, then File > Export > glTF 2.0 (.glb)"
 
 
-def write_motion(motion: Motion, path: str | os.PathLike[str]) -> Path:
+def write_motion(motion: Motion, path: str | os.PathLike[str], *, bare: bool = False) -> Path:
     """Write a clip in the format that the ending of the file's name says; see `Clip.write`."""
-    path = checked_path(path, "path")
-    ending = _ending(path, WRITERS, "written")
+    path = check_ending(path, bare=bare)
+    ending = path.suffix.lower()
     if ending != ".npz":
         one_figure(motion.figure, f"{one_line(path.name)} holds one figure, and the clip's figure")
-    return WRITERS[ending](motion, path)
+    return columns.write(motion, path, bare=True) if bare else WRITERS[ending](motion, path)
 
 
-def check_ending(path: str | os.PathLike[str]) -> Path:
-    """The path of a file to write, checked before long work."""
+def check_ending(path: str | os.PathLike[str], *, bare: bool = False) -> Path:
+    """The path of a file to write, checked before long work; without names only as CSV."""
     path = checked_path(path, "path")
-    _ending(path, WRITERS, "written")
+    if _ending(path, WRITERS, "written") != ".csv" and flag(bare, "bare"):
+        raise InputError(f"{one_line(path.name)}: bare numbers are written as CSV; give the name the ending .csv")
     return path
 
 

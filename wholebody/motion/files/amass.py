@@ -63,6 +63,7 @@ def _arrays(name: str, arrays: dict[str, np.ndarray]) -> tuple[Array, Array, flo
         raise FileFormatError(f"{name}: is no archive of AMASS; it lacks {', '.join(missing)}")
     if "poses" in arrays:
         poses = _numbers(arrays["poses"], f"{name}: poses")
+        poses = poses.reshape(len(poses), -1) if poses.ndim == 3 and poses.shape[2] == 3 else poses
     else:
         parts = [_numbers(arrays[part], f"{name}: {part}") for part in ("root_orient", "pose_body")]
         if any(part.ndim != 2 or len(part) != len(parts[0]) for part in parts):

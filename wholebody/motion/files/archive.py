@@ -18,13 +18,14 @@ from wholebody.base.files import LARGEST, read_bytes, title_of
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
 from wholebody.motion.files.base import Frames, Motion
+from wholebody.motion.files.robot_arrays import robot_arrays
 from wholebody.tracking.tracks import MOST_FRAMES
 
 VERSION = 1  # of the layout of the arrays
 
 
 def write(motion: Motion, path: Path) -> Path:
-    """Write a clip as npz: `wholebody_clip` (version), `q`, `dt`, `name`, `joints`, `figure`."""
+    """Write a clip as npz: `wholebody_clip` (version), `q`, `dt`, `name`, `joints`, `figure`; see `robot_arrays`."""
     data = io.BytesIO()
     np.savez_compressed(
         data,
@@ -34,6 +35,7 @@ def write(motion: Motion, path: Path) -> Path:
         name=np.array(motion.name),
         joints=np.array(motion.figure.joints, dtype=np.str_),
         figure=np.array(motion.figure.name),
+        **robot_arrays(motion),
     )
     return write_file(path, data.getvalue())
 

@@ -12,12 +12,14 @@ from wholebody.base.errors import FileFormatError, InputError
 from wholebody.base.files import title_of
 from wholebody.figures.figure import Figure
 from wholebody.motion.files.base import Frames, Motion
-from wholebody.tracking.track_files import read_values, write_track
+from wholebody.tracking.track_files import read_values, write_numbers, write_track
 from wholebody.tracking.tracks import ROOT_SIZE, Track
 
 
-def write(motion: Motion, path: Path) -> Path:
+def write(motion: Motion, path: Path, *, bare: bool = False) -> Path:
     """Write time, the seven values of a free root, and the joints in radians; turns without limits are angles.
+
+    `bare` leaves out the line of names and the times.
 
     Raises:
         InputError: a joint has several degrees of freedom, or the file cannot be written.
@@ -31,7 +33,8 @@ def write(motion: Motion, path: Path) -> Path:
         root = q[:, : ROOT_SIZE if figure.root == "free" else 0]
         angles = np.unwrap([list(figure.joint_values(each).values()) for each in q], axis=0)
         q = np.hstack([root, angles])
-    return write_track(Track(q, motion.dt, figure.joints, motion.name), path)
+    track = Track(q, motion.dt, figure.joints, motion.name)
+    return write_numbers(track, path) if bare else write_track(track, path)
 
 
 def read(

@@ -23,7 +23,7 @@ from wholebody.figures.link_pieces import triangles_of
 from wholebody.figures.link_visuals import Color, Drawn, drawn_of
 from wholebody.figures.surface import Surface, surface_of
 from wholebody.geometry.gltf_builder import VERTICES, GltfBuilder
-from wholebody.motion.files.base import Motion
+from wholebody.motion.files.base import Motion, steady
 from wholebody.motion.skeleton import UP
 
 JOINT = "joint "
@@ -182,7 +182,7 @@ class JointTree:
             ends = [data.oMi[joint].homogeneous @ offset for joint, offset in (first, second)]
             found[k] = np.linalg.solve(*ends)
         half = Rotation.from_rotvec(0.5 * Rotation.from_matrix(found[:, :3, :3]).as_rotvec()).as_quat()
-        return _steady(half), found[:, :3, 3]
+        return steady(half), found[:, :3, 3]
 
 
 def keys_of(model: Any, q: Array) -> tuple[Array, Array]:
@@ -194,14 +194,7 @@ def keys_of(model: Any, q: Array) -> tuple[Array, Array]:
         for joint, at in enumerate(data.liMi):
             values = pin.SE3ToXYZQUAT(at)
             places[k, joint], turns[k, joint] = values[:3], values[3:]
-    return _steady(turns), places
-
-
-def _steady(turns: Array) -> Array:
-    """Quaternions (n, ..., 4), each on the same half of the sphere as the one before."""
-    flips = np.where((turns[1:] * turns[:-1]).sum(axis=-1) < 0.0, -1.0, 1.0)
-    turns[1:] *= np.cumprod(flips, axis=0)[..., None]
-    return turns
+    return steady(turns), places
 
 
 def triangles(shape: Any) -> Any:

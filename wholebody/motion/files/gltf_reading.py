@@ -137,6 +137,8 @@ def _bound(document: GltfDocument, skin: int, rest: Array) -> Array:
     """
     joints = document.tree["skins"][skin]["joints"]
     bind = np.linalg.inv(document.inverse_binds(skin))
+    if np.ptp(bind[:, :3, 3], axis=0).max() < 1e-9:  # no matrices: the mesh is bound by the nodes as they rest
+        return rest
     theirs, ours = bind[:, :3, 3], rest[joints][:, :3, 3]
     meshes = [node for node, fields in enumerate(document.tree["nodes"]) if fields.get("skin") == skin]
     tops = [int(document.parents[node]) for node in joints if document.parents[node] not in joints]

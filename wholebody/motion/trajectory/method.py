@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Mask
-from wholebody.motion.avoider import MethodResult, Run
+from wholebody.base.fields import Checked, Range
+from wholebody.motion.avoider import CLEARANCE, MethodResult, Run
 from wholebody.motion.clip import Clip
 from wholebody.motion.frame_terms import FrameTerms, between
 from wholebody.motion.stance import standing_feet
@@ -22,7 +23,7 @@ from wholebody.motion.windows import Window
 
 
 @dataclass(frozen=True)
-class Trajectory:
+class Trajectory(Checked):
     """All frames at once: the least deviation from the original, and the least acceleration of that deviation.
 
     Frames are changed in windows around what collides; all others stay as they are, bit by bit.
@@ -45,19 +46,15 @@ class Trajectory:
 
     name: ClassVar[str] = "trajectory"
 
-    clearance: float = 0.0
-    time: float | None = None
-    margin: float = 0.5
-    stretch: float = 1.0
+    clearance: Annotated[float, CLEARANCE] = 0.0
+    time: Annotated[float, Range(0.0, 100.0, "s")] | None = None
+    margin: Annotated[float, Range(0.0, 100.0, "s")] = 0.5
+    stretch: Annotated[float, Range(1.0, 100.0)] = 1.0
     dynamics: Strength | None = None
 
     def __post_init__(self) -> None:
         """Check the settings."""
-        checks.settle(self, "clearance", checks.number(self.clearance, "Trajectory: clearance", 0.0, 0.5, "m"))
-        if self.time is not None:
-            checks.settle(self, "time", checks.number(self.time, "Trajectory: time", 0.0, 100.0, "s"))
-        checks.settle(self, "margin", checks.number(self.margin, "Trajectory: margin", 0.0, 100.0, "s"))
-        checks.settle(self, "stretch", checks.number(self.stretch, "Trajectory: stretch", 1.0, 100.0))
+        super().__post_init__()
         if self.dynamics is not None:
             checks.instance(self.dynamics, Strength, "Trajectory: dynamics", "give wb.motion.Strength(percentile=50)")
 

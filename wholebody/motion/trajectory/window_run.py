@@ -255,8 +255,8 @@ class ClipRun:
     def _starts(self, own: _Window, depths: Array) -> Iterable[Array]:
         """Deviations (n, nv) to begin with.
 
-        None; frames kept on one side of what motions between them pass; what following from the deepest frame and both
-        ends gives, the least first.
+        None; frames kept on one side of what motions between them pass; what following gives from the deepest frame and
+        from both ends.
         """
         window, none = own.window, np.zeros((len(own.window), self._run.workspace.model.nv))
         yield none
@@ -267,8 +267,8 @@ class ClipRun:
             if x.any():
                 yield x
         deepest = window.first + int(np.argmax(depths[window.first : window.end]))
-        for q in followed(self._run, window, (deepest, window.first, window.end - 1)):
-            yield own.deviations(q)
+        for middle in dict.fromkeys((deepest, window.first, window.end - 1)):
+            yield own.deviations(followed(self._run, window, middle))
 
     def _attempt(self, begun: _Attempt, own: _Window, objective: Objective, way: _Way) -> _Attempt | None:
         """What iterations from an attempt lead to; None where the caller ends them."""

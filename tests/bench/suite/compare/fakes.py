@@ -19,6 +19,7 @@ from wholebody.bench.suite.problem_sets.case import ProblemSet
 from wholebody.methods.base import SolvingTracker
 from wholebody.methods.control import Progress
 
+COMPILING = 0.8  # s: that the first solve of the method that compiles takes longer
 ARM = Path(__file__).parents[3] / "data" / "arm" / "arm.urdf"
 
 
@@ -83,7 +84,7 @@ class Fake:
             time.sleep(float(os.environ.get("FAKES_SLEEP", "0.01")))
         if self.does == "compiles" and "COMPILED" not in os.environ:
             os.environ["COMPILED"] = "in this process"
-            time.sleep(1.5)
+            time.sleep(COMPILING)
         solution = wb.QP(solver="daqp", tolerance=self.tolerance).solve(problem)
         if self.does == "nan":
             return replace(solution, q=np.full_like(solution.q, np.nan))

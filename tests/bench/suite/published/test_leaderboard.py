@@ -34,6 +34,11 @@ def test_a_folder_of_answers_becomes_a_page(folder: Path, tmp_path: Path, arms: 
     assert "median time 1e+02 reference kernels" in page
     assert page.count("<svg") == 1
     assert not re.search(r'(?:src|href)="https?:', page)
+    table = (tmp_path / "out" / "summary.tex").read_text()
+    assert "robot arm, near & good & 100.0 [" in table
+    assert "& poor <b> & " in table
+    assert table.count("{") == table.count("}")
+    assert len((tmp_path / "out" / "summary.csv").read_text().splitlines()) == 4  # what was asked, names, two methods
     assert main(["bench", "judge", str(place), "--problems", str(folder), "--out", str(tmp_path / "o")]) == 0
 
 

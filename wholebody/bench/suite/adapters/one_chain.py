@@ -1,4 +1,4 @@
-"""Solvers of the chain that carries one frame as methods: what they take, and the chain as they read it."""
+"""optik, TRAC-IK and EAIK, solvers of the chain that carries one frame, as methods."""
 
 from __future__ import annotations
 
@@ -89,16 +89,111 @@ class OneChain(OneCall[Chain], ABC):
             return refused
         if len(problem.goals) != 1:
             return ["several goals"]
-        model = problem.scene.model
-        chain = list(model.supports[_goal(problem).residual.place.joint])[1:]
-        kinds = [model.joints[joint].shortname() for joint in chain]
-        if not chain or not all(kind.startswith(("JointModelR", "JointModelP")) for kind in kinds):
+        joints = _joints(problem)
+        if not joints or not all(joint.shortname().startswith(("JointModelR", "JointModelP")) for joint in joints):
             return ["a free root" if problem.scene.figure.root == "free" else "a joint of several axes"]
-        if any(model.joints[joint].nq != 1 for joint in chain):
-            return ["a joint without limits"]
-        return []
+        return ["a joint without limits"] if any(joint.nq != 1 for joint in joints) else []
 
 
 def _goal(problem: Problem) -> Any:
     (goal,) = problem.goals
     return goal
+
+
+def _joints(problem: Problem) -> list[Any]:
+    """The joints of the chain that carries the goal's frame."""
+    model = problem.scene.model
+    return [model.joints[joint] for joint in list(model.supports[_goal(problem).residual.place.joint])[1:]]
+
+
+class _OptikChain(Chain):
+    def __init__(self, model: pin.Model, frame: int) -> None:
+        import optik
+
+        super().__init__(model, frame)
+        with self.written(model) as (path, first, last):
+            self._robot = optik.Robot.from_urdf_file(str(path), first, last)
+        self._robot.set_parallelism(1)
+
+    def values(self, start: Array, target: pin.SE3, tolerance: float) -> Any:
+        import optik
+
+        # optik bounds the squared error, here of the frame itself; its restarts end after 1 s.
+        settings = optik.SolverConfig(solution_mode="speed", max_time=1.0, tol_f=(0.5 * tolerance) ** 2)
+        answer: Any = self._robot.ik(settings, (target * self.end).homogeneous, start, self.end.homogeneous)
+        return None if answer is None else answer[0]
+
+
+class Optik(OneChain):
+    """optik: random restarts of a bounded quasi-Newton method (SLSQP) on the error of the frame."""
+
+    name = "optik"
+    chain = _OptikChain
+    way = "by its restarts"
+    failure = "optik found no posture in its time"
+
+
+class _TracikChain(Chain):
+    def __init__(self, model: pin.Model, frame: int) -> None:
+        super().__init__(model, frame)
+        self._solver: Any = None
+        self._asked, self._model = 0.0, model
+
+    def values(self, start: Array, target: pin.SE3, tolerance: float) -> Any:
+        if tolerance != self._asked:  # which it takes when it is made
+            from trac_ik import TracIK
+
+            with self.written(self._model) as (path, first, last):
+                self._solver = TracIK(first, last, str(path), timeout=0.05, epsilon=0.3 * tolerance)
+            self._asked = tolerance
+        return self._solver.ik(target.translation, target.rotation, start)
+
+
+class Tracik(OneChain):
+    """TRAC-IK: Newton's method with restarts and a quadratic program on the frame's error, beside each other."""
+
+    name = "tracik"
+    chain = _TracikChain
+    way = "by its restarts"
+    failure = "TRAC-IK found no posture in its time"
+
+
+class _EaikChain(Chain):
+    def __init__(self, model: pin.Model, frame: int) -> None:
+        from eaik.IK_HP import HPRobot
+
+        super().__init__(model, frame)
+        data = model.createData()
+        pin.computeJointJacobians(model, data, pin.neutral(model))
+        places = [data.oMi[joint] for joint in self.joints]
+        axes = np.array([data.J[3:, model.joints[joint].idx_v] for joint in self.joints])
+        points = np.array([np.zeros(3), *(place.translation for place in places), places[-1].translation])
+        self._robot, self._turned = HPRobot(axes, np.diff(points, axis=0)), places[-1].rotation
+        self._lower, self._upper = (
+            limit[self.places] for limit in (model.lowerPositionLimit, model.upperPositionLimit)
+        )
+
+    def values(self, start: Array, target: pin.SE3, tolerance: float) -> Any:
+        found = self._robot.IK(pin.SE3(target.rotation @ self._turned.T, target.translation).homogeneous)
+        turn = 2.0 * np.pi
+        exact = np.atleast_2d(found.Q)[~np.asarray(found.is_LS, dtype=bool)]
+        near = exact + turn * np.round((start - exact) / turn)
+        near -= turn * np.ceil((near - self._upper) / turn).clip(0.0)
+        near += turn * np.ceil((self._lower - near) / turn).clip(0.0)
+        near = near[(near <= self._upper).all(axis=1)]
+        return near[((near - start) ** 2).sum(axis=1).argmin()] if len(near) else None
+
+
+class Eaik(OneChain):
+    """EAIK: all branches of arms of six turning joints in closed form, of which the nearest within limits is taken."""
+
+    name = "eaik"
+    chain = _EaikChain
+    way = "in closed form"
+    failure = "EAIK found no branch within limits"
+
+    def unsupported(self, problem: Problem) -> list[str]:
+        """Names of what EAIK cannot express."""
+        refused = super().unsupported(problem)
+        turning = [] if refused else [joint.shortname().startswith("JointModelR") for joint in _joints(problem)]
+        return refused if refused or turning == [True] * 6 else ["an arm of other than six turning joints"]

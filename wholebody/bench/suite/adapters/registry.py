@@ -113,7 +113,8 @@ def _rows() -> dict[str, _Row]:
 def _class_of(name: str, end: str = "") -> Any:
     """The class of an adapter's module, such as Placo, PrunedPlaco or PlacoTool."""
     family, _, variant = name.partition("/")
-    module = import_module(f"wholebody.bench.suite.adapters.{family}")
+    file = _texts().get(family, {}).get("file", family)
+    module = import_module(f"wholebody.bench.suite.adapters.{file}")
     return getattr(module, f"{variant.capitalize()}{family.capitalize()}{end}")
 
 

@@ -14,7 +14,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.bench.suite.adapters.loop import size
-from wholebody.bench.suite.problem_sets.things import shape_of
+from wholebody.bench.suite.problem_sets.things import hull_obj, shape_of
 from wholebody.figures.figure import Figure
 from wholebody.figures.urdf.writing import FOLLOWS, UrdfAxis, add_joint, exact, urdf_axis
 from wholebody.scene.scene import Scene
@@ -124,7 +124,7 @@ def _shape(scene: Scene, piece: Any, path: Path) -> tuple[ElementTree.Element, p
         ElementTree.SubElement(inner, "box", size=exact(np.array([edge, edge, 0.25 * edge])))
         shift = _slab(scene, piece, 0.125 * edge)
     elif kind == "hull":
-        path.write_text(_obj(piece.geometry), encoding="utf-8")
+        path.write_text(hull_obj(piece.geometry), encoding="utf-8")
         ElementTree.SubElement(inner, "mesh", filename=str(path))
     else:
         raise InputError(
@@ -141,15 +141,6 @@ def _slab(scene: Scene, piece: Any, depth: float) -> pin.SE3:
     places = scene.model.jointPlacements
     root = piece.placement.actInv(places[1].translation) if len(places) > 1 else np.zeros(3)
     return pin.SE3(turn, root - (normal @ root - piece.geometry.d + depth) * normal)
-
-
-def _obj(shape: Any) -> str:
-    """A hull as a Wavefront file."""
-    lines = ["v " + exact(shape.point(k)) for k in range(shape.num_points)]
-    for k in range(shape.num_polygons):
-        triangle = shape.polygons(k)
-        lines.append("f " + " ".join(str(triangle[corner] + 1) for corner in range(3)))
-    return "\n".join(lines) + "\n"
 
 
 def mjcf(scene: Scene, frames: Mapping[str, tuple[int, pin.SE3]] = MappingProxyType({})) -> str:
@@ -182,7 +173,7 @@ def _body(model: Any, index: int, parent: ElementTree.Element) -> ElementTree.El
     if inertia.mass > 0.0:
         moments = (full[0, 0], full[1, 1], full[2, 2], full[0, 1], full[0, 2], full[1, 2])
         ElementTree.SubElement(
-            body, "inertial", pos=_text(inertia.lever), mass=repr(float(inertia.mass)), fullinertia=_text(moments)
+            body, "inertial", pos=exact(inertia.lever), mass=repr(float(inertia.mass)), fullinertia=exact(moments)
         )
     else:
         ElementTree.SubElement(body, "inertial", pos="0 0 0", mass="1e-6", diaginertia="1e-9 1e-9 1e-9")
@@ -197,11 +188,11 @@ def _motion(model: Any, index: int) -> dict[str, str]:
     """Kind, axis and limits of a joint of one degree of freedom."""
     joint = model.joints[index]
     known = axis_of(model, index, "MJCF is written for free roots, turning and sliding joints")
-    attributes = {"type": "slide" if known.kind == "prismatic" else "hinge", "axis": _text(known.axis)}
+    attributes = {"type": "slide" if known.kind == "prismatic" else "hinge", "axis": exact(known.axis)}
     if joint.nq == 1:
         limits = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
         if np.isfinite(limits).all():
-            attributes["range"] = _text(limits)
+            attributes["range"] = exact(limits)
     return attributes
 
 
@@ -209,14 +200,14 @@ def _geom(piece: Any, body: ElementTree.Element, assets: ElementTree.Element) ->
     shape, (kind, lengths) = piece.geometry, shape_of(piece.geometry)
     attributes = {"name": piece.name, "type": kind} | _place(piece.placement)
     if kind == "sphere":
-        attributes |= {"size": _text(lengths)}
+        attributes |= {"size": exact(lengths)}
     elif kind == "capsule":
-        attributes |= {"size": _text((lengths[0], 0.5 * lengths[1]))}
+        attributes |= {"size": exact((lengths[0], 0.5 * lengths[1]))}
     elif kind == "box":
-        attributes |= {"size": _text(0.5 * np.array(lengths))}
+        attributes |= {"size": exact(0.5 * np.array(lengths))}
     elif kind == "hull":
         points = np.array([shape.point(k) for k in range(shape.num_points)])
-        ElementTree.SubElement(assets, "mesh", name=piece.name, vertex=_text(points.ravel()))
+        ElementTree.SubElement(assets, "mesh", name=piece.name, vertex=exact(points.ravel()))
         attributes |= {"type": "mesh", "mesh": piece.name}
     elif kind == "half-space":
         attributes |= {"type": "plane", "size": "0 0 1"} | _place(piece.placement * _surface(shape))
@@ -237,8 +228,4 @@ def _surface(shape: Any) -> Any:
 
 def _place(placement: Any) -> dict[str, str]:
     x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
-    return {"pos": _text(placement.translation), "quat": _text((w, x, y, z))}
-
-
-def _text(values: Any) -> str:
-    return " ".join(repr(float(value)) for value in values)
+    return {"pos": exact(placement.translation), "quat": exact((w, x, y, z))}

@@ -13,7 +13,7 @@ from wholebody.assessment.posture import assess
 from wholebody.base.compiled import compile_all
 from wholebody.base.runner import ONE_THREAD, Child, EndedError, allow, allow_processor
 from wholebody.bench import rows as tables
-from wholebody.bench.rows import Figure, Panel, Row
+from wholebody.bench.rows import Figure, Panel, Row, texts
 from wholebody.bench.suite.adapters.base import Adapter
 from wholebody.bench.suite.compare.results import ANSWERED, COARSE, DEFAULT, FAILED, OVERTIME, Record
 from wholebody.bench.suite.compare.solving import BUILDING, Ready, solve
@@ -107,14 +107,7 @@ def _row(name: str, first: Mapping[str, Figure], records: Sequence[Record]) -> R
 
 def report(rows: Sequence[Row], title: str, facts: Mapping[str, str], cap: float = 20.0) -> str:
     """The table as Markdown, refusals and failures below it; `cap` is that of `compared`."""
-    about = (
-        "Each method has a process of its own. *Cold* is its first solve, imports and "
-        f"set-up included; *warm* the median of {REPEATS} later ones, with the least and the greatest. *Set-up* builds "
-        "a model of the tool's own and is in cold alone. *Peak* is the greatest resident memory of the process. "
-        f"Answers at a tolerance of {DEFAULT[0]:g} are judged from the "
-        f"posture: solved where goals are met and everything holds to {COARSE:g} m and rad. A solve is ended after "
-        f"{cap:g} s of the processor's time. One problem says nothing of others."
-    )
+    about = texts()["own_task"].format(repeats=REPEATS, tolerance=DEFAULT[0], coarse=COARSE, cap=cap)
     answered = [Row(title, row.tool, row.figures) for row in rows if "worst" in row.figures]
     silent = [f"`{row.tool}`, {row['outcome']}: {row['said']}" for row in rows if "worst" not in row.figures]
     return tables.report(f"# {title[:1].upper()}{title[1:]}\n\n{about}", {"": answered}, facts, silent)

@@ -103,6 +103,16 @@ def draw_all(
 PAGE = "report.html"
 
 
+def write_summary(rows: Sequence[Summary], facts: Mapping[str, str], folder: Path) -> None:
+    """Write the table of sets and methods as CSV, and with intervals as LaTeX for a paper."""
+    write_rows(folder / "summary.csv", facts, rows)
+    sets = list(dict.fromkeys(row.set for row in rows))
+    text = render(
+        "summary.tex", rows=rows, sets=sets, facts="; ".join(f"{name} {value}" for name, value in facts.items())
+    )
+    write_text(folder / "summary.tex", text + "\n")
+
+
 def publish(
     settings: Settings,
     store: Store,
@@ -117,7 +127,7 @@ def publish(
     """
     given = material(settings, store.chunks, facts, missing)
     write_rows(folder / "solves.csv", facts, store.records)
-    write_rows(folder / "summary.csv", facts, given.rows)
+    write_summary(given.rows, facts, folder)
     write_lock(folder / LOCK, locked(given))
     say("charts")
     titles = {family.name: family.title for family in settings.sets}

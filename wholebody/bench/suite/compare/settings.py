@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf
-from typing import Any
+from typing import Annotated, Any
 
 from wholebody.base.errors import InputError
+from wholebody.base.fields import Checked, Range
 from wholebody.bench.suite.adapters.base import FEASIBILITY_ONLY, Adapter, Budget
 from wholebody.bench.suite.compare.results import DEFAULT
 from wholebody.bench.suite.problem_sets.case import ProblemSet
 from wholebody.version import __version__
 
 SEEDS = 3  # from which the cases of a set are made in turn
+MOST = 1 << 31
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(Checked):
     """What is compared, and how much of it.
 
     `cases` of every set at the default budget, of which the first `sweep` at `levels` others too; problems are made
@@ -26,21 +27,16 @@ class Settings:
 
     sets: tuple[ProblemSet, ...]
     adapters: tuple[Adapter, ...]
-    cases: int = 200
-    sweep: int = 40
-    levels: int = 6
-    seed: int = 0
-    cap: float = 20.0
-    minutes: float = 25.0
+    cases: Annotated[int, Range(1, MOST, whole=True)] = 200
+    sweep: Annotated[int, Range(0, MOST, whole=True)] = 40
+    levels: Annotated[int, Range(1, MOST, whole=True)] = 6
+    seed: Annotated[int, Range(0, MOST, whole=True)] = 0
+    cap: Annotated[float, Range(1e-3, 1e6, "s")] = 20.0
+    minutes: Annotated[float, Range(1e-3, 1e6)] = 25.0
 
     def __post_init__(self) -> None:
-        """Check the numbers; InputError for one that makes no sense."""
-        for name, least in (("cases", 1), ("sweep", 0), ("levels", 1), ("seed", 0)):
-            if getattr(self, name) < least:
-                raise InputError(f"{name} is {getattr(self, name)}; give {least} or more")
-        for name in ("cap", "minutes"):
-            if not (0.0 < getattr(self, name) < inf):
-                raise InputError(f"{name} is {getattr(self, name)}; give a number above 0")
+        """Check the numbers; InputError for one that makes no sense, and for no set or method."""
+        super().__post_init__()
         if not self.sets or not self.adapters:
             raise InputError("a comparison needs a problem set and a method; name at least one of each")
 

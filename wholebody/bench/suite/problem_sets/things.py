@@ -13,6 +13,7 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
+from wholebody.figures.urdf.writing import exact
 from wholebody.geometry.pieces import swept_points
 from wholebody.geometry.placement import placement
 
@@ -66,6 +67,14 @@ def shape_of(geometry: Any) -> tuple[str, list[float]]:
         return "hull", []
     kind, lengths = known.get(type(geometry), (type(geometry).__name__, lambda shape: ()))
     return kind, [float(length) for length in lengths(geometry)]
+
+
+def hull_obj(hull: Any) -> str:
+    """A convex hull of coal as the text of a Wavefront file."""
+    lines = [f"v {exact(point)}" for point in np.array(hull.points()) + 0.0]  # no negative zero
+    triangles = map(hull.polygons, range(hull.num_polygons))
+    lines += [f"f {' '.join(str(int(triangle[corner]) + 1) for corner in range(3))}" for triangle in triangles]
+    return "\n".join(lines) + "\n"
 
 
 class Occupied:

@@ -16,7 +16,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
-from wholebody.bench.suite.problem_sets.things import shape_of
+from wholebody.bench.suite.problem_sets.things import hull_obj, shape_of
 from wholebody.bench.suite.published.rebuilt import VERSION, model_of
 from wholebody.figures.figure import Figure
 from wholebody.figures.joined import one_figure
@@ -33,7 +33,7 @@ def described(geometry: Any, meshes: Meshes, name: str) -> dict[str, Any]:
     kind, lengths = shape_of(geometry)
     if kind == "hull":
         path = f"meshes/{name.replace(' ', '-').replace(':', '-')}.obj"
-        meshes[path] = _obj(geometry)
+        meshes[path] = hull_obj(geometry)
         return {"type": "convex", "mesh": path}
     match kind:
         case "box":
@@ -54,14 +54,6 @@ def described(geometry: Any, meshes: Meshes, name: str) -> dict[str, Any]:
 def pose_of(place: pin.SE3) -> list[float]:
     """A placement as x, y, z and the quaternion x, y, z, w."""
     return [float(value) + 0.0 for value in pin.SE3ToXYZQUAT(place)]
-
-
-def _obj(convex: Any) -> str:
-    points = np.array(convex.points())
-    faces = [convex.polygons(number) for number in range(convex.num_polygons)]
-    lines = [f"v {' '.join(repr(float(value) + 0.0) for value in point)}" for point in points]
-    lines += [f"f {' '.join(str(int(face[corner]) + 1) for corner in range(3))}" for face in faces]
-    return "\n".join(lines) + "\n"
 
 
 @dataclass(frozen=True)

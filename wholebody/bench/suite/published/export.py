@@ -39,6 +39,7 @@ from wholebody.bench.suite.published.rebuilt import (
     read_body,
     worst_of,
 )
+from wholebody.figures.packaged_urdf import client_paths
 
 
 @dataclass
@@ -75,7 +76,7 @@ def export(
     schemas = {f"{name}.schema.json": f"{name}.schema.json" for name in ("problem", "body", "answers", "verdict")}
     for name, source in {**schemas, "LICENSE": "LICENSE.txt", "README.md": "README.txt"}.items():
         done.write(name, read_text(Path(__file__).parent / "static" / source))
-    for path in client_paths():
+    for path in client_paths().values():
         done.write(f"clients/{path.name}", read_text(path))
     index = {
         "format": "wholebody index",
@@ -88,16 +89,6 @@ def export(
     }
     write(folder / INDEX, dumped(index))  # last: a folder without it was not finished
     return folder / INDEX
-
-
-def client_paths() -> list[Path]:
-    """Return the example clients of an installed package or a checkout; WholebodyError without them."""
-    here = Path(__file__).resolve().parent
-    for folder in (here / "clients", here.parents[3] / "examples" / "clients"):
-        found = sorted(folder.glob("*.py"))
-        if found:
-            return found
-    raise WholebodyError(f"there are no clients in {here} or beside the package; install wholebody again")
 
 
 def _written_set(

@@ -10,7 +10,7 @@ from wholebody.base.errors import InputError
 from wholebody.base.files import is_folder
 from wholebody.bench.report import page, render
 from wholebody.bench.suite.compare.advice import advice, choices, named, reference, standings
-from wholebody.bench.suite.compare.report import groups, overview
+from wholebody.bench.suite.compare.report import groups, overview, write_summary
 from wholebody.bench.suite.compare.results import ANSWERED, FAILED, REFUSED, Record, Results
 from wholebody.bench.suite.compare.summary import summaries
 from wholebody.bench.suite.published import judging
@@ -77,6 +77,7 @@ def publish(verdicts: Sequence[Verdict], problems: Path, out: Path) -> list[str]
         charts=list(charts), units={verdict.answers.method: _in_kernels(verdict) for verdict in verdicts},
     )  # fmt: skip
     write_text(out / "leaderboard.md", text + "\n")
+    write_summary(rows, {"problems": f"{index['version']}, {index['fingerprint']}"}, out)
     write_text(out / PAGE, page("Leaderboard", text, charts) + "\n")
     return said
 

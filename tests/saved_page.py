@@ -1,0 +1,15 @@
+"""The page within a saved page, which is compressed and unpacks itself in a browser."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import re
+from pathlib import Path
+
+
+def unpacked(path: str | Path) -> str:
+    """The text of the page that a browser shows."""
+    packed = re.search(r'<script id="page"[^>]*>(.*?)</script>', Path(path).read_text(encoding="utf-8"))
+    assert packed
+    return gzip.decompress(base64.b64decode(packed[1])).decode()

@@ -1,0 +1,182 @@
+"""Chains of joints of one degree of freedom each, as arrays, with their closed form where they have one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.base.arrays import Array
+from wholebody.figures.description import Limits
+from wholebody.methods.qp.chain_kernel import Chain, Goals, Room
+from wholebody.methods.qp.closed_form import Branches, closed_form
+from wholebody.methods.qp.closed_form import compiled_kernel as closed_form_kernel
+from wholebody.methods.qp.closed_form_kernel import BRANCHES
+from wholebody.methods.qp.settings import SEEDS
+from wholebody.terms.entries import Entry
+
+_ONE = np.zeros(1)
+_SHARES = np.linspace(0.0, 1.0, SEEDS.samples)
+
+
+class PlainChain:
+    """The joints of a model that carry some frames, as arrays, with room for one descent.
+
+    Attributes:
+        chain: the arrays.
+        idx_v: (n,) place of each joint in the tangent.
+    """
+
+    def __init__(self, model: pin.Model, limits: Limits, joints: tuple[int, ...]) -> None:
+        """Read joints, ordered, with all that carry them; each has one degree of freedom."""
+        kinds, number = [model.joints[joint] for joint in joints], {0: 0}
+        number |= {joint: k + 1 for k, joint in enumerate(joints)}
+        subspaces = np.array([np.asarray(kind.createData().S).ravel() for kind in kinds], dtype=float)
+        placements = [model.jointPlacements[joint] for joint in joints]
+        self._number = number
+        self._idx_q = np.array([kind.idx_q for kind in kinds], dtype=np.intp)
+        self._round = np.flatnonzero([kind.nq == 2 for kind in kinds])
+        self.idx_v = np.array([kind.idx_v for kind in kinds], dtype=np.intp)
+        lower, upper = np.full(model.nv, -np.inf), np.full(model.nv, np.inf)
+        lower[limits.idx_v], upper[limits.idx_v] = limits.lower, limits.upper
+        self.chain = Chain(
+            parents=np.array([number[model.parents[joint]] for joint in joints], dtype=np.intp),
+            places=np.array([[*place.rotation.T, place.translation] for place in placements], dtype=float),
+            turns=subspaces[:, 3:].copy(),
+            slides=subspaces[:, :3].copy(),
+            support=_support([number[model.parents[joint]] for joint in joints]),
+            lower=lower[self.idx_v],
+            upper=upper[self.idx_v],
+        )
+        limited = np.isfinite(self.chain.upper - self.chain.lower)
+        self._far = np.where(self.chain.turns.any(axis=1), np.pi, np.where(limited, np.inf, 1.0))
+        self._rooms: dict[int, Room] = {}
+        self.arm = closed_form(self.chain)
+        self.held = -1 if self.arm is None or self.arm.held < 0 else int(self.arm.joints[self.arm.held])
+
+    def angles(self, q: Array) -> Array:
+        """Values (..., n) of the joints at postures (..., nq)."""
+        values: Array = q[..., self._idx_q]
+        if len(self._round):
+            values[..., self._round] = np.arctan2(q[..., self._idx_q[self._round] + 1], values[..., self._round])
+        return values
+
+    def posture(self, values: Array, at: Array) -> Array:
+        """Postures (..., nq) with values (..., n) of the joints."""
+        q: Array = at.copy()
+        q[..., self._idx_q] = values
+        if len(self._round):
+            turned = values[..., self._round]
+            q[..., self._idx_q[self._round]], q[..., self._idx_q[self._round] + 1] = np.cos(turned), np.sin(turned)
+        return q
+
+    def goals(self, entries: list[Entry]) -> Goals:
+        """Entries of goals with the numbers of these joints."""
+        integers, row = np.empty((len(entries), 6), dtype=np.int64), 0
+        for k, entry in enumerate(entries):
+            joint, base, *kinds = entry.integers
+            integers[k] = row, self._number[joint], self._number[base], *kinds
+            row += entry.rows
+        return Goals(np.array([entry.floats for entry in entries]), integers)
+
+    def room(self, rows: int) -> Room:
+        """Room for descents with so many rows: the same for the same number."""
+        if rows not in self._rooms:
+            size = len(self.idx_v)
+            joints = np.zeros((size + 1, 4, 3))
+            joints[0, :3] = np.eye(3)
+            self._rooms[rows] = Room(
+                joints, np.empty((size, 6)), np.empty((rows, 6)), np.empty(rows), np.empty((rows, size)),
+                np.empty(size, dtype=np.bool_),
+            )  # fmt: skip
+        return self._rooms[rows]
+
+    def branches(self, goals: Goals, nearest: Array) -> Branches:
+        """The branches of the closed form for the placement of one frame; `nearest` as in `chain_kernel.reach`.
+
+        With six joints these are all postures. With seven they are samples, where one joint has values all over its
+        limits, but not farther than half a turn from the nearest posture.
+        """
+        assert self.arm is not None
+        lower, upper, values = self.chain.lower, self.chain.upper, self.held_values(nearest[0])
+        found, effort = self.angles_of(goals.tables[0], values), np.empty((len(values), BRANCHES))
+        order = np.empty(effort.size, dtype=np.intp)
+        count = closed_form_kernel().least(found.reshape(*effort.shape, -1), lower, upper, nearest, effort, order)
+        return Branches(found, effort.ravel(), found[order[:count]])
+
+    def is_exact(self, entries: Sequence[Entry]) -> bool:
+        """Whether the goals are one placement of a frame that the closed form has the postures of."""
+        return self.arm is not None and [entry.integers[1:] for entry in entries] == [(0, 1, 1, 0)]
+
+    def held_values(self, nearest: Array) -> Array:
+        """Values (v,) of the joint that the closed form holds, not farther than half a turn from values (n,)."""
+        if (held := self.held) < 0:
+            return _ONE
+        near = nearest[held]
+        low, high = max(self.chain.lower[held], near - np.pi), min(self.chain.upper[held], near + np.pi)
+        values: Array = low + (high - low) * _SHARES
+        return values
+
+    def angles_of(self, goal: Array, held: Array | None = None) -> Array:
+        """Values (8 v, n) of all branches for a goal (36,), NaN for none, with (v,) values of a joint that is held."""
+        values = _ONE if held is None else held
+        found = np.empty((len(values), BRANCHES, len(self.idx_v)))
+        closed_form_kernel().branches(self.arm, goal, values, found)
+        return found.reshape(-1, len(self.idx_v))
+
+    def seeds(self, start: Array, seed: int, count: int) -> Iterator[Array]:
+        """Batches (count, n) of values all over the limits, but not farther from a start (n,) than half a turn.
+
+        The first batch has the start, and values half as far from it, where ends of little effort are. Joints that
+        slide without limits begin within a metre.
+        """
+        lower, upper = np.maximum(self.chain.lower - start, -self._far), np.minimum(self.chain.upper - start, self._far)
+        for batch in range(SEEDS.batches):
+            directions = _directions(seed, batch, count, len(start))
+            values = start + (0.5 if batch == 0 else 1.0) * np.where(directions < 0.0, -lower, upper) * directions
+            if batch == 0:
+                values[0] = start
+            yield values
+
+
+class Chains:
+    """The chains of a model that were asked for; one run uses it at a time."""
+
+    def __init__(self, model: pin.Model, limits: Limits) -> None:
+        self._model, self._limits = model, limits
+        self._chains: dict[frozenset[int], PlainChain | None] = {}
+
+    def of(self, joints: frozenset[int]) -> PlainChain | None:
+        """The chain that carries joints; None where one of it has several degrees of freedom or follows another."""
+        if joints not in self._chains:
+            model = self._model
+            path = sorted({above for joint in joints for above in list(model.supports[joint])} - {0})
+            plain = bool(path) and all(_is_plain(model.joints[joint]) for joint in path)
+            self._chains[joints] = PlainChain(model, self._limits, tuple(path)) if plain else None
+        return self._chains[joints]
+
+    def carrying(self, entries: Sequence[Entry]) -> PlainChain | None:
+        """The chain that carries the frames of goals."""
+        return self.of(frozenset(joint for entry in entries for joint in entry.integers[:2]))
+
+
+@lru_cache(maxsize=64)
+def _directions(seed: int, batch: int, count: int, size: int) -> Array:
+    """(count, size) numbers between -1 and 1."""
+    return np.random.default_rng([seed, batch]).uniform(-1.0, 1.0, (count, size))
+
+
+def _support(parents: list[int]) -> NDArray[np.int8]:
+    """(n + 1, n) 1 where a column moves a joint; the first row is the world's."""
+    support = np.zeros((len(parents) + 1, len(parents)), dtype=np.int8)
+    for k, parent in enumerate(parents):
+        support[k + 1] = support[parent]
+        support[k + 1, k] = 1
+    return support
+
+
+def _is_plain(joint: pin.JointModel) -> bool:
+    return bool(joint.nv == 1) and str(joint.shortname()).startswith(("JointModelR", "JointModelP"))

@@ -1,0 +1,65 @@
+"""What is done in a process that solves problems of many: each answer is what its record says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from wholebody.base.arrays import Array
+from wholebody.base.errors import WholebodyError, one_line
+from wholebody.methods.base import Method
+from wholebody.methods.inputs import check_problem
+from wholebody.problem import Problem
+from wholebody.studies.records import REFUSED, answer_of
+from wholebody.studies.starting import begun_at, warmed
+
+Make = Callable[[], Problem]
+
+Start = tuple[Make, Any]
+"""A problem, and the posture (nq,) from which it is solved."""
+
+Run = tuple[Any, Sequence[Make]]
+"""The posture (nq,) from which the first of some problems is tried, None for its own start; and the problems."""
+
+
+def solve_runs(runs: Sequence[Run], method: Method) -> list[list[dict[str, Any]]]:
+    """Solve the problems of runs: what their records say."""
+    answers: list[list[dict[str, Any]]] = []
+    for q, run in runs:
+        answers.append([])
+        for make in run:
+            answers[-1].append(_solved(make, method, q))
+            q = answers[-1][-1]["q"] if answers[-1][-1]["outcome"] == "solved" else None
+    return answers
+
+
+def _solved(make: Make, method: Method, q: Array | None) -> dict[str, Any]:
+    try:
+        problem = check_problem(make(), "the task's answer")
+        if q is not None and q.shape == problem.start.shape:
+            warm = _warm_answer(problem, method, q)
+            if warm is not None:
+                return warm
+        return answer_of(method.solve(problem))
+    except WholebodyError as error:
+        told = str(error)
+    except Exception as error:  # of a term or a task of the user's own
+        told = one_line(f"{type(error).__name__}: {error}")
+    return {"outcome": REFUSED, "message": told, "q": None}
+
+
+def _warm_answer(problem: Problem, method: Method, q: Array) -> dict[str, Any] | None:
+    """What a record says of a problem solved from another's answer (nq,); None where it is not solved, or refused.
+
+    A start may be refused that is another's answer where the problem's own is not: a hold elsewhere at the start.
+    """
+    try:
+        solution = warmed(method).solve(begun_at(problem, q))
+    except WholebodyError:
+        return None
+    return answer_of(solution) if solution.solved else None
+
+
+def solve_from(given: Sequence[Start], method: Method) -> list[dict[str, Any] | None]:
+    """Solve problems from others' answers (nq,): what their records say; None for one that is not solved."""
+    return [_warm_answer(check_problem(make(), "the task's answer"), warmed(method), q) for make, q in given]
