@@ -167,3 +167,4 @@ def test_retargeting_many_writes_a_folder(clip: wb.Clip, tmp_path: Path) -> None
     for k in range(2):
         made = wb.read_clip(tmp_path / "out" / "originals" / f"arm{k}.npz", clip.figure)
         assert np.array_equal(made.q, clip.q)
+    assert main(["clip", "retarget", *files, "--ground", "none", "--out", str(tmp_path / "other")]) == 2
