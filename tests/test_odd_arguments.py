@@ -335,6 +335,16 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     plane = {"frame": "link4", "normal": at, "point": at, "side": "above"}
     yield "Plane", Call(wb.Plane, plane, solve_it)
     yield "Balance", Call(wb.Balance, {"feet": ["left_foot"], "margin": 0.0}, on_a_person)
+    carried = [wb.Force("left_palm", (0.0, 0.0, -10.0))]
+    yield "Force", Call(wb.Force, {"frame": "left_palm", "force": (0.0, 0.0, -10.0)}, lambda force: force.frame)
+    loaded = {"forces": carried, "feet": ["left_foot"], "margin": 0.0}
+    yield "LoadedBalance", Call(wb.ergonomics.LoadedBalance, loaded, on_a_person)
+    strong = {"forces": carried, "strength": wb.motion.Strength(), "standing": True}
+    yield "Exertion", Call(wb.ergonomics.Exertion, {**strong, "weight": 1.0}, lambda term: term.weight)
+    limited = {**strong, "share": 1.0, "compression": 3400.0}
+    yield "StrengthLimit", Call(wb.ergonomics.StrengthLimit, limited, on_a_person)
+    settings = {"parts": {"seat": wb.Sphere(0.1)}, "slide": (0.0, 0.1), "height": (0.0, 0.1), "tilt": (0.0, 0.1)}
+    yield "adjustable", Call(wb.figures.adjustable, settings)
     yield "ReachCones", Call(wb.ReachCones, {"names": ["left_shoulder"]}, on_a_person)
     yield "RangeOfMotion", Call(wb.RangeOfMotion, {"names": ["neck"]}, on_a_person)
     yield "Cylinder", Call(wb.Cylinder, {"radius": 0.1, "length": 0.2}, lambda shape: shape.pieces())
@@ -703,6 +713,8 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         "static_torques",
         Call(wb.ergonomics.static_torques, {"figure": person.figure, "q": upright, "load": 5.0, "seated": True}),
     )
+    pressed = {"figure": person.figure, "q": upright, "forces": [wb.Force("left_palm", (0.0, 0.0, -10.0))]}
+    yield "back_compression", Call(wb.ergonomics.back_compression, pressed)
     scored = wb.ergonomics.ergonomics_of(person.figure, upright)
     yield "BodyAngles.side", Call(scored.angles.side, {"name": "left"})
     yield "StaticTorques.of_side", Call(scored.torques.of_side, {"side": "left"})

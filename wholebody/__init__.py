@@ -34,6 +34,7 @@ from wholebody.version import __version__  # noqa: E402
 if TYPE_CHECKING:
     from wholebody import dynamics, ergonomics, figures, methods, motion, planning, studies, taskfile
     from wholebody.assessment.posture import Assessment, assess
+    from wholebody.dynamics.actuated import Actuated
     from wholebody.dynamics.world import World
     from wholebody.figures import Figure, load
     from wholebody.geometry.shapes import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere, Torus
@@ -69,6 +70,7 @@ if TYPE_CHECKING:
         Discomfort,
         Displacement,
         Effort,
+        Force,
         Frame,
         Freeze,
         Goal,
@@ -98,6 +100,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "QP",
+    "Actuated",
     "Assembly",
     "Assessment",
     "Axis",
@@ -117,6 +120,7 @@ __all__ = [
     "Ellipsoid",
     "Figure",
     "FileFormatError",
+    "Force",
     "Frame",
     "Freeze",
     "Goal",
@@ -191,6 +195,7 @@ __all__ = [
 _ROOMS = ("dynamics", "ergonomics", "figures", "methods", "motion", "planning", "studies", "taskfile")
 _MODULES = {
     "wholebody.assessment.posture": "Assessment assess",
+    "wholebody.dynamics.actuated": "Actuated",
     "wholebody.dynamics.world": "World",
     "wholebody.figures": "Figure load",
     "wholebody.geometry.shapes": "Box Capsule Cylinder Ellipsoid HalfSpace Hull Mesh Shape Sphere Torus",
@@ -217,8 +222,8 @@ _MODULES = {
     "wholebody.studies.reach_map": "reach_map",
     "wholebody.studies.study": "study",
     "wholebody.taskfile": "read_task write_task",
-    "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Frame Freeze Goal "
-    "Hold Measure Orientation Plane Point Posture PotentialEnergy RangeOfMotion ReachCones Relative Rhythm "
+    "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Force Frame Freeze "
+    "Goal Hold Measure Orientation Plane Point Posture PotentialEnergy RangeOfMotion ReachCones Relative Rhythm "
     "RotationEffort StepLimit Grasp Lean Sit Stand Touch",
     "wholebody.terms.derivatives": "check_derivatives",
     "wholebody.tracking.drag": "Drag",

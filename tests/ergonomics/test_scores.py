@@ -292,7 +292,7 @@ def test_colours_are_of_every_segment_and_red_where_it_is_worst(person: wb.Figur
 
 def test_a_figure_that_is_no_person_is_refused() -> None:
     arm = wb.load(Path(__file__).resolve().parents[2] / "examples" / "tasks" / "arm.urdf")
-    with pytest.raises(wb.InputError, match="load a person"):
+    with pytest.raises(wb.InputError, match="take a person"):
         wb.ergonomics.rula(arm, arm.neutral)
 
 

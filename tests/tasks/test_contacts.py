@@ -376,3 +376,22 @@ def test_who_stands_keeps_the_margin_of_people() -> None:
     assert stand.keeps == pytest.approx(0.15 * 0.201, abs=0.001)
     inside = stand.value(scene.state(found[None].q))[stand.lower > 0.0]
     assert inside.min() >= stand.keeps - 1e-4
+
+
+def test_a_person_kneels_in_balance() -> None:
+    shanks = ("left_shank", "right_shank")
+    person = wb.load("human")
+    scene = wb.Scene(person).add(wb.HalfSpace(), name="floor")
+    goals = [wb.Point("right_index_tip", (0.5, -0.1, 0.3))]
+    kneels = wb.Stand("floor", feet=shanks, knees=shanks)
+    solution = wb.solve(wb.Problem(scene, "kneeling", goals=goals, constraints=[kneels]))
+    assert solution.solved
+    center = pin.centerOfMass(person.model, person.model.createData(), solution.q)
+    knees, toes = (
+        [person.placement(solution.q, f"{side}_{end}").translation for side in ("left", "right")]
+        for end in ("knee", "toe_tip")
+    )
+    # The joint of a knee on the floor is as high as the knee is thick; the body is over shins and feet.
+    assert all(0.04 < knee[2] < 0.08 for knee in knees)
+    assert all(abs(toe[2]) < 0.05 for toe in toes)
+    assert min(toe[0] for toe in toes) < center[0] < max(knee[0] for knee in knees) + 0.06

@@ -87,8 +87,8 @@ def _outer(finger: str) -> tuple[str, ...]:
 
 @pytest.mark.parametrize(
     "shape",
-    [wb.Sphere(0.016), wb.Sphere(0.04), wb.Capsule(0.025, 0.3)],
-    ids=["ball 32 mm", "ball 80 mm", "rod 50 mm"],
+    [wb.Sphere(0.015), wb.Sphere(0.04), wb.Capsule(0.025, 0.3)],
+    ids=["ball 30 mm", "ball 80 mm", "rod 50 mm"],
 )
 def test_in_a_power_grip_the_thumb_opposes_the_fingers(figure: wb.Figure, shape: Any) -> None:
     scene = wb.Scene(figure).add(shape, name="thing", at=AT)

@@ -176,15 +176,19 @@ def test_what_cannot_be_dragged_is_refused() -> None:
         LiveDrag("human")  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("method", ["qp", "ccd", "dls"])
+@pytest.mark.parametrize("method", ["qp", "ccd", "dls", "assembly"])
 def test_what_frames_need_is_made_before_them(drag: LiveDrag, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Sweeps, chains and the scene of what moves take as long as ten frames."""
+    """Sweeps, chains and the scene of what moves take as long as ten frames; of two people, twenty."""
 
     def made(*_: object, **__: object) -> None:
         raise AssertionError("made in a frame")
 
-    drag.choose(method)
-    for name, way in (("right_palm", (0.2, 0.1, -0.3)), ("table", (-0.3, 0.0, 0.1))):
+    ways = {"right_palm": (0.2, 0.1, -0.3), "table": (-0.3, 0.0, 0.1)}
+    if method == "assembly":
+        drag, ways = LiveDrag(jointed()), {"ball": (0.3, 0.2, -0.1), "block": (-0.75, 0.0, 0.0)}
+    else:
+        drag.choose(method)
+    for name, way in ways.items():
         with monkeypatch.context() as patched:
             drag.take(name)
             for kind in (Sweep, MovingScene, ChainResolver):

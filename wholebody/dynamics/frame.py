@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -12,6 +12,7 @@ import pinocchio as pin
 from wholebody.base import checks
 from wholebody.base.arrays import Array, brief
 from wholebody.base.errors import InputError
+from wholebody.base.records import with_values
 from wholebody.geometry.placement import placement
 
 
@@ -52,6 +53,7 @@ class EngineFrame(NamedTuple):
         coulomb: likewise.
         steps: how many steps were made, those made again included.
         sleeping: bodies that sleep.
+        wrenches: the impulses with their moments about the world's origin, (6,), N s and N m s.
     """
 
     events: tuple[Event, ...]
@@ -64,6 +66,7 @@ class EngineFrame(NamedTuple):
     coulomb: float
     steps: int
     sleeping: int
+    wrenches: Mapping[str, Array]
 
 
 @dataclass
@@ -73,7 +76,7 @@ class FrameRecord:
     __repr__ = brief
 
     stops: int  # early ends of steps that are left
-    impulse: Array  # (n, 3) of each body
+    impulse: Array  # (n, 6) of each body, with its moment about the origin
     time: float = 0.0
     events: list[Event] = field(default_factory=list)
     contacts: int = 0
@@ -88,9 +91,37 @@ class FrameRecord:
         """The frame, with the names of the bodies."""
         pushed = np.flatnonzero(self.impulse.any(axis=1)).tolist()
         return EngineFrame(
-            tuple(self.events), {names[k]: self.impulse[k] for k in pushed}, self.contacts, self.deepest, energy,
+            tuple(self.events), {names[k]: self.impulse[k, :3] for k in pushed}, self.contacts, self.deepest, energy,
             self.work, self.signorini, self.coulomb, self.steps, sleeping,
+            {names[k]: self.impulse[k] for k in pushed},
         )  # fmt: skip
+
+
+def one_frame(frames: Sequence[EngineFrame], ends: Sequence[float]) -> EngineFrame | None:
+    """Several frames that follow each other, with the times of their ends, as one; None for none."""
+    if not frames:
+        return None
+    starts = [0.0, *ends[:-1]]
+    events = [
+        with_values(event, time=start + event.time)
+        for start, one in zip(starts, frames, strict=True)
+        for event in one.events
+    ]
+    wrenches: dict[str, Array] = {}
+    for one in frames:
+        for name, wrench in one.wrenches.items():
+            wrenches[name] = wrenches.get(name, np.zeros(6)) + wrench
+    return with_values(
+        frames[-1],
+        events=tuple(events),
+        impulses={name: wrench[:3] for name, wrench in wrenches.items()},
+        deepest=max(one.deepest for one in frames),
+        work=sum(one.work for one in frames),
+        signorini=max(one.signorini for one in frames),
+        coulomb=max(one.coulomb for one in frames),
+        steps=sum(one.steps for one in frames),
+        wrenches=wrenches,
+    )
 
 
 def given_placements(kinematic: object) -> dict[str, tuple[pin.SE3, pin.SE3]]:

@@ -112,18 +112,34 @@ class RigidBodies:
     def mobility(self, name: str, point: Array) -> Array:
         """Change (3, 3) of the velocity of a body's point (3,) by an impulse there, 1/kg."""
         number, point = self._number(name), _bounded(point, FARTHEST, "point")
-        lever = pin.skew(point - self.state.bodies.position[number])
-        inverse = self._inverse_inertia(number)
-        if not self.state.bodies.jointed[number]:
-            return np.asarray(np.eye(3) / self._pieces.mass[number] - lever @ inverse @ lever)
-        found, movable = np.empty((3, 3)), self.state.bodies.moving | self._joints.linked(number)
-        for axis in range(3):
-            twist = np.zeros_like(self.state.bodies.twist)
-            twist[number, axis] = 1.0 / self._pieces.mass[number]
-            twist[number, 3:] = inverse @ lever[:, axis]
-            self._joints.project_velocities(self.state, twist, movable)
-            found[:, axis] = twist[number, :3] - lever @ twist[number, 3:]
+        arm = np.hstack([np.eye(3), -pin.skew(point - self.state.bodies.position[number])])
+        return np.asarray(arm @ self.response(name) @ arm.T)
+
+    def response(self, name: str) -> Array:
+        """Change (6, 6) of a body's twist by impulse and angular impulse about its centre, joints at work."""
+        number, found = self._number(name), np.zeros((6, 6))
+        found[:3, :3], found[3:, 3:] = np.eye(3) / self._pieces.mass[number], self._inverse_inertia(number)
+        if self.state.bodies.jointed[number]:
+            movable = self.state.bodies.moving | self._joints.linked(number)
+            for column in found.T:
+                twist = np.zeros_like(self.state.bodies.twist)
+                twist[number] = column
+                self._joints.project_velocities(self.state, twist, movable)
+                column[:] = twist[number]
         return found
+
+    def centre(self, name: str) -> Array:
+        """A body's centre of mass (3,), metres."""
+        return np.array(self.state.bodies.position[self._number(name)])
+
+    def weight(self, name: str) -> Array:
+        """The weight (3,) of a body that moves by itself, newtons."""
+        return np.asarray(self._pieces.mass[self._number(name)] * self.gravity)
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Names of the bodies that move by themselves."""
+        return tuple(name for name, free in zip(self.names, self._pieces.dynamic, strict=True) if free)
 
     def push(self, name: str, impulse: Array, point: Array) -> None:
         """Give a body that moves by itself an impulse (3,) at a place (3,) in the world, N s; it wakes."""
@@ -174,7 +190,7 @@ class RigidBodies:
             state.give(number, before, after, dt)
         self._sleepers.wake_where_put(self._finder, ended)
         count = int(np.ceil(dt / STEP - 1e-9))
-        record = FrameRecord(self._stops(), np.zeros((len(self.names), 3)), work=self._pushed)
+        record = FrameRecord(self._stops(), np.zeros((len(self.names), 6)), work=self._pushed)
         self._pushed = 0.0
         self._find_near(dt / count)
         for number in range(count):
@@ -243,8 +259,9 @@ class RigidBodies:
         record.work += float(work.sum())
         self._joints.project_velocities(state, state.bodies.twist, state.bodies.moving)
         program.settle(before.kept, work)
-        np.add.at(record.impulse, program.points.bodies[:, 1], impulse)
-        np.add.at(record.impulse, program.points.bodies[:, 0], -impulse)
+        wrench = np.hstack([impulse, np.cross(program.points.point, impulse)])
+        np.add.at(record.impulse, program.points.bodies[:, 1], wrench)
+        np.add.at(record.impulse, program.points.bodies[:, 0], -wrench)
         record.contacts = int((impulse != 0.0).any(axis=1).sum())
         record.signorini = max(record.signorini, program.residuals[0])
         record.coulomb = max(record.coulomb, program.residuals[1])
@@ -295,8 +312,9 @@ class RigidBodies:
         for row in events:
             number = int(row[0])
             first, second = points.bodies[number]
-            record.impulse[second] += row[2:]
-            record.impulse[first] -= row[2:]
+            wrench = np.concatenate([row[2:], np.cross(points.point[number], row[2:])])
+            record.impulse[second] += wrench
+            record.impulse[first] -= wrench
             for body, sign in ((first, 1.0), (second, -1.0)):
                 if self.state.bodies.given[body]:
                     lever = points.point[number] - self.state.bodies.position[body]

@@ -18,8 +18,10 @@ from numpy.typing import ArrayLike
 from wholebody.base.arrays import Array
 from wholebody.base.checks import array, instance, time_step
 from wholebody.base.errors import InputError
+from wholebody.dynamics.actuated import Actuated
+from wholebody.dynamics.articulated import Articulated, Moved
 from wholebody.dynamics.coupling import Coupling, PushedContacts, Spring
-from wholebody.dynamics.frame import EngineFrame
+from wholebody.dynamics.frame import EngineFrame, one_frame
 from wholebody.dynamics.overlaps import Overlap, overlaps
 from wholebody.dynamics.pieces import HUMAN, segment_placements
 from wholebody.dynamics.rigid_bodies import RigidBodies
@@ -32,6 +34,9 @@ from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import NotCopyable
 from wholebody.tracking.frame import FRAME, Frame
 from wholebody.tracking.loop import FrameLoop, invalid_reason
+
+Advance = tuple[Array, Frame, Mapping[str, Array], EngineFrame | None]
+"""The posture that was wanted, the frame, impulses on things, and what the things did."""
 
 
 class WorldFrame(NamedTuple):
@@ -90,7 +95,7 @@ class World(NotCopyable):
         dt: float = FRAME,
         overlap: str = "qp",
         seed: int = 0,
-        spring: Spring | None = None,
+        spring: Spring | Actuated | None = None,
     ) -> None:
         """Begin.
 
@@ -100,7 +105,8 @@ class World(NotCopyable):
             dt: seconds a frame.
             overlap: how the figure's overlap is removed, "qp" or "ccd"; see `FrameLoop`.
             seed: of all random orders; the same seed gives the same motion.
-            spring: between tracker and figure, K 1000, R 40 and 0.4 kg by default.
+            spring: between tracker and figure, K 1000, R 40 and 0.4 kg by default; or a `wb.Actuated` of the figure,
+                whose joints then yield to what they meet.
 
         Raises:
             InputError: no posture near the start is free, a thing that moves by itself overlaps another thing at the
@@ -108,11 +114,15 @@ class World(NotCopyable):
             UnknownNameError: another overlap, or a joint names a thing that is not there.
         """
         self.scene, self.dt = instance(scene, Scene, "World: scene", _scene_instead(scene)), time_step(dt, "dt")
-        instance(spring, (Spring, type(None)), "World: spring", "give wb.dynamics.Spring(mass=0.4), or leave it out")
+        instead = "give wb.dynamics.Spring(mass=0.4) or wb.Actuated(figure), or leave it out"
+        instance(spring, (Spring, Actuated, type(None)), "World: spring", instead)
         self._bodies = tuple(name for name, thing in scene.objects.items() if thing.body is not None)
         first = scene.figure.posture(scene.figure.postures[0]) if start is None else start
         self._loop = FrameLoop(scene, first, overlap=overlap, dt=self.dt, seed=seed, touching=self._bodies)
         self.engine = RigidBodies(scene, start=self._loop.shown) if self._bodies else None
+        self._articulated = None
+        if isinstance(spring, Actuated):
+            self._articulated, spring = Articulated(scene, self._loop.shown, spring, self.engine), None
         self._coupling = Coupling(scene.model, self._loop.shown, spring)
         self._tracked: Array = self._loop.shown
         self._workspace, self.time = scene.workspace(), 0.0
@@ -123,7 +133,10 @@ class World(NotCopyable):
         owners = self._workspace.owners
         self._owner_of = {piece: name for piece, name in enumerate(owners) if name in self._bodies}
         self._surfaces = {
-            (piece, name): self._surface(owner, name) for piece, owner in enumerate(owners) for name in self._bodies
+            (piece, name): self._surface(owner, name)
+            for piece, owner in enumerate(owners)
+            for name in self._bodies
+            if owner != name
         }
 
     def __repr__(self) -> str:
@@ -133,7 +146,18 @@ class World(NotCopyable):
     @property
     def q(self) -> Array:
         """(nq,) the posture that is shown."""
-        return self._loop.shown
+        return self._loop.shown if self._articulated is None else self._articulated.q
+
+    @property
+    def velocity(self) -> Array:
+        """(nv,) of the figure, rad/s and m/s."""
+        return np.array((self._coupling if self._articulated is None else self._articulated).velocity)
+
+    @property
+    def energy(self) -> float:
+        """Kinetic and potential energy of what moves by itself, joules; a figure is among it if it yields."""
+        figure = 0.0 if self._articulated is None else self._articulated.energy()
+        return figure + (0.0 if self.engine is None else self.engine.energy())
 
     def step(self, tracked: ArrayLike | None = None) -> WorldFrame:
         """Make one frame.
@@ -152,22 +176,14 @@ class World(NotCopyable):
             goal = array(tracked, "tracked", f"{self.scene.model.nq} numbers")
             note = invalid_reason(self.scene, goal)
             self._tracked = self._tracked if note else np.array(pin.normalize(self.scene.model, goal))
-        wanted = self._coupling.toward(self._tracked, self.dt)
         moved = self._user_moves()
-        frame = self._loop.frame(wanted)
-        impulses: dict[str, Array] = {}
-        engine = None
+        advance = self._advance if self._articulated is None else self._yield
+        wanted, frame, impulses, engine = advance(moved)
         if self.engine is not None:
-            impulses = self._push(frame.q)
-            after = self._segments(frame.q)
-            given = {name: (self._before[name], place) for name, place in after.items()}
-            engine = self.engine.advance(self.dt, {**given, **moved})
-            self._before = after
             for name in self._bodies:
                 place = self.engine.placement(name)
                 if place != self._placed[name]:
                     self.scene.move(name, at=place)
-        self._coupling.stopped(frame.q, wanted, self.dt)
         self.time += self.dt
         for name in self._placed:
             self._placed[name] = self.scene.objects[name].placement
@@ -182,6 +198,30 @@ class World(NotCopyable):
             self.time, frame.q, wanted, {name: self._placed[name] for name in self._bodies}, impulses, frame,
             engine, (*frame.collisions, *squeezed), found, deepest, time.perf_counter() - began, note,
         )  # fmt: skip
+
+    def _advance(self, moved: Moved) -> Advance:
+        """Go on by a frame with a figure that goes where it wants to, as far as contact allows."""
+        wanted = self._coupling.toward(self._tracked, self.dt)
+        frame = self._loop.frame(wanted)
+        impulses, engine = dict[str, Array](), None
+        if self.engine is not None:
+            impulses = self._push(frame.q)
+            after = self._segments(frame.q)
+            given = {name: (self._before[name], place) for name, place in after.items()}
+            engine = self.engine.advance(self.dt, {**given, **moved})
+            self._before = after
+        self._coupling.stopped(frame.q, wanted, self.dt)
+        return wanted, frame, impulses, engine
+
+    def _yield(self, moved: Moved) -> Advance:
+        """The same with a figure that yields."""
+        figure = self._articulated
+        assert figure is not None
+        began, cpu = time.perf_counter(), time.thread_time()
+        figure.advance(self._tracked, self.dt, moved, self._frames)
+        spent = time.perf_counter() - began, time.thread_time() - cpu
+        frame = Frame(figure.q, *spent, 0.0, 0.0, len(figure.ends), 0, figure.points, "")
+        return self._tracked, frame, figure.impulses, one_frame(figure.frames, figure.ends)
 
     def _segments(self, q: Array) -> dict[str, pin.SE3]:
         """Where every segment is at a posture (nq,)."""

@@ -9,6 +9,7 @@ from wholebody.base.imports import exported
 if TYPE_CHECKING:
     from wholebody.ergonomics.angles import BodyAngles, body_angles
     from wholebody.ergonomics.assessment import Ergonomics, ergonomics_of
+    from wholebody.ergonomics.exertion import Exertion, StrengthLimit, back_compression
     from wholebody.ergonomics.lifting import Lift, lift_between
     from wholebody.ergonomics.owas_score import Owas, owas
     from wholebody.ergonomics.posture_torques import StaticTorques, static_torques
@@ -16,12 +17,15 @@ if TYPE_CHECKING:
     from wholebody.ergonomics.rula_score import Rula, RulaParts, rula
     from wholebody.ergonomics.vision import FieldOfView, Sight, sight
     from wholebody.ergonomics.work import Work
+    from wholebody.tasks.forces import LoadedBalance
 
 __all__ = [
     "BodyAngles",
     "Ergonomics",
+    "Exertion",
     "FieldOfView",
     "Lift",
+    "LoadedBalance",
     "Owas",
     "Reba",
     "RebaParts",
@@ -29,7 +33,9 @@ __all__ = [
     "RulaParts",
     "Sight",
     "StaticTorques",
+    "StrengthLimit",
     "Work",
+    "back_compression",
     "body_angles",
     "ergonomics_of",
     "lift_between",
@@ -45,6 +51,7 @@ __getattr__, __dir__ = exported(
     {
         "wholebody.ergonomics.angles": "BodyAngles body_angles",
         "wholebody.ergonomics.assessment": "Ergonomics ergonomics_of",
+        "wholebody.ergonomics.exertion": "Exertion StrengthLimit back_compression",
         "wholebody.ergonomics.lifting": "Lift lift_between",
         "wholebody.ergonomics.owas_score": "Owas owas",
         "wholebody.ergonomics.reba_score": "Reba RebaParts reba",
@@ -52,5 +59,6 @@ __getattr__, __dir__ = exported(
         "wholebody.ergonomics.posture_torques": "StaticTorques static_torques",
         "wholebody.ergonomics.vision": "FieldOfView Sight sight",
         "wholebody.ergonomics.work": "Work",
+        "wholebody.tasks.forces": "LoadedBalance",
     },
 )

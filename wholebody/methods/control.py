@@ -50,6 +50,16 @@ def within_budget(seconds: float) -> Iterator[None]:
         BUDGET.seconds, BUDGET.until = before
 
 
+def budget_for_sweep() -> Callable[[], bool]:
+    """Whether a sweep that begins now has had its share of this thread's budget.
+
+    A search ends within one budget or little more; sweeps have another two. One that came later leaves as much as most
+    sweeps take, so that its motion is not given up without a look.
+    """
+    until = max(3.0, BUDGET.spent + 1.0)
+    return lambda: BUDGET.spent > until
+
+
 Progress = Callable[[TraceEntry], Any]
 """Called after every iteration with its entry of the trace; if it returns True, the solve ends."""
 

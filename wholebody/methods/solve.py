@@ -7,6 +7,7 @@ import sys
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from importlib import import_module
 from typing import Any
 
@@ -35,6 +36,12 @@ def method_named(name: str) -> Method:
         return as_method(imported(name)())
     if name not in METHODS:
         raise UnknownNameError("method", name, METHODS)
+    return _usual(name)
+
+
+@cache
+def _usual(name: str) -> Method:
+    """A method with its default settings, which are frozen: one object serves all solves."""
     method: Method = getattr(import_module("wholebody.methods"), METHODS[name])()
     return method
 

@@ -6,6 +6,7 @@ from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
 from wholebody.tasks.bounds import Freeze, StepLimit
 from wholebody.tasks.discomfort import Discomfort
 from wholebody.tasks.distance import Displacement, Effort, RotationEffort
+from wholebody.tasks.forces import Force
 from wholebody.tasks.frame import Frame, Hold, Orientation, Relative
 from wholebody.tasks.grasp import Grasp
 from wholebody.tasks.point import CenterOfMass, Plane, Point
@@ -26,6 +27,7 @@ __all__ = [
     "Discomfort",
     "Displacement",
     "Effort",
+    "Force",
     "Frame",
     "Freeze",
     "Goal",

@@ -14,6 +14,7 @@ from wholebody.tasks.balance import STEADY, Balance, convex_polygon, least_width
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings
 from wholebody.tasks.bounds import Freeze
 from wholebody.tasks.distance import Effort
+from wholebody.tasks.forces import LoadedBalance
 from wholebody.tasks.frame import Hold
 from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
 from wholebody.tasks.rhythm import Rhythm, girdles_of
@@ -77,7 +78,7 @@ def standing(
 def balancing(scene: Surroundings, terms: Sequence[Constraint | Goal]) -> tuple[str, ...]:
     """The figures with feet, by what their names begin with, of which no term says how they stand."""
     figure = scene.figure
-    told = [inputs.body_of(scene, term.feet) for term in terms if isinstance(term, (Balance, Stand))]
+    told = [inputs.body_of(scene, term.feet) for term in terms if isinstance(term, (Balance, LoadedBalance, Stand))]
     return tuple(
         body
         for body in figure.bodies

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from typing import NamedTuple
 
@@ -13,12 +14,13 @@ from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
-from wholebody.tasks.balance import STANDING_HEIGHT, STEADY, Feet, Margin, hull_corners, least_width, low_points
+from wholebody.tasks.balance import STANDING_HEIGHT, STEADY, Feet, Margin, hull_corners, least_width
 from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.contact_parts import Facing, Gap, Over, Part, TermOfParts, owner_pairs
 from wholebody.tasks.sit import UP, upright
-from wholebody.tasks.surfaces import face, segments_beyond, surface
+from wholebody.tasks.surfaces import Surface, face, joined, outermost, segments_beyond, surface
 
+FLESH = 0.03  # m: how much farther ahead than the ankle a shin may be on which somebody kneels
 FAR_INSIDE = 1.0  # m: value of a row whose corner is no corner of the polygon
 
 
@@ -35,6 +37,8 @@ class Stand(TermOfParts):
         balance: whether the centre of mass stays over the soles; False for who also sits, leans or holds on.
         margin: distance of the centre of mass from the edges of the polygon [m]; None for 0.15 of its least width where
             the feet are at the start, as people keep it; that is in `keeps` once resolved.
+        knees: those of the `feet` that are shanks and kneel: the knee and the foot beyond it touch the thing. So
+            ``Stand("floor", feet=shanks, knees=shanks)`` kneels, and with "left_foot" and "right_shank" on one knee.
         parts: of each foot the distance, two angles, and two rows over the face, which are zero; then, with balance,
             the distances of the centre of mass inside the edges [m]; once resolved.
     """
@@ -44,6 +48,7 @@ class Stand(TermOfParts):
     feet: Feet = ("left_foot", "right_foot")
     balance: bool = True
     margin: Margin | None = None
+    knees: Sequence[str] = ()
     keeps: float = field(init=False, repr=False, default=0.0)
 
     def resolve(self, scene: Surroundings, start: Array) -> Stand:
@@ -60,19 +65,22 @@ class Stand(TermOfParts):
             place, sole = inputs.find_place(scene, foot, where), surface(scene, foot, where)
             if not sole.owners or place.joint == 0:
                 raise InputError(f"{where}: {foot!r} has no pieces to stand on; name segments with geometry as feet")
-            up = rest.frame(place.frame).rotation.T @ UP
-            parts += [
-                Gap(sole, thing, ground),
-                Facing(place, across(up), ground, UP),
-                Over(place, ground, -ground.half, ground.half),
-            ]
             toes = [owner for owner in segments_beyond(scene, place.joint) if owner != foot]
-            touches += owner_pairs([*sole.owners, *toes], thing.owners)
-            lows = np.vstack([low_points(shape, sole.placed(k, rest)) for k, shape in enumerate(sole.shapes)])
-            lows = lows[lows[:, 2] <= lows[:, 2].min() + STANDING_HEIGHT]
-            inside = rest.data.oMi[place.joint].inverse()
-            corners += [np.asarray(inside.act(point)) for point in lows]
-            joints += [place.joint] * len(lows)
+            if foot in self.knees:
+                bears, end = _knee(scene, place, foot), joined(scene, f"{foot}'s foot", toes)
+                parts += [Gap(bears, thing, ground), Gap(end, thing, ground)]
+                ahead = np.asarray(rest.data.oMi[int(scene.model.supports[place.joint][1])].rotation[:, 0])
+                lows = [_lows(sole, rest, ahead, FLESH), _lows(end, rest, ahead, STANDING_HEIGHT)]
+            else:
+                bears = sole
+                up = rest.frame(place.frame).rotation.T @ UP
+                parts += [Gap(sole, thing, ground), Facing(place, across(up), ground, UP)]
+                lows = [_lows(sole, rest, -UP, STANDING_HEIGHT)]
+            parts.append(Over(place, ground, -ground.half, ground.half))
+            touches += owner_pairs([*bears.owners, *toes], thing.owners)
+            for each in lows:
+                corners += each[0]
+                joints += each[1]
         if self.balance:
             mass = inputs.joints_with_mass(scene, where, self.feet)
             polygon = SolePolygon(np.array(corners), np.array(joints, dtype=np.intp), mass)
@@ -94,6 +102,28 @@ class Stand(TermOfParts):
 
     def _balanced(self) -> list[bool]:
         return [isinstance(part, SolePolygon) for part in self.parts for _ in part.in_radians]
+
+
+def _knee(scene: Surroundings, place: inputs.Place, shank: str) -> Surface:
+    """A shank with the segment above it, whose end at the knee rests beside it."""
+    above, segments = int(scene.model.parents[place.joint]), set(scene.figure.segments)
+    pieces = zip(scene.piece_owner, scene.geometry.geometryObjects, strict=True)
+    return joined(
+        scene, shank, [shank, *(one for one, piece in pieces if piece.parentJoint == above and one in segments)]
+    )
+
+
+def _lows(bears: Surface, rest: State, under: Array, within: float) -> tuple[list[Array], list[int]]:
+    """Points (3,) of a surface that are farthest towards a direction, in the axes of their joints, and these."""
+    found = [outermost(shape, bears.placed(k, rest), under) for k, shape in enumerate(bears.shapes)]
+    deepest = max(float((points @ under).max()) for points in found)
+    pairs = [
+        (np.asarray(rest.data.oMi[joint].inverse().act(point)), int(joint))
+        for points, joint in zip(found, bears.joints, strict=True)
+        for point in points
+        if point @ under >= deepest - within
+    ]
+    return [point for point, _ in pairs], [joint for _, joint in pairs]
 
 
 class SolePolygon(NamedTuple):

@@ -18,7 +18,7 @@ from wholebody.base.errors import InputError
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import GRAZE, is_free
 from wholebody.methods.base import Method, Step, Tracker, goal_error, judged
-from wholebody.methods.control import BUDGET, within_budget
+from wholebody.methods.control import BUDGET, budget_for_sweep, within_budget
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.assembly_solution import AssemblySolution
 from wholebody.methods.solve import method_for_motions
@@ -166,7 +166,7 @@ class ProblemDrag:
         """Whether the motion to the posture q (nq,) is free, with things that move meanwhile; see `is_free`."""
         if self._motion is not None:
             return self._motion.first_contact(self.q, q, GRAZE) is None
-        return is_free(self._workspace, self.q, q, unswept)
+        return is_free(self._workspace, self.q, q, unswept, budget_for_sweep())
 
     def _came_in(self) -> float:
         """Depth of overlap of the figure, metres; 0 if it is small, or if the tracker itself leads out."""
@@ -318,6 +318,12 @@ class Drag(NotCopyable, Generic[Answer]):
     def problem(self) -> Problem | Assembly:
         """The problem, whose goals are replaced as they move; or the assembly."""
         return self._run.assembly if isinstance(self._run, AssemblyDrag) else self._run.problem
+
+    @property
+    def workspace(self) -> Workspace | None:
+        """Distances and sweeps of its frames; None for an assembly in which no shapes can touch."""
+        run = self._run
+        return run.assembly.workspace if isinstance(run, AssemblyDrag) else run.tracker.workspace
 
     @property
     def tracker(self) -> Tracker | None:

@@ -190,8 +190,8 @@ class LiveDrag:
         held = self.held - {self.taken}
         try:
             self._drag = self._subject.drag(self.q, followed, self.place(followed), held, self.method)
-            if self._drag.tracker is not None:  # what later frames need is made now
-                workspace = self._drag.tracker.workspace
+            workspace = self._drag.workspace
+            if workspace is not None:  # what later frames need is made now
                 workspace.sweep.first_contact(self.q, self.q, None, FARTHEST_STEP)
                 if self.taken in self.things:
                     workspace.frame({self.taken: (workspace.where(self.taken),) * 2})
@@ -213,6 +213,7 @@ class LiveDrag:
                 at = self.scene.objects[thing].placement
                 self._subject.move(thing, pin.SE3(at.rotation, at.translation + 1e-6), FRAME)
                 drag.to(place)
+            self.report()
         except WholebodyError:
             pass  # it is told when a handle is taken
         finally:

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+import wholebody as wb
 from wholebody import InputError
 from wholebody.base.arrays import Array
 from wholebody.geometry.continuous import sweep as module
@@ -253,3 +254,16 @@ def test_joints_without_a_bound_are_refused() -> None:
     model.addJoint(0, pin.JointModelSphericalZYX(), pin.SE3.Identity(), "hip")
     with pytest.raises(InputError, match="hip"):
         Sweep(model, pin.GeometryModel())
+
+
+def test_a_sweep_ends_with_its_time_and_says_so() -> None:
+    scene = wb.Scene(wb.load("avatar"))
+    start = scene.figure.posture("standing")
+    there = start.copy()
+    there[scene.model.joints[scene.figure.joint_id("right_shoulder_flexion")].idx_q] += 1.0
+    sweep = scene.workspace().sweep
+    assert sweep.first_contact(start, there) is None
+    cut = sweep.first_contact(start, there, over=lambda: True)
+    assert cut is not None
+    assert not cut.certain
+    assert 0.0 <= cut.fraction < 1.0

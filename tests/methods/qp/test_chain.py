@@ -15,7 +15,8 @@ from wholebody.figures.description import Limits
 from wholebody.figures.state import State
 from wholebody.methods.control import Control
 from wholebody.methods.damped_least_squares import DampedLeastSquares
-from wholebody.methods.qp.chain import compiled_kernel, from_seeds, goal_entries
+from wholebody.methods.qp import chain_kernel
+from wholebody.methods.qp.chain import from_seeds, goal_entries
 from wholebody.methods.qp.chain_kernel import Goals
 from wholebody.methods.qp.multistart import Budget
 from wholebody.methods.qp.plain_chain import Chains, PlainChain
@@ -66,7 +67,7 @@ def test_joints_are_where_pinocchio_has_them():
     state, room, goals = State(model), chain.room(0), Goals(np.zeros((0, 36)), np.zeros((0, 6), dtype=np.int64))
     for _ in range(20):
         q = rng.uniform(-3.0, 3.0, model.nq)
-        compiled_kernel().evaluate(chain.chain, goals, room, q)
+        chain_kernel.evaluate(chain.chain, goals, room, q)
         state.update(q)
         np.testing.assert_allclose(room.joints, state.joints, atol=1e-13)
         np.testing.assert_allclose(room.columns, state.columns, atol=1e-13)
@@ -78,7 +79,7 @@ def test_rows_of_goals_are_derivatives_of_their_errors(two_arms):
     start = rng.uniform(-1.0, 1.0, 7)
     goals = [random_goal(two_arms, "left", rng, True), wb.Relative("right", "left", (0.1, 0.2, 0.3))]
     problem = wb.Problem(wb.Scene(two_arms), start, goals=goals)
-    chain, kernel = whole_chain(two_arms.model, two_arms.limits), compiled_kernel()
+    chain, kernel = whole_chain(two_arms.model, two_arms.limits), chain_kernel
     entries = chain.goals(goal_entries(problem))
     room = chain.room(12)
     kernel.evaluate(chain.chain, entries, room, start)
@@ -108,8 +109,8 @@ def test_steps_are_those_of_the_textbook_method(arm, two_arms, turned):
         chain = Chains(figure.model, figure.limits).of(frozenset(entry.integers[0] for entry in entries))
         values = chain.angles(start)
         for most in (1, 2, 3):
-            seeds, ends, asked = values[None].copy(), np.empty((1, 4)), np.array([1e-12, 1e-6, most, 1.0])
-            compiled_kernel().reach(
+            seeds, ends, asked = values[None].copy(), np.empty((1, 4)), np.array([1e-12, 1e-6, most, 1.0, 0.0])
+            chain_kernel.reach(
                 chain.chain, chain.goals(entries), chain.room(6 if turned else 3), seeds,
                 np.array([values, np.zeros(len(values))]), asked, ends,
             )  # fmt: skip
@@ -239,14 +240,14 @@ def test_wide_joints_end_the_shorter_way_round():
         place = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.3 if number else 0.1]))
         model.addJoint(number, axis, place, f"joint {number}")
     limits = Limits(np.arange(3), np.arange(3), np.full(3, -2.0 * np.pi), np.full(3, 2.0 * np.pi))
-    chain, kernel, rng = whole_chain(model, limits), compiled_kernel(), np.random.default_rng(2)
+    chain, kernel, rng = whole_chain(model, limits), chain_kernel, np.random.default_rng(2)
     entry = Entry(RESIDUAL, (3, 0, 1, 0, 0), np.concatenate([np.eye(3).ravel(), (0, 0, 0.3), np.zeros(24)]), 3)
     for _ in range(10):
         start = rng.uniform(-2.0 * np.pi, 2.0 * np.pi, 3)
         state = State(model).update(rng.uniform(-1.0, 1.0, 3))
         entry.floats[24:27] = pin.SE3(state.data.oMi[3]).act(np.array([0.0, 0.0, 0.3]))
         seeds, ends = np.concatenate([*itertools.islice(chain.seeds(start, 0, 12), 2)]), np.empty((24, 4))
-        asked = np.array([1e-9, 1e-6, 60.0, 24.0])
+        asked = np.array([1e-9, 1e-6, 60.0, 24.0, 0.0])
         kernel.reach(
             chain.chain, chain.goals([entry]), chain.room(3), seeds, np.array([start, np.ones(3)]), asked, ends
         )

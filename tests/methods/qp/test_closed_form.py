@@ -9,7 +9,7 @@ import pytest
 import wholebody as wb
 from wholebody.bench.suite.problem_sets.robots import known_arm
 from wholebody.figures.description import Limits
-from wholebody.methods.qp.chain import branches
+from wholebody.methods.qp.chain import branches, goal_entries
 from wholebody.methods.qp.plain_chain import PlainChain
 
 X, Y, Z = np.eye(3)
@@ -101,3 +101,66 @@ def test_the_answer_of_six_joints_is_the_least_of_all_branches():
             assert answer.solved
             assert answer.assessment.measure == pytest.approx(min(holding), rel=1e-5)
     assert free >= 4
+
+
+def test_no_posture_of_seven_joints_that_is_free_takes_less_effort():
+    """Against ten thousand values of the joint that the closed form holds; elbows at their limits are among them."""
+    figure, rng = known_arm("panda")[0], np.random.default_rng(5)
+    scene, least = wb.Scene(figure), []
+    lower, upper = figure.limits.lower, figure.limits.upper
+    chain = PlainChain(figure.model, figure.limits, tuple(range(1, 8)))
+    for _ in range(25):
+        start = rng.uniform(lower, upper)
+        place = figure.placement(rng.uniform(lower, upper), "tool")
+        problem = wb.Problem(scene, start, goals=[wb.Frame("tool", place)])
+        solution = wb.solve(problem)
+        assert solution.solved, solution.message
+        weights = problem.measures[0].distance.weights
+        values = np.linspace(lower[chain.held], upper[chain.held], 10_000)
+        found = chain.angles_of(chain.goals(goal_entries(problem)).tables[0], values)
+        found += 2.0 * np.pi * np.round((start - found) / (2.0 * np.pi))
+        inside = ((found >= lower) & (found <= upper)).all(axis=1)
+        effort = np.where(inside, (found - start) ** 2 @ weights, np.inf)
+        for k in effort.argsort()[: min(2000, inside.sum())]:
+            if wb.assess(problem, found[k]).holds(1e-6):
+                least.append(solution.assessment.measure / effort[k])
+                break
+    assert len(least) > 20
+    assert np.median(least) < 1.0001
+    assert np.quantile(least, 0.9) < 1.01
+
+
+def test_goals_that_a_posture_reaches_are_never_proven_out_of_reach():
+    """Postures at limits and where axes line up are among them; what is moved away is proven, and no search is made."""
+    rng, proven = np.random.default_rng(8), 0
+    for name in ("ur10", "z1"):
+        figure = known_arm(name)[0]
+        lower, upper = figure.limits.lower, figure.limits.upper
+        chain, scene = PlainChain(figure.model, figure.limits, tuple(range(1, 7))), wb.Scene(figure)
+        for number in range(120):
+            q = rng.uniform(lower, upper)
+            at = rng.integers(6)
+            q[at] = (q[at], lower[at], upper[at], np.clip(0.0, lower[at], upper[at]))[number % 4]
+            place = pin.SE3(figure.placement(q, "tool"))
+            goals = chain.goals(goal_entries(wb.Problem(scene, goals=[wb.Frame("tool", place)])))
+            found = chain.loosely_met(goals, 0)
+            off = [np.abs(pin.log6(figure.placement(np.clip(each, lower, upper), "tool").actInv(place)).vector).max()
+                   for each in found]  # fmt: skip
+            assert min(off) < 0.05
+            if number % 12 == 0:
+                place.translation = 4.0 * place.translation / np.linalg.norm(place.translation)
+                solution = wb.solve(wb.Problem(scene, goals=[wb.Frame("tool", place)]))
+                proven += solution.status == "unreachable" and solution.iterations < 60
+    assert proven == 20
+
+
+def test_a_goal_whose_every_posture_is_inside_of_a_thing_is_out_of_reach():
+    figure = known_arm("ur10")[0]
+    place = pin.SE3(figure.placement(np.array([0.3, -1.0, 1.2, -0.5, 1.3, 0.2]), "tool"))
+    free = wb.Scene(figure)
+    around = wb.Scene(figure).add(wb.Sphere(0.08), name="ball", at=place.translation)
+    for scene, status in ((free, "solved"), (around, "unreachable")):
+        solution = wb.solve(wb.Problem(scene, goals=[wb.Frame("tool", place)]))
+        assert solution.status == status, solution.message
+        assert solution.assessment.penetration < 1e-5
+        assert solution.iterations < 100

@@ -75,7 +75,8 @@ def opened_for_a_bar(sides: Sequence[str]) -> Iterator[dict[str, float]]:
     """Angles of the joints of fingers from which hands take a bar by a power grip, radians; nothing without sides.
 
     Fingers that bend at their roots first lay their first parts on the bar before it meets the palm. Of a hook the
-    roots are nearly straight. First the thumb is left out, then it is that of a fist, which lies over the fingers.
+    roots are nearly straight. First the thumb is left out, then it is that of a fist, which lies over the fingers, last
+    that of the hook.
     """
     hook, fist = ({name: angle for side in sides for name, angle in finger_angles(shape, side).items()}
                   for shape in ("hook", "fist"))  # fmt: skip
@@ -83,6 +84,7 @@ def opened_for_a_bar(sides: Sequence[str]) -> Iterator[dict[str, float]]:
     if fingers:
         yield fingers
         yield fingers | {name: angle for name, angle in fist.items() if "thumb" in name}
+        yield hook
 
 
 def with_fingers(spec: BodySpec, size: Dimensions, detail: str) -> BodySpec:

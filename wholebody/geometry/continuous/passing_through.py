@@ -53,11 +53,16 @@ class Queries(Protocol):
         """Placements of all pieces at a posture (nq,); see `Contacts.placements`."""
 
 
-def is_free(queries: Queries, before: Array, after: Array, unswept: float) -> bool:
-    """Whether a motion between two postures penetrates nothing; one shorter than `unswept`, rad and m, is not swept."""
+def is_free(
+    queries: Queries, before: Array, after: Array, unswept: float, over: Callable[[], bool] = bool
+) -> bool:  # fmt: skip
+    """Whether a motion between two postures is known to penetrate nothing.
+
+    One shorter than `unswept`, rad and m, is not swept; a sweep ends where its time is `over`.
+    """
     if np.isinf(unswept) or np.abs(pin.difference(queries.model, before, after)).max(initial=0.0) <= unswept:
         return True
-    return queries.sweep.first_contact(before, after, tolerance=GRAZE) is None
+    return queries.sweep.first_contact(before, after, tolerance=GRAZE, over=over) is None
 
 
 class Entered(NamedTuple):

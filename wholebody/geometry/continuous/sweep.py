@@ -12,6 +12,7 @@ supports that piece, so the least height of the other piece bounds the distance 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,7 +75,13 @@ class Sweep:
         self._reach = reach[self._pairs].sum(axis=1)
 
     def first_contact(
-        self, q0: Array, q1: Array, numbers: Indices | None = None, tolerance: float = TOLERANCE
+        self,
+        q0: Array,
+        q1: Array,
+        numbers: Indices | None = None,
+        tolerance: float = TOLERANCE,
+        *,
+        over: Callable[[], bool] = bool,
     ) -> FirstContact | None:
         """First contact on the geodesic ``pinocchio.interpolate(model, q0, q1, t)``; None if the whole motion is free.
 
@@ -88,6 +95,7 @@ class Sweep:
             q1: (nq,) its end.
             numbers: (k,) places of the pairs to test among the collision pairs of the geometry model; all by default.
             tolerance: metres.
+            over: whether the queries end here; the answer is then not `certain`.
 
         Raises:
             InputError: postures of the wrong shape, not finite or with a quaternion that is not of unit length; a
@@ -111,10 +119,10 @@ class Sweep:
         index, speed = index[near], speed[near]
         if not len(index):
             return None
-        return self._advance(q0, velocity, index, speed, tolerance)
+        return self._advance(q0, velocity, index, speed, tolerance, over)
 
     def _advance(
-        self, q0: Array, velocity: Array, index: Indices, speed: Array, tolerance: float
+        self, q0: Array, velocity: Array, index: Indices, speed: Array, tolerance: float, over: Callable[[], bool]
     ) -> FirstContact | None:
         start = self._distances.measured(index)[:, 0]
         level = np.minimum(start, 0.0) - tolerance
@@ -139,6 +147,8 @@ class Sweep:
             for k in np.flatnonzero((asked[due] > 3) & (safe < TOGETHER)):
                 safe[k] = max(safe[k], self._second_order(int(index[due[k]]), rows[k], float(level[due[k]])))
             free[due] = np.maximum(free[due], now + safe)
+            if free.min() < 1.0 and over():
+                break
         worst = int(np.argmin(free))
         q = np.asarray(pin.integrate(self.model, q0, now * velocity))
         self._place(q, velocity)

@@ -18,6 +18,7 @@ from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
 from wholebody.geometry.memory_views import placement_view
 from wholebody.geometry.placement import PlacementLike
+from wholebody.methods.control import budget_for_sweep
 from wholebody.methods.inputs import ITERATIONS, TOLERANCE
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.assembly_geometry import AssemblyFigure
@@ -37,6 +38,7 @@ from wholebody.methods.newton.settings import CONTACTS, FRAMES
 from wholebody.methods.newton.system import ActiveSystem, System, unit
 from wholebody.scene.moving_obstacles import FrameMotion
 from wholebody.scene.scene import Scene
+from wholebody.scene.workspace import Workspace
 from wholebody.tasks.inputs import point
 
 if TYPE_CHECKING:
@@ -262,6 +264,12 @@ class Assembly(AssemblyJoints):
             self._ready(None)
         return self
 
+    @property
+    def workspace(self) -> Workspace | None:
+        """Distances and sweeps of the next steps; None where no shapes can touch."""
+        active = self._ready(None)
+        return None if active.contacts is None else active.workspace
+
     def step(self, tolerance: float = FRAMES.tolerance) -> AssemblyStep:
         """One frame of a drag: the least motion towards the present goals, in a few iterations.
 
@@ -285,9 +293,10 @@ class Assembly(AssemblyJoints):
             early_exit=True, thorough=True,
         )  # fmt: skip
         holds = found.hard <= max(10.0 * FRAMES.hard_tolerance, before)
-        taken = holds and (
-            active.contacts is None or is_free(active.workspace, self._to_scene(start), self._to_scene(found.x), SHORT)
-        )
+        taken = holds
+        if holds and active.contacts is not None:
+            ends = self._to_scene(start), self._to_scene(found.x)
+            taken = is_free(active.workspace, *ends, SHORT, budget_for_sweep())
         if taken:
             self._places = list(found.x.reshape(-1, 7))
         return AssemblyStep(found.goal, found.hard, found.iterations, found.systems, taken)

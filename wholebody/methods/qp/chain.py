@@ -9,8 +9,7 @@ keeps every clearance is an answer; the others are rejected.
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -21,15 +20,19 @@ from wholebody.base.pool import Pool
 from wholebody.base.records import with_values
 from wholebody.figures.figure import Figure
 from wholebody.methods.control import Control
-from wholebody.methods.qp.chain_kernel import Chain, Goals, Room
+from wholebody.methods.qp.chain_kernel import Goals
+from wholebody.methods.qp.closed_form import compiled_kernel as closed_form_kernel
+from wholebody.methods.qp.closed_form_kernel import BRANCHES
 from wholebody.methods.qp.multistart import Budget
-from wholebody.methods.qp.plain_chain import Chains, PlainChain
+from wholebody.methods.qp.plain_chain import FIRST, Chains, PlainChain
 from wholebody.methods.qp.settings import SEEDS
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
 from wholebody.tasks.distance import SquaredDistance
 from wholebody.terms.entries import RESIDUAL, Entry, entries_of, placement_floats
+
+GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
 class Met(NamedTuple):
@@ -40,11 +43,12 @@ class Met(NamedTuple):
     stationary: bool  # whether the measures are stationary too
     # (nq,) an end of far less effort that does not keep its clearances; None where there is none
     blocked: Array | None = None
+    reached: bool = True  # False where no posture meets the goals: it is one that comes near them
 
     @property
     def complete(self) -> bool:
         """Whether no descent from here can lead to less."""
-        return self.stationary and self.blocked is None
+        return self.stationary and self.blocked is None and self.reached
 
 
 def chains_of(problem: Problem) -> Pool[Chains]:
@@ -127,7 +131,7 @@ class _Seeded:
         if self.distance is not None:
             self.nearest[0] = chain.angles(self.distance.reference)
             self.nearest[1] = self.distance.weights[chain.idx_v]
-        self.goals, self.room = chain.goals(entries), chain.room(sum(entry.rows for entry in entries))
+        self.goals, self.rows = chain.goals(entries), sum(entry.rows for entry in entries)
         self.exact = chain.is_exact(entries)
         self.finite = self.exact and chain.held < 0  # ends are isolated, and the closed form has all of them
         self.trace: list[TraceEntry] = []
@@ -138,55 +142,142 @@ class _Seeded:
         """The answer of the batches in turn: the closed form's ends, its samples, and ends of random seeds."""
         if not self.budget.restarts:
             return self._ended(self.start[None].copy())
-        more = 1 + self.budget.restarts_for_measure
+        more, q = 1 + self.budget.restarts_for_measure, None
         if self.exact:
             near = self.nearest
             if self.distance is None:
                 near = np.array([self.start, np.ones_like(self.start)])
-            branches = self.chain.branches(self.goals, near)
-            met = self._ended(branches.least, 1 if self.finite else SEEDS.compared * more)
+            enough = 1 if self.finite else SEEDS.compared * more
+            met, branches = self._first_ended(near, enough), None
+            if met is None and not self.control.over:
+                branches = self.chain.branches(self.goals, near)
+                met = self._ended(branches.least, enough)
+            if met is not None and not met.stationary and self.distance is not None:
+                met = self._along(met)
+            if met is None and self.finite:
+                return self._nearest() if self._is_out_of_reach() else None
             if (met is not None and met.blocked is None) or self.finite or self.control.over:
                 return met
             # What blocks an end may leave postures of its branch free. All samples meet the goals.
+            branches = branches or self.chain.branches(self.goals, near)
             most = np.inf if met is None else SEEDS.worth * self._effort(met.q)
             samples = (self.chain.posture(each, self.at) for each in branches.cheaper(most))
             q = next((each for each in samples if self._is_free(each)), None)
             if met is not None:
                 return with_values(met, blocked=q)
-            if q is not None:
-                return Met(q, tuple(self.trace), False)
         for seeds in self.chain.seeds(self.start, self.budget.seed, SEEDS.together * more):
             met = self._ended(seeds, SEEDS.compared * more)
+            if met is not None and not met.stationary and self.exact and self.distance is not None:
+                met = self._along(met)
             if met is not None or self.control.over:
                 return met
+            if q is not None:
+                return Met(q, tuple(self.trace), False)
         return None
+
+    def _is_out_of_reach(self) -> bool:
+        """Whether all postures of six joints at the goal and at those nearby are beyond limits or far inside things."""
+        chain, problem = self.chain, self.problem
+        found = chain.loosely_met(self.goals, self.budget.seed)
+        if len(found) and problem.scene.model.nv > len(self.start):
+            return False  # others may make room
+        for values in found:
+            near = self.workspace.near_views(chain.posture(values, self.at), float(problem.clearances.max(initial=0.0)))
+            if not (near.distance < problem.clearances[near.number] - SEEDS.deep).any():
+                return False
+        return True
+
+    def _nearest(self) -> Met:
+        """Where descents from the first seeds come nearest to the goals with everything held."""
+        seeds = next(self.chain.seeds(self.start, self.budget.seed, SEEDS.together))
+        given = self.goals.tables[None], self.goals, np.array([[self.nearest, self.nearest]]), self._asked(1)
+        begin = self.at
+        found, _ = self.chain.descents(*given, seeds[None], len(seeds))
+        for k in found[0, :, 0].argsort():
+            if self._is_free(q := self.chain.posture(seeds[k], self.at)):
+                begin = q
+                break
+        return Met(begin, tuple(self.trace), False, reached=False)
+
+    def _asked(self, enough: int) -> Array:
+        """See `chain_kernel.reach`."""
+        budget, enough = self.budget, enough if self.distance is not None else 1
+        return np.array([budget.tolerance, SEEDS.damping**2, min(budget.iterations, SEEDS.steps), enough, 1.0])
+
+    def _first_ended(self, near: Array, enough: int) -> Met | None:
+        """What `_ended` leads to from the first of the closed form's branches, as near to a posture as they go."""
+        ends, nearest = np.empty((1, FIRST, len(self.start))), np.array([[near, self.nearest]])
+        found, counts = self.chain.descents(self.goals.tables[None], self.goals, nearest, self._asked(enough), ends)
+        count = int(counts[0])
+        return self._chosen(ends[0, :count], found[0, :count]) if count > 0 else None
 
     def _ended(self, seeds: Array, enough: int = 1) -> Met | None:
         """The end of least effort that is free, of the first that meet the goals; None where none is."""
-        budget, chain = self.budget, self.chain
-        enough = enough if self.distance is not None else 1
-        asked = np.array([budget.tolerance, SEEDS.damping**2, min(budget.iterations, SEEDS.steps), enough])
-        reach = compiled_kernel().reach
-        while len(seeds):
-            found = np.empty((len(seeds), 4))
-            taken = reach(chain.chain, self.goals, self.room, seeds, self.nearest, asked, found)
-            ends = found[:taken].tolist()
-            for left, _, _, steps in ends:
-                if steps and not self.control.reason:
-                    self.trace.append(TraceEntry(left, 0.0, 0.0, 0.0, "seed"))
-                    self.control.tell(self.trace[-1])
-            for effort, k in sorted((end[1], k) for k, end in enumerate(ends) if end[1] < np.inf):
-                q = chain.posture(seeds[k], self.at)
-                if self._is_free(q):
-                    known = bool(ends[k][2]) and (self.distance is not None or not budget.measures)
-                    # Ends of a chain with as many joints as rows are isolated: no descent leads out of what blocks it.
-                    free = len(self.start) > len(self.room.value) and self.least < SEEDS.worth * effort
-                    return Met(q, tuple(self.trace), known, self.blocked if free else None)
-                self.least, self.blocked = (effort, q) if effort < self.least else (self.least, self.blocked)
-            seeds = seeds[taken:]
-            if self.control.over:
-                break
+        asked, nearest = self._asked(enough), np.array([[self.nearest, self.nearest]])
+        given = self.goals.tables[None], self.goals, nearest, asked
+        while count := len(seeds):
+            found, counts = self.chain.descents(*given, seeds[None], count)
+            taken = int(counts[0])
+            met = self._chosen(seeds[:taken], found[0, :taken])
+            if met is not None or self.control.over:
+                return met
+            left = found[0, :taken, 2] < 0.0  # they have their turn where no end is free
+            seeds, asked[4] = np.concatenate([seeds[:taken][left], seeds[taken:]]), 0.0
         return None
+
+    def _chosen(self, seeds: Array, found: Array) -> Met | None:
+        """Of ends (k, n) and what was found there (k, 4) the free one of least effort; None where none is."""
+        chain, ends = self.chain, found.tolist()
+        for left, _, _, steps in ends:
+            if steps and not self.control.reason:
+                self.trace.append(TraceEntry(left, 0.0, 0.0, 0.0, "seed"))
+                self.control.tell(self.trace[-1])
+        for effort, k in sorted((end[1], k) for k, end in enumerate(ends) if end[1] < np.inf):
+            q = chain.posture(seeds[k], self.at)
+            if self._is_free(q):
+                known = bool(ends[k][2]) and (self.distance is not None or not self.budget.measures)
+                # Ends of a chain with as many joints as rows are isolated: no descent leads out of what blocks it.
+                free = len(self.start) > self.rows and self.least < SEEDS.worth * effort
+                return Met(q, tuple(self.trace), known, self.blocked if free else None)
+            self.least, self.blocked = (effort, q) if effort < self.least else (self.least, self.blocked)
+        return None
+
+    def _along(self, met: Met) -> Met:
+        """An end near singular postures, which programs lead to no least effort from, led there along its branch.
+
+        By golden sections over the joint that the closed form holds, between the samples beside it.
+        """
+        chain = self.chain
+        values, spacing = chain.angles(met.q), np.ptp(chain.held_values(self.nearest[0])) / (SEEDS.samples - 1)
+        low, high = values[chain.held] + (-spacing, spacing)
+        best = values
+        inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)]
+        found = [self._nearest_branch(at, values) for at in inner]
+        while high - low > 1e-6:
+            lower = found[0][0] <= found[1][0]
+            low, high = (low, inner[1]) if lower else (inner[0], high)
+            at = high - GOLDEN * (high - low) if lower else low + GOLDEN * (high - low)
+            new = self._nearest_branch(at, values)
+            inner, found = ([at, inner[0]], [new, found[0]]) if lower else ([inner[1], at], [found[1], new])
+        effort, best = min(found, key=lambda each: each[0])
+        ended = self._ended(best[None].copy()) if effort < np.inf else None
+        if ended is not None and self._effort(ended.q) <= self._effort(met.q):
+            met = with_values(met, q=ended.q)
+        # Where not even this is stationary, branches cross; a descent finds hardly less in a hundred times the time.
+        return with_values(met, trace=tuple(self.trace), stationary=True)
+
+    def _nearest_branch(self, held: float, near: Array) -> tuple[float, Array]:
+        """Effort and values (n,) of the branch nearest to others, with a value of the held joint; inf for none."""
+        chain = self.chain
+        found, effort = chain.angles_of(self.goals.tables[0], np.array([held])), np.empty((1, BRANCHES))
+        order = np.empty(BRANCHES, dtype=np.intp)
+        limits = chain.chain.lower, chain.chain.upper
+        count = closed_form_kernel().least(found[None], *limits, self.nearest, effort, order)
+        away = np.abs(found[order[:count]] - near).max(axis=1, initial=0.0)
+        if not count or away.min() > 1.0:
+            return np.inf, near
+        k = order[away.argmin()]
+        return float(effort[0, k]), found[k]
 
     def _effort(self, q: Array) -> float:
         away = self.chain.angles(q) - self.nearest[0]
@@ -216,23 +307,3 @@ def distance_of(problem: Problem, chain: PlainChain, at: Array) -> SquaredDistan
         return distance
     rest = weights * pin.difference(problem.scene.model, distance.reference, at)
     return None if rest.any() else distance
-
-
-def small_chain() -> tuple[Chain, Room]:
-    """A chain of one joint with room for goals without rows, for which loops are compiled."""
-    joint, one, axis = np.zeros(1, dtype=np.intp), np.zeros(1), np.zeros((1, 3))
-    room = Room(
-        np.zeros((2, 4, 3)), np.zeros((1, 6)), np.zeros((0, 6)), np.zeros(0), np.zeros((0, 1)), np.zeros(1, np.bool_)
-    )
-    return Chain(joint, np.zeros((1, 4, 3)), axis, axis, np.zeros((2, 1), dtype=np.int8), one, one), room
-
-
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
-    """The module of compiled loops, compiled or read back: not in the middle of a solve."""
-    from wholebody.methods.qp import chain_kernel
-
-    chain, room = small_chain()
-    goals = Goals(np.zeros((0, 36)), np.zeros((0, 6), dtype=np.int64))
-    chain_kernel.reach(chain, goals, room, np.zeros((1, 1)), np.zeros((2, 1)), np.zeros(4), np.zeros((1, 4)))
-    return chain_kernel

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Hashable, Sequence
-from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,19 +15,13 @@ from wholebody.assessment.postures import Judged, Numbers, judged
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.errors import InputError
 from wholebody.methods.conclusion import assessed_tolerance
-from wholebody.methods.qp.chain import chains_of, distance_of, goal_entries, is_free, small_chain
-from wholebody.methods.qp.chain import compiled_kernel as chain_kernel
-from wholebody.methods.qp.closed_form import compiled_kernel as closed_form_kernel
-from wholebody.methods.qp.closed_form_kernel import CROSSING, Arm
+from wholebody.methods.qp.chain import chains_of, distance_of, goal_entries, is_free
 from wholebody.methods.qp.multistart import Budget
-from wholebody.methods.qp.plain_chain import PlainChain
+from wholebody.methods.qp.plain_chain import FIRST, PlainChain
 from wholebody.methods.qp.settings import SEEDS
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.terms.entries import Entry
-
-ROOM = 16  # ends of descents that are kept for a problem; one that has more is left to a solve of its own
-_NO_ARM = Arm(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, dtype=np.intp), -1, CROSSING, 0, np.zeros((4, 3)))
 
 
 class Answers(NamedTuple):
@@ -118,19 +111,15 @@ class _Descents:
         nearest[:, 0, 0] = nearest[:, 1, 0] = chain.angles(batch.numbers.references) if measures else values
         goals = chain.goals(entries)
         self.rows, more = sum(entry.rows for entry in entries), 1 + batch.budget.restarts_for_measure
-        arm = chain.arm if chain.is_exact(entries) else None
-        together = 0 if arm is not None else SEEDS.together * more
-        self.ends = np.empty((len(values), max(ROOM, together), size))
+        exact = chain.is_exact(entries)
+        together = 0 if exact else SEEDS.together * more
+        self.ends = np.empty((len(values), together or FIRST, size))
         for k, start in enumerate(values if together else ()):
-            self.ends[k, :together] = next(chain.seeds(start, batch.budget.seed, together))
-        held = np.array([chain.held_values(each) for each in nearest[:, 0, 0]])
-        enough = 1 if not measures or (arm is not None and chain.held < 0) else SEEDS.compared * more
-        asked = np.array([batch.budget.tolerance, SEEDS.damping**2, min(batch.budget.iterations, SEEDS.steps), enough])
-        self.found, self.counts = np.empty((*self.ends.shape[:2], 4)), np.full(len(values), together)
-        compiled_kernel().reach_all(
-            (chain.chain, _NO_ARM if arm is None else arm, chain.room(self.rows)), asked,
-            (batch.tables, goals.entries), held, nearest, self.ends, self.found, self.counts,
-        )  # fmt: skip
+            self.ends[k] = next(chain.seeds(start, batch.budget.seed, together))
+        enough = 1 if not measures or (exact and chain.held < 0) else SEEDS.compared * more
+        steps = min(batch.budget.iterations, SEEDS.steps)
+        asked = np.array([batch.budget.tolerance, SEEDS.damping**2, steps, enough, 1.0])
+        self.found, self.counts = chain.descents(batch.tables, goals, nearest, asked, self.ends, together)
 
     def answers(self, workspace: Workspace) -> tuple[Array, Indices, Mask]:
         """Postures (k, nq), descents (k,), and which (k,) are free and of the least effort."""
@@ -150,18 +139,3 @@ class _Descents:
                     break
                 rejected = min(rejected, effort)
         return q, iterations, solved
-
-
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
-    """The module of the compiled loop, compiled or read back."""
-    from wholebody.methods.qp import chain_batch_kernel
-
-    chain_kernel()
-    closed_form_kernel()
-    chain, room = small_chain()
-    chain_batch_kernel.reach_all(
-        (chain, _NO_ARM, room), np.zeros(4), (np.zeros((0, 0, 36)), np.zeros((0, 6), dtype=np.int64)),
-        np.zeros((0, 1)), np.zeros((0, 2, 2, 1)), np.zeros((0, 1, 1)), np.zeros((0, 1, 4)), np.zeros(0, dtype=np.intp),
-    )  # fmt: skip
-    return chain_batch_kernel

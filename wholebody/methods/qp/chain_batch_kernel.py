@@ -20,7 +20,7 @@ def reach_all(
 
     Args:
         bodies: the joints; the arm that they are, without joints where it has no closed form; room, written.
-        asked: (4,) as in `chain_kernel.reach`.
+        asked: (5,) as in `chain_kernel.reach`.
         goals: floats (k, e, 36) and integers (e, 6) of the goals.
         held: (k, v) values of the joint that the closed form holds.
         nearest: (k, 2, 2, n) as in `chain_kernel.reach`: for the branches, then for the descents.

@@ -14,6 +14,8 @@ from wholebody.terms.entries import Integers
 from wholebody.terms.residual_kernel import residuals
 
 TURN = 2.0 * np.pi
+CLEARLY, NEAR = 1.25, 0.3
+"""An end of less than this many radians or metres away is left where it will take this many times another's effort."""
 
 
 class Chain(NamedTuple):
@@ -56,16 +58,17 @@ def reach(chain: Chain, goals: Goals, room: Room, seeds: Array, nearest: Array, 
         room: written.
         seeds: (k, n) where descents begin; each becomes where one ends.
         nearest: (2, n) posture of least effort, and weights of the effort ``sum w (q - nearest)^2``, or zeros.
-        asked: (4,) norm of all errors at which the goals are met, metres and radians; damping of a step at the goals,
-            squared; most steps; how many ends that meet the goals are enough.
+        asked: (5,) norm of all errors at which the goals are met, metres and radians; damping of a step at the goals,
+            squared; most steps; how many ends that meet the goals are enough; 1 where those that will clearly take more
+            effort than others may be left.
         found: (k, 4) written: norm of the errors at an end; its effort, inf where goals are not met; 1 if the effort is
-            stationary there or not asked for; steps.
+            stationary there or not asked for, -1 where a descent was left for an end of less effort; steps.
 
     Returns:
         How many seeds were taken.
     """
     tolerance, most, enough = asked[0], int(asked[2]), asked[3]
-    weighed = False
+    weighed, best = False, np.inf
     for weight in nearest[1]:
         weighed = weighed or weight > 0.0
     for k in range(len(seeds)):
@@ -78,13 +81,15 @@ def reach(chain: Chain, goals: Goals, room: Room, seeds: Array, nearest: Array, 
         _unwind(chain, q, nearest[0])
         if weighed:
             before = q.copy()
-            found[k, 3] += _least_effort(chain, goals, room, q, nearest, tolerance, found[k])
+            asked_of = tolerance, CLEARLY * best if asked[4] > 0.0 else np.inf
+            found[k, 3] += _least_effort(chain, goals, room, q, nearest, asked_of, found[k])
             if found[k, 2] == 0.0:
                 q[:] = before
-        effort = 0.0
-        for i in range(len(q)):
-            effort += nearest[1, i] * (q[i] - nearest[0, i]) ** 2
-        found[k, 1] = effort
+        if found[k, 2] >= 0.0:
+            found[k, 1] = 0.0
+            for i in range(len(q)):
+                found[k, 1] += nearest[1, i] * (q[i] - nearest[0, i]) ** 2
+            best = min(best, found[k, 1])
         enough -= 1.0
         if enough <= 0.0:
             return k + 1
@@ -152,7 +157,7 @@ def _descend(
 
 @compiled(inner=True, error_model="numpy")
 def _least_effort(
-    chain: Chain, goals: Goals, room: Room, q: Array, nearest: Array, tolerance: float, found: Array
+    chain: Chain, goals: Goals, room: Room, q: Array, nearest: Array, asked: tuple[float, float], found: Array
 ) -> int:  # fmt: skip
     """Step to the least effort among postures that meet the goals, by programs whose constraints are linear.
 
@@ -160,7 +165,8 @@ def _least_effort(
     solution is ``d = p - W^-1 J' y`` with ``p = nearest - q`` and ``J W^-1 J' y = J p + e``. How far it goes along d
     is J. Barzilai and J. M. Borwein's step length ("Two-Point Step Size Gradient Methods", IMA Journal of Numerical
     Analysis 8, 1988), since the curvature of the constraints is left out of the programs. Sets ``found[0]`` to the
-    norm of the errors, and ``found[2]`` to 1 where it converged, else to 0.
+    norm of the errors, and ``found[2]`` to 1 where it converged, to -1 where the effort will clearly be more than
+    ``asked[1]``, else to 0. ``asked[0]`` is the tolerance.
 
     Returns:
         Steps taken.
@@ -168,7 +174,7 @@ def _least_effort(
     size, rows = len(q), len(room.value)
     right, system, dq, shift = np.empty(rows), np.empty((rows, rows)), np.empty(size), np.empty(size)
     moved, before, share, wrong = np.zeros(size), np.zeros(size), 1.0, -1
-    released = np.empty(size, dtype=np.bool_)
+    released, (tolerance, most) = np.empty(size, dtype=np.bool_), asked
     found[2] = 0.0
     for count in range(40):
         evaluate(chain, goals, room, q)
@@ -201,10 +207,14 @@ def _least_effort(
                 changed = wrong >= 0 and not released[wrong]
                 if changed:
                     room.free[wrong] = released[wrong] = True
-        longest = 0.0
+        longest, effort = 0.0, 0.0
         for i in range(size):
             longest = max(longest, abs(dq[i]))
+            effort += nearest[1, i] * (q[i] + dq[i] - nearest[0, i]) ** 2
         left = _norm(room.value)
+        if longest < NEAR and effort > most:
+            found[2] = -1.0
+            return count
         if longest < 1e-5 and left <= tolerance:
             found[0], found[2] = left, 1.0 if wrong < 0 else 0.0
             return count

@@ -16,7 +16,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
 from wholebody.methods.qp.chain_kernel import Chain
-from wholebody.methods.qp.closed_form_kernel import BRANCHES, CROSSING, PARALLEL, THREE_PARALLEL, Arm
+from wholebody.methods.qp.closed_form_kernel import BRANCHES, CROSSING, PARALLEL, SLACK, THREE_PARALLEL, Arm
 
 ALIKE = 1e-4  # rad: axes that differ by less count as parallel; m: lines that pass each other nearer count as crossing
 HELD = (6, 0, 2)
@@ -60,7 +60,7 @@ def _arm(placed: bytes, turned: bytes) -> Arm | None:
     for held, backwards, kind in product(HELD if size == 7 else (-1,), (0, 1), (THREE_PARALLEL, PARALLEL, CROSSING)):
         joints, sign = (there[::-1].copy(), -1.0) if backwards else (there, 1.0)
         place = size - 1 - held if backwards and held >= 0 else held
-        known = _solvable(Arm(sign * axes[joints], points[joints], joints, place, kind, backwards, end))
+        known = _solvable(Arm(sign * axes[joints], points[joints], joints, place, kind, backwards, end, SLACK))
         if known is not None:
             return known
     return None
@@ -111,7 +111,7 @@ def compiled_kernel() -> Any:
     from wholebody.methods.qp import closed_form_kernel
 
     none = np.zeros((0, 3))
-    arm = Arm(none, none, np.zeros(0, dtype=np.intp), -1, CROSSING, 0, np.zeros((4, 3)))
+    arm = Arm(none, none, np.zeros(0, dtype=np.intp), -1, CROSSING, 0, np.zeros((4, 3)), SLACK)
     found = np.zeros((0, BRANCHES, 0))
     closed_form_kernel.branches(arm, np.zeros(36), np.zeros(0), found)
     closed_form_kernel.least(

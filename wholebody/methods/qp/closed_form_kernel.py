@@ -37,6 +37,7 @@ class Arm(NamedTuple):
     kind: int  # what makes it solvable
     backwards: int  # 1 where the axes begin at the end
     end: Array  # (4, 3) placement of the last joint at zero: the columns of its rotation, then its translation
+    slack: float  # share by which an arm may be stretched too far
 
 
 @compiled(inner=True)
@@ -78,22 +79,24 @@ def _between(axis: Vector, a: Vector, b: Vector) -> float:
 
 
 @compiled(inner=True, error_model="numpy")
-def _angles(h: Vector, axis: Vector, v: Vector, d: float) -> tuple[int, float, float]:
+def _angles(h: Vector, axis: Vector, v: Vector, d: float, slack: float) -> tuple[int, float, float]:
     """How many angles about an axis turn v to where h . v = d, and both of them (subproblem 4)."""
     along = _dot(h, axis) * _dot(axis, v)
     a, b, c = _dot(h, v) - along, _dot(h, _cross(axis, v)), d - along
     most = np.sqrt(a * a + b * b)
-    if not abs(c) <= most * (1.0 + SLACK) + SLACK * SLACK:
+    if not abs(c) <= most * (1.0 + slack) + slack * slack:
         return 0, 0.0, 0.0
     middle, side = np.arctan2(b, a), np.arccos(min(max(c / most, -1.0), 1.0)) if most > 0.0 else 0.0
     return 2, middle + side, middle - side
 
 
 @compiled(inner=True)
-def _bent(first: Vector, axis: Vector, second: Vector, v: Vector, far: Vector) -> tuple[int, float, float]:
+def _bent(
+    first: Vector, axis: Vector, second: Vector, v: Vector, far: Vector, slack: float
+) -> tuple[int, float, float]:
     """Angles about an axis through `second` at which v is as far from `first` as `far` is (subproblem 3)."""
     x, y, z = _minus(second, first), _minus(v, second), _minus(far, first)
-    return _angles(x, axis, y, 0.5 * (_dot(z, z) - _dot(x, x) - _dot(y, y)))
+    return _angles(x, axis, y, 0.5 * (_dot(z, z) - _dot(x, x) - _dot(y, y)), slack)
 
 
 @compiled(inner=True)
@@ -123,23 +126,23 @@ def _across(h: Vector) -> Vector:
 
 
 @compiled(inner=True, error_model="numpy")
-def _with_wrist(kind: int, h: Array, o: Array, place: Array, found: Array) -> None:
+def _with_wrist(kind: int, slack: float, h: Array, o: Array, place: Array, found: Array) -> None:
     """The branches (8, 6) of an arm whose last axes cross; the place of their crossing comes first."""
     h1, h2, h3, o1, o2, o3 = _vector(h, 0), _vector(h, 1), _vector(h, 2), _vector(o, 0), _vector(o, 1), _vector(o, 2)
     wrist, at = _vector(o, 5), _plus(_rotated(place, _vector(o, 5)), _vector(place, 3))
     away = _minus(at, o1)
     if kind == PARALLEL:
-        number, one, other = _angles(h2, (-h1[0], -h1[1], -h1[2]), away, _dot(h2, _minus(wrist, o1)))
+        number, one, other = _angles(h2, (-h1[0], -h1[1], -h1[2]), away, _dot(h2, _minus(wrist, o1)), slack)
     else:
-        number, one, other = _bent(o1, h3, o3, wrist, at)
+        number, one, other = _bent(o1, h3, o3, wrist, at, slack)
     for outer in range(number):
         first = one if outer == 0 else other
         if kind == PARALLEL:
             back = _plus(o1, _turn(h1, -first, away))
-            count, low, high = _bent(o2, h3, o3, wrist, back)
+            count, low, high = _bent(o2, h3, o3, wrist, back, slack)
         else:
             arm = _minus(_plus(o3, _turn(h3, first, _minus(wrist, o3))), o1)
-            count, low, high = _angles(h1, h2, arm, _dot(h1, away))
+            count, low, high = _angles(h1, h2, arm, _dot(h1, away), slack)
         for inner in range(count):
             second = low if inner == 0 else high
             if kind == PARALLEL:
@@ -147,19 +150,20 @@ def _with_wrist(kind: int, h: Array, o: Array, place: Array, found: Array) -> No
                 q1, q2, q3 = first, _between(h2, arm, _minus(back, o2)), second
             else:
                 q1, q2, q3 = _between(h1, _turn(h2, second, arm), away), second, first
-            _turned_wrist(h, place, q1, q2, q3, found[4 * outer + 2 * inner : 4 * outer + 2 * inner + 2])
+            _turned_wrist(h, place, (q1, q2, q3), slack, found[4 * outer + 2 * inner : 4 * outer + 2 * inner + 2])
 
 
 @compiled(inner=True)
-def _turned_wrist(h: Array, place: Array, q1: float, q2: float, q3: float, found: Array) -> None:
+def _turned_wrist(h: Array, place: Array, first: Vector, slack: float, found: Array) -> None:
     """The two ways (2, 6) to turn a wrist where the first three angles are known."""
     h1, h2, h3, h4, h5, h6 = (
         _vector(h, 0), _vector(h, 1), _vector(h, 2), _vector(h, 3), _vector(h, 4), _vector(h, 5),
     )  # fmt: skip
+    q1, q2, q3 = first
     asked = _turn(h3, -q3, _turn(h2, -q2, _turn(h1, -q1, _rotated(place, h6))))
     side = _across(h6)
     turned = _turn(h3, -q3, _turn(h2, -q2, _turn(h1, -q1, _rotated(place, side))))
-    count, low, high = _angles(h4, h5, h6, _dot(h4, asked))
+    count, low, high = _angles(h4, h5, h6, _dot(h4, asked), slack)
     for k in range(count):
         q5 = low if k == 0 else high
         q4 = _between(h4, _turn(h5, q5, h6), asked)
@@ -168,24 +172,24 @@ def _turned_wrist(h: Array, place: Array, q1: float, q2: float, q3: float, found
 
 
 @compiled(inner=True, error_model="numpy")
-def _with_parallels(h: Array, o: Array, place: Array, found: Array) -> None:
+def _with_parallels(slack: float, h: Array, o: Array, place: Array, found: Array) -> None:
     """The branches (8, 6) of an arm whose axes 2 to 4 are parallel."""
     h1, h2, h3, h5, h6 = _vector(h, 0), _vector(h, 1), _vector(h, 2), _vector(h, 4), _vector(h, 5)
     o1, o2, o3, o4, end = _vector(o, 0), _vector(o, 1), _vector(o, 2), _vector(o, 3), _vector(o, 5)
     third, fourth = _dot(h2, h3), _dot(h2, _vector(h, 3))
     away, side = _minus(_plus(_rotated(place, end), _vector(place, 3)), o1), _across(h2)
-    number, one, other = _angles(h2, (-h1[0], -h1[1], -h1[2]), away, _dot(h2, _minus(end, o1)))
+    number, one, other = _angles(h2, (-h1[0], -h1[1], -h1[2]), away, _dot(h2, _minus(end, o1)), slack)
     for outer in range(number):
         q1 = one if outer == 0 else other
         back = _plus(o1, _turn(h1, -q1, away))
-        count, low, high = _angles(h2, h5, h6, _dot(h2, _turn(h1, -q1, _rotated(place, h6))))
+        count, low, high = _angles(h2, h5, h6, _dot(h2, _turn(h1, -q1, _rotated(place, h6))), slack)
         for inner in range(count):
             q5 = low if inner == 0 else high
             q6 = _between(h6, _rotated_back(place, _turn(h1, q1, h2)), _turn(h5, -q5, h2))
             turned = _turn(h1, -q1, _rotated(place, _turn(h6, -q6, _turn(h5, -q5, side))))
             total = _between(h2, side, turned)
             elbow = _minus(back, _turn(h2, total, _minus(end, o4)))
-            both, up, down = _bent(o2, h3, o3, o4, elbow)
+            both, up, down = _bent(o2, h3, o3, o4, elbow, slack)
             for k in range(both):
                 q3 = up if k == 0 else down
                 q2 = _between(h2, _minus(_plus(o3, _turn(h3, q3, _minus(o4, o3))), o2), _minus(elbow, o2))
@@ -227,9 +231,9 @@ def branches(arm: Arm, goal: Array, values: Array, found: Array) -> None:
             k += 1
         six[:] = np.nan
         if arm.kind == THREE_PARALLEL:
-            _with_parallels(h, o, place, six)
+            _with_parallels(arm.slack, h, o, place, six)
         else:
-            _with_wrist(arm.kind, h, o, place, six)
+            _with_wrist(arm.kind, arm.slack, h, o, place, six)
         for b in range(BRANCHES):
             k = 0
             for i in range(len(arm.joints)):

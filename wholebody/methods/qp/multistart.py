@@ -91,12 +91,11 @@ class Multistart:
         assert self._best is not None
         return self._best
 
-    def run(self, begin: Array | None = None, other: Array | None = None) -> LocalSolution:
-        """Make one attempt after the other until the goals are met, the first from `begin` (nq,); the best posture.
-
-        Another start (nq,) that is given is descended from too.
-        """
-        self._search(self._start if begin is None else begin)
+    def run(self, begin: Array | None = None, other: Array | None = None, within_reach: bool = True) -> LocalSolution:
+        """The best posture (nq,) of attempts from `begin` and a descent from `other`; the closest if out of reach."""
+        begin, self._out_of_reach = self._start if begin is None else begin, not within_reach
+        closest = self._closest(self._at_most(SEARCH.coming_near))
+        self._search(begin) if within_reach else self._accept(closest.run(begin), self.how)
         if other is not None:
             self._accept(self._directly(other), "directly")
         self._find_closest()
@@ -338,7 +337,7 @@ class Multistart:
         return int(rows.soft[: rows.goals].any(axis=0).sum())
 
     def _closest_from_best(self) -> None:
-        """Find the closest posture from the best one; where that is stationary no closer one is near."""
+        """Find the closest posture from the best one."""
         nearest = self._ran(self._closest(self._at_most(SEARCH.coming_near)), self.best.q)
         if not nearest.converged:
             self._accept(nearest, self.how)

@@ -4,20 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.records import with_values
 from wholebody.figures.description import Limits
 from wholebody.methods.qp.chain_kernel import Chain, Goals, Room
 from wholebody.methods.qp.closed_form import Branches, closed_form
 from wholebody.methods.qp.closed_form import compiled_kernel as closed_form_kernel
-from wholebody.methods.qp.closed_form_kernel import BRANCHES
+from wholebody.methods.qp.closed_form_kernel import BRANCHES, CROSSING, SLACK, Arm
 from wholebody.methods.qp.settings import SEEDS
 from wholebody.terms.entries import Entry
 
+LOOSE = 1e-2  # a share of lengths, and rad
+NEARBY = 1e-3  # m, rad
+FIRST = 16  # ends of a closed form's branches that the compiled loop has room for
+_NO_ARM = Arm(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, dtype=np.intp), -1, CROSSING, 0, np.zeros((4, 3)), SLACK)
 _ONE = np.zeros(1)
 _SHARES = np.linspace(0.0, 1.0, SEEDS.samples)
 
@@ -107,6 +113,25 @@ class PlainChain:
         count = closed_form_kernel().least(found.reshape(*effort.shape, -1), lower, upper, nearest, effort, order)
         return Branches(found, effort.ravel(), found[order[:count]])
 
+    def loosely_met(self, goals: Goals, seed: int) -> Array:
+        """Postures (k, n) that six joints meet a placement or one nearby with, or nearly so; none is a proof.
+
+        Limits are wider and links longer by a hundredth, and the placement is moved to and fro by a hundred times what
+        a solve is off by: where it is singular, other postures meet these.
+        """
+        assert self.arm is not None
+        arm, rng, found = with_values(self.arm, slack=LOOSE), np.random.default_rng(seed), list[Array]()
+        half, middle = 0.5 * (self.chain.upper - self.chain.lower), 0.5 * (self.chain.upper + self.chain.lower)
+        for shift in np.vstack([np.zeros(6), rng.uniform(-NEARBY, NEARBY, (12, 6))]):
+            table, angles = goals.tables[0].copy(), np.empty((1, BRANCHES, len(half)))
+            table[24:27] += shift[:3]
+            table[27:] = (pin.exp3(shift[3:]) @ table[27:].reshape(3, 3)).ravel()
+            closed_form_kernel().branches(arm, table, _ONE, angles)
+            away = np.remainder(angles[0] - middle + np.pi, 2.0 * np.pi) - np.pi
+            within = (np.abs(away) <= half + LOOSE).all(axis=1)  # not for NaN
+            found.append(middle + np.clip(away[within], -half, half))
+        return np.concatenate(found)
+
     def is_exact(self, entries: Sequence[Entry]) -> bool:
         """Whether the goals are one placement of a frame that the closed form has the postures of."""
         return self.arm is not None and [entry.integers[1:] for entry in entries] == [(0, 1, 1, 0)]
@@ -119,6 +144,31 @@ class PlainChain:
         low, high = max(self.chain.lower[held], near - np.pi), min(self.chain.upper[held], near + np.pi)
         values: Array = low + (high - low) * _SHARES
         return values
+
+    def descents(
+        self, tables: Array, goals: Goals, nearest: Array, asked: Array, ends: Array, seeds: int = 0
+    ) -> tuple[Array, Indices]:
+        """Descend for each of k problems from the branches of the closed form, or from so many given seeds.
+
+        Args:
+            tables: (k, e, 36) floats of the goals.
+            goals: of one of them.
+            nearest: (k, 2, 2, n) see `chain_batch_kernel.reach_all`.
+            asked: (5,) see `chain_kernel.reach`.
+            ends: (k, m, n) seeds where there are given ones; written.
+            seeds: how many; 0 for the branches.
+
+        Returns:
+            What was found (k, m, 4) at the ends, and how many there are (k,); -1 for more than there is room for.
+        """
+        room = self.room(sum(3 * int(each[3] + each[4]) for each in goals.entries))
+        held = np.array([self.held_values(each) for each in nearest[:, 0, 0]])
+        found, counts = np.empty((*ends.shape[:2], 4)), np.full(len(ends), seeds)
+        arm = _NO_ARM if seeds or self.arm is None else self.arm
+        compiled_kernel().reach_all(
+            (self.chain, arm, room), asked, (tables, goals.entries), held, nearest, ends, found, counts
+        )
+        return found, counts
 
     def angles_of(self, goal: Array, held: Array | None = None) -> Array:
         """Values (8 v, n) of all branches for a goal (36,), NaN for none, with (v,) values of a joint that is held."""
@@ -180,3 +230,26 @@ def _support(parents: list[int]) -> NDArray[np.int8]:
 
 def _is_plain(joint: pin.JointModel) -> bool:
     return bool(joint.nv == 1) and str(joint.shortname()).startswith(("JointModelR", "JointModelP"))
+
+
+def _small_chain() -> tuple[Chain, Room]:
+    """A chain of one joint with room for goals without rows, for which loops are compiled."""
+    joint, one, axis = np.zeros(1, dtype=np.intp), np.zeros(1), np.zeros((1, 3))
+    room = Room(
+        np.zeros((2, 4, 3)), np.zeros((1, 6)), np.zeros((0, 6)), np.zeros(0), np.zeros((0, 1)), np.zeros(1, np.bool_)
+    )
+    return Chain(joint, np.zeros((1, 4, 3)), axis, axis, np.zeros((2, 1), dtype=np.int8), one, one), room
+
+
+@lru_cache(maxsize=1)
+def compiled_kernel() -> Any:
+    """The module of the compiled loop, compiled or read back: not in the middle of a solve."""
+    from wholebody.methods.qp import chain_batch_kernel
+
+    closed_form_kernel()
+    chain, room = _small_chain()
+    chain_batch_kernel.reach_all(
+        (chain, _NO_ARM, room), np.zeros(5), (np.zeros((0, 0, 36)), np.zeros((0, 6), dtype=np.int64)),
+        np.zeros((0, 1)), np.zeros((0, 2, 2, 1)), np.zeros((0, 1, 1)), np.zeros((0, 1, 4)), np.zeros(0, dtype=np.intp),
+    )  # fmt: skip
+    return chain_batch_kernel

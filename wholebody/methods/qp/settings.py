@@ -103,6 +103,7 @@ class SeedNumbers(NamedTuple):
     compared: int = 5  # ends of which the one of least effort is taken. More: less effort, more time.
     samples: int = 24  # values of the joint of seven that a closed form holds. More: less effort, more time.
     worth: float = 0.9  # share of the effort of an answer below which a rejected end is descended from too
+    deep: float = 5e-3  # m: of a posture inside of a thing that no tolerance of the goals leads out of
 
 
 class FeasibilityNumbers(NamedTuple):

@@ -1,0 +1,135 @@
+"""A figure that yields: impulses, momentum and energy against closed forms; ragdolls, pushes, catches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.dynamics.articulated import Articulated
+from wholebody.dynamics.rigid_bodies import RigidBodies
+
+DT = 1.0 / 60.0
+NO_WEIGHT = (0.0, 0.0, 0.0)
+
+
+def two_links(planar_arm: Callable[..., wb.Figure], material: wb.dynamics.Material, x: float, speed: float) -> Any:
+    """An arm of links of 0.5 and 0.4 m, masses in their joints, and a ball of 0.5 kg that flies at the second link."""
+    figure = planar_arm([0.5, 0.4])
+    ball = wb.Body(mass=0.5, material=material, velocity=(0.0, -speed, 0.0))
+    scene = wb.Scene(figure).add(wb.Sphere(0.05), name="ball", at=(x, 0.2, 0.0), body=ball)
+    engine = RigidBodies(scene, NO_WEIGHT, figure.neutral)
+    free = wb.Actuated(figure, stiffness=0.0, damping=0.0)
+    return Articulated(scene, figure.neutral, free, engine), engine, scene
+
+
+@pytest.mark.parametrize("bounce", [0.0, 0.4, 1.0])
+@pytest.mark.parametrize("x", [0.65, 0.85])
+def test_a_blow_moves_the_whole_arm_as_equation_9_says(planar_arm: Any, bounce: float, x: float) -> None:
+    material = wb.dynamics.Material("test", {"human": (bounce, 0.0)})
+    arm, engine, scene = two_links(planar_arm, material, x, 2.0)
+    segments = {name: scene.frame_id(name) for name in ("link0", "link1")}
+    while not arm.impulses:
+        arm.advance(arm.q, 1e-3, {}, segments)
+    arm.advance(arm.q, 1e-3, {}, segments)  # what does not bounce comes to rest against it in two steps
+    own, mass, ball = 0.4 * 0.1**2, 1.0, 0.5
+    inertia = np.array([[2.0 * own + mass * 0.5**2, own], [own, own]])  # joint angles, the arm straight
+    row = np.array([x, x - 0.5])  # of the place that is hit, along y
+    impulse = (1.0 + bounce) * 2.0 / (1.0 / ball + row @ np.linalg.solve(inertia, row))
+    met = engine.twist("ball")[1]
+    assert met == pytest.approx(-2.0 + impulse / ball, abs=2e-3)
+    # the arm turns on freely after the blow: its angular momentum about the fixed joint and its energy stay
+    began = 0.5 * ball * 2.0**2
+    after = 0.5 * ball * met**2 + arm.energy()
+    lost = 0.5 * (1.0 - bounce**2) * 2.0**2 / (1.0 / ball + row @ np.linalg.solve(inertia, row))
+    assert after == pytest.approx(began - lost, rel=2e-3)
+
+
+def test_a_blow_between_a_ball_and_a_hand_in_the_air_keeps_their_momentum() -> None:
+    hand = wb.load("hand")
+    scene = wb.Scene(hand)
+    start = hand.posture("relaxed")
+    ball = wb.Body(mass=0.3, velocity=(0.0, 0.0, -2.0))
+    scene.add(
+        wb.Sphere(0.03), name="ball", at=hand.placement(start, "right_palm").translation + (0, 0.02, 0.2), body=ball
+    )
+    engine = RigidBodies(scene, NO_WEIGHT, start)
+    moving = Articulated(scene, start, wb.Actuated(hand, stiffness=0.0, damping=0.0), engine)
+    before, energy = engine.momentum(), engine.energy()
+    while not moving.impulses:
+        moving.advance(moving.q, 1e-3, {}, {name: scene.frame_id(name) for name in hand.segments})
+        after = engine.momentum() + moving.momentum()
+        assert after == pytest.approx(before, abs=1e-4)  # N s, N m s
+        assert engine.energy() + moving.energy() < energy + 1e-6
+    assert np.linalg.norm(moving.momentum()[:3]) > 0.2
+
+
+def test_a_ragdoll_falls_and_rests_and_its_energy_never_grows() -> None:
+    scene = wb.Scene(wb.load("avatar")).add(wb.HalfSpace(), name="floor")
+    start = scene.figure.posture("standing").copy()
+    start[2], start[3:7] = 0.4, (0.0, np.sin(-0.75), 0.0, np.cos(0.75))  # on its back, in the air
+    world = wb.World(scene, start, spring=wb.Actuated(scene.figure, stiffness=0.0, damping=1.0))
+    energies = [world.energy]
+    for _ in range(50):
+        assert world.step().deepest < 1e-3
+        energies.append(world.energy)
+    assert np.diff(energies).max() < 1e-6
+    assert energies[0] - energies[-1] > 100.0  # J
+    assert np.abs(world.velocity).max() < 0.05
+
+
+def test_a_hand_is_pushed_aside_by_a_swinging_beam_and_comes_back() -> None:
+    hand = wb.load("hand")
+    start = hand.posture("relaxed")
+    x, y, z = hand.placement(start, "right_hand").translation
+    hinge = wb.dynamics.Hinge((0.0, 0.0, 0.5), axis=(0.0, 1.0, 0.0))
+    beam = wb.Body(mass=3.0, velocity=(2.0, 0.0, 0.0), angular_velocity=(0.0, -4.0, 0.0), joints=[hinge])
+    scene = wb.Scene(hand).add(wb.Box((0.04, 0.04, 1.0)), name="beam", at=(x - 0.3, y, z + 0.4), body=beam)
+    world = wb.World(scene, start, spring=wb.Actuated(hand))
+    away, slowest = [], 9.0
+    for _ in range(40):
+        frame = world.step(start)
+        assert frame.deepest < 1e-3
+        away.append(np.linalg.norm(frame.q[:3] - start[:3]))
+        slowest = min(slowest, world.engine.twist("beam")[0])  # type: ignore[union-attr]
+    assert max(away) > 0.03
+    assert slowest < 0.0  # the beam is thrown back
+    assert away[-1] < 2e-3
+
+
+def test_a_person_catches_a_ball_and_bears_its_weight() -> None:
+    figure = wb.load("avatar")
+    start = figure.posture("arms_forward").copy()
+    for joint, turn in (("shoulder_flexion", -0.75), ("elbow_flexion", 0.9)):
+        for side in ("left", "right"):
+            start[figure.model.joints[figure.joint_id(f"{side}_{joint}")].idx_q] += turn
+    scene = wb.Scene(figure).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Sphere(0.22), name="ball", at=(0.4, 0.0, 1.6), body=wb.Body(mass=0.5, material="human"))
+    world = wb.World(scene, start, spring=wb.Actuated(figure))
+    given = []
+    for _ in range(60):
+        frame = world.step(start)
+        assert frame.deepest < 1e-3
+        given.append(frame.impulses.get("ball", np.zeros(3)))
+    assert frame.placements["ball"].translation[2] > 1.3
+    assert np.mean(given[-10:], axis=0) == pytest.approx((0.0, 0.0, 0.5 * 9.81 * DT), abs=0.01)
+    assert np.abs(frame.q - start).max() < 0.05
+
+
+def test_what_drives_a_joint_is_given_by_its_name() -> None:
+    figure = wb.load("avatar")
+    driven = wb.Actuated(figure, stiffness={"root": 500.0, "left_arm": 20.0}, damping={"left_elbow_flexion": 3.0})
+    stiffness, damping = driven.gains(np.ones(figure.model.nv))
+    elbow = figure.model.joints[figure.joint_id("left_elbow_flexion")].idx_v
+    assert stiffness[:6] == pytest.approx(500.0)
+    assert (stiffness[elbow], damping[elbow], damping.sum()) == (20.0, 3.0, 3.0)
+    assert stiffness.sum() == 6 * 500.0 + 20.0 * len(figure.groups["left_arm"])
+    with pytest.raises(wb.UnknownNameError, match="left_elbow_flexion"):
+        wb.Actuated(figure, stiffness={"left_elbow_flexio": 1.0})
+    with pytest.raises(wb.InputError, match="damping"):
+        wb.Actuated(figure, damping=-1.0)
+    with pytest.raises(wb.InputError, match="scene is not one of"):
+        wb.World(wb.Scene(wb.load("hand")), spring=wb.Actuated(figure))

@@ -1,0 +1,111 @@
+"""Forces and strength in the search for a posture: levers by hand, and what people do."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.ergonomics import Exertion, LoadedBalance, StrengthLimit, back_compression
+
+CARRIED = [wb.Force(f"{side}_palm", (0.0, 0.0, -98.1)) for side in ("left", "right")]
+PUSHED = [wb.Force(f"{side}_palm", (-100.0, 0.0, 0.0)) for side in ("left", "right")]
+FEET = [wb.Hold("left_foot"), wb.Hold("right_foot")]
+
+
+@pytest.fixture(scope="module")
+def person() -> wb.Figure:
+    return wb.load("human")
+
+
+@pytest.fixture(scope="module")
+def bent(person: wb.Figure) -> Any:
+    joints = {"spine1_flexion": 0.3, "spine2_lateral": 0.1, "left_elbow_flexion": 1.2, "left_shoulder_flexion": 0.7,
+              "left_knee_flexion": 0.4, "left_hip_flexion": 0.5}  # fmt: skip
+    return person.with_joints(person.posture("standing"), joints)
+
+
+@pytest.mark.parametrize(
+    "term",
+    [Exertion([*CARRIED, *PUSHED]), Exertion(CARRIED, standing=False), StrengthLimit(PUSHED), LoadedBalance(PUSHED)],
+    ids=lambda term: type(term).__name__,
+)  # fmt: skip
+def test_derivatives_are_those_of_finite_differences(person: wb.Figure, bent: Any, term: Any) -> None:
+    assert wb.check_derivatives(term, wb.Scene(person), bent).agrees
+
+
+def test_torques_are_those_of_inverse_dynamics(person: wb.Figure) -> None:
+    # The same on both sides: there the two ways to split the ground's force over the feet are one.
+    joints = {"hip_flexion": 0.6, "knee_flexion": 0.8, "ankle_dorsiflexion": 0.2, "elbow_flexion": 1.2}
+    sides = {f"{side}_{joint}": angle for side in ("left", "right") for joint, angle in joints.items()}
+    q = person.with_joints(person.posture("standing"), {**sides, "spine1_flexion": 0.2})
+    q[2] -= person.placement(q, "left_sole").translation[2]
+    term = StrengthLimit(CARRIED, compression=None).resolve(wb.Scene(person), q)
+    share = term.statics.efforts(wb.Scene(person).state(q))[0]
+    known = wb.ergonomics.static_torques(person, q, load=20.0).share
+    names = [person.model.names[k] for k in term.statics.carriers.tolist()]
+    for name, one in zip(names, share, strict=True):
+        # Stand-ins for the ground differ in the sideways forces at the feet.
+        assert abs(one) == pytest.approx(known[name], abs=0.02), name
+
+
+def test_the_disc_bears_what_levers_say(person: wb.Figure) -> None:
+    standing = person.posture("standing")
+    # Nachemson (1981): 500 N at L3 of people of 70 kg who stand at ease.
+    assert back_compression(person, standing) == pytest.approx(500.0, rel=0.25)
+    ahead = person.with_joints(standing, {f"{side}_shoulder_flexion": 0.5 * np.pi for side in ("left", "right")})
+    empty, loaded = (back_compression(person, ahead, forces) for forces in ((), CARRIED))
+    spine = person.model.getJointId("spine1_flexion")
+    lever = person.placement(ahead, "left_palm").translation[0] - person.joint_placement(ahead, spine).translation[0]
+    assert loaded - empty == pytest.approx(196.2 * lever / 0.06 + 196.2, rel=0.03)
+
+
+def test_who_pushes_leans_forward(person: wb.Figure) -> None:
+    goals = [wb.Point("left_palm", (0.5, 0.2, 1.0)), wb.Point("right_palm", (0.5, -0.2, 1.0))]
+    loaded = LoadedBalance(PUSHED)
+    solution = wb.solve(wb.Problem(wb.Scene(person), goals=goals, constraints=[*FEET, loaded]))
+    assert solution.solved
+    heel = person.placement(solution.q, "left_heel").translation[0]
+    center = pin.centerOfMass(person.model, person.model.createData(), solution.q)[0]
+    weight = 9.81 * pin.computeTotalMass(person.model)
+    # About the heels the weight has at least the moment of 200 N one metre high.
+    assert weight * (center - heel) >= 200.0 * 1.0
+
+
+def test_a_bound_on_the_back_is_kept(person: wb.Figure) -> None:
+    goals = [wb.Point("left_palm", (0.6, 0.2, 1.0)), wb.Point("right_palm", (0.6, -0.2, 1.0))]
+    found = []
+    for bound in ([], [StrengthLimit(CARRIED, compression=3000.0)]):
+        problem = wb.Problem(wb.Scene(person), goals=goals, constraints=[*FEET, LoadedBalance(CARRIED), *bound])
+        solution = wb.solve(problem)
+        assert solution.solved
+        found.append(back_compression(person, solution.q, CARRIED))
+    assert found[0] > 3500.0
+    assert found[1] <= 3000.1
+
+
+def test_who_holds_a_load_brings_it_near(person: wb.Figure) -> None:
+    level = [wb.Plane(f"{side}_palm", (0, 0, 1), point=(0.0, 0.0, 1.0)) for side in ("left", "right")]
+    constraints = [*FEET, *level, LoadedBalance(CARRIED)]
+    usual, strong = (
+        wb.solve(wb.Problem(wb.Scene(person), constraints=constraints, measures=measures)).q
+        for measures in (None, [wb.Effort(), Exertion(CARRIED, weight=10.0)])
+    )
+    ahead = [person.placement(q, "left_palm").translation[0] for q in (usual, strong)]
+    assert ahead[1] < ahead[0] - 0.1
+
+
+def test_odd_forces_are_refused(person: wb.Figure) -> None:
+    with pytest.raises(wb.InputError, match="newtons"):
+        wb.Force("left_palm", (0.0, 0.0, -1e6))
+    with pytest.raises(wb.InputError, match="forces"):
+        Exertion([(0.0, 0.0, -100.0)])  # type: ignore[list-item]
+    with pytest.raises(wb.UnknownNameError, match="left_palm"):
+        wb.Problem(wb.Scene(person), measures=[Exertion([wb.Force("left_plam", (0, 0, -9))])])
+    with pytest.raises(wb.InputError, match="lift the figure"):
+        wb.Problem(wb.Scene(person), constraints=[LoadedBalance([wb.Force("left_palm", (0, 0, 2000))])])
+    with pytest.raises(wb.InputError, match="StrengthLimit"):
+        wb.Problem(wb.Scene(wb.load("hand")), constraints=[StrengthLimit()])

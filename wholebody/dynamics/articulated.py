@@ -1,0 +1,333 @@
+"""A figure that yields: motion and impulses in joint space.
+
+With the inertia M of the joints, springs K and dampers R towards a tracker, a step of h seconds has
+
+    (M + h R + h^2 K) v+ = M v + h (K e - c) + (h R + h^2 K) v_tracked + J^T p,
+
+e from the figure to the tracker, c the forces of motion and weight. The springs are implicit, so any are stable. The
+impulses p are equation 9 of Schmidl and Lin with the whole articulated body in it, J M^-1 J^T in place of its mass and
+inertia: what is hit anywhere moves all joints. Impacts come first, without forces; a step ends where the next begins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.base.arrays import Array, Indices
+from wholebody.dynamics import impulse_kernel
+from wholebody.dynamics.actuated import Actuated
+from wholebody.dynamics.frame import EngineFrame
+from wholebody.dynamics.pieces import HUMAN
+from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
+from wholebody.dynamics.step_program import SKIN
+from wholebody.geometry.contact_rows import ContactRowBuilder
+from wholebody.scene.matter.materials import surface
+from wholebody.scene.scene import Scene
+
+BOUNCE = 0.05  # m/s: slower approaches do not bounce
+SHORTEST = 5e-4  # s: steps do not end earlier at an impact
+PARTED = 0.2  # share of an overlap that a step removes
+FASTEST = 0.5  # m/s, at most
+
+Moved = Mapping[str, tuple[pin.SE3, pin.SE3]]
+
+
+class Points(NamedTuple):
+    """Points at which a figure is touched, and its joint limits, as m points of which only the normal counts."""
+
+    figure: Array  # (3 m, nv) velocities of the second body relative to the first along n, t1, t2, by those of joints
+    things: Array  # (3 m, 6 b) the same by the twists of the bodies that move by themselves
+    given: Array  # (3 m,) the same by what is moved, m/s
+    gap: Array  # (m,) metres, radians
+    friction: Array  # (m,)
+    restitution: Array  # (m,)
+    pushes: list[tuple[str, int, Array, Array]]  # name of such a body, its point's number, place (3,), axes (3, 3)
+    bodies: list[str]  # (b,)
+    driven: NDArray[np.bool_]  # (m,) points of what moves
+
+
+class Articulated:
+    """The joints of a figure in motion.
+
+    Attributes:
+        q: (nq,) the posture.
+        velocity: (nv,) rad/s, m/s.
+        impulses: name of a thing that moves by itself to the impulse (3,) that the figure gave it in the last frame.
+        frames: of the engine, one for each step of the last frame.
+        ends: when these steps ended, seconds since the frame began.
+        points: contact points and joint limits in the last step.
+    """
+
+    def __init__(
+        self, scene: Scene, q: Array, actuated: Actuated, engine: RigidBodies | None, gravity: Array | None = None
+    ) -> None:
+        """Begin at rest at the posture q (nq,), among the bodies of an engine."""
+        actuated.check(scene.model)
+        self._scene, self._engine, self._model, self.q = scene, engine, pin.Model(scene.model), np.array(q)
+        self._gravity = np.array(GRAVITY if engine is None else engine.gravity) if gravity is None else gravity
+        self._model.gravity.linear = self._gravity
+        self._data, self._workspace = self._model.createData(), scene.workspace()
+        self._rows = ContactRowBuilder(self._workspace.table, 4, 0.995)
+        self.velocity, self.impulses, self.points = np.zeros(self._model.nv), dict[str, Array](), 0
+        self.frames, self.ends = list[EngineFrame](), list[float]()
+        self._tracked = self.q
+        inertia = self._inertia(self.q)
+        self._armature = np.where(inertia.diagonal() < 1e-5, 1e-5, 0.0)  # kg m2: of links without mass
+        self.stiffness, self.damping = actuated.gains(inertia.diagonal() + self._armature)
+        free = [joint for joint in self._model.joints if joint.nq == joint.nv == 1]
+        self._limited: Indices = np.array([(joint.idx_q, joint.idx_v) for joint in free], dtype=np.intp).reshape(-1, 2)
+        impulse_kernel.compiled_kernel()
+
+    def advance(self, tracked: Array, dt: float, moved: Moved, segments: Mapping[str, int]) -> None:
+        """Go on by a frame, towards the tracked posture (nq,) at its end; the things go on with it.
+
+        `moved` are things with their placements before and after, `segments` the frames of what the engine calls so.
+        """
+        steady = pin.difference(self._model, self._tracked, tracked) / dt
+        now, left, self.impulses, self.frames, self.ends = 0.0, dt, {}, [], []
+        while left > 1e-9 * dt:
+            shares = (now / dt, min(1.0, (now + min(left, STEP)) / dt))
+            ways = {name: tuple(pin.SE3.Interpolate(*way, s) for s in shares) for name, way in moved.items()}
+            aim = np.asarray(pin.integrate(self._model, self._tracked, steady * now))
+            step = self._step(min(left, STEP), aim, steady, ways, segments)
+            now, left = now + step, left - step
+            self.ends.append(now)
+        self._tracked = np.array(tracked)
+
+    def energy(self) -> float:
+        """Kinetic and potential energy, joules."""
+        potential = pin.computePotentialEnergy(self._model, self._data, self.q)
+        return self._kinetic(self._inertia(self.q), self.velocity) + float(potential)
+
+    def momentum(self) -> Array:
+        """Momentum [kg m/s] and angular momentum about the world's origin [kg m2/s], (6,)."""
+        centroidal = pin.computeCentroidalMomentum(self._model, self._data, self.q, self.velocity)
+        linear = np.array(centroidal.linear)
+        return np.concatenate([linear, centroidal.angular + np.cross(self._data.com[0], linear)])
+
+    def _inertia(self, q: Array) -> Array:
+        upper = np.triu(pin.crba(self._model, self._data, q))
+        return np.asarray(upper + upper.T - np.diag(upper.diagonal()))
+
+    def _kinetic(self, inertia: Array, velocity: Array) -> float:
+        return 0.5 * float(velocity @ inertia @ velocity + self._armature @ velocity**2)
+
+    # ---- a step
+
+    def _step(self, time: float, aim: Array, steady: Array, moved: Moved, segments: Mapping[str, int]) -> float:
+        """Advance by at most a time, to the next impact if that comes first; by how much."""
+        model, engine = self._model, self._engine
+        inertia = self._inertia(self.q)
+        own = inertia + np.diag(self._armature)
+        planned, points = time, self._points(time, moved)
+        began = self._kinetic(inertia, self.velocity) + float(
+            pin.computePotentialEnergy(model, self._data, self.q)
+        )  # of the figure alone
+        start = self.velocity.copy()
+        impulse = self._bounce(own, points)
+        time = self._until_impact(points, time)
+        weight = np.asarray(pin.computeGeneralizedGravity(model, self._data, self.q)).copy()
+        forces = np.asarray(pin.nonLinearEffects(model, self._data, self.q, self.velocity)).copy()
+        borne = np.where(self.stiffness > 0.0, weight, 0.0)
+        apart = np.asarray(pin.difference(model, self.q, aim))
+        soft = time * self.damping + time * time * self.stiffness
+        driven = own + np.diag(soft)
+        rest = own @ self.velocity + time * (self.stiffness * apart - forces + borne) + soft * steady
+        self.velocity = np.linalg.solve(driven, rest)
+        impulse = impulse + self._bear(driven, points, time)
+        after = self.velocity
+        motor = self.stiffness * (apart + time * (steady - after)) + self.damping * (steady - after) + borne
+        work = np.einsum("ij,ij->i", impulse, (points.figure @ (0.5 * (start + after))).reshape(-1, 3))
+        paid = time * float(motor @ (0.5 * (start + after))) + float(work[points.driven].sum())
+        ways = self._move(time, segments)
+        ways |= {name: (way[0], pin.SE3.Interpolate(*way, time / planned)) for name, way in moved.items()}
+        self._settle(began + paid)
+        if engine is not None:
+            frame = engine.advance(time, ways)
+            self.frames.append(frame)
+            self._react(frame.wrenches, segments)
+        return time
+
+    def _points(self, time: float, moved: Moved) -> Points:
+        """What the figure can touch within a time, and the joint limits that it can reach."""
+        workspace, engine, model = self._workspace, self._engine, self._model
+        names = {} if engine is None else {name: engine.placement(name) for name in engine.bodies}
+        workspace.place({**names, **{name: way[0] for name, way in moved.items()}})
+        pin.computeJointJacobians(model, self._data, self.q)
+        twists = [] if engine is None else [engine.twist(name) for name in names]
+        speed = max(float(np.abs(one).max(initial=0.0)) for one in [self.velocity, *twists])
+        near = workspace.near(self.q, 2e-3 + min(0.2, 1.5 * time * speed))  # m
+        rows = self._rows.rows(near)
+        kept = (rows.first > 0) | (rows.second > 0)
+        contact, wrench = rows.contact[kept], rows.wrench[kept]
+        middle = 0.5 * (near.point_a + near.point_b)[contact]
+        normal = wrench[:, :3]
+        height = (normal * middle).sum(axis=1)
+        place = np.cross(normal, wrench[:, 3:]) + height[:, None] * normal
+        limits = self._limits(time)
+        count = len(contact) + len(limits)
+        bodies = sorted({name for row in contact for name in self._owners(near.pair[row]) if name in names})
+        made = Points(
+            np.zeros((3 * count, model.nv)), np.zeros((3 * count, 6 * len(bodies))), np.zeros(3 * count),
+            np.zeros(count), np.zeros(count), np.zeros(count), [], bodies, np.zeros(count, dtype=bool),
+        )  # fmt: skip
+        jacobians = [np.zeros((6, model.nv))] + [
+            pin.getJointJacobian(model, self._data, joint, pin.WORLD) for joint in range(1, model.njoints)
+        ]
+        for c, (row, joints) in enumerate(
+            zip(contact.tolist(), zip(rows.first[kept], rows.second[kept], strict=True), strict=True)
+        ):
+            axes = _axes(normal[c])
+            here = slice(3 * c, 3 * c + 3)
+            directions = np.hstack([axes, np.cross(place[c], axes)])
+            made.figure[here] = directions @ (jacobians[joints[1]] - jacobians[joints[0]])
+            owners = self._owners(near.pair[row])
+            made.gap[c] = rows.gap[kept][c]
+            made.restitution[c], made.friction[c] = self._surface(*owners)
+            for owner, sign in zip(owners, (-1.0, 1.0), strict=True):
+                if owner in names:
+                    b = 6 * bodies.index(owner)
+                    lever = place[c] - engine.centre(owner)  # type: ignore[union-attr]
+                    made.things[here, b : b + 6] += sign * np.hstack([axes, np.cross(lever, axes)])
+                    made.pushes.append((owner, c, place[c], sign * axes))
+                if owner in moved:
+                    before, after = moved[owner]
+                    made.given[here] += sign * directions @ pin.log6(after * before.inverse()).vector / time
+                made.driven[c] |= owner in names or owner in moved
+        for c, (freedom, sign, gap) in enumerate(limits, len(contact)):
+            made.figure[3 * c, freedom], made.gap[c] = sign, gap
+        self.points = count
+        return made
+
+    def _limits(self, time: float) -> list[tuple[int, float, float]]:
+        """Freedoms that can come to a limit within a time, the sign of motion away from it, and how far it is."""
+        found = []
+        for at, freedom in self._limited.tolist():
+            for sign, limit in (
+                (1.0, self._model.lowerPositionLimit[at]),
+                (-1.0, self._model.upperPositionLimit[at]),
+            ):
+                gap = sign * (self.q[at] - limit)
+                if gap < 0.02 + 1.5 * time * abs(self.velocity[freedom]):  # rad, m
+                    found.append((freedom, sign, gap))
+        return found
+
+    def _owners(self, pair: Array) -> tuple[str, str]:
+        owners = self._workspace.owners
+        return owners[pair[0]], owners[pair[1]]
+
+    def _surface(self, first: str, second: str) -> tuple[float, float]:
+        """Restitution and friction of two segments or things."""
+        objects = self._scene.objects
+        made_of = [objects[name].material if name in objects else HUMAN for name in (first, second)]
+        found = surface(made_of[0], made_of[1])
+        return found.restitution, found.friction
+
+    def _relative(self, points: Points) -> Array:
+        """Velocities (3 m,) at the points along their axes, m/s."""
+        engine = self._engine
+        twists = [engine.twist(name) for name in points.bodies] if engine is not None else []
+        moving = points.things @ np.concatenate(twists) if twists else 0.0
+        return np.asarray(points.figure @ self.velocity + moving + points.given)
+
+    def _until_impact(self, points: Points, time: float) -> float:
+        """The time to the first impact if that comes within a time."""
+        speed = self._relative(points)[::3]
+        coming = (speed < -BOUNCE) & (points.gap > SHORTEST * -speed) & (points.restitution > 0.0)
+        hits = (points.gap[coming] - SKIN) / -speed[coming]
+        return min(time, max(float(hits.min(initial=time)), SHORTEST))
+
+    def _bounce(self, inertia: Array, points: Points) -> Array:
+        """Resolve the impacts of points that touch; the impulses (m, 3)."""
+        speed = self._relative(points)
+        approach = speed[::3]
+        hit = (approach < -BOUNCE) & (points.gap - SKIN <= SHORTEST * np.abs(approach))
+        target = np.where(hit, -points.restitution * approach, -np.inf)
+        touching = points.gap <= 2.0 * SKIN
+        target = np.where(touching & ~hit, 0.0, target)  # what is pressed together passes the blow on
+        if not hit.any():
+            return np.zeros((len(target), 3))
+        return self._solved(inertia, points, speed, target, True)
+
+    def _bear(self, inertia: Array, points: Points, time: float) -> Array:
+        """Keep points apart at the end of a step; the impulses (m, 3)."""
+        room = points.gap - SKIN
+        target = np.where(room >= 0.0, -room / time, np.minimum(-PARTED * room / time, FASTEST))
+        speed = self._relative(points)
+        if points.bodies and self._engine is not None:
+            fall = [self._engine.response(name)[:, :3] @ self._engine.weight(name) for name in points.bodies]
+            speed = speed + time * (points.things @ np.concatenate(fall))
+        return self._solved(inertia, points, speed, target)
+
+    def _solved(self, inertia: Array, points: Points, speed: Array, target: Array, blow: bool = False) -> Array:
+        """Impulses (m, 3) that bring the points to least normal velocities; figure and things take them.
+
+        Those of a blow add no kinetic energy.
+        """
+        if not len(target):
+            return np.zeros((0, 3))
+        answer = np.linalg.solve(inertia, points.figure.T)
+        mobility = points.figure @ answer
+        if points.bodies and self._engine is not None:
+            for b, name in enumerate(points.bodies):
+                part = points.things[:, 6 * b : 6 * b + 6]
+                mobility += part @ self._engine.response(name) @ part.T
+        after = speed.copy()
+        impulse = impulse_kernel.solve(mobility, after, points.friction, target, 100, 1e-7)
+        flat = impulse.ravel()
+        gain = float(flat @ (speed + after))
+        if blow and gain > 0.0:  # as friction can where its direction is coupled with the normal: then less of all
+            impulse = impulse * max(0.0, 1.0 - gain / float(flat @ mobility @ flat))
+        self.velocity = self.velocity + answer @ impulse.ravel()
+        for name, c, place, axes in points.pushes:
+            push = impulse[c] @ axes
+            if push.any():
+                self._engine.push(name, push, place)  # type: ignore[union-attr]
+                self.impulses[name] = self.impulses.get(name, np.zeros(3)) + push
+        return impulse
+
+    def _move(self, time: float, segments: Mapping[str, int]) -> dict[str, tuple[pin.SE3, pin.SE3]]:
+        """Move the joints; the ways of the segments."""
+        before = self._placements(segments)
+        self.q = np.asarray(pin.integrate(self._model, self.q, time * self.velocity))
+        after = self._placements(segments)
+        return {name: (before[name], after[name]) for name in segments}
+
+    def _placements(self, segments: Mapping[str, int]) -> dict[str, pin.SE3]:
+        state = self._workspace.state.update(self.q)
+        return {name: pin.SE3(state.frame(number)) for name, number in segments.items()}
+
+    def _settle(self, most: float) -> None:
+        """Take the energy away that a step of this length added, so that kinetic and potential are at most `most`."""
+        inertia = self._inertia(self.q)
+        kinetic = self._kinetic(inertia, self.velocity)
+        excess = kinetic + float(pin.computePotentialEnergy(self._model, self._data, self.q)) - most
+        if excess > 0.0 and kinetic > 0.0:
+            self.velocity = self.velocity * np.sqrt(max(0.0, 1.0 - excess / kinetic))
+
+    def _react(self, wrenches: Mapping[str, Array], segments: Mapping[str, int]) -> None:
+        """Give the figure the impulses that things gave its segments while they went on."""
+        given = {name: wrench for name, wrench in wrenches.items() if name in segments}
+        if not given:
+            return
+        model = self._model
+        inertia = self._inertia(self.q) + np.diag(self._armature)
+        pin.computeJointJacobians(model, self._data, self.q)
+        total = np.zeros(model.nv)
+        for name, wrench in given.items():
+            joint = model.frames[segments[name]].parentJoint
+            if joint:
+                total += pin.getJointJacobian(model, self._data, joint, pin.WORLD).T @ wrench
+        self.velocity = self.velocity + np.linalg.solve(inertia, total)
+
+
+def _axes(normal: Array) -> Array:
+    """(3, 3) the normal and two tangents, one a row."""
+    first = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
+    first /= np.linalg.norm(first)
+    return np.array([normal, first, np.cross(normal, first)])

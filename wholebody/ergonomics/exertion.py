@@ -1,0 +1,262 @@
+"""Strength in the search for a posture: joint torques of weight and forces, and the compression of the low back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import KW_ONLY, dataclass, field
+from typing import Annotated, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base import checks
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.errors import InputError
+from wholebody.base.fields import Range
+from wholebody.ergonomics.angles import check_person
+from wholebody.figures.figure import Figure
+from wholebody.figures.state import State
+from wholebody.motion.strength import Strength
+from wholebody.scene.scene import Scene
+from wholebody.tasks import inputs
+from wholebody.tasks.base import Constraint, Measure, Surroundings, filled
+from wholebody.tasks.forces import GRAVITY, Force, Forces, Loads, point_rows, pressure, resolved
+
+LEVER = 0.06
+"""m: of the muscles of the back about the disc L5/S1. One muscle stands for all: 50 to 75 mm in the literature
+(Chaffin, Andersson & Martin, "Occupational Biomechanics", chapter 6)."""
+
+ROUND = 5.0  # N m: smaller moments than this of either side count as none, so that the derivative is continuous
+FEET = ("left_sole", "right_sole")
+MOST = 3400.0
+"""N: compression that NIOSH's action limit allows (1981)."""
+
+
+def _strength(value: object, where: str) -> Strength:
+    return checks.instance(value, Strength, where, "give wb.motion.Strength(percentile=50, sex='female')")
+
+
+StrengthOf = Annotated[Strength, _strength]
+
+
+class Statics(NamedTuple):
+    """Torques that hold a person under forces, and their derivatives.
+
+    The ground's force is split over both soles by where it presses between them, each part through a point as far from
+    its sole as the whole from the line of both. Somebody whose legs bear nothing, on a seat, has none: torques of the
+    legs are then those of hanging legs, and are left out.
+    """
+
+    loads: Loads
+    feet: tuple[inputs.Place, ...]  # the soles; none for who sits
+    joints: Indices  # (k,) in the tangent, of the joints with published strength
+    carriers: Indices  # (k,) their joints in the model
+    upper: Array  # (k,) greatest torque towards positive angles [N m]
+    lower: Array  # (k,) least, negative
+    back: tuple[int, int]  # joints of L5/S1, and of the next disc that has one
+
+    def torques(self, state: State, joints: Indices, carriers: Indices) -> tuple[Array, Array]:
+        """Torques (k,) of some joints [N m], and their derivative (k, nv)."""
+        model, data = state.model, state.companion(Statics, state.model).data
+        torque = np.array(pin.computeGeneralizedGravity(model, data, state.q))[joints]
+        moves = np.array(pin.computeGeneralizedGravityDerivatives(model, data, state.q))[joints]
+        for joint, point, rows, force, turn in self._acting(state):
+            moment = np.cross(point, force)
+            d_moment = np.cross(rows.T, force) + np.cross(point, turn.T)  # (nv, 3)
+            reaches = state.support[joint][joints][:, None]
+            linear, angular = state.columns[joints, :3], state.columns[joints, 3:]
+            torque -= reaches[:, 0] * (linear @ force + angular @ moment)
+            axis = np.hstack([np.cross(angular, force), np.cross(linear, force) + np.cross(angular, moment)])
+            turned = (axis @ state.jacobian) * state.support[carriers]
+            moves -= reaches * (turned + linear @ turn + angular @ d_moment.T)
+        return torque, moves
+
+    def _acting(self, state: State) -> list[tuple[int, Array, Array, Array, Array]]:
+        """Of each force the joint, the point (3,) and its derivative (3, nv), the force (3,) and its derivative."""
+        points, rows = self.loads.at(state)
+        none = np.zeros((3, state.model.nv))
+        found = [
+            (one.joint, point, moves, force, none)
+            for one, point, moves, force in zip(self.loads.places, points, rows, self.loads.vectors, strict=True)
+        ]
+        return found + (self._ground(state) if self.feet else [])
+
+    def _ground(self, state: State) -> list[tuple[int, Array, Array, Array, Array]]:
+        left, right = (state.frame(one.frame).translation for one in self.feet)
+        d_left, d_right = (
+            point_rows(state, point, one.joint) for point, one in zip((left, right), self.feet, strict=True)
+        )
+        height = 0.5 * float(left[2] + right[2])
+        at, d_at = pressure(state, self.loads, None, height)
+        weight = GRAVITY * sum(one.mass for one in list(state.model.inertias)[1:])
+        whole = np.array((0.0, 0.0, weight)) - self.loads.vectors.sum(axis=0)
+        d_height = 0.5 * (d_left + d_right)[2]
+        d_at += np.outer(whole[:2] / whole[2], d_height)  # of where it presses at another height
+        at, d_at = np.append(at, height), np.vstack([d_at, d_height])
+        line, d_line = left - right, d_left - d_right
+        length = float(line @ line)
+        share = float(line @ (at - right)) / length
+        d_share = ((at - right) @ d_line + line @ (d_at - d_right) - 2.0 * share * (line @ d_line)) / length
+        if not 0.0 < share < 1.0:
+            share, d_share = min(max(share, 0.0), 1.0), np.zeros_like(d_share)
+        off = at - share * left - (1.0 - share) * right
+        d_off = d_at - share * d_left - (1.0 - share) * d_right - np.outer(line, d_share)
+        return [
+            (one.joint, foot + off, d_foot + d_off, part * whole, np.outer(whole, sign * d_share))
+            for one, foot, d_foot, part, sign in (
+                (self.feet[0], left, d_left, share, 1.0), (self.feet[1], right, d_right, 1.0 - share, -1.0)
+            )
+        ]  # fmt: skip
+
+    def efforts(self, state: State) -> tuple[Array, Array]:
+        """Torques (k,) as shares of the strength in their directions, with sign, and the derivative (k, nv)."""
+        torque, moves = self.torques(state, self.joints, self.carriers)
+        limit = np.where(torque >= 0.0, self.upper, -self.lower)
+        return torque / limit, moves / limit[:, None]
+
+    def compression(self, state: State) -> tuple[float, Array]:
+        """Compression of the disc L5/S1 [N], and its derivative (nv,)."""
+        model, (low, high) = state.model, self.back
+        first = int(model.joints[low].idx_v)
+        joints = np.arange(first, first + 2, dtype=np.intp)  # flexion and lateral bending
+        moment, d_moment = self.torques(state, joints, np.array((low, low + 1), dtype=np.intp))
+        whole = float(np.sqrt(moment @ moment + ROUND**2))
+        above = [k for k in range(low, model.njoints) if low in model.supports[k]]
+        force = np.array((0.0, 0.0, -GRAVITY * sum(model.inertias[k].mass for k in above)))
+        force += sum(
+            (vector for one, vector in zip(self.loads.places, self.loads.vectors, strict=True) if one.joint in above),
+            np.zeros(3),
+        )
+        a, b = (np.asarray(state.data.oMi[k].translation) for k in (low, high))
+        along, d_along = b - a, point_rows(state, b, high) - point_rows(state, a, low)
+        length = float(np.linalg.norm(along))
+        unit = along / length
+        d_unit = (d_along - np.outer(unit, unit @ d_along)) / length
+        return (whole - ROUND) / LEVER - float(force @ unit), moment @ d_moment / (whole * LEVER) - force @ d_unit
+
+
+def statics_of(scene: Surroundings, forces: Sequence[Force], strength: Strength, standing: bool, where: str) -> Statics:
+    """What holds a scene's person under forces; standing, on both soles."""
+    figure = check_person(scene.figure, f"{where}: the scene's figure")
+    lower, upper = strength.limits(figure)
+    legs = set() if standing else set(figure.dofs(["legs"]).tolist())
+    known = np.flatnonzero(np.isfinite(lower) & np.isfinite(upper))
+    joints = np.array([k for k in known.tolist() if k not in legs], dtype=np.intp)
+    if "spine1_flexion" not in figure.joints:
+        raise InputError(f"{where}: takes a person with a spine; load one with wb.load('human')")
+    state, loads = State(scene.model), resolved(forces, scene, f"{where}: forces")
+    if standing:
+        pressure(state, loads, None, 0.0)  # forces that lift are refused here
+    return Statics(
+        loads,
+        tuple(inputs.find_place(scene, foot, where) for foot in FEET) if standing else (),
+        joints, state.column_joint[joints], upper[joints], lower[joints],
+        (figure.joint_id("spine1_flexion"), figure.joint_id("spine2_flexion")),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Exertion(Measure):
+    """Sum of the squared torques of joints over their strength: elbows go in, and who lifts comes near [no unit].
+
+    Torques are those of the weight, the forces and, of somebody who stands, the ground (`Statics`). Joints without
+    published strength do not count.
+
+    Attributes:
+        forces: on the person beside the weight.
+        strength: of the person.
+        standing: whether both feet carry the person; False for who sits, whose legs do not count.
+        weight: factor on the measure; 10 of it beside `Effort` is as strong as a habit.
+    """
+
+    forces: Forces = ()
+    _: KW_ONLY
+    strength: StrengthOf = Strength()  # noqa: RUF009
+    standing: bool = True
+    weight: inputs.Weight = 1.0
+    statics: Statics = field(init=False, repr=False)
+
+    def resolve(self, scene: Surroundings, start: Array) -> Exertion:
+        """Look up the joints and their strength."""
+        return filled(self, statics=statics_of(scene, self.forces, self.strength, self.standing, "Exertion"))
+
+    def value(self, state: State) -> float:
+        """The sum."""
+        share = self.statics.efforts(state)[0]
+        return float(share @ share)
+
+    def gradient(self, state: State) -> Array:
+        """(nv,) its derivative."""
+        share, moves = self.statics.efforts(state)
+        return np.asarray(2.0 * share @ moves)
+
+    def curvature(self, state: State) -> Array:
+        """(nv,) the diagonal of Gauss and Newton."""
+        moves = self.statics.efforts(state)[1]
+        return np.asarray(2.0 * np.einsum("ij,ij->j", moves, moves) + 1e-6)
+
+    def squares(self, state: State) -> tuple[Array, Array]:
+        """The shares and their derivative."""
+        return self.statics.efforts(state)
+
+
+@dataclass(frozen=True, eq=False)
+class StrengthLimit(Constraint):
+    """Keep joint torques within strength, and the compression of the disc L5/S1 within a bound.
+
+    Rows are what is left: of the strength of each joint with published strength in either direction [share], and of the
+    compression [kN].
+
+    Attributes:
+        forces: on the person beside the weight.
+        strength: of the person.
+        standing: as for `Exertion`.
+        share: of the strength that may be used.
+        compression: greatest of the disc L5/S1 [N]; None for no bound.
+    """
+
+    forces: Forces = ()
+    _: KW_ONLY
+    strength: StrengthOf = Strength()  # noqa: RUF009
+    standing: bool = True
+    share: Annotated[float, Range(0.01, 10.0)] = 1.0
+    compression: Annotated[float, Range(100.0, 1e5, "N")] | None = MOST
+    statics: Statics = field(init=False, repr=False)
+
+    def resolve(self, scene: Surroundings, start: Array) -> StrengthLimit:
+        """Look up the joints and their strength."""
+        return filled(self, statics=statics_of(scene, self.forces, self.strength, self.standing, "StrengthLimit"))
+
+    def value(self, state: State) -> Array:
+        """(m,) what is left."""
+        return self.value_and_jacobian(state, self.value)[0]
+
+    def jacobian(self, state: State) -> Array:
+        """(m, nv)."""
+        return self.value_and_jacobian(state, self.value)[1]
+
+    def value_and_jacobian(self, state: State, value: Callable[[State], Array]) -> tuple[Array, Array]:
+        """Both from one look at the forces."""
+        share, moves = self.statics.efforts(state)
+        values, rows = [self.share - share, self.share + share], [-moves, moves]
+        if self.compression is not None:
+            found, row = self.statics.compression(state)
+            values.append(np.array([1e-3 * (self.compression - found)]))
+            rows.append(-1e-3 * row[None])
+        return np.concatenate(values), np.vstack(rows)
+
+
+def back_compression(figure: Figure, q: Array, forces: Sequence[Force] = ()) -> float:
+    """Compression of the disc L5/S1 of a person in a posture (nq,) under weight and forces, N.
+
+    One muscle of the back holds the moments of all that is above, with a lever of 60 mm; the weight and the forces
+    above press along the spine beside it. NIOSH's action limit is 3400 N.
+
+    Raises:
+        InputError: no person, no posture, or no forces.
+        UnknownNameError: a force on an unknown frame.
+    """
+    person = check_person(figure, "back_compression: figure")
+    q = checks.posture(q, person.model.nq, "back_compression: q")
+    term = StrengthLimit(forces, standing=False).resolve(Scene(person), q)
+    return term.statics.compression(State(person.model).update(q))[0]

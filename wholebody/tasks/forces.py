@@ -1,0 +1,160 @@
+"""Forces on a figure beside its weight, and where the ground presses against both."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import KW_ONLY, dataclass, field
+from typing import Annotated, Any, NamedTuple, TypeAlias
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base import checks
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
+from wholebody.base.fields import Checked
+from wholebody.figures.state import State
+from wholebody.tasks import inputs
+from wholebody.tasks.balance import STEADY, Balance, Feet, Margin, convex_polygon, least_width, standing_points
+from wholebody.tasks.base import Constraint, Surroundings, filled
+
+GRAVITY = 9.81
+"""m/s^2, as in Pinocchio's models."""
+
+MOST = 1e5  # N: a greater force is a mistake of units
+
+
+def _force(value: object, where: str) -> Array:
+    """Force (3,), N."""
+    found = checks.numbers(value, (3,), where)
+    if np.linalg.norm(found) > MOST:
+        raise InputError(f"{where} is {np.linalg.norm(found):.4g} N; forces are in newtons, at most {MOST:g}")
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Force(Checked):
+    """A force on a figure that keeps its direction: 10 kg in a hand are ``Force("left_palm", (0, 0, -98))``.
+
+    Who pushes a cart forward by 100 N has a force of (-100, 0, 0) on the hands: the cart pushes back.
+
+    Attributes:
+        frame: where it acts: the origin of a frame.
+        force: (3,) in the world [N].
+    """
+
+    frame: inputs.Name
+    force: Annotated[Any, _force]
+
+
+def _forces(value: object, where: str) -> tuple[Force, ...]:
+    """Forces as a tuple."""
+    listed = checks.listed(value, where, "[wb.Force('right_palm', (0, 0, -100))]")
+    return tuple(checks.instance(one, Force, where, "give wb.Force('right_palm', (0, 0, -100))") for one in listed)
+
+
+Forces: TypeAlias = Annotated[Sequence[Force], _forces]
+
+
+class Loads(NamedTuple):
+    """Forces on the joints of a figure, ready to be evaluated."""
+
+    places: tuple[inputs.Place, ...]  # frame and joint of each
+    vectors: Array  # (k, 3) in the world [N]
+
+    def at(self, state: State) -> tuple[Array, Array]:
+        """Where they act (k, 3) [m], and the derivative (k, 3, nv)."""
+        points = np.array([state.frame(place.frame).translation for place in self.places]).reshape(-1, 3)
+        moves = [point_rows(state, point, one.joint) for point, one in zip(points, self.places, strict=True)]
+        return points, np.array(moves).reshape(-1, 3, state.model.nv)
+
+
+def resolved(forces: Sequence[Force], scene: Surroundings, where: str) -> Loads:
+    """Forces on a scene's figure."""
+    places = tuple(inputs.find_place(scene, one.frame, where) for one in forces)
+    return Loads(places, np.array([one.force for one in forces]).reshape(-1, 3))
+
+
+def point_rows(state: State, point: Array, joint: int) -> Array:
+    """Derivative (3, nv) of a point (3,) in the world that a joint carries."""
+    wrench = np.hstack([np.eye(3), pin.skew(point).T])
+    return state.rows(wrench, np.full(3, joint, dtype=np.intp), np.zeros(3, dtype=np.intp))
+
+
+def pressure(state: State, loads: Loads, mass: range | None, height: float) -> tuple[Array, Array]:
+    """Where level ground at a height presses against the weight of some joints and forces, and its derivative.
+
+    About that point the weight and the forces have no moment but about the vertical: without forces it is below the
+    centre of mass.
+
+    Returns:
+        The point (2,), metres, and the derivative (2, nv).
+    """
+    model = state.model
+    weight = GRAVITY * sum(model.inertias[k].mass for k in (mass or range(1, model.njoints)))
+    center, moved = state.center_of_mass(mass)[:2], state.center_of_mass_jacobian(mass)[:2]
+    if not len(loads.vectors):
+        return center, moved
+    points, rows = loads.at(state)
+    down = weight - float(loads.vectors[:, 2].sum())
+    if down < 0.05 * weight:
+        raise InputError(
+            f"forces lift the figure: {down:.0f} N of its weight are left on the ground; make them smaller"
+        )
+    f = loads.vectors
+    arm = np.einsum("k,ki->i", -f[:, 2], points[:, :2]) + np.einsum("k,ki->i", points[:, 2] - height, f[:, :2])
+    turn = np.einsum("k,kij->ij", -f[:, 2], rows[:, :2]) + np.einsum("kj,ki->ij", rows[:, 2], f[:, :2])
+    return (weight * center + arm) / down, (weight * moved + turn) / down
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedBalance(Constraint):
+    """Keep the balance under forces: the ground presses within the support polygon of the feet.
+
+    As `Balance`, which it takes the place of, but of the point where the ground presses in place of the centre of mass:
+    who pushes leans forward, and who carries leans back. There is a row for each edge [m].
+
+    Attributes:
+        forces: on the figure beside its weight.
+        feet: segments that carry the figure, as for `Balance`.
+        margin: least distance from the edges [m]; None for 0.15 of the polygon's least width.
+        keeps: that margin; once resolved.
+    """
+
+    forces: Forces
+    _: KW_ONLY
+    feet: Feet = ("left_foot", "right_foot")
+    margin: Margin | None = None
+    keeps: float = field(init=False, repr=False)
+    loads: Loads = field(init=False, repr=False)
+    polygon: Balance = field(init=False, repr=False)
+    height: float = field(init=False, repr=False)
+
+    def resolve(self, scene: Surroundings, start: Array) -> LoadedBalance:
+        """Compute the support polygon at the start."""
+        points = standing_points(scene, start, self.feet)
+        corners = convex_polygon(points[:, :2])
+        keeps = STEADY * least_width(corners) if self.margin is None else self.margin
+        polygon = Balance(self.feet, margin=keeps).on_polygon(corners, scene)
+        loads, height = resolved(self.forces, scene, "LoadedBalance: forces"), float(points[:, 2].min())
+        pressure(State(scene.model).update(start), loads, polygon.joints, height)  # forces that lift are refused here
+        return filled(self, loads=loads, polygon=polygon, keeps=keeps, height=height)
+
+    @property
+    def lower(self) -> Array:
+        """The margin."""
+        return np.array(self.keeps)
+
+    def value(self, state: State) -> Array:
+        """(m,) distance inside each edge [m]."""
+        return self.value_and_jacobian(state, self.value)[0]
+
+    def jacobian(self, state: State) -> Array:
+        """(m, nv)."""
+        return self.value_and_jacobian(state, self.value)[1]
+
+    def value_and_jacobian(self, state: State, value: Callable[[State], Array]) -> tuple[Array, Array]:
+        """Both from one look at the forces."""
+        point, rows = pressure(state, self.loads, self.polygon.joints, self.height)
+        normals = self.polygon.normals
+        return np.asarray(normals @ point - self.polygon.offsets), np.asarray(normals @ rows)
