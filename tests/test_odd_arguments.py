@@ -356,7 +356,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Torus", Call(wb.Torus, {"radius": 0.1, "tube": 0.02}, lambda shape: shape.pieces())
     task = wb.read_task(path / "task.toml")
     given = {"problem": task.problem, "path": path / "written.toml", "title": "one line"}
-    yield "write_task", Call(wb.write_task, given)
+    yield "write_task", Call(wb.taskfile.write_task, given)
     answer = wb.solve(task.problem)
     stored = path / "result.json"
     yield "write_result", Call(wb.taskfile.write_result, {"task": task, "solution": answer, "path": stored})
