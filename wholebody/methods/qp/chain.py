@@ -190,7 +190,9 @@ class _Seeded:
     def _nearest(self) -> Met:
         """Where descents from the first seeds come nearest to the goals with everything held: a few, which differ."""
         seeds = next(self.chain.seeds(self.start, self.budget.seed, SEEDS.together))
-        given = self.goals.tables[None], self.goals, np.array([[self.nearest, self.nearest]]), self._asked(1)
+        asked = self._asked(1)
+        asked[3:] = len(seeds), 0.0  # all of them, although some may meet the goals inside of things
+        given = self.goals.tables[None], self.goals, np.array([[self.nearest, self.nearest]]), asked
         found, _ = self.chain.descents(*given, seeds[None], len(seeds))
         values, near = list[Array](), list[Array]()
         for k in found[0, :, 0].argsort():
