@@ -18,6 +18,7 @@ from wholebody.tasks.base import Goal, filled
 from wholebody.tasks.contact_parts import Gap, Near
 from wholebody.tasks.frame import Frame
 from wholebody.tasks.grips import Opposing
+from wholebody.tasks.inputs import Place
 from wholebody.tasks.point import Point
 from wholebody.tasks.residuals import PlacementResidual
 from wholebody.tasks.surfaces import nearest
@@ -49,7 +50,7 @@ def _beside(term: Any) -> tuple[Any, ...] | None:
 
 def _places(problem: Problem, term: Any, state: State) -> list[Goal]:
     """Resolved goals for where a contact's frames are, or its point."""
-    names, start, scene = problem.scene.model.names, problem.start, problem.scene
+    names = problem.scene.model.names
     turned: dict[int, Any] = {part.place.frame: part.place for part in term.parts if hasattr(part, "place")}
     found: list[Goal] = []
     for place in turned.values():
@@ -57,7 +58,8 @@ def _places(problem: Problem, term: Any, state: State) -> list[Goal]:
         found.append(filled(Frame(names[place.joint], at), residual=PlacementResidual.build(place, at)))
     if not turned:
         near = nearest(term.parts[0].first, term.parts[0].second, state)
-        joint = near.against or near.joint
-        offset: Array = state.data.oMi[joint].actInv(near.point)
-        found.append(Point(names[joint], near.point, offset=offset).resolve(scene, start))
+        joint, frames = near.against or near.joint, problem.scene.model.frames
+        number = next(k for k, frame in enumerate(frames) if frame.parentJoint == joint)  # a body may have its name
+        offset: Array = state.frame(number).actInv(near.point)
+        found.append(filled(Point(frames[number].name, near.point, offset=offset), place=Place(number, joint)))
     return found
