@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,9 @@ import pytest
 import wholebody as wb
 from wholebody.motion.avoider import MethodResult, Run
 from wholebody.motion.clip_torques import LoadChange
-from wholebody.motion.trajectory.loads import standing_frames
+from wholebody.motion.frame_terms import frame_terms
+from wholebody.motion.stance import standing_feet
+from wholebody.motion.trajectory.loads import ClipLoads, standing_frames
 
 WHEEL = """<robot name="wheel"><link name="base"/>
 <link name="wheel"><inertial><mass value="2"/>
@@ -76,8 +78,22 @@ def test_what_is_beyond_its_bound_is_said_with_its_figures(tmp_path: Path) -> No
     assert bound > 2.0
     assert not found.report.solved
     assert f"turn needs {1.3 * bound:.4g} N m" in found.report.message
-    assert f"30.0% more than its bound of {bound:.4g} N m, where 2% are allowed" in found.report.message
+    assert (
+        f"30.0% more than its bound of {bound:.4g} N m, where 2% are allowed; before it needed at most"
+        in found.report.message
+    )
+    assert f"at most {bound:.4g} N m, beyond its strength of 2 N m" in found.report.message
     assert wb.avoid(clip, dynamics=True, method=Larger(1.01)).report.solved
+
+
+def test_a_strength_that_the_clip_kept_is_said(tmp_path: Path) -> None:
+    """The wheel needs 1.5 of what it needed, which was within its effort."""
+    clip = wheel(tmp_path, 4.0)
+    was = np.abs(wb.motion.torques(clip).torque).max()
+    assert 0.7 * 4.0 < was < 4.0
+    found = wb.avoid(clip, dynamics=True, method=Larger(1.5), constraints=[wb.motion.MotionBounds(None, None, None)])
+    assert f"{1.5 * was / 4.0 - 1.0:.1%} more than its bound of 4 N m" in found.report.message
+    assert f"before it needed at most {was:.4g} N m, within its strength of 4 N m" in found.report.message
 
 
 def test_other_methods_do_not_take_dynamics(tmp_path: Path) -> None:
@@ -114,6 +130,36 @@ def test_a_recording_that_is_freed_stays_within_strength(recorded: wb.Clip) -> N
     lower, upper = loads.bounds
     assert (loads.after.torque[:, 6:] <= upper[6:] * 1.02 + 1e-6).all()
     assert (loads.after.torque[:, 6:] >= lower[6:] * 1.02 - 1e-6).all()
+
+
+def test_nothing_is_asked_of_a_recording_beyond_what_it_keeps(recorded: wb.Clip) -> None:
+    """It leans out of its feet and is beyond strength, so it is as far beyond its bounds as before: nowhere."""
+    public = wb.motion.torques(recorded)
+    assert public.outside.max() > 0.05
+    assert public.largest_share > 1.2
+    terms = frame_terms(wb.Scene(recorded.figure), recorded.q, recorded.dt, (), 0.0)
+    asked = ClipLoads.original(recorded, standing_feet(recorded, public.feet), wb.motion.Strength(), terms)
+    assert asked.worst().max() < 1e-9
+    assert asked.corrected(recorded.q).of(recorded.q).worst().max() < 1e-9
+    judged = LoadChange(public, public, np.arange(float(len(recorded))))
+    assert not judged.beyond.any()
+    assert not judged.farther.any()
+    assert not judged.missed
+
+
+@pytest.mark.parametrize(("inside", "told"), [(True, "was within it before"), (False, "mm before")])
+def test_a_support_that_is_left_is_said(recorded: wb.Clip, inside: bool, told: str) -> None:
+    """Where a frame leans 30 mm farther: by how much, when, out of which feet, and how it was before."""
+    public = wb.motion.torques(recorded)
+    frames = public.stands.all(axis=1) & ((public.outside == 0.0) if inside else (public.outside > 0.05))
+    frame = int(np.flatnonzero(frames)[0])
+    outside = public.outside.copy()
+    outside[frame] += 0.03
+    (said,) = LoadChange(public, replace(public, outside=outside), np.arange(float(len(recorded)))).missed
+    assert f"30 mm farther outside of the feet than before at {frame * recorded.dt:.2f} s" in said
+    assert f"{1e3 * outside[frame]:.3g} mm outside of the support of left_foot and right_foot" in said
+    assert "too far in 1 frames" in said
+    assert told in said
 
 
 def test_a_recording_is_slowed_and_stays_within_strength(recorded: wb.Clip) -> None:

@@ -230,3 +230,16 @@ def test_a_scene_is_sent_once_and_again_when_something_moved():
     assert moved.scene is not read.scene
     assert moved.scene.objects["box"].placement.translation[0] == 0.7
     np.testing.assert_allclose(wb.solve(moved).q, wb.solve(first).q, atol=1e-12)
+
+
+class Hit(Tries):
+    """A method during whose first solve Ctrl-C is hit."""
+
+    def solve(self, problem: wb.Problem, progress: Any = None) -> wb.Solution:
+        return wb.solve(problem, progress=lambda entry: signal.raise_signal(signal.SIGINT))
+
+
+def test_ctrl_c_ends_all_and_not_one_solve(arm: wb.Figure) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        wb.solve_many([problem(arm, (5.0, 0.0, 0.5))], Hit())
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

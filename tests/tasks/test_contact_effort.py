@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -65,6 +67,37 @@ def test_a_contact_costs_no_more_than_its_place(name: str) -> None:
     if not isinstance(touch, wb.Touch):
         goal = wb.Frame(frame, np.r_[place.translation, pin.Quaternion(place.rotation).coeffs()])
     assert solution.assessment.measure < AS_CHEAP * effort_there(problem, solution.q, [goal])
+
+
+def two_people() -> wb.Problem:
+    facing = (1.05, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+    scene = wb.Scene({"anna": wb.load("human", sex="female"), "ben": (wb.load("human", sex="male"), facing)})
+    feet = [wb.Hold(f"{name}/{side}_foot") for name in ("anna", "ben") for side in ("left", "right")]
+    return wb.Problem(scene, goals=[wb.Touch("anna/right_palm", "ben/right_palm")], constraints=feet)
+
+
+def own_palms() -> wb.Problem:
+    scene = wb.Scene(wb.load("human"))
+    feet = [wb.Hold(f"{side}_foot") for side in ("left", "right")]
+    return wb.Problem(scene, goals=[wb.Touch("left_palm", "right_palm")], constraints=feet)
+
+
+@pytest.mark.parametrize("make", [two_people, own_palms])
+def test_palms_meet_without_effort_elsewhere(make: Callable[[], wb.Problem]) -> None:
+    """Where both are is as cheap as frames there; a distance of two points would have no derivative where they meet."""
+    problem = make()
+    solution = wb.solve(problem)
+    assert solution.status == "solved"
+    assert solution.assessment.optimality < STATIONARY
+    names = (problem.goals[0].part, problem.goals[0].thing)
+    palms = [problem.scene.figure.placement(solution.q, name) for name in names]
+    assert np.linalg.norm(palms[0].translation - palms[1].translation) < 2e-5
+    assert palms[0].rotation[:, 2] @ palms[1].rotation[:, 2] == pytest.approx(-1.0, abs=1e-6)
+    ends = [np.r_[palm.translation, pin.Quaternion(palm.rotation).coeffs()] for palm in palms]
+    there = [wb.Frame(name, end) for name, end in zip(names, ends, strict=True)]
+    touching = problem.goals[0].touching
+    placed = wb.Problem(problem.scene, goals=there, constraints=problem.constraints, touching=touching)
+    assert solution.assessment.measure < AS_CHEAP * wb.solve(placed).assessment.measure
 
 
 SEATS = {"with a back": (-0.35, 0.05, 0.42), "without": (-0.425, 0.179, 0.347)}

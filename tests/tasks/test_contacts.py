@@ -33,6 +33,7 @@ TERMS = {
     "touch": wb.Touch("left_hand", "box"),
     "touch_piece": wb.Touch("left_forearm", "ball"),
     "touch_point": wb.Touch("right_index_tip", "ball"),
+    "touch_frames": wb.Touch("right_palm", "left_palm"),
     "touch_itself": wb.Touch("right_hand", "left_thigh"),
     "lean": wb.Lean("backrest"),
     "sit": wb.Sit("seat"),

@@ -292,24 +292,41 @@ class LoadChange:
 
     @property
     def missed(self) -> list[str]:
-        """Sentences on loads that are beyond their bounds: which, by how much, where, and what is allowed."""
+        """Sentences on loads beyond their bounds: which, by how much, where, what is allowed, and what was before."""
         said, joint, frame = list[str](), int(np.argmax(self.beyond)), int(np.argmax(self.farther))
         if self.beyond[joint] > TORQUE:
-            (lower, upper), torque = self.bounds, self.after.torque[:, joint]
-            high = torque.max() / upper[joint] >= torque.min() / lower[joint]
-            needed, bound = (torque.max(), upper[joint]) if high else (torque.min(), lower[joint])
-            at = int(np.argmax(torque == needed)) * self.after.dt
-            said.append(
-                f"{self.before.joint_of(joint)} needs {abs(needed):.4g} N m at {at:.2f} s, {self.beyond[joint]:.1%} "
-                f"more than its bound of {abs(bound):.4g} N m, where {TORQUE:.0%} are allowed"
-            )
+            said.append(self._torque_missed(joint))
         if self.farther[frame] > PLACE:
             said.append(
                 f"the zero moment point is {1e3 * self.farther[frame]:.3g} mm farther outside of the feet than before "
                 f"at {frame * self.after.dt:.2f} s, where {1e3 * PLACE:g} mm are allowed, and too far in "
-                f"{int((self.farther > PLACE).sum())} frames"
+                f"{int((self.farther > PLACE).sum())} frames; {self._support(frame)}"
             )
         return said
+
+    def _torque_missed(self, joint: int) -> str:
+        """The sentence on a torque that is beyond its bound."""
+        old, (lower, upper), now = self.before, self.bounds, self.after.torque[:, joint]
+        high = now.max() / upper[joint] >= now.min() / lower[joint]
+        sign, bound, strength = (1.0, upper, old.upper) if high else (-1.0, -lower, -old.lower)
+        needed, before = sign * now, max(float((sign * old.torque[:, joint]).max()), 0.0)
+        kept = "beyond" if before > strength[joint] else "within"
+        others = int((self.beyond > TORQUE).sum()) - 1
+        return (
+            f"{old.joint_of(joint)} needs {needed.max():.4g} N m at {int(needed.argmax()) * self.after.dt:.2f} s, "
+            f"{self.beyond[joint]:.1%} more than its bound of {bound[joint]:.4g} N m, where {TORQUE:.0%} are allowed; "
+            f"before it needed at most {before:.4g} N m, {kept} its strength of {strength[joint]:.4g} N m"
+            + (f"; {others} more joint{'s are' if others > 1 else ' is'} beyond" if others else "")
+        )
+
+    def _support(self, frame: int) -> str:
+        """Where the zero moment point of a frame is, and was."""
+        now, was = 1e3 * self.after.outside[frame], 1e3 * (self.after.outside[frame] - self.farther[frame])
+        feet = " and ".join(
+            name for name, stands in zip(self.after.feet, self.after.stands[frame], strict=True) if stands
+        )
+        before = f"{was:.3g} mm" if was > 1e-3 else "within it"
+        return f"it is {now:.3g} mm outside of the support of {feet} there, and was {before} before"
 
     def __str__(self) -> str:
         """One sentence."""

@@ -13,6 +13,7 @@ from wholebody.base import checks
 from wholebody.base.batches import fingerprint, run_batch, shared
 from wholebody.base.runner import EndedError, Job
 from wholebody.methods.base import Method
+from wholebody.methods.control import ctrl_c_ends_all
 from wholebody.methods.inputs import check_problem
 from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
@@ -152,6 +153,7 @@ def runs_of(cases: Sequence[Case], length: int) -> list[list[Case]]:
     return [list(cases[k : k + length]) for k in range(0, len(cases), length)]
 
 
+@ctrl_c_ends_all()
 def run_cases(runs: Sequence[Sequence[Case]], running: Running, store: RecordStore | None = None) -> Records:
     """Solve cases; see `solve_many`.
 

@@ -135,6 +135,23 @@ class Gap(NamedTuple):
         return SupportingPlanes(value, rows, key, bend, np.zeros(len(bend), dtype=np.intp))
 
 
+class Meeting(NamedTuple):
+    """Two points that meet: three rows, what is between them along the axes of the world [m].
+
+    Their distance would not do: where it vanishes it has no derivative, and steps to it swing.
+    """
+
+    first: Surface  # the points
+    second: Surface
+    in_radians: tuple[bool, ...] = (False, False, False)
+
+    def rows(self, state: State) -> tuple[Array, Array]:
+        """The way from the second point to the first, and forces through each."""
+        ends = [(point.placed(0, state).translation, point.joints[0]) for point in self[:2]]
+        moves = [between(state, through(place, np.eye(3)), joint, 0) for place, joint in ends]
+        return ends[0][0] - ends[1][0], moves[0] - moves[1]
+
+
 class Near(NamedTuple):
     """Two surfaces not farther apart than a distance: one row, zero within it, and what is beyond it [m]."""
 

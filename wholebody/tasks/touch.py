@@ -15,8 +15,8 @@ from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import Surroundings, filled
-from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, OwnSurface, owner_pairs
-from wholebody.tasks.surfaces import Surface, carried_by, face, nearest, surface
+from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Meeting, OwnSurface, Part, owner_pairs
+from wholebody.tasks.surfaces import Face, Surface, carried_by, face, nearest, surface
 
 ON_SURFACE = 1e-6  # m: a point this near to a surface of its own piece is on it
 WITHIN_FACE = 1e-3  # m: and one on a face is within it if it is this far from all others
@@ -28,9 +28,10 @@ class Touch(ContactTerm):
 
     The value is the signed distance of the two surfaces [m]: positive apart, negative in an overlap. Its derivative is
     that of the nearest points along the normal. A frame on the round end of its own piece counts as touching where the
-    piece does, if it is at most 8e-6 m off there; one within a flat face lays that on what it touches. Use it as a goal
-    or as a constraint. The clearance of what is to touch is zero, for a frame that of the segment which carries it. A
-    thing that is moved is touched where it is.
+    piece does, if it is at most 8e-6 m off there; one within a flat face lays that on what it touches. Two frames meet:
+    the value is the way between their origins (3,), and where both are on their own pieces, whose surfaces then look at
+    each other, the angle between those (2,) [rad]. Use it as a goal or as a constraint. The clearance of what is to
+    touch is zero, for a frame that of the segment which carries it. A thing that is moved is touched where it is.
 
     Attributes:
         part: name of a segment, of a piece such as "left_hand:0", or of a frame, whose origin then touches. Of a link
@@ -58,9 +59,14 @@ class Touch(ContactTerm):
         where = f"Touch({shown(self.part)}, {shown(self.thing)})"
         first, second = surface(scene, self.part, where), surface(scene, self.thing, where)
         check_apart(first, second, where)
+        if second.fixed is not None and first.fixed is None:
+            first, second = second, first  # of the first surface alone it is known whether it is on its own piece
+        parts: tuple[Part, ...] = (Gap(first, second, own=own_surface(scene, first)),)
+        if second.fixed is not None:
+            parts = _meeting(scene, first, second, where)
         return filled(
             self,
-            parts=(Gap(first, second, own=own_surface(scene, first)),),
+            parts=parts,
             touches=owner_pairs(touched(scene, first), touched(scene, second)),
         )
 
@@ -100,6 +106,25 @@ class Lean(ContactTerm):
         facing = Facing(place, across(self.resolved_side), leaned_on, np.array((0.0, 0.0, -1.0)))
         parts = (Gap(first, second, leaned_on), facing)
         return filled(self, parts=parts, touches=owner_pairs(touched(scene, first), second.owners))
+
+
+def _meeting(scene: Surroundings, first: Surface, second: Surface, where: str) -> tuple[Part, ...]:
+    """Two points that meet; where both are on the surfaces of their pieces, those look at each other."""
+    meeting, ways = Meeting(first, second), (_outwards(scene, first), _outwards(scene, second))
+    if ways[0] is None or ways[1] is None:
+        return (meeting,)
+    face = Face(second, np.zeros(3), across(ways[1]), np.zeros(2))
+    place = inputs.find_place(scene, first.name, where)
+    return meeting, Facing(place, across(ways[0]), face, np.array((0.0, 0.0, -1.0)))
+
+
+def _outwards(scene: Surroundings, point: Surface) -> Array | None:
+    """Normal (3,) of the piece on whose surface a point is, in the axes of its frame; None where it is on none."""
+    own = own_surface(scene, point)
+    if own is None:
+        return None
+    way = point.fixed.translation - own.middle.fixed.translation
+    return np.asarray(point.fixed.rotation.T @ way / np.linalg.norm(way))
 
 
 def own_surface(scene: Surroundings, point: Surface) -> OwnSurface | None:

@@ -186,6 +186,7 @@ WRONG = {
     "no bodies": ("<mujoco><worldbody/></mujoco>", "no bodies"),
     "an unknown joint": (ARM.replace('type="slide"', 'type="screw"'), "MuJoCo cannot read it .*screw"),
     "no mesh": (ARM.replace('vertex="0 0 0  0.1 0 0  0 0.1 0  0 0 0.1"', 'file="gone.stl"'), "gone.stl"),
+    "a long name": (ARM.replace('type="slide"', f'class="{"c" * 300}"'), "MuJoCo cannot read it .*unknown default"),
     "broken": (ARM[:-40], "MuJoCo cannot read it"),
     "another file": ("<scene/>", "<scene>, not <robot>"),
 }

@@ -22,7 +22,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError, InputError, MissingPackageError
-from wholebody.base.files import read_bytes
+from wholebody.base.files import is_file, read_bytes
 from wholebody.geometry.meshes import check_content
 
 FREE, BALL, SLIDE, HINGE = range(4)
@@ -203,7 +203,7 @@ def _compile(path: Path) -> tuple[Any, tuple[str, ...]]:
             return read(textures=False), (f"textures are left out: {reason}",)
         except wrong as error:
             for named in map(Path, re.findall("'([^']+)'", str(error))):
-                if named.is_file() and named != path:
+                if is_file(named) and named != path:
                     check_content(named)
             raise FileFormatError(f"{path}: MuJoCo cannot read it ({_said(error)}); correct the file") from None
 

@@ -43,12 +43,12 @@ class Met(NamedTuple):
     stationary: bool  # whether the measures are stationary too
     # (nq,) an end of far less effort that does not keep its clearances; None where there is none
     blocked: Array | None = None
-    reached: bool = True  # False where no posture meets the goals: it is one that comes near them
+    near: tuple[Array, ...] = ()  # where no posture meets the goals: free ones that come near them, q the nearest
 
     @property
     def complete(self) -> bool:
         """Whether no descent from here can lead to less."""
-        return self.stationary and self.blocked is None and self.reached
+        return self.stationary and self.blocked is None and not self.near
 
 
 def chains_of(problem: Problem) -> Pool[Chains]:
@@ -188,16 +188,20 @@ class _Seeded:
         return True
 
     def _nearest(self) -> Met:
-        """Where descents from the first seeds come nearest to the goals with everything held."""
+        """Where descents from the first seeds come nearest to the goals with everything held: a few, which differ."""
         seeds = next(self.chain.seeds(self.start, self.budget.seed, SEEDS.together))
         given = self.goals.tables[None], self.goals, np.array([[self.nearest, self.nearest]]), self._asked(1)
-        begin = self.at
         found, _ = self.chain.descents(*given, seeds[None], len(seeds))
+        values, near = list[Array](), list[Array]()
         for k in found[0, :, 0].argsort():
-            if self._is_free(q := self.chain.posture(seeds[k], self.at)):
-                begin = q
+            differs = all(np.abs(seeds[k] - each).max() > SEEDS.differing for each in values)
+            if differs and self._is_free(q := self.chain.posture(seeds[k], self.at)):
+                values.append(seeds[k])
+                near.append(q)
+            if len(near) == SEEDS.near:
                 break
-        return Met(begin, tuple(self.trace), False, reached=False)
+        near = near or [self.at]
+        return Met(near[0], tuple(self.trace), False, near=tuple(near))
 
     def _asked(self, enough: int) -> Array:
         """See `chain_kernel.reach`."""

@@ -116,7 +116,7 @@ class QP(Checked):
             else:
                 search = Multistart(problem, workspace, self._qp_solver(), budget, control)
                 begin, before = (None, ()) if met is None else (met.q if judgement is None else None, met.trace)
-                best = search.run(begin, None if met is None else met.blocked, met is None or met.reached)
+                best = search.run(begin, None if met is None else met.blocked, () if met is None else met.near)
                 ending = Ending(
                     best.q, best.converged, len(before) + search.spent, (*before, *search.trace), search.how,
                     contradictions=search.contradictions, programs=search.solver.counted(),

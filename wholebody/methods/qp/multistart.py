@@ -91,11 +91,15 @@ class Multistart:
         assert self._best is not None
         return self._best
 
-    def run(self, begin: Array | None = None, other: Array | None = None, within_reach: bool = True) -> LocalSolution:
-        """The best posture (nq,) of attempts from `begin` and a descent from `other`; the closest if out of reach."""
-        begin, self._out_of_reach = self._start if begin is None else begin, not within_reach
-        closest = self._closest(self._at_most(SEARCH.coming_near))
-        self._search(begin) if within_reach else self._accept(closest.run(begin), self.how)
+    def run(
+        self, begin: Array | None = None, other: Array | None = None, near: tuple[Array, ...] = ()
+    ) -> LocalSolution:
+        """The best of attempts from `begin` (nq,) and a descent from `other`; out of reach, the closest to `near`."""
+        self._out_of_reach = bool(near)
+        if not near:
+            self._search(self._start if begin is None else begin)
+        for q in near:
+            self._accept(self._ran(self._closest(self._at_most(SEARCH.coming_near)), q), self.how)
         if other is not None:
             self._accept(self._directly(other), "directly")
         self._find_closest()
@@ -167,8 +171,7 @@ class Multistart:
 
     def _directly(self, start: Array) -> LocalSolution:
         """A descent; without measures by whole steps as long as these gain much."""
-        local = self._ran(self._descent(self.budget.iterations, None, "", full_step=not self.budget.measures), start)
-        return local
+        return self._ran(self._descent(self.budget.iterations, None, "", full_step=not self.budget.measures), start)
 
     def feasibility_first(self, start: Array) -> LocalSolution:
         """Find a feasible posture without measures, and descend with measures from there."""
@@ -262,8 +265,7 @@ class Multistart:
         """Test by few programs whether the goals can be met from a start, pieces inside each other by a depth [m]."""
         most = max(min(self._left, SEARCH.probe_programs), 1)
         lineariser = self.lineariser if depth == 0.0 else self.lineariser.relaxed(depth)
-        local = self._ran(self._feasibility(lineariser, most, "probe"), start)
-        return local
+        return self._ran(self._feasibility(lineariser, most, "probe"), start)
 
     def _ran(self, stage: SQP | Feasibility | Closest, start: Array) -> LocalSolution:
         """The end of a stage from a posture (nq,), whose iterations count."""

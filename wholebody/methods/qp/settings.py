@@ -103,6 +103,8 @@ class SeedNumbers(NamedTuple):
     compared: int = 5  # ends of which the one of least effort is taken. More: less effort, more time.
     samples: int = 24  # values of the joint of seven that a closed form holds. More: less effort, more time.
     worth: float = 0.9  # share of the effort of an answer below which a rejected end is descended from too
+    near: int = 3  # ends near goals that no posture meets from which the nearest is sought. More: nearer, more time.
+    differing: float = 0.1  # rad or m by which these differ
     deep: float = 5e-3  # m: of a posture inside of a thing that no tolerance of the goals leads out of
 
 
