@@ -289,7 +289,7 @@ def test_an_overlap_that_an_escape_leaves_is_named_until_it_is_gone():
     scene.add(wb.Box((0.001, 0.27728, 0.10526)), name="plate", at=at)
     start = scene.figure.posture("standing")
     loop, overlapping = FrameLoop(scene, start, overlap="ccd"), 0
-    for _ in range(6):
+    for _ in range(8):
         at = pin.SE3(turn, at.translation + way)
         scene.move("plate", at=at, over=DT)
         frame = loop.frame(start)

@@ -233,3 +233,20 @@ def test_a_hanging_forearm_that_a_thing_moves_aside_keeps_its_direction(
         most = max(most, float(np.degrees(np.linalg.norm(pin.log3(shown.rotation.T @ tracked.rotation)))))
     assert np.linalg.norm(shown.translation - tracked.translation) > 0.03
     assert most < 0.4
+
+
+def test_a_forearm_that_an_edge_moves_aside_keeps_its_direction_to_its_round_end(avatar: wb.Figure) -> None:
+    """The edge slides along the forearm to the elbow, where its normal is no more that of the shaft."""
+    turns = {"right_shoulder_flexion": -0.073, "right_shoulder_abduction": 0.835, "right_elbow_flexion": 1.098}
+    start = avatar.with_joints(avatar.posture("standing"), turns)
+    at = pin.SE3(pin.exp3(np.array([1.643, 1.759, 1.466])), np.array([0.0781, -0.3132, 1.1684]))
+    scene = wb.Scene(avatar).add(wb.Box((0.06, 0.14, 0.06)), name="bar", at=at)
+    q, rng, most = start, np.random.default_rng(0), 0.0
+    for frame in range(40):
+        moved = min(frame / 30, 1.0) * np.array([-0.0142, -0.0374, 0.0008])
+        scene.move("bar", at=pin.SE3(at.rotation, at.translation + moved))
+        q = resolve_overlap(scene, q, start, rng).q
+        shown, tracked = (avatar.placement(posture, "right_forearm") for posture in (q, start))
+        most = max(most, float(np.degrees(np.linalg.norm(pin.log3(shown.rotation.T @ tracked.rotation)))))
+    assert np.linalg.norm(shown.translation - tracked.translation) > 0.02
+    assert most < 0.5

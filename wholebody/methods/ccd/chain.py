@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,13 @@ MARGIN = 2e-4  # m: distance of a goal outside the obstacle, so that the next qu
 SWEEPS = 5  # for one goal; it is computed anew afterwards, so more sweeps waste time
 PARALLEL = 0.26  # sine of 15 degrees: a bone at a smaller angle to the obstacle's surface is nearly parallel to it
 SHORT = 0.02  # m: a link shorter than this has no meaningful direction
+
+
+class Tracked(NamedTuple):
+    """Placements of Pinocchio's joints, to be indexed: at the tracked posture, and at the one shown before."""
+
+    placed: Any
+    shown: Any
 
 
 class ChainResolver:
@@ -43,6 +50,7 @@ class ChainResolver:
         """Prepare a chain; `foreign` are the joints of the other chains, `tip` is the frame at its end."""
         self.translated: set[int] = set()
         self.limbs = Limbs(scene.model, joints)
+        self._base = int(scene.model.parents[joints[0]])
         self._finder = LinkFinder(workspace, self.limbs, foreign, exact)
         self._guards = guards(scene.figure, self.limbs, kept)
         self._cones = cone_guards(scene.figure, self.limbs, kept)
@@ -93,7 +101,7 @@ class ChainResolver:
         """The link that is deepest inside; see `LinkFinder.deepest`."""
         return self._finder.deepest(overlaps)
 
-    def push(self, link: Link, margin: float = MARGIN, tracked: Any = None) -> tuple[int, ...]:
+    def push(self, link: Link, margin: float = MARGIN, tracked: Tracked | None = None) -> tuple[int, ...]:
         """Move the link out of the obstacle by `margin` metres; returns the nodes that moved. Call `read` first.
 
         A link that is translated takes the orientation that it has in `tracked`, or keeps its own.
@@ -129,21 +137,36 @@ class ChainResolver:
             if left < 1e-4 or left > 0.9 * before:  # m: reached; or slow
                 return
 
-    def _kept(self, link: Link, push: Vector, tracked: Any) -> Array | None:
+    def _kept(self, link: Link, push: Vector, tracked: Tracked | None) -> Array | None:
         """(3, 3) axes, one a row, that a link keeps which moves out by translation; None for one that turns.
 
         A link is translated whose bone is nearly parallel to the obstacle's surface: in its tracked direction, if it is
-        near to that, so that what other links and frames turned is turned back; else as it is.
+        near to that, so that what other links and frames turned is turned back, and while it is held; else as it is.
         """
         there, bone = _columns(self.limbs.frames[link.node]).copy(), self._bone(link)
         if tracked is not None:
-            wanted = np.ascontiguousarray(tracked.oMi[self.limbs.joints[link.node]].rotation.T)
+            wanted = np.ascontiguousarray(tracked.placed[self.limbs.joints[link.node]].rotation.T)
             turned = float(np.abs(wanted - there).max())
-            most = 2.0 * PARALLEL if turned < 0.02 else PARALLEL  # what is held there by translation stays so
-            if turned < PARALLEL and _parallel(wanted.T @ (there @ bone), push, most):
+            most = 2.0 * PARALLEL if turned < 0.02 else PARALLEL  # one that is tracked rather moves aside than turns
+            parallel = _parallel(wanted.T @ (there @ bone), push, most)
+            if turned < PARALLEL and (parallel or self._held(link, tracked)):
                 self.translated.update(self.limbs.joints[node] for node in link.nodes)
                 return wanted
         return there if _parallel(bone, push, PARALLEL) else None
+
+    def _held(self, link: Link, tracked: Tracked) -> bool:
+        """Whether a link was moved out by translation before: in this step, or as shown it is aside but not turned.
+
+        It stays so at any angle to the surface: an edge that slides along it meets its round end in the end.
+        """
+        joint, base = self.limbs.joints[link.node], self._base
+        if joint in self.translated:
+            return True
+        now, before = tracked.placed, tracked.shown
+        if float(np.abs(now[joint].rotation - before[joint].rotation).max()) > 0.02:
+            return False
+        moved = now[base].actInv(now[joint]).translation - before[base].actInv(before[joint]).translation
+        return float(np.abs(moved).max()) > 1e-3  # m
 
     def _translate(self, link: Link, push: Vector, inner: Sequence[int], there: Array) -> None:
         """Move the link by pure translation: its joint's origin moves, and its axes become `there` (3, 3).

@@ -19,7 +19,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import first_passed, last_free
-from wholebody.methods.ccd.chain import MARGIN
+from wholebody.methods.ccd.chain import MARGIN, Tracked
 from wholebody.methods.ccd.resolver import PERTURBATIONS, Counts, OverlapResolver
 from wholebody.scene.scene import Scene
 
@@ -144,11 +144,12 @@ class Attraction:
         """Whether each part has a link, moved out by translation, that is nearer to its tracked direction than at q."""
         found = [False] * len(self.parts)
         for k, chain in enumerate(self._resolver.chains.values()):
-            if chain.translated:
+            tracked = self._resolver.tracked
+            if chain.translated and tracked is not None:
                 link, turns = max(chain.translated), []
                 for posture in (q, trial):
                     pin.forwardKinematics(self._model, self._data, posture)
-                    wanted = self._resolver.tracked.oMi[link].rotation
+                    wanted = tracked.placed[link].rotation
                     turns.append(np.abs(self._data.oMi[link].rotation - wanted).max())
                 found[k] = turns[1] < turns[0] - 1e-3  # rad
         return found
@@ -179,7 +180,8 @@ class FrameResolver:
         """Prepare the chains and their degrees of freedom."""
         self._model, self._figure, self._workspace = scene.model, scene.figure, scene.workspace()
         self._resolver = OverlapResolver(scene, self._workspace, exact=False)
-        self._tracked = scene.model.createData()
+        self._data = scene.model.createData(), scene.model.createData()  # at the tracked posture, and as shown before
+        self._tracked = Tracked(*(data.oMi for data in self._data))
         self._attraction = Attraction(scene, self._resolver)
         self._parts = self._attraction.parts
 
@@ -192,7 +194,10 @@ class FrameResolver:
         resolver = self._resolver
         resolver.counts, resolver.margin = Counts(), MARGIN
         wanted = resolver.into_cones(self._figure.clamp(q_wanted))
-        pin.forwardKinematics(self._model, self._tracked, wanted)
+        for data, posture in zip(self._data, (wanted, q_free), strict=True):
+            pin.forwardKinematics(self._model, data, posture)
+        for chain in resolver.chains.values():
+            chain.translated.clear()
         resolver.tracked = self._tracked
         self._swept = False
         q, free = self._freed(q_free, rng)

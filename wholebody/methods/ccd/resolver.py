@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -14,7 +13,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.geometry.continuous.moved_pairs import QueryResult
-from wholebody.methods.ccd.chain import MARGIN, ChainResolver
+from wholebody.methods.ccd.chain import MARGIN, ChainResolver, Tracked
 from wholebody.methods.ccd.guards import NOTHING_FIXED, Kept
 from wholebody.methods.ccd.limbs import movable
 from wholebody.methods.ccd.links import Link, Overlap
@@ -60,7 +59,7 @@ class OverlapResolver:
     def __init__(self, scene: Scene, workspace: Workspace, kept: Kept = NOTHING_FIXED, *, exact: bool = True) -> None:
         """Prepare for clearances of zero; `begin` takes others, and `exact` is as in `LinkFinder`: up to 0.1 s."""
         self.exact, self.margin = exact, MARGIN
-        self.tracked: Any = None
+        self.tracked: Tracked | None = None
         self.scene, self.workspace, self._kept = scene, workspace, kept
         self.begin(None, TOLERANCE, Control(np.inf))
         self._data = scene.model.createData()
