@@ -62,7 +62,7 @@ WRITERS: dict[str, tuple[Callable[[Path], Any], tuple[str, ...]]] = {
     "ReachMap.to_vtk": (lambda path: reached().to_vtk(path), (".vtk",)),
     "ReachMap.picture": (lambda path: reached().picture(path), (".png",)),
     "ReachMap.html": (lambda path: reached().html(path), (".htm", ".html")),
-    "write_task": (lambda path: wb.write_task(wb.Scene(hand()), path), (".toml",)),
+    "write_task": (lambda path: wb.taskfile.write_task(wb.Scene(hand()), path), (".toml",)),
     "write_result": (solved, (".json",)),
     "write_track": (lambda path: write_track(Track.of(hand(), postures(), 0.1), path), (".csv",)),
     "Clip.write": (

@@ -282,7 +282,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     still = {"link1": (np.eye(4), np.eye(4))}
     yield "RigidBodies.advance", Call(engine.advance, {"dt": 0.1, "kinematic": None})
     yield "RigidBodies.advance(kinematic)", Call(engine.advance, {"dt": 0.1, "kinematic": still})
-    for name in ("placement", "twist"):
+    for name in ("placement", "twist", "response", "centre", "weight"):
         yield f"RigidBodies.{name}", Call(getattr(engine, name), {"name": "ball"})
     for name in ("energy", "momentum"):
         yield f"RigidBodies.{name}", Call(getattr(engine, name), {})
@@ -293,6 +293,8 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     spring = {"stiffness": 1000.0, "damping": 40.0, "mass": 0.4}
     yield "Spring", Call(wb.dynamics.Spring, spring, lambda made: made.transition(0.1))
     yield "Spring.transition", Call(wb.dynamics.Spring().transition, {"time": 0.1})
+    actuated = {"figure": arm, "stiffness": {"joint1": 10.0}, "damping": 1.0}
+    yield "Actuated", Call(wb.Actuated, actuated, lambda made: wb.World(there, q, spring=made).step(q))
 
     def put(shape: Any) -> Any:
         return wb.Scene(arm).add(shape, name="it").contacts(q)
@@ -354,7 +356,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Torus", Call(wb.Torus, {"radius": 0.1, "tube": 0.02}, lambda shape: shape.pieces())
     task = wb.read_task(path / "task.toml")
     given = {"problem": task.problem, "path": path / "written.toml", "title": "one line"}
-    yield "write_task", Call(wb.write_task, given)
+    yield "write_task", Call(wb.taskfile.write_task, given)
     answer = wb.solve(task.problem)
     stored = path / "result.json"
     yield "write_result", Call(wb.taskfile.write_result, {"task": task, "solution": answer, "path": stored})
@@ -846,8 +848,8 @@ ANSWERS = (
 OF_METHODS = ("QPTracker", "NewtonTracker", "SolvingTracker")
 """What `tracker` of a method builds; and workspaces, which a run has to itself, are for methods of one's own."""
 
-AVOIDERS = ("Trajectory.avoid", "PerFrame.avoid", "Bisection.avoid")
-"""Called by `avoid` alone, with a run that it set up."""
+BY_OWNERS = ("Trajectory.avoid", "PerFrame.avoid", "Bisection.avoid", "QP.batches", "Actuated.check", "Actuated.gains")
+"""Called by `avoid`, `solve_many` and a world alone, with what they set up."""
 
 DERIVATIVES = (
     "on_polygon",
@@ -889,7 +891,7 @@ def fed(name: str) -> bool:
     owner, _, method = name.partition(".")
     if name in ANSWERS or (owner == "Viewer" and method in BROWSER) or name == "write_filmstrip":
         return False
-    if name in OF_METHODS or name in AVOIDERS or owner == "Workspace":
+    if name in OF_METHODS or name in BY_OWNERS or owner == "Workspace":
         return False
     if method in DERIVATIVES and owner not in ("Assembly", "Records", "Ergonomics"):
         return False

@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     from wholebody.studies.populations import boundary, people
     from wholebody.studies.reach_map import reach_map
     from wholebody.studies.study import study
-    from wholebody.taskfile import read_task, write_task
+    from wholebody.taskfile import read_task
     from wholebody.tasks import (
         Axis,
         Balance,
@@ -189,7 +189,6 @@ __all__ = [
     "studies",
     "study",
     "taskfile",
-    "write_task",
 ]
 
 _ROOMS = ("dynamics", "ergonomics", "figures", "methods", "motion", "planning", "studies", "taskfile")
@@ -221,7 +220,7 @@ _MODULES = {
     "wholebody.studies.many": "solve_many",
     "wholebody.studies.reach_map": "reach_map",
     "wholebody.studies.study": "study",
-    "wholebody.taskfile": "read_task write_task",
+    "wholebody.taskfile": "read_task",
     "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Force Frame Freeze "
     "Goal Hold Measure Orientation Plane Point Posture PotentialEnergy RangeOfMotion ReachCones Relative Rhythm "
     "RotationEffort StepLimit Grasp Lean Sit Stand Touch",

@@ -25,7 +25,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.records import as_dict, with_values
 from wholebody.bench.rows import Row
 from wholebody.bench.rows import report as tables_of
-from wholebody.bench.suite.problem_sets.registry import SETS
+from wholebody.bench.suite.problem_sets.registry import NAMED, SETS
 from wholebody.bench.suite.stability.case import Posed
 from wholebody.bench.suite.stability.catalogue import cases
 from wholebody.methods.solve import method_named
@@ -97,9 +97,8 @@ def constants_in(modules: Iterable[str]) -> tuple[list[Constant], list[str]]:
 
 def problems(count: int, method: str) -> list[Problem]:
     """The first problems of every still set, and the hard cases that are solved once: those that the method takes."""
-    made = [
-        SETS[name].make(number, seed=5).problem for name in SETS if not SETS[name].moving for number in range(count)
-    ]
+    still = {name: each for name, each in {**SETS, **NAMED}.items() if not each.moving and name != "robots"}
+    made = [each.make(number, seed=5).problem for each in still.values() for number in range(count)]
     posed = [given.problem for given in (case.question() for case in cases()) if isinstance(given, Posed)]
     solver = method_named(method)
     return [problem for problem in made + posed if solver.accepts(problem) is None]
@@ -134,30 +133,33 @@ def ablation(
     outcome(method, given)  # what is compiled or loaded at first use
     whole = outcome(method, given)
     rows: list[Row] = []
-    unchanged = [whole.seconds]
+    before = whole.seconds
 
-    def note(what: str, change: str) -> None:
-        now = outcome(method, given)
+    def note(what: str, change: str, now: Outcome, unchanged: float) -> None:
         figures = {
             "answers that differ": now.differ(whole),
             "solved": now.solved - whole.solved,
             "iterations": now.iterations - whole.iterations,
             "left m, rad": now.left - whole.left,
-            "time": now.seconds / whole.seconds,
+            "time": now.seconds / unchanged,
         }
         rows.append(Row(what, change, figures))
         tell(f"{what}, {change}: {figures}")
 
     for name, (owner, attribute, instead) in mechanisms.items():
         with replaced([(owner, attribute)], instead):
-            note(name, "off")
-        unchanged.append(outcome(method, given).seconds)  # the machine's speed drifts
+            now = outcome(method, given)
+        after = outcome(method, given).seconds
+        note(name, "off", now, 0.5 * (before + after))  # the machine's speed drifts
+        before = after
     for constant in constants(method)[0]:
         for change, factor in FACTORS.items():
             value = constant.times(factor)
             if value != constant.value:
                 with changed(constant, value):
-                    note(f"{constant.module.removeprefix('wholebody.methods.')}.{constant.name}", change)
+                    now = outcome(method, given)
+                name = f"{constant.module.removeprefix('wholebody.methods.')}.{constant.name}"
+                note(name, change, now, before)
     return whole, rows
 
 
@@ -165,14 +167,20 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
     """What a method can do without, by name; empty where nothing is listed."""
     if method != "qp":
         return {}
+    from wholebody.methods import starts
     from wholebody.methods.acceleration import Anderson
+    from wholebody.methods.qp import closest, feasibility, multistart, sqp, working_set
     from wholebody.methods.qp import method as qp
-    from wholebody.methods.qp import multistart, sqp
     from wholebody.methods.qp.feasibility import Feasibility
     from wholebody.methods.qp.working_set import WorkingSet
     from wholebody.terms import linearisation
 
     search, descent, corrected = multistart.Multistart, sqp.SQP, WorkingSet._corrected
+
+    def plain(self: multistart.Multistart, start: Array) -> Any:
+        probe = self._probe(start, 0.0)
+        self._minima.add(probe.violation.total, probe.converged)
+        return self._descend(probe.q, "restart") if probe.violation.worst <= self.budget.tolerance else probe
 
     def cold(self: WorkingSet, *given: Any) -> Any:
         self.reset()
@@ -193,6 +201,22 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         "contradictions of goals": (multistart, "contradictions", lambda problem, workspace: ()),
         "hooked hands": (multistart, "hooked_hands", lambda problem, state, start: iter(())),
         "leaving contacts that cancel": (multistart, "posture_apart", lambda problem, workspace, q: None),
+        "multipliers": (sqp, "DESCENT", with_values(sqp.DESCENT, near_met=0.0)),
+        "working sets that grow": (working_set, "CORRECTIONS", with_values(working_set.CORRECTIONS, near=-1e9)),
+        "sets corrected in one entry": (
+            working_set,
+            "CORRECTIONS",
+            with_values(working_set.CORRECTIONS, at_once=10**6),
+        ),
+        "end of probes that stall": (feasibility, "stalls", lambda history, tolerance: False),
+        "rule of Boender and Rinnooy Kan": (starts, "all_found", lambda *given: False),
+        "Latin hypercube": (multistart, "throughout", multistart.restarts),
+        "closest posture: curvature": (
+            closest.Closest,
+            "_curvature",
+            lambda self, rows, push: (rows.soft[:0], rows.soft_error[:0]),
+        ),
+        "probes without relaxation": (search, "_relaxed", plain),
         "relaxed probes": (search, "_relaxed", lambda self, start: None),
         "test of out of reach": (search, "_known_out_of_reach", lambda self, q: False),
         "closest posture to goals that are not met": (search, "_find_closest", lambda self: None),

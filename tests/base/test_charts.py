@@ -47,6 +47,14 @@ def test_a_clip_draws_the_joints_that_move_most() -> None:
         clip.plot(["tail"])
 
 
+def test_names_with_dollars_are_no_formulas() -> None:
+    figure = wb.load("hand")
+    scene = wb.Scene(figure).add(wb.Sphere(0.2), name=r"$\ball$", at=(0.0, 0.0, 0.0))
+    found = wb.check(wb.Clip(figure, np.array([figure.neutral] * 2), 0.02), scene)
+    assert any("ball" in each.names for each in found.contacts)
+    assert "<svg" in found._repr_html_()
+
+
 def test_records_that_are_too_many_for_a_chart_are_told_without_one() -> None:
     few, many = ([SolveRecord(f"case {k}", "solved") for k in range(count)] for count in (3, 101))
     assert "<svg" in Records(few)._repr_html_()

@@ -83,6 +83,8 @@ def test_what_is_wrong_with_one_file_is_told_and_the_others_are_made(
     made = wb.motion.read_many([good, tmp_path / "broken.csv"], tmp_path / "out", human)
     assert isinstance(made["good"], Path)
     assert "broken.csv" in str(made["broken"])
+    made = wb.motion.read_many(["none.csv", "there/none.csv"], tmp_path / "out", human)
+    assert set(made) == {"none", "there none"}
 
 
 def test_input_is_refused_before_anything_is_written(clip: wb.Clip, tmp_path: Path) -> None:
@@ -90,6 +92,7 @@ def test_input_is_refused_before_anything_is_written(clip: wb.Clip, tmp_path: Pa
     for arguments, sentence in (
         ({"clips": [clip, clip]}, "two clips are named 'an arm'"),
         ({"clips": ["walk.bvh"]}, "say of which figure"),
+        ({"clips": ["walk.bvh", 5]}, "a clip is 5; give the path"),
         ({"equipment": ["pak"]}, "pack"),
         ({"equipment": ["pack", "pack"]}, "two pieces of equipment are named 'pack'"),
         ({"methods": ["framse"]}, "frames"),
@@ -164,3 +167,4 @@ def test_retargeting_many_writes_a_folder(clip: wb.Clip, tmp_path: Path) -> None
     for k in range(2):
         made = wb.read_clip(tmp_path / "out" / "originals" / f"arm{k}.npz", clip.figure)
         assert np.array_equal(made.q, clip.q)
+    assert main(["clip", "retarget", *files, "--ground", "none", "--out", str(tmp_path / "other")]) == 2

@@ -267,7 +267,7 @@ def test_a_task_file_states_several_figures(tmp_path: Path, pair: wb.Scene) -> N
         constraints=[*feet("anna/", "ben/"), wb.Freeze("anna/left_arm")],
         goals=[wb.Relative("anna/right_palm", "ben/right_palm", (0.0, 0.0, 0.2), orientation=False)],
     )
-    path = wb.write_task(problem, tmp_path / "pair.toml")
+    path = wb.taskfile.write_task(problem, tmp_path / "pair.toml")
     read = wb.read_task(path).problem
     assert read.start == pytest.approx(problem.start, abs=1e-9)
     assert read.scene.figure.joints == pair.figure.joints

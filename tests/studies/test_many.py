@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import signal
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -162,6 +163,52 @@ def test_the_nearest_answer_is_tried_first_and_kept(arm: wb.Figure, tmp_path: Pa
     assert first.solved == 1.0
     again = wb.solve_many(given, method, folder=tmp_path)  # what was found is kept
     assert [one.neighbour for one in again] == [one.neighbour for one in first]
+
+
+@dataclass(frozen=True)
+class Tries:
+    """A method of a user, with a number of restarts that is no setting, or a budget that may not be zero."""
+
+    name: ClassVar[str] = "tries"
+    restarts: ClassVar[int] = 3
+    budget: float = 2.0
+
+    def __post_init__(self) -> None:
+        if self.budget <= 0.0:
+            raise ValueError("no budget")
+
+    def accepts(self, problem: wb.Problem) -> None:
+        return None
+
+    def solve(self, problem: wb.Problem, progress: Any = None) -> wb.Solution:
+        return wb.solve(problem, progress=progress)
+
+    def tracker(self, problem: wb.Problem, dt: float) -> Any:
+        return wb.QP().tracker(problem, dt)
+
+
+@dataclass(frozen=True)
+class Restarts(Tries):
+    restarts: int = 3  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("method", [Tries(), Restarts()])
+def test_a_method_of_a_user_keeps_its_settings_where_it_has_to(arm: wb.Figure, method: Any) -> None:
+    places = [*PLACES[:3], (5.0, 0.0, 0.5)]
+    records = wb.solve_many([problem(arm, place) for place in places], method, warm_start=True)
+    assert [one.outcome for one in records] == ["solved"] * 3 + ["unreachable"]
+
+
+def test_a_method_derived_from_qp_solves_each_problem(arm: wb.Figure) -> None:
+    solved = []
+
+    class Counted(wb.QP):
+        def solve(self, problem: wb.Problem, progress: Any = None) -> wb.Solution:
+            solved.append(problem)
+            return super().solve(problem, progress)
+
+    wb.solve_many([problem(arm, place) for place in PLACES], Counted())
+    assert len(solved) == len(PLACES)
 
 
 def test_a_place_that_no_neighbour_reaches_stays_out_of_reach(arm: wb.Figure) -> None:

@@ -40,7 +40,7 @@ def same(first: wb.Problem, second: wb.Problem) -> None:
 
 def test_everything_goes_round(tmp_path: Path) -> None:
     problem = wb.read_task(EVERYTHING).problem
-    path = wb.write_task(problem, tmp_path / "again.toml", title='a "title"')
+    path = wb.taskfile.write_task(problem, tmp_path / "again.toml", title='a "title"')
     again = wb.read_task(path)
     assert again.title == 'a "title"'
     same(problem, again.problem)
@@ -58,7 +58,7 @@ def test_a_problem_of_a_script_goes_round(tmp_path: Path, root: Path) -> None:
     q = scene.figure.clamp(q)
     tip = scene.figure.segments[-1]
     problem = wb.Problem(scene, q, goals=[wb.Point(tip, (0.4, 0.1, 0.6))], constraints=[wb.Plane(tip, (0, 1, 0))])
-    path = wb.write_task(problem, tmp_path / "task.toml")
+    path = wb.taskfile.write_task(problem, tmp_path / "task.toml")
     same(problem, wb.read_task(path).problem)
     assert (tmp_path / "task-rock_one.obj").exists()
 
@@ -68,7 +68,7 @@ def test_a_problem_of_a_script_goes_round(tmp_path: Path, root: Path) -> None:
 )
 def test_what_a_person_keeps_by_default_goes_round(tmp_path: Path, asked: dict[str, bool]) -> None:
     problem = wb.Problem(wb.Scene(wb.load("human")), goals=[wb.Point("right_palm", (0.4, -0.2, 1.2))], **asked)
-    again = wb.read_task(wb.write_task(problem, tmp_path / "task.toml")).problem
+    again = wb.read_task(wb.taskfile.write_task(problem, tmp_path / "task.toml")).problem
     same(problem, again)
     assert [type(term) for term in again.defaults] == [type(term) for term in problem.defaults]
     assert (wb.RangeOfMotion in map(type, again.defaults)) == asked.get("range_of_motion", True)
@@ -84,14 +84,14 @@ def test_joints_of_things_go_round(tmp_path: Path) -> None:
     scene = wb.Scene(wb.load("hand")).add(wb.Box((0.1, 1.0, 0.1)), name="beam", at=(2.0, 0.0, 2.0))
     scene.add(wb.Box((0.04, 0.8, 2.0)), name="door", at=(3.0, 0.0, 1.0), body=door)
     scene.add(wb.Capsule(0.01, 0.9), name="rope", at=(2.0, 0.0, 1.4), body=rope)
-    again = wb.read_task(wb.write_task(scene, tmp_path / "door.toml")).problem.scene
+    again = wb.read_task(wb.taskfile.write_task(scene, tmp_path / "door.toml")).problem.scene
     for name in ("door", "rope"):
         assert again.objects[name].body == scene.objects[name].body
 
 
 def test_a_scene_alone_and_a_result(tmp_path: Path) -> None:
     scene = wb.Scene(wb.load("human", sex="female", stature=1.6)).add(wb.HalfSpace(), name="floor")
-    task = wb.read_task(wb.write_task(scene, tmp_path / "scene.toml"))
+    task = wb.read_task(wb.taskfile.write_task(scene, tmp_path / "scene.toml"))
     assert (task.problem.goals, task.problem.constraints) == ((), task.problem.defaults)
     solution = wb.solve(task.problem)
     result = wb.taskfile.read_result(wb.taskfile.write_result(task, solution, tmp_path / "result.json"))
@@ -101,7 +101,7 @@ def test_a_scene_alone_and_a_result(tmp_path: Path) -> None:
 
 def test_proportions_and_age_are_written(tmp_path: Path) -> None:
     figure = wb.load("human", percentile=75, proportions={"sitting_height": 0.95, "hand_length": 0.2}, age=50)
-    again = wb.read_task(wb.write_task(wb.Scene(figure), tmp_path / "scene.toml")).problem.scene.figure
+    again = wb.read_task(wb.taskfile.write_task(wb.Scene(figure), tmp_path / "scene.toml")).problem.scene.figure
     assert again.describe().person == figure.describe().person
     assert again.describe().person.age == 50.0
 
@@ -109,10 +109,10 @@ def test_proportions_and_age_are_written(tmp_path: Path) -> None:
 def test_what_a_task_file_cannot_say_is_named(tmp_path: Path) -> None:
     figure = wb.load("human")
     with pytest.raises(wb.InputError, match="reduced"):
-        wb.write_task(wb.Scene(figure.reduced(["right_arm"])), tmp_path / "a.toml")
+        wb.taskfile.write_task(wb.Scene(figure.reduced(["right_arm"])), tmp_path / "a.toml")
     problem = wb.Problem(wb.Scene(figure), constraints=[wb.StepLimit()])
     with pytest.raises(wb.InputError, match=r"constraints\[0\] is a StepLimit"):
-        wb.write_task(problem, tmp_path / "a.toml")
+        wb.taskfile.write_task(problem, tmp_path / "a.toml")
     assert not list(tmp_path.iterdir())
 
 

@@ -120,7 +120,7 @@ def test_a_mug_is_taken_from_a_table(hand: Any, radius: float, at: Any, top: flo
     assert top < palm.translation[2] < top + 0.12
     assert abs(palm.rotation[2, 1]) > 0.999  # the mug stands across the palm
     toward = scene.objects["thing"].placement.translation - palm.translation
-    assert palm.rotation[:2, 2] @ toward[:2] > radius - 1e-5  # which looks at it
+    assert palm.rotation[:2, 2] @ toward[:2] > 0.9 * radius  # which looks at it
 
 
 def test_derivative_of_a_hand_about_to_close(figure: wb.Figure) -> None:

@@ -76,7 +76,7 @@ def test_a_thing_pushes_the_hand_away_and_undo_brings_both_back(drag: LiveDrag) 
 
 def test_the_posture_is_a_task(drag: LiveDrag, tmp_path: Any) -> None:
     along(drag, "right_palm", (0.1, 0.0, 0.2))
-    task = wb.read_task(wb.write_task(drag.stated(), tmp_path / "posture.toml"))
+    task = wb.read_task(wb.taskfile.write_task(drag.stated(), tmp_path / "posture.toml"))
     np.testing.assert_allclose(task.problem.start, drag.q, atol=1e-12)
     assert len(task.problem.constraints) - len(task.problem.defaults) == 2
 

@@ -25,7 +25,7 @@ def page(tmp_path: Path) -> Iterator[LivePage]:
     scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
     scene.add(wb.Box((0.4, 0.8, 0.04)), name="table", at=(0.6, 0.3, 0.75))
     drag = LiveDrag(wb.Problem(scene, constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")]))
-    made = LivePage(drag, tmp_path / "posture.toml", 8377, lambda path: wb.write_task(drag.stated(), path))
+    made = LivePage(drag, tmp_path / "posture.toml", 8377, lambda path: wb.taskfile.write_task(drag.stated(), path))
     yield made
     made.stop()
 

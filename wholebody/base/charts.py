@@ -20,6 +20,11 @@ def new_chart(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, 
     return chart, chart.subplots(rows, columns, squeeze=False)
 
 
+def plain(text: str) -> str:
+    """A text as a chart shows it, whose dollar signs begin no formula."""
+    return text.replace("$", r"\$")
+
+
 def png(chart: Any) -> bytes:
     """A chart as the bytes of a PNG file, the same for the same chart."""
     stream = io.BytesIO()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+from types import SimpleNamespace
+
 import numpy as np
 
 from wholebody.base.arrays import Array
@@ -52,6 +55,8 @@ def solve(mobility: Array, velocity: Array, friction: Array, target: Array, most
     return impulse
 
 
-def compiled_kernel() -> None:
+@lru_cache(maxsize=1)
+def compiled_kernel() -> SimpleNamespace:
     """Compile or load the loop."""
     solve(np.eye(3), np.zeros(3), np.zeros(1), np.zeros(1), 1, 1e-9)
+    return SimpleNamespace(solve=solve)

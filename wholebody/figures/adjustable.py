@@ -76,8 +76,8 @@ def adjustable(
         shape, at = given if isinstance(given, tuple) and len(given) == 2 else (given, (0.0, 0.0, 0.0))
         told = f"adjustable: {checks.text(name, told)!r}"
         checks.instance(shape, Shape, told, "give wb.Box, wb.Mesh or another")
-        if "/" in name or isinstance(shape, HalfSpace):
-            raise InputError(f"{told}: take a name without a slash, and a shape that ends somewhere")
+        if "/" in name or model.existFrame(name) or isinstance(shape, HalfSpace):
+            raise InputError(f"{told}: take a name without a slash that no setting has, and a shape with an end")
         place = placement(at, told)
         frame = model.addFrame(pin.Frame(name, last, 0, place, pin.FrameType.BODY))
         for number, part in enumerate(shape.pieces()):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -282,18 +283,18 @@ def _read(path: str, figure: Figure) -> tuple[Array, float] | str:
 def _sources(given: Sequence[Any], figure: Figure | None, what: str) -> dict[str, Clip | Path]:
     """The clips and files by name."""
     found: list[tuple[str, Clip | Path]] = []
-    for source in given:
-        if isinstance(source, Clip):
-            found.append((source.name, source))
+    sources = [one if isinstance(one, Clip) else checks.path(one, f"{what}: a clip") for one in given]
+    stems = Counter(one.stem for one in sources if isinstance(one, Path))
+    for path in sources:
+        if isinstance(path, Clip):
+            found.append((path.name, path))
             continue
-        path = checks.path(source, f"{what}: a clip")
         if figure is None:
             raise InputError(
                 f"{what}: {checks.shown(path.name)} is a file; say of which figure: figure=wb.load('human')"
             )
         check_figure(figure, what)
-        same = sum(Path(other).stem == path.stem for other in given if not isinstance(other, Clip)) > 1
-        found.append((f"{path.parent.name} {path.stem}" if same else path.stem, path))
+        found.append((f"{path.parent.name} {path.stem}".strip() if stems[path.stem] > 1 else path.stem, path))
     twice = first_twice(name for name, _ in found)
     if twice is not None:
         raise InputError(f"{what}: two clips are named {checks.shown(twice)}; give each another name")

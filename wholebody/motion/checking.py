@@ -10,7 +10,7 @@ import numpy as np
 
 from wholebody.assessment.motion import root_mean_square, third_differences, velocities
 from wholebody.base.arrays import Array
-from wholebody.base.charts import Shown, new_chart
+from wholebody.base.charts import Shown, new_chart, plain
 from wholebody.base.checks import function, instance, number
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
@@ -138,7 +138,7 @@ class ClipCheck(Shown):
         chart, axes = new_chart(1, 1, (8.0, 2.6))
         axis, times = axes[0, 0], self.clip.times
         for each in self.contacts[:8]:
-            axis.plot(times, 1e3 * each.depth, label=each.names)
+            axis.plot(times, 1e3 * each.depth, label=plain(each.names))
         axis.axhline(1e3 * self.tolerance, color="0.6", linestyle="--", label="tolerance")
         axis.set(xlabel="time [s]", ylabel="depth [mm]", xlim=(0.0, max(self.clip.duration, self.clip.dt)))
         chart.legend(loc="outside right upper", fontsize="x-small")

@@ -14,7 +14,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array, Indices
-from wholebody.base.charts import Shown, new_chart
+from wholebody.base.charts import Shown, new_chart, plain
 from wholebody.base.checks import array, instance, listed, number, shown, text, time_step
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
@@ -344,8 +344,10 @@ class Clip(Shown):
         for name in names:
             one = of[name]
             for k in range(one.nq):
-                axes[0, 0].plot(self.times, self.q[:, one.idx_q + k], label=name if one.nq == 1 else f"{name}[{k}]")
-        axes[0, 0].set(xlabel="time [s]", ylabel="joint [rad, m]", title=self.name.replace("$", r"\$"))
+                axes[0, 0].plot(
+                    self.times, self.q[:, one.idx_q + k], label=plain(name if one.nq == 1 else f"{name}[{k}]")
+                )
+        axes[0, 0].set(xlabel="time [s]", ylabel="joint [rad, m]", title=plain(self.name))
         chart.legend(loc="outside right upper", fontsize="x-small")
         return chart
 

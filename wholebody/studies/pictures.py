@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.base.charts import new_chart, png
+from wholebody.base.charts import new_chart, plain, png
 from wholebody.base.errors import InputError
 from wholebody.base.files import write
 
@@ -55,7 +55,7 @@ def slices_chart(found: Any) -> Any:
     bar = chart.colorbar(image, ax=list(axes.flat), shrink=0.8)
     bar.set_label(MEANING, fontsize="x-small")
     bar.ax.tick_params(labelsize="x-small")
-    chart.suptitle(f"{found.frame}: {found.share:.0%} of {found.verdict.size} places reached, seen from above")
+    chart.suptitle(f"{plain(found.frame)}: {found.share:.0%} of {found.verdict.size} places reached, seen from above")
     return chart
 
 
@@ -163,10 +163,8 @@ def outcomes_chart(records: Sequence[Any]) -> Any:
             axis.text(x + 0.5, y + 0.5, f"{1e3 * one.goal_error:.0f} mm", ha="center", va="center", fontsize="x-small")
     axis.set(xlim=(0, len(columns)), ylim=(len(rows), 0))
     # so that matplotlib reads no formula in a name
-    axis.set_xticks(
-        np.arange(len(columns)) + 0.5, [*(name.replace("$", r"\$") for name in columns)], fontsize="x-small"
-    )
-    axis.set_yticks(np.arange(len(rows)) + 0.5, [*(name.replace("$", r"\$") for name in rows)], fontsize="x-small")
+    axis.set_xticks(np.arange(len(columns)) + 0.5, [*(plain(name) for name in columns)], fontsize="x-small")
+    axis.set_yticks(np.arange(len(rows)) + 0.5, [*(plain(name) for name in rows)], fontsize="x-small")
     axis.tick_params(length=0)
     seen = {one.outcome for one in records}
     patches = [Patch(facecolor=color, label=outcome) for outcome, color in COLORS.items() if outcome in seen]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import is_dataclass, replace
+from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,11 @@ def begun_at(problem: Problem, q: Array) -> Problem:
 
 
 def warmed(method: Any) -> Any:
-    """Return the method without starts of its own and the search that goes with them, where it has such."""
-    held = {name: value for name, value in (("restarts", 0), ("budget", 0)) if hasattr(method, name)}
-    return replace(method, **held) if held and is_dataclass(type(method)) else method
+    """Return the method without starts of its own and the search that goes with them, where these are its settings."""
+    settings = {one.name for one in fields(type(method)) if one.init} if is_dataclass(type(method)) else set()
+    if "restarts" not in settings:
+        return method
+    try:
+        return replace(method, **dict.fromkeys(settings & {"restarts", "budget"}, 0))
+    except Exception:  # a method of the user's own may refuse them
+        return method

@@ -145,7 +145,7 @@ class Grasp(ContactTerm):
         thickness = 2.0 * float(bar.half[1])
         # m: thumb and fingers close around a bar of 5 cm that crosses the palm's middle. Thinner ones lie beside it,
         # and thicker ones, around which the thumb reaches less.
-        room = min(abs(0.05 - thickness), 0.03) if fingers and thickness >= THIN else 0.0
+        room = (0.05 - thickness if thickness < 0.05 else 0.03) if fingers and thickness >= THIN else 0.0
         parts: list[Part] = [
             Gap(hand, thing),
             Facing(place, across(y), bar, z, either=True),

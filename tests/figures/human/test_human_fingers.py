@@ -156,7 +156,7 @@ def test_a_task_file_names_the_hands(tmp_path):
     )
     problem = wb.read_task(path).problem
     assert problem.scene.figure.model.nv == 95
-    written = wb.write_task(problem, tmp_path / "again.toml")
+    written = wb.taskfile.write_task(problem, tmp_path / "again.toml")
     assert wb.read_task(written).problem.scene.figure.model.nv == 95
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -42,3 +43,17 @@ def test_closed_fingers_have_no_place() -> None:
     scene = wb.Scene(wb.load("human", hands="fingers")).add(wb.Capsule(0.02, 0.3), name="bar", at=BOX)
     problem = wb.Problem(scene, goals=[wb.Grasp("right", "bar", "power")])
     assert at_its_place(problem, scene.state(problem.start)) is None
+
+
+def test_a_body_may_have_the_name_of_its_joint(tmp_path: Path) -> None:
+    hinge = '<joint name="{0}" type="hinge" axis="0 1 0" pos="0.05 0 0.1"/><geom type="sphere" size="0.05"/>'
+    upper = f'<body name="b" pos="0 0 0.4">{hinge.format("b")}</body>'
+    file = tmp_path / "two.xml"
+    file.write_text(f'<mujoco><worldbody><body name="a">{hinge.format("a")}{upper}</body></worldbody></mujoco>')
+    scene = wb.Scene(wb.load(file)).add(wb.Sphere(0.1), name="ball", at=(0.3, 0.0, 0.4))
+    problem = wb.Problem(scene, goals=[wb.Touch("b", "ball")])
+    q = wb.solve(problem).q
+    there = at_its_place(problem, scene.state(q))
+    assert there is not None
+    assert wb.assess(there, q).goal_error < 1e-5
+    assert wb.assess(there, q + 0.1).goal_error > 5e-3

@@ -10,6 +10,7 @@ import wholebody as wb
 from wholebody.bench.suite.problem_sets.robots import known_arm
 from wholebody.figures.description import Limits
 from wholebody.methods.qp.chain import branches, goal_entries
+from wholebody.methods.qp.chain_kernel import Goals
 from wholebody.methods.qp.plain_chain import PlainChain
 
 X, Y, Z = np.eye(3)
@@ -152,6 +153,17 @@ def test_goals_that_a_posture_reaches_are_never_proven_out_of_reach():
                 solution = wb.solve(wb.Problem(scene, goals=[wb.Frame("tool", place)]))
                 proven += solution.status == "unreachable" and solution.iterations < 60
     assert proven == 20
+
+
+@pytest.mark.parametrize("name", [name for name, (axes, _) in ARMS.items() if len(axes) == 6])
+def test_joints_without_limits_are_not_out_of_reach(name):
+    rng = np.random.default_rng(9)
+    model, chain = arm(name, rng, np.inf)
+    q, data = rng.uniform(-np.pi, np.pi, 6), model.createData()
+    pin.forwardKinematics(model, data, q)
+    table = goal_of(chain, data.oMi[6], pin.SE3.Identity())
+    found = chain.loosely_met(Goals(table[None], np.zeros((1, 6), dtype=np.int64)), 0)
+    assert np.abs(np.exp(1j * found) - np.exp(1j * q)).max(axis=1).min() < 1e-6
 
 
 def test_a_goal_whose_every_posture_is_inside_of_a_thing_is_out_of_reach():

@@ -71,3 +71,5 @@ def test_bare_numbers_are_rows_of_root_and_joints(clip: wb.Clip, tmp_path: Path)
     np.testing.assert_array_equal(again.q, clip.resampled(1.0 / 30.0).q)
     with pytest.raises(wb.InputError, match=r"ending \.csv"):
         clip.write(tmp_path / "turn.npz", bare=True)
+    with pytest.raises(wb.InputError, match="give True or False"):
+        clip.write(path, bare="yes")  # type: ignore[arg-type]

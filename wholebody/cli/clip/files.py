@@ -178,8 +178,8 @@ def _many(arguments: argparse.Namespace) -> int:
     from wholebody.base.errors import InputError
     from wholebody.motion.batch import read_many
 
-    for given in ("names", "unit", "up", "rate", "bare"):
-        if getattr(arguments, given) not in (None, False):
+    for given in ("names", "ground", "unit", "up", "rate", "bare"):
+        if getattr(arguments, given) not in (None, False, "auto"):
             raise InputError(f"--{given} is for one file, and there are {len(arguments.files)}; give one at a time")
     figure, count = figure_of(arguments), len(arguments.files)
     with bar("retargeting", count) as tell:

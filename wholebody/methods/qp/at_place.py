@@ -18,6 +18,7 @@ from wholebody.tasks.base import Goal, filled
 from wholebody.tasks.contact_parts import Gap, Near
 from wholebody.tasks.frame import Frame
 from wholebody.tasks.grips import Opposing
+from wholebody.tasks.inputs import Place
 from wholebody.tasks.point import Point
 from wholebody.tasks.residuals import PlacementResidual
 from wholebody.tasks.surfaces import nearest
@@ -54,7 +55,7 @@ def _beside(term: Any) -> tuple[Any, ...] | None:
 
 def _places(problem: Problem, term: Any, state: State) -> list[Goal]:
     """Resolved goals for where a contact's frames are, or its point on all that moves."""
-    names, start, scene = problem.scene.model.names, problem.start, problem.scene
+    names, frames = problem.scene.model.names, problem.scene.model.frames
     turned: dict[int, Any] = {part.place.frame: part.place for part in term.parts if hasattr(part, "place")}
     found: list[Goal] = []
     for place in turned.values():
@@ -64,6 +65,7 @@ def _places(problem: Problem, term: Any, state: State) -> list[Goal]:
     near = nearest(gap.first, gap.second, state)
     for joint in (near.joint,) if turned else (near.joint, near.against):
         if joint:
-            offset: Array = state.data.oMi[joint].actInv(near.point)
-            found.append(Point(names[joint], near.point, offset=offset).resolve(scene, start))
+            number = next(k for k, frame in enumerate(frames) if frame.parentJoint == joint)  # a body may have its name
+            offset: Array = state.frame(number).actInv(near.point)
+            found.append(filled(Point(frames[number].name, near.point, offset=offset), place=Place(number, joint)))
     return found

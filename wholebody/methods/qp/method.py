@@ -124,8 +124,12 @@ class QP(Checked):
         return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
 
     def batches(self, problems: Sequence[Problem], largest: int) -> list[Batch]:
-        """Those of many problems that may be solved at once, in batches of at most so many: see `chain_batch`."""
-        return batches(problems, self._budget, largest) if self.time_limit is None else []
+        """Those of many problems that may be solved at once, in batches of at most so many: see `chain_batch`.
+
+        Empty where a time limit, or the `solve` of a class derived from this one, has a say in each.
+        """
+        alone = self.time_limit is not None or type(self).solve is not QP.solve
+        return [] if alone else batches(problems, self._budget, largest)
 
     @property
     def _budget(self) -> Budget:

@@ -121,7 +121,10 @@ class PlainChain:
         """
         assert self.arm is not None
         arm, rng, found = with_values(self.arm, slack=LOOSE), np.random.default_rng(seed), list[Array]()
-        half, middle = 0.5 * (self.chain.upper - self.chain.lower), 0.5 * (self.chain.upper + self.chain.lower)
+        lower, upper = self.chain.lower, self.chain.upper
+        limited = np.isfinite(lower) & np.isfinite(upper)  # the others turn all around
+        lower, upper = np.where(limited, lower, -np.pi), np.where(limited, upper, np.pi)
+        half, middle = 0.5 * (upper - lower), 0.5 * (upper + lower)
         for shift in np.vstack([np.zeros(6), rng.uniform(-NEARBY, NEARBY, (12, 6))]):
             table, angles = goals.tables[0].copy(), np.empty((1, BRANCHES, len(half)))
             table[24:27] += shift[:3]

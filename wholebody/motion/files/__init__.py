@@ -46,7 +46,7 @@ def write_motion(motion: Motion, path: str | os.PathLike[str], *, bare: bool = F
 def check_ending(path: str | os.PathLike[str], *, bare: bool = False) -> Path:
     """The path of a file to write, checked before long work; without names only as CSV."""
     path = checked_path(path, "path")
-    if _ending(path, WRITERS, "written") != ".csv" and flag(bare, "bare"):
+    if flag(bare, "bare") and _ending(path, WRITERS, "written") != ".csv":
         raise InputError(f"{one_line(path.name)}: bare numbers are written as CSV; give the name the ending .csv")
     return path
 
