@@ -54,7 +54,7 @@ def before_contact(
     alone.take(goals, alone.clearances, constraints)
     start = problem.scene.figure.clamp(problem.start)
     # most descents, of which the first is from the start; of a driver in 30 one in ten is met; fingers close slowly
-    count = 1 if grips else 24
+    count = 3 if grips else 24
     others = restarts(problem, shared.lineariser.state, start, np.random.default_rng(seed), count - 1)
     ends, missed = list[float](), list[LocalSolution]()
     for q in chain([start], others):
