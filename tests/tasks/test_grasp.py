@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.tasks.grips import opened
 
 FEET = [wb.Hold("left_foot"), wb.Hold("right_foot")]
 AT = (0.40, -0.2, 1.1)
@@ -97,6 +98,43 @@ def test_in_a_power_grip_the_thumb_opposes_the_fingers(figure: wb.Figure, shape:
     assert solution.status == "solved", solution.message
     mean = np.sum([_normal(scene, solution.q, _outer(finger)) for finger in FOUR], axis=0)
     assert _apart(_normal(scene, solution.q, _outer("thumb")), mean) > 135.0 - 0.1
+
+
+@pytest.mark.parametrize(
+    ("hand", "radius", "at", "top", "options"),
+    [
+        ("right", 0.035, (0.42, -0.18), 1.1, {}),
+        ("left", 0.04, (0.40, 0.10), 0.85, {"approach": "side"}),
+    ],
+    ids=["at 1.10 m", "left at 0.85 m"],
+)
+def test_a_mug_is_taken_from_a_table(hand: Any, radius: float, at: Any, top: float, options: Any) -> None:
+    """From below the table no descent leads around it, and around so thick a bar no thumb reaches across its middle."""
+    scene = wb.Scene(wb.load("human", sex="female", hands="fingers"))
+    scene.add(wb.Box((0.5, 1.2, 0.03)), name="table", at=(0.50, 0.0, top - 0.015))
+    scene.add(wb.Cylinder(radius, 0.12), name="thing", at=(*at, top + 0.0601))
+    grasp = wb.Grasp(hand, "thing", "power", **options)
+    solution = wb.solve(wb.Problem(scene, goals=[grasp], constraints=FEET), wb.QP(measures=False))
+    assert solution.status == "solved", solution.message
+    palm = scene.figure.placement(solution.q, f"{hand}_palm")
+    assert top < palm.translation[2] < top + 0.12
+    assert abs(palm.rotation[2, 1]) > 0.999  # the mug stands across the palm
+    toward = scene.objects["thing"].placement.translation - palm.translation
+    assert palm.rotation[:2, 2] @ toward[:2] > 0.9 * radius  # which looks at it
+
+
+def test_derivative_of_a_hand_about_to_close(figure: wb.Figure) -> None:
+    q = _start(figure)
+    place = figure.placement(q, "right_palm")
+    scene = wb.Scene(figure).add(wb.Capsule(0.03, 0.3), name="thing", at=place.act(np.array((0.05, 0.0, 0.09))))
+    term = opened(wb.Grasp("right", "thing", "power").resolve(scene, q), 0.01)
+    rng, state = np.random.default_rng(1), scene.state(q)
+    there = pin.integrate(figure.model, q, 0.05 * rng.normal(size=figure.model.nv))
+    way = rng.normal(size=figure.model.nv)
+    ends = [term.value(state.update(pin.integrate(figure.model, there, step * way))) for step in (1e-6, -1e-6)]
+    given = term.jacobian(state.update(there)) @ way
+    np.testing.assert_allclose((ends[0] - ends[1]) / 2e-6, given, atol=1e-5)
+    assert np.abs(given[0]) > 1e-3
 
 
 @pytest.mark.parametrize("radius", [0.007, 0.01])

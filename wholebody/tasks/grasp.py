@@ -143,8 +143,9 @@ class Grasp(ContactTerm):
         fingers = self._outer_parts(scene)
         y, z = np.array((0.0, 1.0, 0.0)), np.array((0.0, 0.0, 1.0))
         thickness = 2.0 * float(bar.half[1])
-        # m: thumb and fingers close around a bar of 5 cm that crosses the palm's middle; thinner ones lie beside it
-        room = max(0.0, 0.05 - thickness) if fingers and thickness >= THIN else 0.0
+        # m: thumb and fingers close around a bar of 5 cm that crosses the palm's middle. Thinner ones lie beside it,
+        # and thicker ones, around which the thumb reaches less.
+        room = (0.05 - thickness if thickness < 0.05 else 0.03) if fingers and thickness >= THIN else 0.0
         parts: list[Part] = [
             Gap(hand, thing),
             Facing(place, across(y), bar, z, either=True),

@@ -19,12 +19,13 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
+from wholebody.base.records import with_values
 from wholebody.figures.state import State
 from wholebody.geometry.hull import coal_convex
 from wholebody.geometry.pieces import swept_points
 from wholebody.tasks.axis import across
-from wholebody.tasks.base import SupportingPlanes
-from wholebody.tasks.contact_parts import Gap, between, one_sided, through
+from wholebody.tasks.base import SupportingPlanes, filled
+from wholebody.tasks.contact_parts import Gap, Near, between, one_sided, through
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.surfaces import Face, Surface, between_pieces, nearest, outermost
 
@@ -117,16 +118,60 @@ class Crossing(NamedTuple):
 
     def _all(self, state: State) -> tuple[Array, Array]:
         """What is across the palm and how far the bar's middle is along the bar (2,), and their derivative (2, nv)."""
-        center, axes = self.bar.at(state)
-        frame, along = state.frame(self.place.frame), axes[2]
-        palm, fingers = frame.translation, frame.rotation[:, 0]
-        way = center - palm
-        level = fingers - (fingers @ along) * along  # x . (1 - l l') (c - p) = level . way
-        reach = float(along @ way)
-        # of the hand against the thing, seen from the thing: the hand's velocity v and rotation w
-        wrench = through(palm, np.array([-level, -along]))
-        wrench[0, 3:] += pin.skew(fingers) @ (way - reach * along)
-        return np.array([level @ way, reach]), between(state, wrench, self.place.joint, self.bar.joint)
+        return _beside(self.place, self.bar, 0, state)
+
+
+class Ahead(NamedTuple):
+    """A bar's axis at a distance from the palm, on the side where the palm looks: one row [m]."""
+
+    place: Place  # the palm
+    bar: Face  # the bar
+    distance: float  # [m]
+    in_radians: tuple[bool, ...] = (False,)
+
+    def rows(self, state: State) -> tuple[Array, Array]:
+        """How far it is too far away, and a wrench."""
+        value, rows = _beside(self.place, self.bar, 2, state)
+        return value[:1] - self.distance, rows[:1]
+
+
+def takes_bar(term: Any) -> bool:
+    """Whether a resolved term closes a hand around a bar."""
+    return any(isinstance(part, Crossing) for part in getattr(term, "parts", ()))
+
+
+def opened(term: Any, distance: float) -> Any:
+    """A resolved term whose hand is about to close: the bar is in front of the palm by a distance [m], fingers free."""
+    if not takes_bar(term):
+        return term
+    crossing = next(part for part in term.parts if isinstance(part, Crossing))
+    ahead = Ahead(crossing.place, crossing.bar, float(crossing.bar.half[1]) + distance)
+    parts: list[Any] = [ahead]  # in the place of the hand's gap, which is the first part; rows stay as many
+    for part in term.parts[1:]:
+        if isinstance(part, Gap):
+            parts.append(Near(part.first, part.second, np.inf))
+        elif isinstance(part, Crossing):
+            parts.append(with_values(part, across=0.0))
+        else:
+            parts.append(with_values(part, most=np.pi) if isinstance(part, Opposing) else part)
+    return filled(term, parts=tuple(parts))
+
+
+def _beside(place: Place, bar: Face, axis: int, state: State) -> tuple[Array, Array]:
+    """The way from the palm to a bar along an axis of the palm, across the bar, and along the bar; derivatives (2, nv).
+
+    The way along the bar is that to its middle. Both in metres.
+    """
+    center, axes = bar.at(state)
+    frame, along = state.frame(place.frame), axes[2]
+    palm, across_palm = frame.translation, frame.rotation[:, axis]
+    way = center - palm
+    level = across_palm - (across_palm @ along) * along  # x . (1 - l l') (c - p) = level . way
+    reach = float(along @ way)
+    # of the hand against the thing, seen from the thing: the hand's velocity v and rotation w
+    wrench = through(palm, np.array([-level, -along]))
+    wrench[0, 3:] += pin.skew(across_palm) @ (way - reach * along)
+    return np.array([level @ way, reach]), between(state, wrench, place.joint, bar.joint)
 
 
 class Looking(NamedTuple):

@@ -29,9 +29,9 @@ class Touch(ContactTerm):
     The value is the signed distance of the two surfaces [m]: positive apart, negative in an overlap. Its derivative is
     that of the nearest points along the normal. A frame on the round end of its own piece counts as touching where the
     piece does, if it is at most 8e-6 m off there; one within a flat face lays that on what it touches. Two frames meet:
-    the value is the way between their origins (3,), and where both are on their own pieces, whose surfaces then look at
-    each other, the angle between those (2,) [rad]. Use it as a goal or as a constraint. The clearance of what is to
-    touch is zero, for a frame that of the segment which carries it. A thing that is moved is touched where it is.
+    the value is the way between their origins (3,) and, where both are on their own pieces, which then face each other,
+    an angle (2,) [rad]. Use it as a goal or as a constraint. The clearance of what is to touch is zero, for a frame
+    that of the segment which carries it. A thing that is moved is touched where it is.
 
     Attributes:
         part: name of a segment, of a piece such as "left_hand:0", or of a frame, whose origin then touches. Of a link

@@ -3,6 +3,9 @@
 A descent never passes through a thing. From a foot under the pedal that it is to press, or a back behind its backrest,
 none leads to the contact. The posture just before contact, which is found through everything, is on the right side of
 all faces at once, and a few programs lead from there to the contacts.
+
+A hand that is to close around a bar is found in the same way with the bar in front of its palm: from below a table or
+with the fingers on the bar's far end no descent leads around.
 """
 
 from __future__ import annotations
@@ -19,12 +22,17 @@ from wholebody.methods.qp.sqp import SQP
 from wholebody.methods.starts import restarts
 from wholebody.problem import Problem
 from wholebody.tasks.contact_parts import approached, has_face
+from wholebody.tasks.grips import opened, takes_bar
 
 IN_FRONT = 0.01  # m: how far surfaces are in front of faces; more: reached by fewer limbs, and farther from the contact
 
 
-def before_contact(problem: Problem, shared: Run, seed: int, most: int) -> Iterator[LocalSolution]:
+def before_contact(
+    problem: Problem, shared: Run, seed: int, most: int, *, grips: bool = False
+) -> Iterator[LocalSolution]:
     """Descents through everything to where surfaces are in front of their faces; none where no term has a face.
+
+    Or, if asked for, to where bars are in front of palms, in problems without faces.
 
     The measures count: as nothing is in the way, all that the terms leave open is as the figure likes it.
 
@@ -33,16 +41,21 @@ def before_contact(problem: Problem, shared: Run, seed: int, most: int) -> Itera
         shared: of the search.
         seed: of the starts.
         most: entries of the trace with which no further descent begins.
+        grips: whether hands that close around bars are meant.
     """
-    if not any(has_face(term) for term in (*problem.goals, *problem.constraints)):
+    terms = (*problem.goals, *problem.constraints)
+    faces = any(has_face(term) for term in terms)
+    if faces == grips or (grips and not any(takes_bar(term) for term in terms)):
         return
-    goals = [approached(term, IN_FRONT) for term in problem.goals]
-    constraints = [approached(term, IN_FRONT) for term in problem.constraints]
+    in_front = opened if grips else approached
+    goals = [in_front(term, IN_FRONT) for term in problem.goals]
+    constraints = [in_front(term, IN_FRONT) for term in problem.constraints]
     alone = shared.lineariser.relaxed(ENDLESS)
     alone.take(goals, alone.clearances, constraints)
     start = problem.scene.figure.clamp(problem.start)
-    # most descents, of which the first is from the start; of a driver in 30 one in ten is met
-    others = restarts(problem, shared.lineariser.state, start, np.random.default_rng(seed), 24 - 1)
+    # most descents, of which the first is from the start; of a driver in 30 one in ten is met; fingers close slowly
+    count = 3 if grips else 24
+    others = restarts(problem, shared.lineariser.state, start, np.random.default_rng(seed), count - 1)
     ends, missed = list[float](), list[LocalSolution]()
     for q in chain([start], others):
         # to 1 mm or mrad: what is exact there is not where surfaces meet

@@ -130,6 +130,7 @@ class Multistart:
         if least is None:
             return
         yield Attempt(self._before_contact(), lambda q: self._descend(q, full_step=True), "from before contact")
+        yield Attempt(self._before_contact(grips=True), self.feasibility_first, "from before a grip")
         yield Attempt([start], self.feasibility_first, "by feasibility first")
         hooked = [*self.lineariser.defined(hooked_hands(self.problem, state, start))]
         yield Attempt(self._while_open(hooked), self._relaxed, "from another start")
@@ -163,9 +164,10 @@ class Multistart:
 
         return takewhile(is_open, starts)
 
-    def _before_contact(self) -> Iterator[Array]:
-        """Postures where surfaces are in front of the faces that they are to meet."""
-        for local in before_contact(self.problem, self._shared, self.budget.seed, len(self.trace) + self._left):
+    def _before_contact(self, grips: bool = False) -> Iterator[Array]:
+        """Postures where surfaces are in front of the faces that they are to meet, or bars in front of palms."""
+        most = len(self.trace) + self._left
+        for local in before_contact(self.problem, self._shared, self.budget.seed, most, grips=grips):
             self.spent += local.iterations
             yield local.q
 
