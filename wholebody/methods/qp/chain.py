@@ -24,7 +24,7 @@ from wholebody.methods.qp.chain_kernel import Goals
 from wholebody.methods.qp.closed_form import compiled_kernel as closed_form_kernel
 from wholebody.methods.qp.closed_form_kernel import BRANCHES
 from wholebody.methods.qp.multistart import Budget
-from wholebody.methods.qp.plain_chain import FIRST, Chains, PlainChain
+from wholebody.methods.qp.plain_chain import FIRST, NEARBY, Chains, PlainChain
 from wholebody.methods.qp.settings import SEEDS
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
@@ -178,6 +178,8 @@ class _Seeded:
     def _is_out_of_reach(self) -> bool:
         """Whether all postures of six joints at the goal and at those nearby are beyond limits or far inside things."""
         chain, problem = self.chain, self.problem
+        if self.budget.tolerance > NEARBY:
+            return False  # postures farther from the goal would do
         found = chain.loosely_met(self.goals, self.budget.seed)
         if len(found) and problem.scene.model.nv > len(self.start):
             return False  # others may make room
