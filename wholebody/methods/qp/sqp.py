@@ -2,7 +2,8 @@
 
 Each iteration linearises, solves one quadratic program, and judges its step by the violation and the measures, with a
 funnel (Gould and Toint 2010): far from the goals a step must reduce the violation; near, it must reduce the Lagrangian
-and stay inside the funnel. No penalty weight has to be guessed. Steps that could have jumped over something are swept.
+and stay inside the funnel, which narrows where a descent leaves the best feasible posture and ends at an infeasible
+one. No penalty weight has to be guessed. Steps that could have jumped over something are swept.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
 from wholebody.methods.qp.iterates import Iterate, LocalSolution, PredictedReduction, Stage, Step, StepAcceptance, judge
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
-from wholebody.methods.qp.rows import StepSize
+from wholebody.methods.qp.rows import Multipliers, StepSize
 from wholebody.methods.qp.settings import DESCENT, PROGRAM
 from wholebody.methods.qp.subproblem import lagrangian, multipliers_of
 from wholebody.methods.qp.tangential import Extrapolation, parts_of
@@ -48,6 +49,7 @@ class SQP(Stage):
         self._unimproved = 0  # feasible postures in a row that are hardly better than the best
         self._kept: Iterate | None = None  # best feasible posture
         self._gain = 1.0  # share of its tangential part that a step has
+        self._multipliers: Multipliers | None = None  # of the last program near the goals
         self._tension: Array | None = None  # (soft rows,) net multipliers of the last program
 
     def run(self, start: Array) -> LocalSolution:
@@ -70,6 +72,9 @@ class SQP(Stage):
             step = self._predicted_step(here, program, answer)
             swings = self._unimproved >= 4  # the measures, along curved constraints
             if swings or self._radius < LEAST_RADIUS or self._settled(here, step):
+                if feasible := self._feasible_before(here):
+                    here = self._return_to(feasible)
+                    continue
                 converged = True
                 break
             there = self._advance(here, program, step)
@@ -82,6 +87,22 @@ class SQP(Stage):
         if self._kept is not None and not self._better_than_kept(here):
             here = self._kept
         return LocalSolution(here.at.q, here.violation, here.at.measure, converged, count)
+
+    def _feasible_before(self, here: Iterate) -> Iterate | None:
+        """The best feasible posture, where the descent ended at an infeasible one after it and may return.
+
+        Not with an offset: goals out of reach are held at a singular posture, where every descent ends so.
+        """
+        lost = self.offset is None and here.violation.worst > self.tolerance
+        return self._kept if lost and self._width > self.tolerance else None
+
+    def _return_to(self, kept: Iterate) -> Iterate:
+        """Continue from a feasible posture with a narrower funnel."""
+        self._width *= 0.3  # 0.5 ends at infeasible postures again; 0.1 makes steps along contacts tiny
+        self._radius, self._gain, self._damping = DESCENT.first_radius, 1.0, 0.0
+        self._shift, self._watched = np.zeros_like(self._shift), None
+        self._ahead.reset()
+        return kept
 
     def _keep(self, here: Iterate) -> None:
         """Remember the best feasible posture: along curved constraints the measures swing near an optimum."""
@@ -96,7 +117,14 @@ class SQP(Stage):
 
     def _better_than_kept(self, here: Iterate) -> bool:
         fits = here.violation.worst <= self.tolerance
-        return fits and (self._kept is None or here.at.measure < self._kept.at.measure)
+        return fits and (self._kept is None or self._merit(here) < self._merit(self._kept))
+
+    def _merit(self, here: Iterate) -> float:
+        """The measures; near the goals the Lagrangian with the last multipliers, where rows that hold count as zero."""
+        if self._multipliers is None:
+            return here.at.measure
+        beyond = np.maximum(here.rows.elastic_violation, 0.0)
+        return lagrangian(self._multipliers, here.at.measure, with_values(here.rows, elastic_violation=beyond))
 
     def _bent(self, here: Iterate) -> Linearisation:
         """With the second derivatives of goals and equalities, times their multipliers, as squares of the measures.
@@ -133,7 +161,7 @@ class SQP(Stage):
         if parts is None:
             saved = self.shared.subproblem.saving(program, here.rows, x)
         else:
-            multipliers = multipliers_of(program, answer, here.rows, self.shared.subproblem.scale)
+            multipliers = self._multipliers = multipliers_of(program, answer, here.rows, self.shared.subproblem.scale)
             if here.at.planes is not None:
                 self._tension = multipliers.net(here.rows)
             saved = self.shared.subproblem.quadratic_part(program, here.rows, parts.tangential)
