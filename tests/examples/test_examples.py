@@ -17,6 +17,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.saved_page import unpacked
 from wholebody.assessment.motion import assess_motion
 
 Example = Callable[[str], ModuleType]
@@ -403,7 +404,7 @@ def test_ends_in_a_picture_and_a_page(example: Example, tmp_path: Path, monkeypa
 
     module = example("robot_arm_among_obstacles")
     module.main(out=tmp_path / "made", pictures=True)
-    page = (tmp_path / "made" / "robot_arm_among_obstacles.html").read_text(encoding="utf-8")
+    page = unpacked(tmp_path / "made" / "robot_arm_among_obstacles.html")
     assert "wholebody" in page
     picture = tmp_path / "made" / "robot_arm_among_obstacles.png"
     if not picture.exists() and os.environ.get("WHOLEBODY_REQUIRE_BROWSER") != "1":

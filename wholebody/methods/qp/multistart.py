@@ -1,8 +1,4 @@
-"""Multistart: descents from one start after the other, each by a stage, until one meets the goals.
-
-A search is a list of attempts: starts, a stage that leads from a start to a posture, and how the answer is told. Where
-none meets the goals, the posture closest to them is sought, and the measures are lowered there.
-"""
+"""Multistart: attempts until one meets the goals; where none does, the closest posture is sought."""
 
 from __future__ import annotations
 
