@@ -192,12 +192,17 @@ WRONG = {
 }
 
 
-def test_a_pointer_in_place_of_a_mesh_and_a_keyframe_that_is_no_posture_are_refused(tmp_path: Path) -> None:
-    (tmp_path / "hand.stl").write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n")
+@pytest.mark.parametrize("ending", ["stl", "obj", "msh"])
+def test_a_pointer_in_place_of_a_mesh_is_refused(ending: str, tmp_path: Path) -> None:
+    (tmp_path / "parts").mkdir()
+    (tmp_path / f"parts/hand.{ending}").write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n")
     arm = '<body><joint name="j"/><geom type="mesh" mesh="hand"/></body>'
-    mesh = '<asset><mesh name="hand" file="hand.stl"/></asset>'
-    with pytest.raises(FileFormatError, match=r"hand\.stl: the file is a pointer of Git LFS"):
+    mesh = f'<compiler meshdir="parts"/><asset><mesh name="hand" file="hand.{ending}"/></asset>'
+    with pytest.raises(FileFormatError, match=rf"hand\.{ending}: the file is a pointer of Git LFS"):
         wb.load(written(tmp_path, f"<mujoco>{mesh}<worldbody>{arm}</worldbody></mujoco>"))
+
+
+def test_a_keyframe_that_is_no_posture_is_refused(tmp_path: Path) -> None:
     arm = '<body><joint name="j"/><geom size="0.1"/></body>'
     key = '<keyframe><key name="up" qpos="nan"/></keyframe>'
     with pytest.raises(FileFormatError, match="keyframe 'up' has values that are not finite"):

@@ -202,7 +202,7 @@ def _compile(path: Path) -> tuple[Any, tuple[str, ...]]:
         try:
             return read(textures=False), (f"textures are left out: {reason}",)
         except wrong as error:
-            for named in map(Path, re.findall("'([^']+)'", str(error))):
+            for named in [*map(Path, re.findall("'([^']+)'", str(error))), *_meshes(mujoco, path)]:
                 if is_file(named) and named != path:
                     check_content(named)
             raise FileFormatError(f"{path}: MuJoCo cannot read it ({_said(error)}); correct the file") from None
@@ -223,6 +223,15 @@ def _unlogged(mujoco: Any) -> Iterator[None]:
 
 def _said(error: Exception) -> str:
     return " ".join(str(error).split()).removeprefix("Error: ").removeprefix("XML Error: ")
+
+
+def _meshes(mujoco: Any, path: Path) -> list[Path]:
+    """Files of the meshes of a description that can be read but not compiled; MuJoCo's message may not name them."""
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+    except (ValueError, mujoco.FatalError):
+        return []
+    return [path.parent / spec.compiler.meshdir / mesh.file for mesh in spec.meshes]
 
 
 def _without_textures(spec: Any) -> None:
