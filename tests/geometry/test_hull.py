@@ -121,3 +121,14 @@ def test_collada_is_read_in_metres_and_not_turned(tmp_path: Path, unit: str, up:
         assert np.sort(np.unique(theirs.round(9), axis=0), axis=0) == pytest.approx(
             np.sort(np.unique(vertices.round(9), axis=0), axis=0)
         )
+
+
+def test_what_a_hull_adds_is_told_of_an_open_mesh_that_closing_makes_right() -> None:
+    tube = trimesh.creation.annulus(0.08, 0.1, 0.5)
+    found = mesh_hull(tube.vertices, tube.faces[1:], what="tube")
+    share = trimesh.convex.convex_hull(tube).volume / tube.volume - 1.0
+    assert found.added_volume == pytest.approx(share, rel=1e-3)
+    assert found.notes == (
+        "tube: its surface is not closed: 1 hole closed",
+        f"tube: its convex hull has {share:.0%} more volume",
+    )

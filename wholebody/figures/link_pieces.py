@@ -145,14 +145,14 @@ def _of_file(shape: LinkShape, share: float | None) -> ConvexPieces:
     # Kinds of mesh files whose triangles are all in the file itself, so that its content identifies them.
     if file.suffix.lower() not in (".obj", ".stl", ".ply", ".glb", ".dae"):
         return make()
-    settings = f"link {HULL_VERTICES} {share!r} {shape.size!r} {file.suffix.lower()} {coacd_version()}"
+    settings = f"link, closed {HULL_VERTICES} {share!r} {shape.size!r} {file.suffix.lower()} {coacd_version()}"
     return cached((file.read_bytes(),), settings, what, make)
 
 
 def _of_triangles(shape: LinkShape, share: float | None) -> ConvexPieces:
     assert shape.triangles is not None
     vertices, faces = shape.triangles
-    settings = f"link {HULL_VERTICES} {share!r} {coacd_version()}"
+    settings = f"link, closed {HULL_VERTICES} {share!r} {coacd_version()}"
     content = (np.ascontiguousarray(vertices).tobytes(), np.ascontiguousarray(faces).tobytes())
     return cached(content, settings, "mesh", lambda: _pieces(vertices, faces, share, "mesh"))
 
