@@ -91,10 +91,10 @@ def mesh_hull(vertices: ArrayLike, faces: ArrayLike, what: str = "mesh") -> Conv
     solid = enclosed_volume(cloud, triangles)
     if solid is None:
         parts = [part if part.closed else _closed(part, what, notes) for part in split_components(cloud, triangles)]
-        if not all(part.closed for part in parts):
+        solid = sum(part.volume for part in parts)
+        if not (solid > 0.0 and all(part.closed for part in parts)):
             notes.append(f"{what}: its surface is not closed, so what its convex hull adds is not known")
             return ConvexPieces((piece,), 0.0, tuple(notes))
-        solid = sum(part.volume for part in parts)
     added = max(piece.volume / solid - 1.0, 0.0)
     if added > 0.01:  # Share of added volume from which a note reports it.
         notes.append(f"{what}: its convex hull has {added:.0%} more volume")
