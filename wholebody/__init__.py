@@ -89,6 +89,7 @@ if TYPE_CHECKING:
         Rhythm,
         RotationEffort,
         Sit,
+        Soft,
         Stand,
         StepLimit,
         Touch,
@@ -149,6 +150,7 @@ __all__ = [
     "Scene",
     "Shape",
     "Sit",
+    "Soft",
     "Solution",
     "Sphere",
     "Stand",
@@ -223,7 +225,7 @@ _MODULES = {
     "wholebody.taskfile": "read_task",
     "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Force Frame Freeze "
     "Goal Hold Measure Orientation Plane Point Posture PotentialEnergy RangeOfMotion ReachCones Relative Rhythm "
-    "RotationEffort StepLimit Grasp Lean Sit Stand Touch",
+    "RotationEffort StepLimit Grasp Lean Sit Soft Stand Touch",
     "wholebody.terms.derivatives": "check_derivatives",
     "wholebody.tracking.drag": "Drag",
     "wholebody.tracking.path_following": "follow_path",

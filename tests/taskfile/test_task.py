@@ -107,6 +107,20 @@ def test_terms_are_those_that_python_makes(everything: wb.taskfile.Task) -> None
         assert mine.weight * mine.value(state) == pytest.approx(theirs.weight * theirs.value(state))
 
 
+def test_a_soft_goal_is_read_beside_the_default_measures_and_written(tmp_path: Path) -> None:
+    file = tmp_path / "soft.toml"
+    file.write_text(
+        '[figure]\nname = "human"\n'
+        '[[goal]]\ntype = "point"\nframe = "left_palm"\ntarget = [0.5, 0.3, 1.2]\nsoft = 40.0\n'
+    )
+    task = wb.read_task(file)
+    again = wb.read_task(wb.taskfile.write_task(task.problem, tmp_path / "again.toml"))
+    for problem in (task.problem, again.problem):
+        assert problem.goals == ()
+        assert [type(term).__name__ for term in problem.measures] == ["Effort", "Rhythm", "Soft"]
+        assert problem.measures[2].weight == 40.0
+
+
 def test_method_has_its_settings(everything: wb.taskfile.Task) -> None:
     method = everything.method
     assert isinstance(method, wb.QP)

@@ -41,6 +41,7 @@ TERMS = {
     "displacement": tasks.Displacement(2.0),
     "discomfort": tasks.Discomfort(0.1),
     "potential_energy": tasks.PotentialEnergy(0.01),
+    "soft": tasks.Soft(tasks.Frame("tip", (0.1, 0.2, 0.3, 0.5, -0.5, 0.5, 0.5), weight=2.0), 0.5),
 }
 MEASURES = [name for name, term in TERMS.items() if isinstance(term, tasks.Measure)]
 
@@ -170,7 +171,7 @@ def test_rotation_rows_are_exact_at_small_and_large_angles(
         np.testing.assert_allclose(exact, expected, atol=1e-7 * max(1.0, np.abs(expected).max()))
 
 
-@pytest.mark.parametrize("name", MEASURES)
+@pytest.mark.parametrize("name", [name for name in MEASURES if name != "soft"])  # its curvature is a bound
 def test_curvature_is_the_second_derivative_at_rest(name: str, scene: Any) -> None:
     state = State(scene.model)
     q = scene.figure.neutral

@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+import pytest
 
+import wholebody as wb
 from wholebody import tasks
 from wholebody.figures.state import State
 
@@ -102,6 +104,27 @@ def test_discomfort_leaves_out_joints_without_a_range(humanoid: Any) -> None:
     q[7 + 3], q[7 + 4] = 2.0, 2.0
     assert term.value(state.update(q)) == rest
     np.testing.assert_array_equal(term.gradient(state)[[6 + 3, 6 + 4]], 0.0)
+
+
+def test_a_soft_goal_gives_way_to_goals_and_is_weighed_against_effort(planar_arm: Any) -> None:
+    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3)))
+    goal, far = wb.Axis("tip", (1.0, 0.0, 0.0), direction=(0.0, 1.0, 0.0)), wb.Point("tip", (0.6, 0.4, 0.0))
+    wrong = wb.Point("tip", (9.0, 0.0, 0.0))
+    for method in ("qp", "newton"):
+        left = []
+        for weight in (0.1, 10.0, 1e5):
+            measures = [wb.Displacement(), wb.Soft(far, weight)]
+            solution = wb.solve(wb.Problem(scene, np.full(3, 0.2), goals=[goal], measures=measures), method)
+            assert solution.solved
+            left.append(np.linalg.norm(scene.figure.placement(solution.q, "tip").translation - (0.6, 0.4, 0.0)))
+        assert left[0] > 0.05
+        assert left[0] > left[1] > left[2]
+        assert left[2] < 1e-3
+    problem = wb.Problem(scene, np.full(3, 0.2), goals=[goal], measures=[wb.Displacement(), wb.Soft(wrong)])
+    assert wb.solve(problem).solved
+    assert wb.solve(wb.Problem(scene, np.full(3, 0.2), goals=[goal, wrong])).status == "unreachable"
+    with pytest.raises(wb.InputError, match="Soft: goal"):
+        wb.Soft(wb.Effort())  # type: ignore[arg-type]
 
 
 def test_raising_the_whole_body_costs_the_weight_of_each_segment_times_the_height(humanoid: Any) -> None:

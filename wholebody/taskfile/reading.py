@@ -35,7 +35,8 @@ class Entry(NamedTuple):
         assert self.form is not None
         assert self.form.make is not None
         try:
-            return self.form.make(**self.values)
+            own = {key.name for key in self.form.keys}
+            return self.form.make(**{name: value for name, value in self.values.items() if name in own})
         except (UnknownNameError, ValueError, TypeError) as error:
             raise self.where.fault(str(error)) from None
 

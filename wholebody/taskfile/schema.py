@@ -114,6 +114,9 @@ GOALS = {
     **CONTACTS,
 }
 
+SOFT = kind_of(tasks.Soft, "weight")
+"""What `soft` of a goal takes: the weight of the measure that the goal becomes."""
+
 CONSTRAINTS = {
     "hold": _form(tasks.Hold, "frame at orientation relative_to", frame=FRAME, relative_to=FRAME),
     "plane": _form(tasks.Plane, "frame normal point side", frame=FRAME),
@@ -196,7 +199,7 @@ TABLES = {
     "attach": Table(
         (*_needed(name=Text(), to=FRAME), *_keys(rests_on=Several(Text())), *_THING), True, "shape", forms=SHAPES
     ),
-    "goal": Table((), True, "type", forms=GOALS),
+    "goal": Table((Key("soft", SOFT),), True, "type", forms=GOALS),
     "constraint": Table((), True, "type", forms=CONSTRAINTS),
     "measure": Table((), True, "type", forms=MEASURES),
     "view": Table(_keys(eye=POSITION, target=POSITION, see_through=Several(Text()))),

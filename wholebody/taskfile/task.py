@@ -27,6 +27,8 @@ from wholebody.scene.matter.body import Body
 from wholebody.scene.scene import Scene
 from wholebody.taskfile.reading import Contents, Entry, read_contents
 from wholebody.taskfile.where import Where
+from wholebody.tasks import Soft
+from wholebody.tasks.defaults import default_measures
 
 _OF_BODIES = ("density", "mass", "material", "velocity", "angular_velocity", "joints")
 
@@ -88,9 +90,12 @@ def task_from(contents: Contents, file: Path) -> Task:
     scene = _scene(contents, figure)
 
     options = {name: value for name, value in contents.top.values.items() if name != "title"}
-    for name in ("goal", "constraint", "measure"):
-        if terms := _terms(contents, name, scene, start):
-            options[f"{name}s"] = terms
+    terms = {name: _terms(contents, name, scene, start) for name in ("goal", "constraint", "measure")}
+    if soft := [term for term in terms["goal"] if isinstance(term, Soft)]:
+        terms["goal"] = [term for term in terms["goal"] if not isinstance(term, Soft)]
+        ranges = options.get("range_of_motion", True)
+        terms["measure"] = [*(terms["measure"] or default_measures(scene, start, ranges=ranges)), *soft]
+    options |= {f"{name}s": found for name, found in terms.items() if found}
     with contents.top.where.named():
         problem = Problem(scene, start, **options)
     method = contents.one("method")
@@ -99,7 +104,7 @@ def task_from(contents: Contents, file: Path) -> Task:
         title=contents.top.values.get("title", title_of(file)),
         problem=problem,
         method=method.make() if method else method_named("qp"),
-        goal_names=tuple(_goal_name(entry) for entry in contents.tables.get("goal", ())),
+        goal_names=tuple(_goal_name(entry) for entry in contents.tables.get("goal", ()) if "soft" not in entry.values),
         view=_view(contents, scene),
     )
 
@@ -201,7 +206,8 @@ def _terms(contents: Contents, name: str, scene: Scene, start: NDArray[np.float6
     """Terms of one table; each is tried on the scene here so that an error can name its place in the file."""
     terms = []
     for entry in contents.tables.get(name, ()):
-        term = entry.make()
+        weight = entry.values.get("soft")
+        term = entry.make() if weight is None else Soft(entry.make(), weight)
         with entry.where.named():
             term.resolve(scene, start)
         terms.append(term)

@@ -68,12 +68,17 @@ def write_task(problem: Problem | Scene, path: str | PathLike[str], *, title: st
     held = (*problem.stated, *problem.bounds)
     parts += [_table("[[constraint]]", _term(term, CONSTRAINTS, "constraints", n)) for n, term in enumerate(held)]
     if problem.measures_given:
-        parts += [
-            _table("[[measure]]", _term(term, MEASURES, "measures", n)) for n, term in enumerate(problem.measures)
-        ]
+        parts += [_measure(term, n) for n, term in enumerate(problem.measures)]
     for file, text in beside.items():
         files.write(file, text)
     return files.write(target, "\n".join(parts))
+
+
+def _measure(term: Any, number: int) -> str:
+    """The table of a measure; a soft one is a goal that says so."""
+    if not isinstance(term, tasks.Soft):
+        return _table("[[measure]]", _term(term, MEASURES, "measures", number))
+    return _table("[[goal]]", _term(term.goal, GOALS, "measures", number) | {"soft": term.weight})
 
 
 def _figures(figure: Figure, target: Path) -> list[str]:

@@ -36,8 +36,8 @@ def in_words(term: object) -> str:
 
 
 def is_own(term: object) -> bool:
-    """Whether a term is of a class of one's own, or stands for one on a simplified figure."""
-    inner = getattr(term, "term", None)
+    """Whether a term is of a class of one's own, or stands for one."""
+    inner = getattr(term, "term", getattr(term, "goal", None))
     return not _is_ours(type(term)) or (inner is not None and is_own(inner))
 
 
