@@ -380,7 +380,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Rhythm", Call(wb.Rhythm, {"weight": 1.0}, on_a_person)
     for kind in (wb.Effort, wb.RotationEffort, wb.Discomfort, wb.Displacement, wb.PotentialEnergy):
         yield kind.__name__, Call(kind, {"weight": 1.0}, solve_it)
-    soft = {"goal": wb.Point("tip", (0.5, 0.2, 0.0)), "weight": 1.0}
+    soft = {"goal": wb.Point("link4", (0.5, 0.2, 0.0)), "weight": 1.0}
     yield "Soft", Call(wb.Soft, soft, solve_it)
     yield "State", Call(State, {"model": arm.model})
     yield "State.update", Call(state.update, {"q": q})

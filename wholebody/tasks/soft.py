@@ -19,8 +19,8 @@ class Soft(Measure):
     """A goal as a preference: its squared error [m^2, rad^2], which is weighed against the other measures.
 
     Goals and constraints come first: where a preference cannot be met, or costs more than it is worth, the answer is
-    solved all the same. The error that is left is ``problem.measures[k].goal.error(state)``. A preference that stays far
-    off is for "qp": "newton" converges slowly there.
+    solved all the same. The error that is left is ``problem.measures[k].goal.error(state)``. Of a preference
+    that stays far off "newton" converges slowly; take "qp".
 
     Attributes:
         goal: any goal, such as `wb.Point("left_palm", place)`. Its weight is a factor too.
