@@ -66,6 +66,7 @@ class FigureBodies:
         self.q = self._start = pin.neutral(self.model) if start is None else start
         self._state: State | None = None
         self._state_of: Array | None = None
+        self._rows_of: tuple[Array | None, Any] = (None, None)
 
     def index(self, joint: int) -> int:
         """Index of the body of one of Pinocchio's joints; -1, the world, for joint 0."""
@@ -111,6 +112,11 @@ class FigureBodies:
 
         A row has at most eight non-zeros: the rotations of two bodies, or the place or the rotation of a free root.
         """
+        if self._rows_of[0] is not x:
+            self._rows_of = x, self._tangent_rows(x)
+        return self._rows_of[1]
+
+    def _tangent_rows(self, x: Array) -> Any:
         from scipy.sparse import csr_matrix
 
         rows, columns = np.repeat(self._tangent, 8), 7 * self.angles.bodies[:, :, None] + np.arange(3, 7)

@@ -164,25 +164,12 @@ class Gram:
         from scipy.sparse import csc_matrix
 
         self.pattern = pattern
-        height = pattern.height
-        by_row = np.lexsort((pattern.columns, pattern.rows))
-        by_column = np.lexsort((pattern.rows, pattern.columns))
-        place = np.empty(len(by_row), dtype=np.int32)
-        place[by_column] = np.arange(len(by_row))
-        row_start = np.searchsorted(pattern.rows[by_row], np.arange(height + 1))
-        column_end = np.cumsum(np.bincount(pattern.columns, minlength=pattern.width))[pattern.columns]
-        orders = [part.astype(np.int32) for part in (by_row, row_start, by_column, place, column_end)]
-        self._products = Products(*orders)
-        pairs = int((column_end - place).sum())
-        self._target, inner, pointer = (
-            np.empty(pairs, np.int32),
-            np.empty(pairs + height, np.int32),
-            np.zeros(height + 1, np.int32),
-        )
         compiled_kernel()
-        _lay_products(self._products, pattern.rows.astype(np.int32), self._target, inner, pointer)
-        inner = inner[: pointer[-1]]
-        self.matrix = csc_matrix((np.zeros(len(inner)), inner, pointer), shape=(height, height))
+        rows, columns = (part.astype(np.int32) for part in (pattern.rows, pattern.columns))
+        self._products = _paired(rows, columns, pattern.height, pattern.width)
+        self._target, inner, pointer = _laid_products(self._products, rows)
+        shape = (pattern.height, pattern.height)
+        self.matrix = csc_matrix((np.zeros(len(inner)), inner, pointer), shape=shape)
 
     def refill(self, values: Array, weight: Array, damping: Array) -> None:
         """Compute the matrix for values (nnz,) of J, diagonals D and M."""
@@ -193,18 +180,43 @@ class Gram:
 
 
 @compiled()
-def _lay_products(products: Products, rows: Places, target: Places, inner: Places, pointer: Places) -> None:
-    """Lay out the lower triangle of J J' with its diagonal, by columns.
+def _paired(rows: Places, columns: Places, height: int, width: int) -> Products:
+    """The pairs of the entries (nnz,) of a Jacobian."""
+    by_row, row_start = _sorted(rows, np.arange(len(rows)).astype(np.int32), height)
+    by_column, column_start = _sorted(columns, by_row, width)
+    place, column_end = np.empty_like(rows), np.empty_like(rows)
+    for k in range(len(by_column)):
+        place[by_column[k]] = k
+    for entry in range(len(rows)):
+        column_end[entry] = column_start[columns[entry] + 1]
+    return Products(by_row, row_start, by_column, place, column_end)
 
-    Args:
-        products: the pairs of entries.
-        rows: (nnz,) of the entries.
-        target: (pairs,) room for the place of each product in the triangle.
-        inner: room for the rows of the triangle's entries, ascending in each column.
-        pointer: (height + 1,) room for where the columns begin.
+
+@compiled(inner=True)
+def _sorted(keys: Places, order: Places, count: int) -> tuple[Places, Places]:
+    """Entries by their keys below `count`, those of one key as in `order`; and where those of each key begin."""
+    start, result = np.zeros(count + 2, np.int32), np.empty_like(order)
+    for key in keys:
+        start[key + 2] += 1
+    start = np.cumsum(start).astype(np.int32)
+    for entry in order:
+        result[start[keys[entry] + 1]] = entry
+        start[keys[entry] + 1] += 1
+    return result, start[:-1]
+
+
+@compiled()
+def _laid_products(products: Products, rows: Places) -> tuple[Places, Places, Places]:
+    """Lay out the lower triangle of J J' with its diagonal, by columns; `rows` (nnz,) are those of the entries.
+
+    Returns:
+        The place (pairs,) of each product in the triangle; the rows of the triangle's entries, ascending in each
+        column; and (height + 1,) where the columns begin.
     """
     by_row, row_start, by_column, place, column_end = products
-    height = len(row_start) - 1
+    height, pairs = len(row_start) - 1, (column_end - place).sum()
+    target, inner = np.empty(pairs, np.int32), np.empty(pairs + height, np.int32)
+    pointer = np.zeros(height + 1, np.int32)
     seen, where, count, pair = np.full(height, -1), np.zeros(height, np.int32), 0, 0
     for row in range(height):
         begin = count
@@ -224,6 +236,7 @@ def _lay_products(products: Products, rows: Places, target: Places, inner: Place
                 target[pair] = where[rows[by_column[p]]]
                 pair += 1
         pointer[row + 1] = count
+    return target, inner[:count].copy(), pointer
 
 
 @compiled()
@@ -241,9 +254,9 @@ def _sum_products(scaled: Array, values: Array, products: Products, target: Plac
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
     """This module, after its loops are compiled or loaded from the cache, before a solve."""
-    none, places, one = np.zeros(0), np.zeros(0, dtype=np.int32), np.zeros(1, dtype=np.int32)
-    products = Products(places, one, places, places, places)
-    _lay_products(products, places, places, places, one)
+    none, places = np.zeros(0), np.zeros(0, dtype=np.int32)
+    products = _paired(places, places, 0, 0)
+    _laid_products(products, places)
     _sum_products(none, none, products, places, none)
     return sys.modules[__name__]
 
