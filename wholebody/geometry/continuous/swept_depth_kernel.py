@@ -204,7 +204,7 @@ def keep_apart(sliding: Sliding, shapes: Shapes, motion: Speeds, safe: Array) ->
         motion: bounds of the whole motion.
         safe: (k,) raised to what is found.
     """
-    asked, rows, level, place, twist = sliding
+    asked, rows, level, place, _ = sliding
     pairs, joint, reach, points, first_point, radius, radii, faces, first_face = shapes
     outline, limits = (points, first_point, radius, radii), (motion.turn, motion.speed, motion.carries)
     normal, local = np.empty(3), np.empty(3)

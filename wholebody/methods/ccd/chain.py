@@ -182,7 +182,7 @@ class ChainResolver:
         own += tuple(node for node in inner if self._passes(node, first[9:]))
         way, square, done, gain = 1.0, sum(part * part for part in push), 0.0, 1.0
         for _ in range(LONGER):
-            origin = limbs.frame(own_origin)[9:]
+            origin = three(limbs.frames[own_origin, 9:])
             self._reach_out(inner[0], inner, origin, (way * push[0], way * push[1], way * push[2]))
             moved = np.subtract(limbs.frame(own_origin)[9:], first[9:])
             before, done = done, float(moved @ push) / square

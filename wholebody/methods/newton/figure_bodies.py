@@ -108,7 +108,7 @@ class FigureBodies:
         return self._present.update(q)
 
     def tangent_rows(self, x: Array) -> Any:
-        """Derivative (nv, 7 count), a csr_matrix, of the tangent displacement of postures by the bodies x (count + 1, 7).
+        """Derivative (nv, 7 count) of the tangent displacement of postures by bodies x (count + 1, 7), a csr_matrix.
 
         A row has at most eight non-zeros: the rotations of two bodies, or the place or the rotation of a free root.
         """

@@ -242,7 +242,7 @@ def _laid_products(products: Products, rows: Places) -> tuple[Places, Places, Pl
 @compiled()
 def _sum_products(scaled: Array, values: Array, products: Products, target: Places, data: Array) -> None:
     """Add the products of pairs of entries, one scaled and the other not, to data, at the places `target`."""
-    by_row, row_start, by_column, place, column_end = products
+    by_row, _, by_column, place, column_end = products
     pair = 0
     for k in range(len(by_row)):
         value = values[by_row[k]]
