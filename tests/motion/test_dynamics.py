@@ -94,6 +94,7 @@ def test_a_strength_that_the_clip_kept_is_said(tmp_path: Path) -> None:
     found = wb.avoid(clip, dynamics=True, method=Larger(1.5), constraints=[wb.motion.MotionBounds(None, None, None)])
     assert f"{1.5 * was / 4.0 - 1.0:.1%} more than its bound of 4 N m" in found.report.message
     assert f"before it needed at most {was:.4g} N m, within its strength of 4 N m" in found.report.message
+    assert "Trajectory(stretch=2)" in found.report.message
 
 
 def test_other_methods_do_not_take_dynamics(tmp_path: Path) -> None:
