@@ -148,6 +148,18 @@ def test_nothing_is_asked_of_a_recording_beyond_what_it_keeps(recorded: wb.Clip)
     assert not judged.missed
 
 
+def test_loads_are_drawn_beside_those_before(recorded: wb.Clip) -> None:
+    public = wb.motion.torques(recorded)
+    doubled = replace(public, force=2.0 * public.force)
+    chart = LoadChange(public, doubled, np.arange(float(len(recorded)))).plot()
+    before, after = ([line for line in chart.axes[1].lines if line.get_linestyle() == style] for style in ("--", "-"))
+    assert len(before) == len(after) == len(public.feet)
+    for foot, (old, new) in enumerate(zip(before, after, strict=True)):
+        np.testing.assert_allclose(old.get_ydata(), public.force[:, foot, 2])
+        np.testing.assert_allclose(new.get_ydata(), 2.0 * public.force[:, foot, 2])
+        np.testing.assert_allclose(old.get_xdata(), recorded.times)
+
+
 @pytest.mark.parametrize(("inside", "told"), [(True, "was within it before"), (False, "mm before")])
 def test_a_support_that_is_left_is_said(recorded: wb.Clip, inside: bool, told: str) -> None:
     """Where a frame leans 30 mm farther: by how much, when, out of which feet, and how it was before."""
