@@ -342,3 +342,23 @@ def _own_color(piece: Any) -> Color:
 def node(name: str) -> str:
     """A name as a node of the page's tree, where a slash would begin a child."""
     return name.replace("/", "|")
+
+
+def scene_glb(scene: ViewedScene, bodies: Bodies, postures: Array, dt: float, title: str) -> bytes:
+    """What `bodies` draw of a scene at postures (n, nq), `dt` seconds apart: y up, z forward, metres.
+
+    A node `joint NAME` is each joint, a node `piece NAME` each piece; of half-spaces a square is written.
+    """
+    from wholebody.motion.files.gltf import JointTree
+
+    tree = JointTree(scene.model, postures, dt)
+    for figure in bodies.drawn:
+        if isinstance(figure.visual, Skin):
+            name = figure.prefix.strip("/") or str(scene.figure.name)
+            tree.skin(name, figure.visual.surface, figure.visual.places, figure.prefix, figure.color)
+        else:
+            tree.visuals(figure.visual.drawn, figure.prefix, figure.color)
+    for index, (piece, body) in enumerate(zip(scene.geometry.geometryObjects, bodies.all, strict=True)):
+        if not bodies.hidden(index):
+            tree.piece(f"piece {piece.name}", body.joint, piece.placement.homogeneous, piece.geometry, body.color)
+    return tree.builder.glb(title)
