@@ -49,7 +49,9 @@ class Room(NamedTuple):
 
 
 @compiled(error_model="numpy")
-def reach(chain: Chain, goals: Goals, room: Room, seeds: Array, nearest: Array, asked: Array, found: Array) -> int:
+def reach(
+    chain: Chain, goals: Goals, room: Room, seeds: Array, nearest: Array, asked: Array, expected: Array, found: Array
+) -> int:  # fmt: skip
     """Descend from seeds, one after the other, and minimise the effort where the goals are met.
 
     Args:
@@ -61,6 +63,7 @@ def reach(chain: Chain, goals: Goals, room: Room, seeds: Array, nearest: Array, 
         asked: (5,) norm of all errors at which the goals are met, metres and radians; damping of a step at the goals,
             squared; most steps; how many ends that meet the goals are enough; 1 where those that will clearly take more
             effort than others may be left.
+        expected: (k,) effort that the descent from each seed will about lead to; 0 where nothing is known.
         found: (k, 4) written: norm of the errors at an end; its effort, inf where goals are not met; 1 if the effort is
             stationary there or not asked for, -1 where a descent was left for an end of less effort; steps.
 
@@ -73,6 +76,12 @@ def reach(chain: Chain, goals: Goals, room: Room, seeds: Array, nearest: Array, 
         weighed = weighed or weight > 0.0
     for k in range(len(seeds)):
         q = seeds[k]
+        if weighed and asked[4] > 0.0 and expected[k] > CLEARLY * best:
+            found[k, 0], found[k, 1], found[k, 2], found[k, 3] = np.inf, np.inf, -1.0, 0.0
+            enough -= 1.0
+            if enough <= 0.0:
+                return k + 1
+            continue
         steps = _descend(chain, goals, room, q, tolerance, asked[1], most)
         left = _norm(room.value)
         found[k, 0], found[k, 1], found[k, 2], found[k, 3] = left, np.inf, 1.0, steps

@@ -267,21 +267,114 @@ def _target(arm: Arm, goal: Array, frame: Array, target: Array) -> None:
 
 
 @compiled(error_model="numpy")
-def least(found: Array, lower: Array, upper: Array, nearest: Array, effort: Array, order: Indices) -> int:
+def sampled(
+    arm: Arm, goal: Array, limits: tuple[Array, Array], nearest: Array, found: Array, effort: Array, order: Indices
+) -> int:  # fmt: skip
     """Which postures within limits take less effort than the samples beside them in their branch, the least first.
 
+    Samples are those of the joint that is held, all over its limits, but not farther than half a turn from a posture.
+
     Args:
-        found: (v, 8, n) angles, NaN for none; turned by whole turns to where they are within limits and nearest to a
-            posture. Samples that are a little beyond limits are clamped to them.
-        lower: (n,) limits.
-        upper: (n,) limits.
-        nearest: (2, n) the posture, and weights of the effort ``sum w (q - nearest)^2``.
+        arm: the axes.
+        goal: (36,) as in `branches`.
+        limits: (n,) lower and upper ones of the joints.
+        nearest: (2, n) the posture, and weights of the effort ``sum w (q - nearest)^2``; where these are zero, ones.
+        found: (v, 8, n) written: angles, NaN for none; turned by whole turns to where they are within limits and
+            nearest to the posture. Samples that are a little beyond limits are clamped to them.
         effort: (v, 8) written; inf for a posture that does not exist or is nowhere within limits.
-        order: (v * 8,) written: their places in the flattened first two axes.
+        order: (v * 8,) written: places in the flattened first two axes of `found`.
 
     Returns:
         How many there are.
     """
+    (lower, upper), near, values = limits, nearest.copy(), np.zeros(len(found))
+    weighed = False
+    for weight in nearest[1]:
+        weighed = weighed or weight > 0.0
+    if not weighed:
+        near[1] = 1.0
+    if arm.held >= 0:
+        joint = arm.joints[arm.held]
+        low, high = max(lower[joint], near[0, joint] - np.pi), min(upper[joint], near[0, joint] + np.pi)
+        for v in range(len(values)):
+            values[v] = low + (high - low) * v / (len(values) - 1)
+    branches(arm, goal, values, found)
+    return _least(found, lower, upper, near, effort, order)
+
+
+@compiled(error_model="numpy")
+def along(
+    arm: Arm, goal: Array, limits: tuple[Array, Array], nearest: Array, spacing: float, q: Array
+) -> float:  # fmt: skip
+    """Go along a branch of an arm with a held joint to the least effort, by golden sections over that joint.
+
+    Args:
+        arm: the axes.
+        goal: (36,) as in `branches`.
+        limits: (n,) lower and upper ones of the joints.
+        nearest: (2, n) as in `sampled`.
+        spacing: how far the held joint goes to both sides.
+        q: (n,) a posture of the branch; written: that of the least effort.
+
+    Returns:
+        The effort; inf, with q as it was, where there is none.
+    """
+    joint, golden = arm.joints[arm.held], 0.5 * (np.sqrt(5.0) - 1.0)
+    low, high, best, end = q[joint] - spacing, q[joint] + spacing, np.inf, q.copy()
+    at, effort, posture = np.empty(2), np.empty(2), np.empty((2, len(q)))
+    at[0], at[1] = high - golden * (high - low), low + golden * (high - low)
+    for side in range(2):
+        effort[side] = _beside(arm, goal, limits, nearest, at[side], q, posture[side])
+    while high - low > 1e-6:
+        new = 0 if effort[0] <= effort[1] else 1
+        if new == 0:
+            high, at[1], effort[1], posture[1] = at[1], at[0], effort[0], posture[0]
+            at[0] = high - golden * (high - low)
+        else:
+            low, at[0], effort[0], posture[0] = at[0], at[1], effort[1], posture[1]
+            at[1] = low + golden * (high - low)
+        effort[new] = _beside(arm, goal, limits, nearest, at[new], q, posture[new])
+    for side in range(2):
+        if effort[side] < best:
+            best, end[:] = effort[side], posture[side]
+    q[:] = end
+    return best
+
+
+@compiled(inner=True, error_model="numpy")
+def _beside(
+    arm: Arm, goal: Array, limits: tuple[Array, Array], nearest: Array, value: float, q: Array, posture: Array
+) -> float:  # fmt: skip
+    """Effort and, written, posture of the branch nearest to q (n,) where the held joint has a value; inf for none."""
+    found, best, chosen = np.empty((1, BRANCHES, len(q))), np.inf, -1
+    branches(arm, goal, np.array([value]), found)
+    for b in range(BRANCHES):
+        effort, away = _within(found[0, b], limits[0], limits[1], nearest, SLACK), 0.0
+        for i in range(len(q)):
+            away = max(away, abs(found[0, b, i] - q[i]))
+        if effort < np.inf and away < min(best, 1.0):
+            best, chosen, most = away, b, effort
+    if chosen < 0:
+        return np.inf
+    posture[:] = found[0, chosen]
+    return most
+
+
+@compiled(inner=True, error_model="numpy")
+def foreseen(effort: Array, v: int, b: int) -> float:
+    """Least effort of the parabola through a sample and those beside it in its branch; 0 at an end of the branch."""
+    if v == 0 or v + 1 == len(effort):
+        return 0.0
+    before, own, after = effort[v - 1, b], effort[v, b], effort[v + 1, b]
+    bent = before - 2.0 * own + after
+    if not 0.0 < bent < np.inf:
+        return 0.0
+    return float(own - 0.125 * (after - before) ** 2 / bent)
+
+
+@compiled(inner=True, error_model="numpy")
+def _least(found: Array, lower: Array, upper: Array, nearest: Array, effort: Array, order: Indices) -> int:
+    """See `sampled`."""
     count, number = 0, len(found)
     for b in range(BRANCHES):
         for v in range(number):
