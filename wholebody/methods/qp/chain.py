@@ -9,7 +9,6 @@ keeps every clearance is an answer; the others are rejected.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -113,12 +112,13 @@ def from_seeds(problem: Problem, workspace: Workspace, budget: Budget, control: 
         if chain is None:
             return None
         at = problem.scene.figure.clamp(problem.start)
-        distance = distance_of(problem, chain, at) if budget.measures else None
+        distance = distance_of(problem, chain) if budget.measures else None
         nearest = np.array([chain.angles(at if distance is None else distance.reference), np.zeros(len(chain.idx_v))])
         if distance is not None:
             nearest[1] = distance.weights[chain.idx_v]
         asked = Asked(chain.goals(entries), at, nearest, problem.clearances)
-        return Descents(asked, chain, workspace, budget, control).run()
+        rule = Rule.of(chain, asked.goals, budget, distance is not None)
+        return Descents(asked, chain, rule, workspace, budget, control).run()
 
 
 class Asked(NamedTuple):
@@ -133,11 +133,12 @@ class Asked(NamedTuple):
 class Descents:
     """Descents of one problem from one batch of seeds after the other."""
 
-    def __init__(self, asked: Asked, chain: PlainChain, workspace: Workspace, budget: Budget, control: Control) -> None:
+    def __init__(
+        self, asked: Asked, chain: PlainChain, rule: Rule, workspace: Workspace, budget: Budget, control: Control
+    ) -> None:  # fmt: skip
         """Set up; `run` does it all."""
         self.asked, self.chain, self.workspace, self.budget, self.control = asked, chain, workspace, budget, control
-        self.start, self.measured = chain.angles(asked.at), bool(asked.nearest[1].any())
-        self.rule = Rule.of(chain, asked.goals, budget, self.measured)
+        self.start, self.rule, self.measured = chain.angles(asked.at), rule, rule.measured
         self.trace: list[TraceEntry] = []
         self.least = np.inf  # effort of an end that does not keep its clearances
         self.blocked: Array | None = None
@@ -151,7 +152,6 @@ class Descents:
         if not self.budget.restarts:
             return self._ended(self.start[None].copy(), 1)
         exact, finite, enough = self.rule[:3]
-        samples: Iterator[Array] = iter(())
         if exact:
             ends, found = self._first_ended() if first is None else first
             met, branches = self._chosen(ends, found), None
@@ -167,9 +167,11 @@ class Descents:
             # What blocks an end may leave postures of its branch free. All samples meet the goals.
             most = np.inf if met is None else SEEDS.worth * self._effort(met.q)
             cheaper = (branches or self._branches()).cheaper(most)
-            samples = filter(self._is_free, (self.chain.posture(each, self.asked.at) for each in cheaper))
+            free = next((each for each in cheaper if self._is_free(self.chain.posture(each, self.asked.at))), None)
+            if free is not None:
+                return self._to_the_edge(free)
             if met is not None:
-                return with_values(met, blocked=next(samples, None))
+                return with_values(met, blocked=None)
             first = None
         for seeds in self.chain.seeds(self.start, self.budget.seed, self.rule.together):
             if first is None:
@@ -182,8 +184,6 @@ class Descents:
                     met = self._ended(seeds, enough, others=True)
             if met is not None or self.control.over:
                 return met
-            if (q := next(samples, None)) is not None:
-                return Met(q, tuple(self.trace), False)
         return None
 
     def _branches(self) -> Branches:
@@ -270,6 +270,27 @@ class Descents:
         # Where not even this is stationary, branches cross; a descent finds hardly less in a hundred times the time.
         return with_values(met, trace=tuple(self.trace), stationary=True)
 
+    def _to_the_edge(self, values: Array) -> Met:
+        """From a free sample (n,) along its branch to the least effort, as far as all clearances are kept.
+
+        The branch is a curve: where something blocks it, the least effort that is free is at the edge, by bisection.
+        """
+        chain, (goals, at, nearest, _), trace = self.chain, self.asked, tuple(self.trace)
+        blocked = chain.along(goals, nearest, values) if self.measured else None
+        if blocked is None:
+            return Met(chain.posture(values, at), trace, not self.budget.measures)
+        if self._is_free(q := chain.posture(blocked, at)):
+            return Met(q, trace, True)
+        while abs(blocked[chain.held] - values[chain.held]) > 1e-6:
+            middle = chain.beside(goals, nearest, 0.5 * (blocked[chain.held] + values[chain.held]), values)
+            if middle is None:
+                return Met(chain.posture(values, at), trace, False)
+            if self._is_free(chain.posture(middle, at)):
+                values = middle
+            else:
+                blocked = middle
+        return Met(chain.posture(values, at), trace, True)
+
     def _effort(self, q: Array) -> float:
         away = self.chain.angles(q) - self.asked.nearest[0]
         return float(self.asked.nearest[1].dot(away * away))
@@ -292,15 +313,16 @@ class Rule(NamedTuple):
     enough: int  # ends that meet the goals
     rows: int  # of the goals
     together: int  # seeds of a batch of random ones
+    measured: bool  # whether ends are compared by a measure
 
     @classmethod
     def of(cls, chain: PlainChain, goals: Goals, budget: Budget, measured: bool) -> Rule:
-        """The rule for problems with such goals; `measured`: whether ends are compared by a measure."""
+        """The rule for problems with such goals."""
         exact, more = chain.is_exact(goals), 1 + budget.restarts_for_measure
         finite = exact and chain.held < 0
         enough = 1 if finite or not measured else SEEDS.compared * more
         rows = sum(3 * int(each[3] + each[4]) for each in goals.entries)
-        return cls(exact, finite, enough, rows, SEEDS.together * more)
+        return cls(exact, finite, enough, rows, SEEDS.together * more, measured)
 
 
 def is_free(workspace: Workspace, q: Array, clearances: Array) -> bool:
@@ -309,7 +331,7 @@ def is_free(workspace: Workspace, q: Array, clearances: Array) -> bool:
     return not len(near.number) or not (near.distance < clearances[near.number]).any()
 
 
-def distance_of(problem: Problem, chain: PlainChain, at: Array) -> SquaredDistance | None:
+def distance_of(problem: Problem, chain: PlainChain) -> SquaredDistance | None:
     """The measure, where it is one squared distance that the other joints cannot reduce; else None."""
     measures = problem.measures
     if len(measures) != 1 or type(measures[0]) not in (tasks.Effort, tasks.Displacement):
@@ -321,5 +343,6 @@ def distance_of(problem: Problem, chain: PlainChain, at: Array) -> SquaredDistan
     weights[chain.idx_v] = 0.0
     if not weights.any():
         return distance
+    at = problem.scene.figure.clamp(problem.start)
     rest = weights * pin.difference(problem.scene.model, distance.reference, at)
     return None if rest.any() else distance

@@ -62,8 +62,9 @@ class Batch(NamedTuple):
 def batches(problems: Sequence[Problem], budget: Budget, largest: int) -> list[Batch]:
     """The problems that may be solved at once, in batches of at most so many."""
     groups: dict[Hashable, list[tuple[int, Array]]] = {}
+    known: dict[Hashable, PlainChain | None] = {}
     for place, problem in enumerate(problems):
-        found = _form(problem) if budget.restarts else None
+        found = _form(problem, known) if budget.restarts else None
         if found is not None:
             groups.setdefault(found[0], []).append((place, found[1]))
     made = []
@@ -76,8 +77,11 @@ def batches(problems: Sequence[Problem], budget: Budget, largest: int) -> list[B
     return made
 
 
-def _form(problem: Problem) -> tuple[Hashable, Array] | None:
-    """What problems of a batch have in common, and the floats (e, 36) of a problem's goals; None without a chain."""
+def _form(problem: Problem, known: dict[Hashable, PlainChain | None]) -> tuple[Hashable, Array] | None:
+    """What problems of a batch have in common, and the floats (e, 36) of a problem's goals; None without a chain.
+
+    `known` has the chains that were looked up before.
+    """
     entries = goal_entries(problem)
     if entries is None or problem.left_out:
         return None
@@ -85,15 +89,18 @@ def _form(problem: Problem) -> tuple[Hashable, Array] | None:
         problem.check_fresh()
     except InputError:
         return None
-    with chains_of(problem).borrow() as chains:
-        chain = chains.carrying(entries)
-    distance = None if chain is None else distance_of(problem, chain, problem.scene.figure.clamp(problem.start))
+    scene, kinds = problem.scene, tuple([(entry.integers, entry.rows) for entry in entries])
+    key: Hashable = id(scene.built), kinds
+    if key not in known:
+        with chains_of(problem).borrow() as chains:
+            known[key] = chains.carrying(entries)
+    chain = known[key]
+    distance = None if chain is None else distance_of(problem, chain)
     if distance is None:
         return None
-    scene, goals = problem.scene, tuple((type(goal), goal.weight) for goal in problem.goals)
-    kinds = tuple((entry.integers, entry.rows) for entry in entries)
-    key = id(scene), scene.built.moves, goals, kinds, distance.weights.tobytes(), problem.measures[0].weight
-    return key, np.array([entry.floats for entry in entries])
+    goals = tuple([(type(goal), goal.weight) for goal in problem.goals])
+    form = id(scene), scene.built.moves, goals, kinds, distance.weights.tobytes(), problem.measures[0].weight
+    return form, np.array([entry.floats for entry in entries])
 
 
 def _answers(
@@ -107,7 +114,7 @@ def _answers(
     nearest = np.zeros((len(at), 2, len(chain.idx_v)))
     nearest[:, 0] = chain.angles(numbers.references if budget.measures else at)
     if budget.measures:
-        nearest[:, 1] = distance_of(problem, chain, at[0]).weights[chain.idx_v]  # type: ignore[union-attr]
+        nearest[:, 1] = distance_of(problem, chain).weights[chain.idx_v]  # type: ignore[union-attr]
     goals = chain.goals(entries)
     rule = Rule.of(chain, goals, budget, budget.measures)
     together = 0 if rule.exact else rule.together
@@ -121,7 +128,7 @@ def _answers(
         asked = Asked(Goals(batch.tables[k], goals.entries), at[k], nearest[k], numbers.clearances[k])
         workspace.begin()
         count = max(count, 0)
-        met = Descents(asked, chain, workspace, budget, control).run((ends[k, :count], found[k, :count]))
+        met = Descents(asked, chain, rule, workspace, budget, control).run((ends[k, :count], found[k, :count]))
         if met is not None and met.complete:
             q[k], iterations[k], solved[k] = met.q, len(met.trace), True
     return q, iterations, solved

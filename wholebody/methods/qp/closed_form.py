@@ -117,4 +117,5 @@ def compiled_kernel() -> Any:
     order = np.zeros(0, dtype=np.intp)
     closed_form_kernel.sampled(arm, goal, limits, near, found, np.zeros((0, BRANCHES)), order)
     closed_form_kernel.along(arm, goal, limits, near, 0.0, one.copy())
+    closed_form_kernel.beside(arm, goal, limits, near, 0.0, one, one.copy())
     return closed_form_kernel

@@ -324,7 +324,7 @@ def along(
     at, effort, posture = np.empty(2), np.empty(2), np.empty((2, len(q)))
     at[0], at[1] = high - golden * (high - low), low + golden * (high - low)
     for side in range(2):
-        effort[side] = _beside(arm, goal, limits, nearest, at[side], q, posture[side])
+        effort[side] = beside(arm, goal, limits, nearest, at[side], q, posture[side])
     while high - low > 1e-6:
         new = 0 if effort[0] <= effort[1] else 1
         if new == 0:
@@ -333,7 +333,7 @@ def along(
         else:
             low, at[0], effort[0], posture[0] = at[0], at[1], effort[1], posture[1]
             at[1] = low + golden * (high - low)
-        effort[new] = _beside(arm, goal, limits, nearest, at[new], q, posture[new])
+        effort[new] = beside(arm, goal, limits, nearest, at[new], q, posture[new])
     for side in range(2):
         if effort[side] < best:
             best, end[:] = effort[side], posture[side]
@@ -341,11 +341,24 @@ def along(
     return best
 
 
-@compiled(inner=True, error_model="numpy")
-def _beside(
+@compiled(error_model="numpy")
+def beside(
     arm: Arm, goal: Array, limits: tuple[Array, Array], nearest: Array, value: float, q: Array, posture: Array
 ) -> float:  # fmt: skip
-    """Effort and, written, posture of the branch nearest to q (n,) where the held joint has a value; inf for none."""
+    """The branch nearest to a posture where the held joint has a value.
+
+    Args:
+        arm: the axes.
+        goal: (36,) as in `branches`.
+        limits: (n,) lower and upper ones of the joints.
+        nearest: (2, n) as in `sampled`.
+        value: of the held joint.
+        q: (n,) the posture.
+        posture: (n,) written: that of the branch.
+
+    Returns:
+        Its effort; inf where there is none within a radian.
+    """
     found, best, chosen = np.empty((1, BRANCHES, len(q))), np.inf, -1
     branches(arm, goal, np.array([value]), found)
     for b in range(BRANCHES):

@@ -128,6 +128,12 @@ class PlainChain:
         effort = closed_form_kernel().along(self.arm, goals.tables[0], limits, nearest, spacing, found)
         return found if effort < np.inf else None
 
+    def beside(self, goals: Goals, nearest: Array, value: float, values: Array) -> Array | None:
+        """The branch (n,) nearest to values (n,) where the joint that is held has a value; None where there is none."""
+        found, limits = np.empty_like(values), (self.chain.lower, self.chain.upper)
+        effort = closed_form_kernel().beside(self.arm, goals.tables[0], limits, nearest, value, values, found)
+        return found if effort < np.inf else None
+
     def loosely_met(self, goals: Goals, seed: int) -> Array:
         """Postures (k, n) that six joints meet a placement or one nearby with, or nearly so; none is a proof.
 
