@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import fields, is_dataclass
-from functools import partial
+from functools import lru_cache, partial
 from operator import is_
 from typing import Any, TypeVar
 
@@ -138,7 +138,7 @@ class Problem(checks.FixedAttributes):
             self._check_frozen(state)
             _check_goals(self.goals, state)
             self._check_terms(state)
-        self.clearances = self._clearances()
+            self.clearances = self._clearances(workspace)
 
     def _usual_measures(self) -> tuple[Measure, ...]:
         scene, start, ranges = self.scene, self.start, self.range_of_motion
@@ -332,23 +332,23 @@ class Problem(checks.FixedAttributes):
             if is_own(measure):
                 check_measure(f"measures[{number}]", measure, state)
 
-    def _clearances(self) -> Array:
+    def _clearances(self, workspace: Workspace) -> Array:
         built = self.scene.built
         asked = np.full(len(built.table.pairs), self.clearance)
         brought = [pair for term in (*self.goals, *self.constraints) for pair in term.touching]
         allowed = frozenset((*self.touching, *brought))
         if allowed:
             asked[built.known(("touching", allowed), partial(_between, built, allowed))] = 0.0
-        number, kept = built.known(("resting", self.clearance, built.moves, self.start.tobytes()), self._resting)
+        key = "resting", self.clearance, built.moves, self.start.tobytes()
+        number, kept = built.known(key, partial(self._resting, workspace))
         asked[number] = np.minimum(asked[number], kept)
         return asked
 
-    def _resting(self) -> tuple[Indices, Array]:
+    def _resting(self, workspace: Workspace) -> tuple[Indices, Array]:
         """Pairs (k,) nearer than the clearance at the start that do not penetrate, and their distances (k,)."""
-        with self.scene.borrow() as workspace:
-            near = workspace.near_views(self.start, self.clearance + 1e-9)
-            resting = near.distance >= -1e-6
-            return near.number[resting], np.maximum(near.distance[resting], 0.0)
+        near = workspace.near_views(self.start, self.clearance + 1e-9)
+        resting = near.distance >= -1e-6
+        return near.number[resting], np.maximum(near.distance[resting], 0.0)
 
 
 def _between(built: SceneGeometry, allowed: Set[tuple[str, str]]) -> Mask:
@@ -374,6 +374,8 @@ def _start(scene: Scene, start: Array | str | Mapping[str, Array | str] | None) 
     figure.warn_of_angles(q, "start")
     if q.dot(q) > FARTHEST**2 and np.abs(q).max() > FARTHEST:
         raise InputError(f"start has a value of {np.abs(q).max():.3g}; give metres and radians")
+    if scene.model.nq == scene.model.nv:  # no quaternions, and no joints without end
+        return q.copy()
     if not pin.isNormalized(scene.model, q, UNIT_TOLERANCE):
         raise InputError("the start's quaternion is not of unit length; normalise it with pin.normalize(model, q)")
     return np.array(pin.normalize(scene.model, q))
@@ -382,12 +384,18 @@ def _start(scene: Scene, start: Array | str | Mapping[str, Array | str] | None) 
 def _checked(terms: Any, kinds: tuple[type, ...], what: str) -> Sequence[Any]:
     listed = checks.listed(terms, what, f"{what}=[...]")
     for number, term in enumerate(listed):
-        if not isinstance(term, kinds):
+        if not _is_of(type(term), kinds):
             wanted = " or ".join(kind.__name__ for kind in kinds)
             home = next((name for name, taken in _ARGUMENTS.items() if isinstance(term, taken)), "")
             correction = f"give it in {home}=[...]" if home else "see wholebody.tasks"
             raise InputError(f"{what}[{number}] is {checks.a(type(term))}, not a {wanted}; {correction}")
     return listed
+
+
+@lru_cache(maxsize=512)
+def _is_of(kind: type, kinds: tuple[type, ...]) -> bool:
+    """Whether a class is derived from one of several; abstract ones take a microsecond to ask."""
+    return issubclass(kind, kinds)
 
 
 def _owner_pair(scene: Scene, pair: Any) -> tuple[str, str]:

@@ -249,8 +249,14 @@ def test_wide_joints_end_the_shorter_way_round():
         seeds, ends = np.concatenate([*itertools.islice(chain.seeds(start, 0, 12), 2)]), np.empty((24, 4))
         asked = np.array([1e-9, 1e-6, 60.0, 24.0, 0.0])
         kernel.reach(
-            chain.chain, chain.goals([entry]), chain.room(3), seeds, np.array([start, np.ones(3)]), asked,
-                np.zeros(24), ends,
+            chain.chain,
+            chain.goals([entry]),
+            chain.room(3),
+            seeds,
+            np.array([start, np.ones(3)]),
+            asked,
+            np.zeros(24),
+            ends,
         )
         best = seeds[ends[:, 1].argmin()]
         assert np.isfinite(ends[:, 1].min())

@@ -281,14 +281,14 @@ class Descents:
             return Met(chain.posture(values, at), trace, not self.budget.measures)
         if self._is_free(q := chain.posture(blocked, at)):
             return Met(q, trace, True)
-        while abs(blocked[chain.held] - values[chain.held]) > 1e-6:
-            middle = chain.beside(goals, nearest, 0.5 * (blocked[chain.held] + values[chain.held]), values)
-            if middle is None:
-                return Met(chain.posture(values, at), trace, False)
-            if self._is_free(chain.posture(middle, at)):
+        end = float(blocked[chain.held])
+        while abs(end - values[chain.held]) > 1e-6:
+            half = 0.5 * (end + float(values[chain.held]))
+            middle = chain.beside(goals, nearest, half, values)
+            if middle is not None and self._is_free(chain.posture(middle, at)):
                 values = middle
-            else:
-                blocked = middle
+            else:  # blocked, or beyond limits
+                end = half
         return Met(chain.posture(values, at), trace, True)
 
     def _effort(self, q: Array) -> float:
