@@ -292,6 +292,12 @@ class Bodies:
         chosen = [index for index in solid if (self.all[index].thing is not None) == things]
         return self._boxes(chosen, data).reshape(-1, 3)
 
+    def beyond(self, data: Any, index: int, start: Array, direction: Array) -> float:
+        """How far the box around a piece extends from a point (3,) along a unit vector (3,), metres; 0 of a plate."""
+        if self.all[index].plate:
+            return 0.0
+        return max(0.0, float(((self._boxes([index], data)[0] - start) @ direction).max()))
+
     def tops(self, data: Any) -> dict[str, tuple[str, Array]]:
         """Labels of things: by node, the name and the top middle (3,) of its boxes; no half-spaces."""
         found: dict[str, list[Array]] = {}
