@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import fields, is_dataclass
-from functools import lru_cache, partial
+from functools import partial
 from operator import is_
 from typing import Any, TypeVar
 
@@ -375,7 +375,7 @@ def _start(scene: Scene, start: Array | str | Mapping[str, Array | str] | None) 
     if q.dot(q) > FARTHEST**2 and np.abs(q).max() > FARTHEST:
         raise InputError(f"start has a value of {np.abs(q).max():.3g}; give metres and radians")
     if scene.model.nq == scene.model.nv:  # no quaternions, and no joints without end
-        return q.copy()
+        return np.array(q)
     if not pin.isNormalized(scene.model, q, UNIT_TOLERANCE):
         raise InputError("the start's quaternion is not of unit length; normalise it with pin.normalize(model, q)")
     return np.array(pin.normalize(scene.model, q))
@@ -384,18 +384,12 @@ def _start(scene: Scene, start: Array | str | Mapping[str, Array | str] | None) 
 def _checked(terms: Any, kinds: tuple[type, ...], what: str) -> Sequence[Any]:
     listed = checks.listed(terms, what, f"{what}=[...]")
     for number, term in enumerate(listed):
-        if not _is_of(type(term), kinds):
+        if not isinstance(term, kinds):
             wanted = " or ".join(kind.__name__ for kind in kinds)
             home = next((name for name, taken in _ARGUMENTS.items() if isinstance(term, taken)), "")
             correction = f"give it in {home}=[...]" if home else "see wholebody.tasks"
             raise InputError(f"{what}[{number}] is {checks.a(type(term))}, not a {wanted}; {correction}")
     return listed
-
-
-@lru_cache(maxsize=512)
-def _is_of(kind: type, kinds: tuple[type, ...]) -> bool:
-    """Whether a class is derived from one of several; abstract ones take a microsecond to ask."""
-    return issubclass(kind, kinds)
 
 
 def _owner_pair(scene: Scene, pair: Any) -> tuple[str, str]:

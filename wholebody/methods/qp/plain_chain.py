@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.records import with_values
 from wholebody.figures.description import Limits
+from wholebody.methods.qp import branch_kernel
 from wholebody.methods.qp.chain_kernel import Chain, Goals, Room
 from wholebody.methods.qp.closed_form import Branches, closed_form
 from wholebody.methods.qp.closed_form import compiled_kernel as closed_form_kernel
@@ -125,13 +126,13 @@ class PlainChain:
         found, near, held = values.copy(), nearest[0, self.held], self.held
         turn = min(self.chain.upper[held], near + np.pi) - max(self.chain.lower[held], near - np.pi)
         spacing, limits = turn / (SEEDS.samples - 1), (self.chain.lower, self.chain.upper)
-        effort = closed_form_kernel().along(self.arm, goals.tables[0], limits, nearest, spacing, found)
+        effort = branch_kernel.along(self.arm, goals.tables[0], limits, nearest, spacing, found)
         return found if effort < np.inf else None
 
     def beside(self, goals: Goals, nearest: Array, value: float, values: Array) -> Array | None:
         """The branch (n,) nearest to values (n,) where the joint that is held has a value; None where there is none."""
         found, limits = np.empty_like(values), (self.chain.lower, self.chain.upper)
-        effort = closed_form_kernel().beside(self.arm, goals.tables[0], limits, nearest, value, values, found)
+        effort = branch_kernel.beside(self.arm, goals.tables[0], limits, nearest, value, values, found)
         return found if effort < np.inf else None
 
     def loosely_met(self, goals: Goals, seed: int) -> Array:
