@@ -374,9 +374,7 @@ def _start(scene: Scene, start: Array | str | Mapping[str, Array | str] | None) 
     figure.warn_of_angles(q, "start")
     if q.dot(q) > FARTHEST**2 and np.abs(q).max() > FARTHEST:
         raise InputError(f"start has a value of {np.abs(q).max():.3g}; give metres and radians")
-    if scene.model.nq == scene.model.nv:  # no quaternions, and no joints without end
-        return np.array(q)
-    if not pin.isNormalized(scene.model, q, UNIT_TOLERANCE):
+    if scene.model.nq > scene.model.nv and not pin.isNormalized(scene.model, q, UNIT_TOLERANCE):
         raise InputError("the start's quaternion is not of unit length; normalise it with pin.normalize(model, q)")
     return np.array(pin.normalize(scene.model, q))
 

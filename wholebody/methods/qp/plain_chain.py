@@ -123,6 +123,7 @@ class PlainChain:
 
     def along(self, goals: Goals, nearest: Array, values: Array) -> Array | None:
         """Values (n,) of the least effort between the samples beside others of a branch; None where there are none."""
+        assert self.arm is not None
         found, near, held = values.copy(), nearest[0, self.held], self.held
         turn = min(self.chain.upper[held], near + np.pi) - max(self.chain.lower[held], near - np.pi)
         spacing, limits = turn / (SEEDS.samples - 1), (self.chain.lower, self.chain.upper)
@@ -131,6 +132,7 @@ class PlainChain:
 
     def beside(self, goals: Goals, nearest: Array, value: float, values: Array) -> Array | None:
         """The branch (n,) nearest to values (n,) where the joint that is held has a value; None where there is none."""
+        assert self.arm is not None
         found, limits = np.empty_like(values), (self.chain.lower, self.chain.upper)
         effort = branch_kernel.beside(self.arm, goals.tables[0], limits, nearest, value, values, found)
         return found if effort < np.inf else None
