@@ -138,7 +138,7 @@ class Problem(checks.FixedAttributes):
             self._check_frozen(state)
             _check_goals(self.goals, state)
             self._check_terms(state)
-        self.clearances = self._clearances()
+            self.clearances = self._clearances(workspace)
 
     def _usual_measures(self) -> tuple[Measure, ...]:
         scene, start, ranges = self.scene, self.start, self.range_of_motion
@@ -332,23 +332,23 @@ class Problem(checks.FixedAttributes):
             if is_own(measure):
                 check_measure(f"measures[{number}]", measure, state)
 
-    def _clearances(self) -> Array:
+    def _clearances(self, workspace: Workspace) -> Array:
         built = self.scene.built
         asked = np.full(len(built.table.pairs), self.clearance)
         brought = [pair for term in (*self.goals, *self.constraints) for pair in term.touching]
         allowed = frozenset((*self.touching, *brought))
         if allowed:
             asked[built.known(("touching", allowed), partial(_between, built, allowed))] = 0.0
-        number, kept = built.known(("resting", self.clearance, built.moves, self.start.tobytes()), self._resting)
+        key = "resting", self.clearance, built.moves, self.start.tobytes()
+        number, kept = built.known(key, partial(self._resting, workspace))
         asked[number] = np.minimum(asked[number], kept)
         return asked
 
-    def _resting(self) -> tuple[Indices, Array]:
+    def _resting(self, workspace: Workspace) -> tuple[Indices, Array]:
         """Pairs (k,) nearer than the clearance at the start that do not penetrate, and their distances (k,)."""
-        with self.scene.borrow() as workspace:
-            near = workspace.near_views(self.start, self.clearance + 1e-9)
-            resting = near.distance >= -1e-6
-            return near.number[resting], np.maximum(near.distance[resting], 0.0)
+        near = workspace.near_views(self.start, self.clearance + 1e-9)
+        resting = near.distance >= -1e-6
+        return near.number[resting], np.maximum(near.distance[resting], 0.0)
 
 
 def _between(built: SceneGeometry, allowed: Set[tuple[str, str]]) -> Mask:
@@ -374,7 +374,7 @@ def _start(scene: Scene, start: Array | str | Mapping[str, Array | str] | None) 
     figure.warn_of_angles(q, "start")
     if q.dot(q) > FARTHEST**2 and np.abs(q).max() > FARTHEST:
         raise InputError(f"start has a value of {np.abs(q).max():.3g}; give metres and radians")
-    if not pin.isNormalized(scene.model, q, UNIT_TOLERANCE):
+    if scene.model.nq > scene.model.nv and not pin.isNormalized(scene.model, q, UNIT_TOLERANCE):
         raise InputError("the start's quaternion is not of unit length; normalise it with pin.normalize(model, q)")
     return np.array(pin.normalize(scene.model, q))
 
