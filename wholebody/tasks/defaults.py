@@ -19,7 +19,7 @@ from wholebody.tasks.frame import Hold
 from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
 from wholebody.tasks.rhythm import Rhythm, girdles_of
 from wholebody.tasks.sit import Sit
-from wholebody.tasks.stand import Stand
+from wholebody.tasks.stand import Stance, Stand
 from wholebody.tasks.touch import Lean
 
 FEET = ("left_foot", "right_foot")
@@ -27,11 +27,18 @@ FEET = ("left_foot", "right_foot")
 _effort = Effort()
 
 
-def default_measures(scene: Surroundings, start: Array, *, ranges: bool) -> tuple[Measure, ...]:
-    """`Effort`, and for a person `Rhythm` beside it, resolved."""
+def default_measures(
+    scene: Surroundings, start: Array, stances: Sequence[tuple[str, ...]], *, ranges: bool
+) -> tuple[Measure, ...]:
+    """`Effort`, and for a person `Rhythm` beside it, resolved; and the `Stance` of each pair of feet that may slide."""
     person = ranges and bool(scene.figure.ranges) and bool(girdles_of(scene.figure))
-    effort = _effort.resolve(scene, start)
-    return (effort, Rhythm().resolve(scene, start)) if person else (effort,)
+    usual = (_effort, Rhythm(), *map(Stance, stances)) if person else (_effort,)
+    return tuple(measure.resolve(scene, start) for measure in usual)
+
+
+def stances(terms: Sequence[Constraint | Goal]) -> tuple[tuple[str, ...], ...]:
+    """The feet of each that stands on two, and on no knee."""
+    return tuple(tuple(one.feet) for one in terms if isinstance(one, Stand) and len(one.feet) == 2 and not one.knees)
 
 
 def default_constraints(
