@@ -28,6 +28,7 @@ from wholebody.methods.starts import Minima, hooked_hands, restarts, throughout
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
+from wholebody.tasks.distance import Effort
 from wholebody.terms.linearisation import Lineariser
 
 
@@ -120,6 +121,9 @@ class Multistart:
         """The attempts in their order; each is decided on when those before it failed."""
         start, state = self._start, self.lineariser.state
         yield Attempt([begin], self._directly, "directly")
+        efforts = [term.distance.reference for term in self.problem.measures if type(term) is Effort]
+        rests = [rest for rest in efforts if not np.array_equal(rest, start)]  # who is to kneel has it on the knees
+        yield Attempt(rests, self._directly, "from the posture of least effort")
         self._first = len(self.trace)
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
         least = least_left(self.contradictions)
