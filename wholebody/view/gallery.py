@@ -12,8 +12,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from wholebody.base.files import Scratch, read_text, write
-from wholebody.view.templates import render
+from wholebody.base.files import Scratch, read_text, templates, write
 
 LONGEST = 600.0  # s: of one script
 
@@ -88,5 +87,5 @@ def write_gallery(
     for script in scripts:
         made.append(exhibit(script))
         say(made[-1])
-    write(path, render("gallery.html", exhibits=made))
+    write(path, templates(Path(__file__).parent).get_template("gallery.html.jinja").render(exhibits=made))
     return made
