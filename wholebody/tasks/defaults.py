@@ -69,7 +69,7 @@ def _kneeling(scene: Surroundings, start: Array, shanks: Set[str]) -> Array:
             x, y, z, w = start[root + 3 : root + 7]
             heading = 0.5 * np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
             q[root + 2 : root + 7] = kneeling[root + 2], 0.0, 0.0, np.sin(heading), np.cos(heading)
-    return q
+    return np.asarray(q)
 
 
 def default_constraints(
