@@ -96,8 +96,7 @@ class Problem(checks.FixedAttributes):
             start: (nq,) posture, or the name of one; of several figures also one by figure; None for the first posture.
             goals: equalities that are met if possible.
             constraints: what must always hold; bounds on the displacement are given here too.
-            measures: costs to minimise; None for `Effort()`, and for a person `Rhythm()` beside it and, where it
-                stands by `Stand`, `Stance()`.
+            measures: costs to minimise; None for `Effort()`, of a person also `Rhythm()` and, by `Stand`, `Stance()`.
             clearance: least distance between pieces, metres.
             touching: pairs of segment or object names whose clearance is zero; those of contact terms are added.
             range_of_motion: whether a person keeps its ranges of motion and reach cones, and moves in its `Rhythm`.
@@ -143,8 +142,7 @@ class Problem(checks.FixedAttributes):
 
     def _usual_measures(self, stated: Sequence[Constraint]) -> tuple[Measure, ...]:
         scene, start, ranges = self.scene, self.start, self.range_of_motion
-        feet = stances(scene, start, stated)
-        make = partial(default_measures, scene, start, feet, ranges=ranges)
+        make = partial(default_measures, scene, start, feet := stances(scene, start, stated), ranges=ranges)
         return scene.built.known(("measures", ranges, feet, start.tobytes()), make)
 
     def _usual_constraints(self, state: State, stated: Sequence[Constraint]) -> tuple[tuple[Constraint, ...], str]:

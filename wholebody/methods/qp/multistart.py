@@ -120,9 +120,8 @@ class Multistart:
         """The attempts in their order; each is decided on when those before it failed."""
         start, state = self._start, self.lineariser.state
         yield Attempt([begin], self._directly, "directly")
-        efforts = [term.distance.reference for term in self.problem.measures if type(term) is Effort]
-        rests = [rest for rest in efforts if not np.array_equal(rest, start)]  # who is to kneel has it on the knees
-        yield Attempt(rests, self._directly, "from the posture of least effort")
+        rests = (term.distance.reference for term in self.problem.measures if type(term) is Effort)
+        yield Attempt((q for q in rests if (q != start).any()), self._directly, "from the posture of least effort")
         self._first = len(self.trace)
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
         least = least_left(self.contradictions)
