@@ -89,6 +89,7 @@ if TYPE_CHECKING:
         Rhythm,
         RotationEffort,
         Sit,
+        Stance,
         Stand,
         StepLimit,
         Touch,
@@ -151,6 +152,7 @@ __all__ = [
     "Sit",
     "Solution",
     "Sphere",
+    "Stance",
     "Stand",
     "StepLimit",
     "Torus",
@@ -223,7 +225,7 @@ _MODULES = {
     "wholebody.taskfile": "read_task",
     "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Force Frame Freeze "
     "Goal Hold Measure Orientation Plane Point Posture PotentialEnergy RangeOfMotion ReachCones Relative Rhythm "
-    "RotationEffort StepLimit Grasp Lean Sit Stand Touch",
+    "RotationEffort StepLimit Grasp Lean Sit Stance Stand Touch",
     "wholebody.terms.derivatives": "check_derivatives",
     "wholebody.tracking.drag": "Drag",
     "wholebody.tracking.path_following": "follow_path",

@@ -25,7 +25,7 @@ from wholebody.scene.workspace import Workspace, borrowed
 from wholebody.tasks.answers import in_words, is_own
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.checks import check_measure, check_rows
-from wholebody.tasks.defaults import balancing, default_constraints, default_measures, standing
+from wholebody.tasks.defaults import balancing, default_constraints, default_measures, stances, standing
 from wholebody.terms.linearisation import Lineariser
 from wholebody.terms.plan import TermPlan, Terms, make_plan
 
@@ -96,7 +96,7 @@ class Problem(checks.FixedAttributes):
             start: (nq,) posture, or the name of one; of several figures also one by figure; None for the first posture.
             goals: equalities that are met if possible.
             constraints: what must always hold; bounds on the displacement are given here too.
-            measures: costs to minimise; None for `Effort()`, and `Rhythm()` beside it for a person.
+            measures: costs to minimise; None for `Effort()`, of a person also `Rhythm()` and, by `Stand`, `Stance()`.
             clearance: least distance between pieces, metres.
             touching: pairs of segment or object names whose clearance is zero; those of contact terms are added.
             range_of_motion: whether a person keeps its ranges of motion and reach cones, and moves in its `Rhythm`.
@@ -127,7 +127,7 @@ class Problem(checks.FixedAttributes):
         self._plan: tuple[_Planned, TermPlan] | None = None
         """The terms as arrays, and the terms that they were made of; every solve begins with it."""
         self.measures: tuple[Measure, ...] = (
-            self._usual_measures() if measured is None else tuple(m.resolve(scene, self.start) for m in measured)
+            self._usual_measures(stated) if measured is None else tuple(m.resolve(scene, self.start) for m in measured)
         )
         with scene.borrow() as workspace:
             state = workspace.state
@@ -140,10 +140,10 @@ class Problem(checks.FixedAttributes):
             self._check_terms(state)
             self.clearances = self._clearances(workspace)
 
-    def _usual_measures(self) -> tuple[Measure, ...]:
+    def _usual_measures(self, stated: Sequence[Constraint]) -> tuple[Measure, ...]:
         scene, start, ranges = self.scene, self.start, self.range_of_motion
-        make = partial(default_measures, scene, start, ranges=ranges)
-        return scene.built.known(("measures", ranges, start.tobytes()), make)
+        make = partial(default_measures, scene, start, feet := stances(scene, start, stated), ranges=ranges)
+        return scene.built.known(("measures", ranges, feet, start.tobytes()), make)
 
     def _usual_constraints(self, state: State, stated: Sequence[Constraint]) -> tuple[tuple[Constraint, ...], str]:
         scene, start, ranges, known = self.scene, self.start, self.range_of_motion, frozenset(map(type, stated))

@@ -15,7 +15,7 @@ from wholebody.tasks.potential_energy import PotentialEnergy
 from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
 from wholebody.tasks.rhythm import Rhythm
 from wholebody.tasks.sit import Sit
-from wholebody.tasks.stand import Stand
+from wholebody.tasks.stand import Stance, Stand
 from wholebody.tasks.touch import Lean, Touch
 
 __all__ = [
@@ -46,6 +46,7 @@ __all__ = [
     "Rhythm",
     "RotationEffort",
     "Sit",
+    "Stance",
     "Stand",
     "StepLimit",
     "Term",
