@@ -64,7 +64,7 @@ def test_names_for_type_checkers_are_the_names_that_load(package: str) -> None:
 
 
 def test_some_sixty_names_stand_on_top() -> None:
-    assert len(dir(wholebody)) <= 91
+    assert len(dir(wholebody)) <= 92
 
 
 def test_importing_loads_nothing_heavy() -> None:

@@ -90,6 +90,7 @@ if TYPE_CHECKING:
         RotationEffort,
         Sit,
         Soft,
+        Stance,
         Stand,
         StepLimit,
         Touch,
@@ -153,6 +154,7 @@ __all__ = [
     "Soft",
     "Solution",
     "Sphere",
+    "Stance",
     "Stand",
     "StepLimit",
     "Torus",
@@ -225,7 +227,7 @@ _MODULES = {
     "wholebody.taskfile": "read_task",
     "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Force Frame Freeze "
     "Goal Hold Measure Orientation Plane Point Posture PotentialEnergy RangeOfMotion ReachCones Relative Rhythm "
-    "RotationEffort StepLimit Grasp Lean Sit Soft Stand Touch",
+    "RotationEffort StepLimit Grasp Lean Sit Soft Stance Stand Touch",
     "wholebody.terms.derivatives": "check_derivatives",
     "wholebody.tracking.drag": "Drag",
     "wholebody.tracking.path_following": "follow_path",

@@ -25,7 +25,7 @@ from wholebody.scene.workspace import Workspace, borrowed
 from wholebody.tasks.answers import in_words, is_own
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.checks import check_measure, check_rows
-from wholebody.tasks.defaults import balancing, default_constraints, default_measures, standing
+from wholebody.tasks.defaults import balancing, default_constraints, default_measures, stances, standing
 from wholebody.terms.linearisation import Lineariser
 from wholebody.terms.plan import TermPlan, Terms, make_plan
 
@@ -96,7 +96,7 @@ class Problem(checks.FixedAttributes):
             start: (nq,) posture, or the name of one; of several figures also one by figure; None for the first posture.
             goals: equalities that are met if possible.
             constraints: what must always hold; bounds on the displacement are given here too.
-            measures: costs to minimise; None for `Effort()`, and `Rhythm()` beside it for a person.
+            measures: costs to minimise; None for `Effort()`, of a person also `Rhythm()` and, by `Stand`, `Stance()`.
             clearance: least distance between pieces, metres.
             touching: pairs of segment or object names whose clearance is zero; those of contact terms are added.
             range_of_motion: whether a person keeps its ranges of motion and reach cones, and moves in its `Rhythm`.
@@ -127,7 +127,7 @@ class Problem(checks.FixedAttributes):
         self._plan: tuple[_Planned, TermPlan] | None = None
         """The terms as arrays, and the terms that they were made of; every solve begins with it."""
         self.measures: tuple[Measure, ...] = (
-            self._usual_measures() if measured is None else tuple(m.resolve(scene, self.start) for m in measured)
+            self._usual_measures(stated) if measured is None else tuple(m.resolve(scene, self.start) for m in measured)
         )
         with scene.borrow() as workspace:
             state = workspace.state
@@ -138,12 +138,12 @@ class Problem(checks.FixedAttributes):
             self._check_frozen(state)
             _check_goals(self.goals, state)
             self._check_terms(state)
-        self.clearances = self._clearances()
+            self.clearances = self._clearances(workspace)
 
-    def _usual_measures(self) -> tuple[Measure, ...]:
+    def _usual_measures(self, stated: Sequence[Constraint]) -> tuple[Measure, ...]:
         scene, start, ranges = self.scene, self.start, self.range_of_motion
-        make = partial(default_measures, scene, start, ranges=ranges)
-        return scene.built.known(("measures", ranges, start.tobytes()), make)
+        make = partial(default_measures, scene, start, feet := stances(scene, start, stated), ranges=ranges)
+        return scene.built.known(("measures", ranges, feet, start.tobytes()), make)
 
     def _usual_constraints(self, state: State, stated: Sequence[Constraint]) -> tuple[tuple[Constraint, ...], str]:
         scene, start, ranges, known = self.scene, self.start, self.range_of_motion, frozenset(map(type, stated))
@@ -332,23 +332,23 @@ class Problem(checks.FixedAttributes):
             if is_own(measure):
                 check_measure(f"measures[{number}]", measure, state)
 
-    def _clearances(self) -> Array:
+    def _clearances(self, workspace: Workspace) -> Array:
         built = self.scene.built
         asked = np.full(len(built.table.pairs), self.clearance)
         brought = [pair for term in (*self.goals, *self.constraints) for pair in term.touching]
         allowed = frozenset((*self.touching, *brought))
         if allowed:
             asked[built.known(("touching", allowed), partial(_between, built, allowed))] = 0.0
-        number, kept = built.known(("resting", self.clearance, built.moves, self.start.tobytes()), self._resting)
+        key = "resting", self.clearance, built.moves, self.start.tobytes()
+        number, kept = built.known(key, partial(self._resting, workspace))
         asked[number] = np.minimum(asked[number], kept)
         return asked
 
-    def _resting(self) -> tuple[Indices, Array]:
+    def _resting(self, workspace: Workspace) -> tuple[Indices, Array]:
         """Pairs (k,) nearer than the clearance at the start that do not penetrate, and their distances (k,)."""
-        with self.scene.borrow() as workspace:
-            near = workspace.near_views(self.start, self.clearance + 1e-9)
-            resting = near.distance >= -1e-6
-            return near.number[resting], np.maximum(near.distance[resting], 0.0)
+        near = workspace.near_views(self.start, self.clearance + 1e-9)
+        resting = near.distance >= -1e-6
+        return near.number[resting], np.maximum(near.distance[resting], 0.0)
 
 
 def _between(built: SceneGeometry, allowed: Set[tuple[str, str]]) -> Mask:
@@ -374,7 +374,7 @@ def _start(scene: Scene, start: Array | str | Mapping[str, Array | str] | None) 
     figure.warn_of_angles(q, "start")
     if q.dot(q) > FARTHEST**2 and np.abs(q).max() > FARTHEST:
         raise InputError(f"start has a value of {np.abs(q).max():.3g}; give metres and radians")
-    if not pin.isNormalized(scene.model, q, UNIT_TOLERANCE):
+    if scene.model.nq > scene.model.nv and not pin.isNormalized(scene.model, q, UNIT_TOLERANCE):
         raise InputError("the start's quaternion is not of unit length; normalise it with pin.normalize(model, q)")
     return np.array(pin.normalize(scene.model, q))
 

@@ -46,7 +46,7 @@ def test_retarget_writes_a_clip_of_the_figure(walk: Path, tmp_path: Path, capsys
     assert main(["clip", "convert", str(walk), str(tmp_path / "bend.bvh")]) == 0
     size = ["--sex", "female", "--stature", "1.55"]
     out = tmp_path / "woman.npz"
-    assert main(["clip", "retarget", str(tmp_path / "bend.bvh"), str(out), *size]) == 0
+    assert main(["clip", "retarget", str(tmp_path / "bend.bvh"), "--out", str(out), *size]) == 0
     table = [line.split() for line in capsys.readouterr().out.splitlines() if " to " in line]
     assert ["left_shoulder", "to", "left_elbow"] in [row[:3] for row in table]
     assert all(float(row[3]) < 6.0 for row in table)  # degrees
@@ -76,7 +76,7 @@ def test_a_robot_goes_about_where_that_is_asked(walk: Path, tmp_path: Path) -> N
     gone[:, 0] += np.linspace(0.0, 0.5, len(gone))
     clip.with_q(gone).write(tmp_path / "walk.bvh")
     out = tmp_path / "legs.npz"
-    given = ["clip", "retarget", str(tmp_path / "walk.bvh"), str(out), "--figure", str(tmp_path / "legs.urdf")]
+    given = ["clip", "retarget", str(tmp_path / "walk.bvh"), "--out", str(out), "--figure", str(tmp_path / "legs.urdf")]
     assert main([*given, "--root", "free"]) == 0
     way = wb.read_clip(out, wb.load(tmp_path / "legs.urdf", root="free")).q[:, 0]
     assert way[-1] - way[0] == pytest.approx(0.5 * 0.8 / _leg(human), abs=0.05)
@@ -185,11 +185,15 @@ def test_play_shows_what_the_body_wears_on_a_floor_below_it(
         (["convert", "bend.npz", "out.xyz"], "cannot be written as .xyz"),
         (["convert", "bend.npz", "none/out.bvh"], "there is no such folder"),
         (["convert", "bend.npz", "out.bvh", "--dt", "0"], "dt is 0"),
-        (["retarget", "bend.npz", "out.npz"], "bend.npz: is no skeleton"),
+        (["retarget", "bend.npz", "--out", "out.npz"], "bend.npz: is no skeleton"),
         (["play", "bend.npz", "--out", "out.doc"], "cannot be written as .doc; give the name the ending .gif or"),
         (["avoid", "bend.npz", "--scene", "none.toml", "--sex", "female"], "leave out --figure"),
         (["avoid", "bend.npz", "bend.npz", "--scene", "none.toml"], "--scene is for one motion"),
         (["retarget", "bend.bvh"], "name it with --out"),
+        (["retarget", "bend.bvh", "bend.npz"], "name it with --out"),
+        (["convert", "bend.npz", "bend.npz", "--mirror"], "bend.npz is a file that is read"),
+        (["convert", "bend.npz", "../{folder}/bend.npz"], "is a file that is read"),
+        (["avoid", "bend.npz", "--out", "bend.npz"], "bend.npz is a file that is read"),
         (["retarget", "bend.bvh", "--to", "g1.urdf", "--figure", "h1.urdf", "--out", "o.npz"], "one and the same"),
         (["retarget", "bend.bvh", "--bare", "--out", "o.npz"], "ending .csv"),
         (["retarget", "bend.bvh", "--rate", "0", "--out", "o.csv"], "--rate is 0"),
@@ -204,7 +208,7 @@ def test_what_is_wrong_is_one_sentence_and_writes_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(walk.parent)
-    assert main(["clip", *arguments]) == 2
+    assert main(["clip", *(text.format(folder=walk.parent.name) for text in arguments)]) == 2
     said = capsys.readouterr().err
     assert sentence in said
     assert said.count("\n") == 1

@@ -94,6 +94,7 @@ def test_a_strength_that_the_clip_kept_is_said(tmp_path: Path) -> None:
     found = wb.avoid(clip, dynamics=True, method=Larger(1.5), constraints=[wb.motion.MotionBounds(None, None, None)])
     assert f"{1.5 * was / 4.0 - 1.0:.1%} more than its bound of 4 N m" in found.report.message
     assert f"before it needed at most {was:.4g} N m, within its strength of 4 N m" in found.report.message
+    assert "Trajectory(stretch=2)" in found.report.message
 
 
 def test_other_methods_do_not_take_dynamics(tmp_path: Path) -> None:
@@ -145,6 +146,18 @@ def test_nothing_is_asked_of_a_recording_beyond_what_it_keeps(recorded: wb.Clip)
     assert not judged.beyond.any()
     assert not judged.farther.any()
     assert not judged.missed
+
+
+def test_loads_are_drawn_beside_those_before(recorded: wb.Clip) -> None:
+    public = wb.motion.torques(recorded)
+    doubled = replace(public, force=2.0 * public.force)
+    chart = LoadChange(public, doubled, np.arange(float(len(recorded)))).plot()
+    before, after = ([line for line in chart.axes[1].lines if line.get_linestyle() == style] for style in ("--", "-"))
+    assert len(before) == len(after) == len(public.feet)
+    for foot, (old, new) in enumerate(zip(before, after, strict=True)):
+        np.testing.assert_allclose(old.get_ydata(), public.force[:, foot, 2])
+        np.testing.assert_allclose(new.get_ydata(), 2.0 * public.force[:, foot, 2])
+        np.testing.assert_allclose(old.get_xdata(), recorded.times)
 
 
 @pytest.mark.parametrize(("inside", "told"), [(True, "was within it before"), (False, "mm before")])

@@ -379,13 +379,14 @@ def test_who_stands_keeps_the_margin_of_people() -> None:
     assert inside.min() >= stand.keeps - 1e-4
 
 
-def test_a_person_kneels_in_balance() -> None:
+@pytest.mark.parametrize("start", ["kneeling", "standing", "sitting"])
+def test_a_person_kneels_in_balance(start: str) -> None:
     shanks = ("left_shank", "right_shank")
     person = wb.load("human")
     scene = wb.Scene(person).add(wb.HalfSpace(), name="floor")
     goals = [wb.Point("right_index_tip", (0.5, -0.1, 0.3))]
     kneels = wb.Stand("floor", feet=shanks, knees=shanks)
-    solution = wb.solve(wb.Problem(scene, "kneeling", goals=goals, constraints=[kneels]))
+    solution = wb.solve(wb.Problem(scene, start, goals=goals, constraints=[kneels]))
     assert solution.solved
     center = pin.centerOfMass(person.model, person.model.createData(), solution.q)
     knees, toes = (

@@ -10,6 +10,7 @@ import pytest
 
 import wholebody as wb
 from wholebody import tasks
+from wholebody.base.arrays import Array
 from wholebody.figures.state import State
 
 
@@ -161,3 +162,31 @@ def test_squared_changes_are_those_of_the_potential_energies_of_the_segments(
         energies = [pin.computePotentialEnergy(alone, data, posture) for posture in (q, start)]
         total += (energies[0] - energies[1]) ** 2
     np.testing.assert_allclose(term.value(State(model).update(q)), total)
+
+
+def test_stance_counts_what_the_feet_are_off_side_by_side() -> None:
+    person = wb.load("human")
+    stance = wb.Stance().resolve(wb.Scene(person), person.posture("standing"))
+    apart = person.placement(person.posture("standing"), "left_foot").translation[1] * 2.0
+
+    def value(**degrees: float) -> tuple[float, Array, Array]:
+        joints = {name: np.radians(angle) for name, angle in degrees.items()}
+        q = person.with_joints(person.posture("standing"), joints)
+        left, right = (person.placement(q, f"{side}_foot") for side in ("left", "right"))
+        return stance.value(State(person.model).update(q)), left.translation - right.translation, left.rotation
+
+    assert value()[0] < 1e-12
+    split, way, _ = value(left_hip_flexion=20.0, left_ankle_dorsiflexion=-20.0)
+    assert split == pytest.approx(60.0 * way[0] ** 2, rel=1e-9)
+    wide, way, _ = value(left_hip_abduction=10.0, right_hip_abduction=10.0)
+    turned = np.cos(np.radians(10.0)) * way[1]  # as either foot sees it, which the leg has tipped by ten degrees
+    assert wide == pytest.approx(60.0 * (turned - apart) ** 2, rel=1e-6)
+    mirrored = value(right_hip_flexion=20.0, right_ankle_dorsiflexion=-20.0)[0]
+    assert mirrored == pytest.approx(split, rel=1e-9)
+
+
+def test_stance_has_derivatives_and_two_feet() -> None:
+    scene = wb.Scene(wb.load("human"))
+    wb.check_derivatives(wb.Stance(), scene)
+    with pytest.raises(wb.InputError, match="feet has 1 names; give two"):
+        wb.Problem(scene, measures=[wb.Stance(["left_foot"])])

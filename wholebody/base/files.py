@@ -15,7 +15,7 @@ import stat
 import sys
 import tempfile
 import time
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from os import PathLike
@@ -235,8 +235,21 @@ def write(path: str | PathLike[str], content: str | bytes) -> Path:
     return Path(path)
 
 
-def check_writable(path: Path) -> Path:
-    """The path of a file, or an InputError if its folder is missing or not writable; call it before long work."""
+def check_writable(path: Path, read: Iterable[str | PathLike[str] | None] = ()) -> Path:
+    """The path of a file to write, checked before long work.
+
+    Args:
+        path: of the file.
+        read: files that the work reads, None for none: what is read is not written over.
+
+    Raises:
+        InputError: its folder is missing or not writable, or it is one of the files that are read.
+    """
+    for each in read:
+        if each is not None and path.exists() and os.path.exists(each) and os.path.samefile(path, each):
+            raise InputError(
+                f"{_named(path)} is a file that is read, and would be lost; give another place to write to"
+            )
     if not is_folder(path.parent):
         raise _unwritable(path, FileNotFoundError())
     if not os.access(path.parent, os.W_OK | os.X_OK):
@@ -244,9 +257,15 @@ def check_writable(path: Path) -> Path:
     return path
 
 
-def checked_target(path: object, what: str, content: str, endings: Collection[str]) -> Path:
-    """The path of a file to write, checked before long work: its ending as by `checked_ending`, and its folder."""
-    return check_writable(checked_ending(path, what, content, endings))
+def checked_target(
+    path: object,
+    what: str,
+    content: str,
+    endings: Collection[str],
+    read: Iterable[str | PathLike[str] | None] = (),
+) -> Path:
+    """The path of a file to write, checked before long work, as by `checked_ending` and `check_writable`."""
+    return check_writable(checked_ending(path, what, content, endings), read)
 
 
 def checked_ending(path: object, what: str, content: str, endings: Collection[str]) -> Path:

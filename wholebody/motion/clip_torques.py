@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Mask, brief
+from wholebody.base.charts import new_chart, plain
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.joined import one_figure
@@ -303,6 +305,34 @@ class LoadChange:
                 f"{int((self.farther > PLACE).sum())} frames; {self._support(frame)}"
             )
         return said
+
+    def plot(self) -> Any:
+        """Draw torques, forces of the ground and the zero moment point over time, a matplotlib figure.
+
+        The torques are those of the four joints that come nearest to their strength, in parts of it. What was before is
+        dashed, at the times of the answer's frames.
+        """
+        chart, (axes,) = new_chart(1, 3, (12.0, 2.8))
+        shares = np.maximum(self.after.share.max(axis=0), self.before.share.max(axis=0))
+        joints = [k for k in np.argsort(-shares)[:4].tolist() if shares[k] > 0.0]
+        for loads, style, times in (
+            (self.before, "--", np.interp(np.arange(len(self.before.torque)), self.times, np.arange(len(self.times)))),
+            (self.after, "-", np.arange(len(self.times))),
+        ):
+            t = times * self.after.dt
+            curves = [
+                [(loads.joint_of(k), loads.share[:, k]) for k in joints],
+                [(name, loads.force[:, k, 2]) for k, name in enumerate(loads.feet)],
+                [("zero moment point", 1e3 * loads.outside)],
+            ]
+            for axis, each in zip(axes, curves, strict=True):
+                for number, (name, values) in enumerate(each):
+                    axis.plot(t, values, style, color=f"C{number}", label=plain(name) if style == "-" else None)
+        for axis, said in zip(axes, ("torque [strength]", "force upwards [N]", "outside of feet [mm]"), strict=True):
+            axis.set(xlabel="time [s]", ylabel=said)
+            if axis.lines:
+                axis.legend(fontsize="x-small")
+        return chart
 
     def _torque_missed(self, joint: int) -> str:
         """The sentence on a torque that is beyond its bound."""

@@ -23,7 +23,7 @@ from wholebody.motion.standing_ground import Foothold, Ground
 from wholebody.motion.structure import upright
 from wholebody.scene.scene import Scene
 
-STRONG, NEARING, SWING = 800.0, 10.0, 0.3  # weights of what rests, nearly does, and of a sole between; 1 of a bone
+STRONG, NEARING, SWING = 800.0, 30.0, 0.3  # weights of what rests, nearly does, and of a sole between; 1 of a bone
 LANDING = 3.0  # weight in the frame in which a point comes down, where contact decides
 BESIDE = np.array([0.1, 0.1, 1.0])  # shares of that weight: soles that meet come down beside each other
 STEP = 0.3  # m: a surface higher than this above the recording's ground is not what a sole comes down on

@@ -98,7 +98,7 @@ def _form(made: type, names: str, /, **given: Kind) -> Form:
 CONTACTS = {
     "touch": _form(tasks.Touch, "part thing weight"),
     "lean": _form(tasks.Lean, "on part side weight", part=SEGMENT),
-    "sit": _form(tasks.Sit, "on back pelvis trunk weight", pelvis=SEGMENT, trunk=SEGMENT),
+    "sit": _form(tasks.Sit, "on back pelvis trunk erect weight", pelvis=SEGMENT, trunk=SEGMENT),
     "grasp": _form(tasks.Grasp, "hand thing kind side opposed along approach weight", hand=Choice(("left", "right"))),
 }
 """Contacts; each is a goal and a constraint, by the table in which it stands."""
@@ -124,7 +124,7 @@ CONSTRAINTS = {
     "freeze": Form(_needed(joints=Several(GROUP)), lambda joints: tasks.Freeze(*joints)),
     "reach_cones": _form(tasks.ReachCones, "names", names=Several(kinds.CONE)),
     "range_of_motion": _form(tasks.RangeOfMotion, "names", names=Several(kinds.RANGE)),
-    "stand": _form(tasks.Stand, "on feet balance margin", feet=Several(SEGMENT)),
+    "stand": _form(tasks.Stand, "on feet balance margin knees", feet=Several(SEGMENT), knees=Several(SEGMENT)),
     **{name: replace(form, keys=form.keys[:-1]) for name, form in CONTACTS.items()},  # a constraint has no weight
 }
 
@@ -134,6 +134,7 @@ MEASURES = {
     "discomfort": _form(tasks.Discomfort, "weight"),
     "displacement": _form(tasks.Displacement, "weight"),
     "rhythm": _form(tasks.Rhythm, "weight"),
+    "stance": _form(tasks.Stance, "feet weight", feet=Several(SEGMENT)),
     "potential_energy": _form(tasks.PotentialEnergy, "weight"),
 }
 

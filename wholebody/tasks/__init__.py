@@ -16,7 +16,7 @@ from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
 from wholebody.tasks.rhythm import Rhythm
 from wholebody.tasks.sit import Sit
 from wholebody.tasks.soft import Soft
-from wholebody.tasks.stand import Stand
+from wholebody.tasks.stand import Stance, Stand
 from wholebody.tasks.touch import Lean, Touch
 
 __all__ = [
@@ -48,6 +48,7 @@ __all__ = [
     "RotationEffort",
     "Sit",
     "Soft",
+    "Stance",
     "Stand",
     "StepLimit",
     "Term",

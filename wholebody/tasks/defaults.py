@@ -19,19 +19,57 @@ from wholebody.tasks.frame import Hold
 from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
 from wholebody.tasks.rhythm import Rhythm, girdles_of
 from wholebody.tasks.sit import Sit
-from wholebody.tasks.stand import Stand
+from wholebody.tasks.stand import Stance, Stand
 from wholebody.tasks.touch import Lean
 
 FEET = ("left_foot", "right_foot")
 
+KNEELS = 0.05  # m, rad: a `Stand` that misses less at the start is of one who kneels there
+
 _effort = Effort()
 
 
-def default_measures(scene: Surroundings, start: Array, *, ranges: bool) -> tuple[Measure, ...]:
-    """`Effort`, and for a person `Rhythm` beside it, resolved."""
-    person = ranges and bool(scene.figure.ranges) and bool(girdles_of(scene.figure))
-    effort = _effort.resolve(scene, start)
-    return (effort, Rhythm().resolve(scene, start)) if person else (effort,)
+def default_measures(
+    scene: Surroundings, start: Array, stances: Sequence[tuple[str, ...]], *, ranges: bool
+) -> tuple[Measure, ...]:
+    """`Effort`, and for a person `Rhythm` beside it, resolved; and the `Stance` of each pair of feet that may slide.
+
+    Who kneels and does not at the start spares effort from the posture "kneeling" there.
+    """
+    if not (ranges and scene.figure.ranges and girdles_of(scene.figure)):
+        return (_effort.resolve(scene, start),)
+    shanks = {side for sides in stances for side in sides if side.endswith("_shank")}
+    rest = _kneeling(scene, start, shanks) if shanks else start
+    pairs = [feet for feet in stances if len(feet) == 2 and shanks.isdisjoint(feet)]
+    return tuple(measure.resolve(scene, rest) for measure in (_effort, Rhythm(), *map(Stance, pairs)))
+
+
+def stances(scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal]) -> tuple[tuple[str, ...], ...]:
+    """The feet of each that stands, but for those who kneel at the start."""
+
+    def kneels(stand: Stand) -> bool:
+        at_start = stand.value(State(scene.model).update(start))
+        return float(np.maximum(np.maximum(stand.lower - at_start, at_start - stand.upper), 0.0).max()) <= KNEELS
+
+    stand = (one for one in terms if isinstance(one, Stand))
+    return tuple(tuple(one.feet) for one in stand if not (one.knees and kneels(one)))
+
+
+def _kneeling(scene: Surroundings, start: Array, shanks: Set[str]) -> Array:
+    """The start (nq,) with the legs and the height of one who kneels on some shanks, upright and facing as there."""
+    figure, q = scene.figure, start.copy()
+    for body in {shank.removesuffix("shank").removesuffix("left_").removesuffix("right_") for shank in shanks}:
+        kneeling, sitting = (figure.posture(f"{body}{name}") for name in ("kneeling", "sitting"))
+        for side in ("left", "right"):
+            usual = kneeling if f"{body}{side}_shank" in shanks else sitting
+            places = [figure.model.joints[figure.joint_id(one)].idx_q for one in figure.groups[f"{body}{side}_leg"]]
+            q[places] = usual[places]
+        root = int(figure.model.joints[figure.roots[f"{body}root"]].idx_q) if f"{body}root" in figure.roots else None
+        if root is not None:
+            x, y, z, w = start[root + 3 : root + 7]
+            heading = 0.5 * np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+            q[root + 2 : root + 7] = kneeling[root + 2], 0.0, 0.0, np.sin(heading), np.cos(heading)
+    return np.asarray(q)
 
 
 def default_constraints(

@@ -15,12 +15,14 @@ from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.balance import STANDING_HEIGHT, STEADY, Feet, Margin, hull_corners, least_width
-from wholebody.tasks.base import Surroundings, filled
-from wholebody.tasks.contact_parts import Facing, Gap, Over, Part, TermOfParts, owner_pairs
+from wholebody.tasks.base import Measure, Surroundings, filled
+from wholebody.tasks.contact_parts import Facing, Gap, Over, Part, TermOfParts, between, owner_pairs, through
+from wholebody.tasks.distance import LEAST_CURVATURE
 from wholebody.tasks.sit import UP, upright
 from wholebody.tasks.surfaces import Surface, face, joined, outermost, segments_beyond, surface
 
 FLESH = 0.03  # m: how much farther ahead than the ankle a shin may be on which somebody kneels
+STANCE_WEIGHTS = np.array((60.0, 60.0, 4.0))  # of a `Stance`: 1/m^2, 1/m^2, 1/rad^2: ESTIMATE
 FAR_INSIDE = 1.0  # m: value of a row whose corner is no corner of the polygon
 
 
@@ -102,6 +104,67 @@ class Stand(TermOfParts):
 
     def _balanced(self) -> list[bool]:
         return [isinstance(part, SolePolygon) for part in self.parts for _ in part.in_radians]
+
+
+@dataclass(frozen=True, eq=False)
+class Stance(Measure):
+    """Squared distance of two feet from side by side, as far apart and turned as in the figure's first posture.
+
+    ``60 f^2 + 60 w^2 + 4 t^2``: f is by how much one foot is ahead of the other, w by how much their distance to the
+    side differs from that of the posture, each the mean of what either foot sees [m], t the sine of the angle between
+    them, likewise. A person of median size has 0.17 m in the posture, with parallel feet. People who stand as they like
+    have 0.165 m (standard deviation 0.038), or 0.203 m (0.046); for what the weights are, see docs/theory/person.md.
+
+    A person who stands by `Stand` on two feet has this measure by default.
+
+    Attributes:
+        feet: the two feet.
+        weight: factor on the measure.
+        places: of the two, once resolved.
+        rest: (3,) f, w and t in the posture.
+    """
+
+    feet: Feet = ("left_foot", "right_foot")
+    weight: inputs.Weight = 1.0
+    places: tuple[inputs.Place, inputs.Place] = field(init=False, repr=False)
+    rest: Array = field(init=False, repr=False)
+
+    def resolve(self, scene: Surroundings, start: Array) -> Stance:
+        """Find the feet, and how they are in the first posture."""
+        if len(self.feet) != 2:
+            raise InputError(f"Stance: feet has {len(self.feet)} names; give two")
+        places = tuple(inputs.find_place(scene, foot, "Stance") for foot in self.feet)
+        found = filled(self, places=places, rest=np.zeros(3))
+        return filled(found, rest=found.squares(upright(scene))[0] / np.sqrt(STANCE_WEIGHTS))
+
+    def value(self, state: State) -> float:
+        """The measure."""
+        residuals = self.squares(state)[0]
+        return float(residuals @ residuals)
+
+    def gradient(self, state: State) -> Array:
+        """(nv,) derivative."""
+        residuals, rows = self.squares(state)
+        return np.asarray(2.0 * residuals @ rows)
+
+    def curvature(self, state: State) -> Array:
+        """(nv,) row sums of the absolute second derivative of the squares, which bound it."""
+        steep = np.abs(self.squares(state)[1])
+        return np.asarray(2.0 * steep.sum(axis=1) @ steep + LEAST_CURVATURE)
+
+    def squares(self, state: State) -> tuple[Array, Array]:
+        """Residuals (3,) and their derivatives (3, nv)."""
+        (one, other), joints = (state.frame(place.frame) for place in self.places), [p.joint for p in self.places]
+        values, rows = np.zeros(3), np.zeros((3, state.model.nv))
+        for a, b, sign, (joint, against) in ((one, other, 0.5, joints[::-1]), (other, one, -0.5, joints)):
+            axes = sign * a.rotation[:, :2].T
+            values[:2] += axes @ (b.translation - a.translation)
+            rows[:2] += between(state, through(b.translation, axes), joint, against)
+        left, ahead = one.rotation[:, 1], other.rotation[:, 0]
+        values[2] = left @ ahead
+        rows[2] = between(state, np.append(np.zeros(3), np.cross(ahead, left))[None], joints[1], joints[0])[0]
+        factors = np.sqrt(STANCE_WEIGHTS)
+        return factors * (values - self.rest), factors[:, None] * rows
 
 
 def _knee(scene: Surroundings, place: inputs.Place, shank: str) -> Surface:

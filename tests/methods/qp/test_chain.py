@@ -112,7 +112,7 @@ def test_steps_are_those_of_the_textbook_method(arm, two_arms, turned):
             seeds, ends, asked = values[None].copy(), np.empty((1, 4)), np.array([1e-12, 1e-6, most, 1.0, 0.0])
             chain_kernel.reach(
                 chain.chain, chain.goals(entries), chain.room(6 if turned else 3), seeds,
-                np.array([values, np.zeros(len(values))]), asked, ends,
+                np.array([values, np.zeros(len(values))]), asked, np.zeros(1), ends,
             )  # fmt: skip
             q = chain.posture(seeds[0], start)
             textbook = DampedLeastSquares(iterations=most, tolerance=1e-9).solve(problem)
@@ -249,7 +249,14 @@ def test_wide_joints_end_the_shorter_way_round():
         seeds, ends = np.concatenate([*itertools.islice(chain.seeds(start, 0, 12), 2)]), np.empty((24, 4))
         asked = np.array([1e-9, 1e-6, 60.0, 24.0, 0.0])
         kernel.reach(
-            chain.chain, chain.goals([entry]), chain.room(3), seeds, np.array([start, np.ones(3)]), asked, ends
+            chain.chain,
+            chain.goals([entry]),
+            chain.room(3),
+            seeds,
+            np.array([start, np.ones(3)]),
+            asked,
+            np.zeros(24),
+            ends,
         )
         best = seeds[ends[:, 1].argmin()]
         assert np.isfinite(ends[:, 1].min())

@@ -108,7 +108,7 @@ def judge(arguments: argparse.Namespace) -> None:
     from wholebody.bench.suite.published.rebuilt import dumped
 
     out = arguments.out or arguments.answers.with_suffix(".verdict.json")
-    checked_target(out, "--out", "a verdict", (".json",))
+    checked_target(out, "--out", "a verdict", (".json",), [arguments.answers])
     verdict = judge(read_answers(arguments.answers, arguments.problems), arguments.problems)
     write_text(out, dumped(as_json(verdict)))
     console = Console()

@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     (file,) = arguments.files
     jobs_of(arguments)  # one case needs no jobs; what is wrong with them is said all the same
-    out = check_writable(check_ending(arguments.out or file.with_name(f"{file.stem}-free.npz")))
+    out = check_writable(check_ending(arguments.out or file.with_name(f"{file.stem}-free.npz")), [file])
     method, scene = _method(methods[0], arguments), put_on(scene_of(arguments), worn[0])
     clip = read_clip(file, scene.figure)
     with bar(clip.name) as tell:

@@ -75,7 +75,7 @@ def convert(arguments: argparse.Namespace) -> int:
     from wholebody.base.files import check_writable
     from wholebody.motion.files import check_ending
 
-    check_writable(check_ending(arguments.out, bare=arguments.bare))
+    check_writable(check_ending(arguments.out, bare=arguments.bare), [arguments.file])
     clip = clip_of(arguments)
     if arguments.dt is not None:
         clip = clip.resampled(arguments.dt)
@@ -93,7 +93,7 @@ Turn the motion of a skeleton (BVH, glTF, AMASS) into a clip of a figure of any 
 recorded, within joint limits, speed limits and reach cones, smooth, what rests held on the ground, in every frame
 free of itself and the floor. A table has the errors of bones; `wholebody clip check` says what is left, between frames
 too. A robot's .npz has the arrays that mjlab, BeyondMimic and GMR name. Several files are written into a folder; what
-it holds already is not made again. Without --out the last FILE is what is written.""",
+it holds already is not made again.""",
     *MOTIONS,
     option("--to", metavar="FIGURE", help="another name of --figure; a robot goes about freely"),
     option("--out", type=Path, metavar="OUT", help=".npz, .bvh, .csv, .txt or .glb; of several motions a folder"),
@@ -108,15 +108,13 @@ it holds already is not made again. Without --out the last FILE is what is writt
     *JOBS,
     epilog="""\
 examples:
-  wholebody clip retarget walk.bvh walk.npz --sex female --stature 1.62
+  wholebody clip retarget walk.bvh --out walk.npz --sex female --stature 1.62
   wholebody clip retarget walk.bvh --to g1.urdf --ground auto --out walk.npz
   wholebody clip retarget walk.bvh --to g1.urdf --rate 50 --bare --out walk.csv
   wholebody clip retarget walk.bvh run.bvh jump.bvh --out clips --jobs 4""",
 )
 def retarget_motions(arguments: argparse.Namespace) -> int:
     """Read, retarget and write."""
-    if arguments.out is None and len(arguments.files) > 1:
-        arguments.out = arguments.files.pop()
     _aim(arguments)
     if len(arguments.files) > 1:
         return _many(arguments)
@@ -125,7 +123,7 @@ def retarget_motions(arguments: argparse.Namespace) -> int:
     from wholebody.motion.reading import read_skeleton
     from wholebody.motion.retargeting import bone_errors, retarget
 
-    check_writable(check_ending(arguments.out, bare=arguments.bare))
+    check_writable(check_ending(arguments.out, bare=arguments.bare), arguments.files)
     motion = read_skeleton(arguments.files[0], unit=arguments.unit, up=arguments.up)
     figure = figure_of(arguments)
     with bar("retargeting") as tell:

@@ -10,6 +10,7 @@ from wholebody.cli.command import command, option
 
 NOTHING = "nothing"
 PICTURES = 8
+ENDINGS = (".glb", ".htm", ".html", ".mp4", ".gif", ".png")
 
 
 @command(
@@ -54,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     out: Path | None = arguments.out
     whole(arguments.pictures, "--pictures", 1, 100)
     if out is not None:
-        checked_target(out, "--out", "a clip's picture", (".glb", ".htm", ".html", ".mp4", ".gif", ".png"))
+        checked_target(out, "--out", "a clip's picture", ENDINGS, [arguments.file, arguments.ghost])
     clip = clip_of(arguments)
     ghost = None if arguments.ghost is None else read_clip(arguments.ghost, clip.figure)
     if ghost is not None and len(ghost) != len(clip):

@@ -20,8 +20,7 @@ from wholebody.base.pool import Pool
 from wholebody.figures.figure import Figure
 from wholebody.methods.control import Control
 from wholebody.methods.qp.chain_kernel import Goals
-from wholebody.methods.qp.closed_form import compiled_kernel as closed_form_kernel
-from wholebody.methods.qp.closed_form_kernel import BRANCHES
+from wholebody.methods.qp.closed_form import Branches
 from wholebody.methods.qp.multistart import Budget
 from wholebody.methods.qp.plain_chain import FIRST, NEARBY, Chains, PlainChain
 from wholebody.methods.qp.settings import SEEDS
@@ -30,8 +29,6 @@ from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
 from wholebody.tasks.distance import SquaredDistance
 from wholebody.terms.entries import RESIDUAL, Entry, entries_of, placement_floats
-
-GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
 class Met(NamedTuple):
@@ -77,7 +74,7 @@ def branches(figure: Figure, frame: str, placement: pin.SE3, at: Array) -> Array
     floats = [placement_floats(known.placement), np.zeros(12), placement.translation, placement.rotation.ravel()]
     goals = Goals(np.concatenate(floats)[None], np.zeros((1, 6), dtype=np.int64))
     near = chain.angles(at)
-    found = chain.branches(goals, np.array([near, np.ones_like(near)]))
+    found = chain.branches(goals, np.array([near, np.zeros_like(near)]))
     return np.array([chain.posture(values, at) for values in found.cheaper(np.inf)]).reshape(-1, model.nq)
 
 
@@ -111,125 +108,136 @@ def from_seeds(problem: Problem, workspace: Workspace, budget: Budget, control: 
         return None
     with chains_of(problem).borrow() as chains:
         chain = chains.carrying(entries)
-        return None if chain is None else _Seeded(problem, chain, entries, workspace, budget, control).run()
+        if chain is None:
+            return None
+        at = problem.scene.figure.clamp(problem.start)
+        distance = distance_of(problem, chain) if budget.measures else None
+        nearest = np.array([chain.angles(at if distance is None else distance.reference), np.zeros(len(chain.idx_v))])
+        if distance is not None:
+            nearest[1] = distance.weights[chain.idx_v]
+        asked = Asked(chain.goals(entries), at, nearest, problem.clearances)
+        rule = Rule.of(chain, asked.goals, budget, distance is not None)
+        return Descents(asked, chain, rule, workspace, budget, control).run()
 
 
-class _Seeded:
-    """Descents of one run from one batch of seeds after the other."""
+class Asked(NamedTuple):
+    """What a problem asks of a chain."""
+
+    goals: Goals
+    at: Array  # (nq,) its start, within limits
+    nearest: Array  # (2, n) posture from which the measure is a squared distance, and weights; zeros for none
+    clearances: Array  # (pairs,) metres
+
+
+class Descents:
+    """Descents of one problem from one batch of seeds after the other."""
 
     def __init__(
-        self, problem: Problem, chain: PlainChain, entries: list[Entry], workspace: Workspace, budget: Budget,
-        control: Control,
+        self, asked: Asked, chain: PlainChain, rule: Rule, workspace: Workspace, budget: Budget, control: Control
     ) -> None:  # fmt: skip
-        self.problem, self.chain, self.workspace, self.budget, self.control = problem, chain, workspace, budget, control
-        self.at = problem.scene.figure.clamp(problem.start)
-        self.start = chain.angles(self.at)
-        self.distance = distance_of(problem, chain, self.at) if budget.measures else None
-        self.nearest = np.zeros((2, len(self.start)))
-        self.nearest[0] = self.start
-        if self.distance is not None:
-            self.nearest[0] = chain.angles(self.distance.reference)
-            self.nearest[1] = self.distance.weights[chain.idx_v]
-        self.goals, self.rows = chain.goals(entries), sum(entry.rows for entry in entries)
-        self.exact = chain.is_exact(entries)
-        self.finite = self.exact and chain.held < 0  # ends are isolated, and the closed form has all of them
+        """Set up; `run` does it all."""
+        self.asked, self.chain, self.workspace, self.budget, self.control = asked, chain, workspace, budget, control
+        self.start, self.rule, self.measured = chain.angles(asked.at), rule, rule.measured
         self.trace: list[TraceEntry] = []
         self.least = np.inf  # effort of an end that does not keep its clearances
         self.blocked: Array | None = None
 
-    def run(self) -> Met | None:
-        """The answer of the batches in turn: the closed form's ends, its samples, and ends of random seeds."""
+    def run(self, first: tuple[Array, Array] | None = None) -> Met | None:
+        """The answer of the batches in turn: the closed form's ends, its samples, and ends of random seeds.
+
+        Args:
+            first: ends (k, n) of the first batch and what was found there (k, 4), where that was done already.
+        """
         if not self.budget.restarts:
-            return self._ended(self.start[None].copy())
-        more, q = 1 + self.budget.restarts_for_measure, None
-        if self.exact:
-            near = self.nearest
-            if self.distance is None:
-                near = np.array([self.start, np.ones_like(self.start)])
-            enough = 1 if self.finite else SEEDS.compared * more
-            met, branches = self._first_ended(near, enough), None
+            return self._ended(self.start[None].copy(), 1)
+        exact, finite, enough = self.rule[:3]
+        if exact:
+            ends, found = self._first_ended() if first is None else first
+            met, branches = self._chosen(ends, found), None
             if met is None and not self.control.over:
-                branches = self.chain.branches(self.goals, near)
-                met = self._ended(branches.least, enough)
-            if met is not None and not met.stationary and self.distance is not None:
-                met = self._along(met)
-            if met is None and self.finite:
+                branches = self._branches()
+                others = branches.least[len(ends) :]
+                met = self._ended(np.concatenate([ends[found[:, 2] < 0.0], others]), enough, others=True)
+            met = self._along(met)
+            if met is None and finite:
                 return self._nearest() if self._is_out_of_reach() else None
-            if (met is not None and met.blocked is None) or self.finite or self.control.over:
+            if (met is not None and met.blocked is None) or finite or self.control.over:
                 return met
             # What blocks an end may leave postures of its branch free. All samples meet the goals.
-            branches = branches or self.chain.branches(self.goals, near)
             most = np.inf if met is None else SEEDS.worth * self._effort(met.q)
-            samples = (self.chain.posture(each, self.at) for each in branches.cheaper(most))
-            q = next((each for each in samples if self._is_free(each)), None)
+            cheaper = (branches or self._branches()).cheaper(most)
+            free = next((each for each in cheaper if self._is_free(self.chain.posture(each, self.asked.at))), None)
+            if free is not None:
+                return self._to_the_edge(free)
             if met is not None:
-                return with_values(met, blocked=q)
-        for seeds in self.chain.seeds(self.start, self.budget.seed, SEEDS.together * more):
-            met = self._ended(seeds, SEEDS.compared * more)
-            if met is not None and not met.stationary and self.exact and self.distance is not None:
-                met = self._along(met)
+                return with_values(met, blocked=None)
+            first = None
+        for seeds in self.chain.seeds(self.start, self.budget.seed, self.rule.together):
+            if first is None:
+                met = self._along(self._ended(seeds, enough))
+            else:
+                (ends, found), first = first, None
+                met = self._chosen(ends, found)
+                if met is None and not self.control.over:
+                    seeds = np.concatenate([ends[found[:, 2] < 0.0], seeds[len(ends) :]])
+                    met = self._ended(seeds, enough, others=True)
             if met is not None or self.control.over:
                 return met
-            if q is not None:
-                return Met(q, tuple(self.trace), False)
         return None
+
+    def _branches(self) -> Branches:
+        return self.chain.branches(self.asked.goals, self.asked.nearest)
 
     def _is_out_of_reach(self) -> bool:
         """Whether all postures of six joints at the goal and at those nearby are beyond limits or far inside things."""
-        chain, problem = self.chain, self.problem
+        chain, (goals, at, _, clearances) = self.chain, self.asked
         if self.budget.tolerance > NEARBY:
             return False  # postures farther from the goal would do
-        found = chain.loosely_met(self.goals, self.budget.seed)
-        if len(found) and problem.scene.model.nv > len(self.start):
+        found = chain.loosely_met(goals, self.budget.seed)
+        if len(found) and self.workspace.model.nv > len(self.start):
             return False  # others may make room
-        for values in found:
-            near = self.workspace.near_views(chain.posture(values, self.at), float(problem.clearances.max(initial=0.0)))
-            if not (near.distance < problem.clearances[near.number] - SEEDS.deep).any():
-                return False
-        return True
+        deep = clearances - SEEDS.deep
+        return not any(is_free(self.workspace, chain.posture(values, at), deep) for values in found)
 
     def _nearest(self) -> Met:
         """Where descents from the first seeds come nearest to the goals with everything held: a few, which differ."""
         seeds = next(self.chain.seeds(self.start, self.budget.seed, SEEDS.together))
-        asked = self._asked(1)
-        asked[3:] = len(seeds), 0.0  # all of them, although some may meet the goals inside of things
-        given = self.goals.tables[None], self.goals, np.array([[self.nearest, self.nearest]]), asked
-        found, _ = self.chain.descents(*given, seeds[None], len(seeds))
+        # All of them, although some may meet the goals inside of things.
+        found, _ = self._descended(seeds, how_far(self.budget, len(seeds), others=True))
         values, near = list[Array](), list[Array]()
-        for k in found[0, :, 0].argsort():
+        for k in found[:, 0].argsort():
             differs = all(np.abs(seeds[k] - each).max() > SEEDS.differing for each in values)
-            if differs and self._is_free(q := self.chain.posture(seeds[k], self.at)):
+            if differs and self._is_free(q := self.chain.posture(seeds[k], self.asked.at)):
                 values.append(seeds[k])
                 near.append(q)
             if len(near) == SEEDS.near:
                 break
-        near = near or [self.at]
+        near = near or [self.asked.at]
         return Met(near[0], tuple(self.trace), False, near=tuple(near))
 
-    def _asked(self, enough: int) -> Array:
-        """See `chain_kernel.reach`."""
-        budget, enough = self.budget, enough if self.distance is not None else 1
-        return np.array([budget.tolerance, SEEDS.damping**2, min(budget.iterations, SEEDS.steps), enough, 1.0])
+    def _descended(self, seeds: Array, asked: Array) -> tuple[Array, int]:
+        """What is found (k, 4) from seeds (k, n), which become ends, and how many were taken."""
+        goals, _, nearest, _ = self.asked
+        found, counts = self.chain.descents(goals.tables[None], goals, nearest[None], asked, seeds[None], len(seeds))
+        return found[0, : counts[0]], int(counts[0])
 
-    def _first_ended(self, near: Array, enough: int) -> Met | None:
-        """What `_ended` leads to from the first of the closed form's branches, as near to a posture as they go."""
-        ends, nearest = np.empty((1, FIRST, len(self.start))), np.array([[near, self.nearest]])
-        found, counts = self.chain.descents(self.goals.tables[None], self.goals, nearest, self._asked(enough), ends)
-        count = int(counts[0])
-        return self._chosen(ends[0, :count], found[0, :count]) if count > 0 else None
+    def _first_ended(self) -> tuple[Array, Array]:
+        """Ends (k, n) of the closed form's branches, and what was found there (k, 4); empty for more than `FIRST`."""
+        goals, _, nearest, _ = self.asked
+        ends, asked = np.empty((1, FIRST, len(self.start))), how_far(self.budget, self.rule.enough)
+        found, counts = self.chain.descents(goals.tables[None], goals, nearest[None], asked, ends)
+        count = max(int(counts[0]), 0)
+        return ends[0, :count], found[0, :count]
 
-    def _ended(self, seeds: Array, enough: int = 1) -> Met | None:
+    def _ended(self, seeds: Array, enough: int, others: bool = False) -> Met | None:
         """The end of least effort that is free, of the first that meet the goals; None where none is."""
-        asked, nearest = self._asked(enough), np.array([[self.nearest, self.nearest]])
-        given = self.goals.tables[None], self.goals, nearest, asked
-        while count := len(seeds):
-            found, counts = self.chain.descents(*given, seeds[None], count)
-            taken = int(counts[0])
-            met = self._chosen(seeds[:taken], found[0, :taken])
+        while len(seeds):
+            found, taken = self._descended(seeds, how_far(self.budget, enough, others))
+            met = self._chosen(seeds[:taken], found)
             if met is not None or self.control.over:
                 return met
-            left = found[0, :taken, 2] < 0.0  # they have their turn where no end is free
-            seeds, asked[4] = np.concatenate([seeds[:taken][left], seeds[taken:]]), 0.0
+            left = found[:, 2] < 0.0  # they have their turn where no end is free
+            seeds, others = np.concatenate([seeds[:taken][left], seeds[taken:]]), True
         return None
 
     def _chosen(self, seeds: Array, found: Array) -> Met | None:
@@ -240,58 +248,80 @@ class _Seeded:
                 self.trace.append(TraceEntry(left, 0.0, 0.0, 0.0, "seed"))
                 self.control.tell(self.trace[-1])
         for effort, k in sorted((end[1], k) for k, end in enumerate(ends) if end[1] < np.inf):
-            q = chain.posture(seeds[k], self.at)
+            q = chain.posture(seeds[k], self.asked.at)
             if self._is_free(q):
-                known = bool(ends[k][2]) and (self.distance is not None or not self.budget.measures)
+                known = bool(ends[k][2]) and (self.measured or not self.budget.measures)
                 # Ends of a chain with as many joints as rows are isolated: no descent leads out of what blocks it.
-                free = len(self.start) > self.rows and self.least < SEEDS.worth * effort
+                free = len(self.start) > self.rule.rows and self.least < SEEDS.worth * effort
                 return Met(q, tuple(self.trace), known, self.blocked if free else None)
             self.least, self.blocked = (effort, q) if effort < self.least else (self.least, self.blocked)
         return None
 
-    def _along(self, met: Met) -> Met:
-        """An end near singular postures, which programs lead to no least effort from, led there along its branch.
-
-        By golden sections over the joint that the closed form holds, between the samples beside it.
-        """
-        chain = self.chain
-        values, spacing = chain.angles(met.q), np.ptp(chain.held_values(self.nearest[0])) / (SEEDS.samples - 1)
-        low, high = values[chain.held] + (-spacing, spacing)
-        best = values
-        inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)]
-        found = [self._nearest_branch(at, values) for at in inner]
-        while high - low > 1e-6:
-            lower = found[0][0] <= found[1][0]
-            low, high = (low, inner[1]) if lower else (inner[0], high)
-            at = high - GOLDEN * (high - low) if lower else low + GOLDEN * (high - low)
-            new = self._nearest_branch(at, values)
-            inner, found = ([at, inner[0]], [new, found[0]]) if lower else ([inner[1], at], [found[1], new])
-        effort, best = min(found, key=lambda each: each[0])
-        ended = self._ended(best[None].copy()) if effort < np.inf else None
+    def _along(self, met: Met | None) -> Met | None:
+        """An end near singular postures, which programs lead to no least effort from, led there along its branch."""
+        if met is None or met.stationary or not (self.rule.exact and self.measured):
+            return met
+        at = self.chain.angles(met.q)
+        values = None if self.rule.finite else self.chain.along(self.asked.goals, self.asked.nearest, at)
+        ended = None if values is None else self._ended(values[None], 1)
         if ended is not None and self._effort(ended.q) <= self._effort(met.q):
             met = with_values(met, q=ended.q)
         # Where not even this is stationary, branches cross; a descent finds hardly less in a hundred times the time.
         return with_values(met, trace=tuple(self.trace), stationary=True)
 
-    def _nearest_branch(self, held: float, near: Array) -> tuple[float, Array]:
-        """Effort and values (n,) of the branch nearest to others, with a value of the held joint; inf for none."""
-        chain = self.chain
-        found, effort = chain.angles_of(self.goals.tables[0], np.array([held])), np.empty((1, BRANCHES))
-        order = np.empty(BRANCHES, dtype=np.intp)
-        limits = chain.chain.lower, chain.chain.upper
-        count = closed_form_kernel().least(found[None], *limits, self.nearest, effort, order)
-        away = np.abs(found[order[:count]] - near).max(axis=1, initial=0.0)
-        if not count or away.min() > 1.0:
-            return np.inf, near
-        k = order[away.argmin()]
-        return float(effort[0, k]), found[k]
+    def _to_the_edge(self, values: Array) -> Met:
+        """From a free sample (n,) along its branch to the least effort, as far as all clearances are kept.
+
+        The branch is a curve: where something blocks it, the least effort that is free is at the edge, by bisection.
+        """
+        chain, (goals, at, nearest, _), trace = self.chain, self.asked, tuple(self.trace)
+        blocked = chain.along(goals, nearest, values) if self.measured else None
+        if blocked is None:
+            return Met(chain.posture(values, at), trace, not self.budget.measures)
+        if self._is_free(q := chain.posture(blocked, at)):
+            return Met(q, trace, True)
+        end = float(blocked[chain.held])
+        while abs(end - values[chain.held]) > 1e-6:
+            half = 0.5 * (end + float(values[chain.held]))
+            middle = chain.beside(goals, nearest, half, values)
+            if middle is not None and self._is_free(chain.posture(middle, at)):
+                values = middle
+            else:  # blocked, or beyond limits
+                end = half
+        return Met(chain.posture(values, at), trace, True)
 
     def _effort(self, q: Array) -> float:
-        away = self.chain.angles(q) - self.nearest[0]
-        return float(self.nearest[1].dot(away * away))
+        away = self.chain.angles(q) - self.asked.nearest[0]
+        return float(self.asked.nearest[1].dot(away * away))
 
     def _is_free(self, q: Array) -> bool:
-        return is_free(self.workspace, q, self.problem.clearances)
+        return is_free(self.workspace, q, self.asked.clearances)
+
+
+def how_far(budget: Budget, enough: int, others: bool = False) -> Array:
+    """Numbers (5,) of `chain_kernel.reach`; `others`: those too that will take more effort than what is found."""
+    steps = min(budget.iterations, SEEDS.steps)
+    return np.array([budget.tolerance, SEEDS.damping**2, steps, enough, 0.0 if others else 1.0])
+
+
+class Rule(NamedTuple):
+    """How the first batch of seeds is descended from."""
+
+    exact: bool  # whether it is of the branches of a closed form
+    finite: bool  # whether ends are isolated too, and the closed form has all of them
+    enough: int  # ends that meet the goals
+    rows: int  # of the goals
+    together: int  # seeds of a batch of random ones
+    measured: bool  # whether ends are compared by a measure
+
+    @classmethod
+    def of(cls, chain: PlainChain, goals: Goals, budget: Budget, measured: bool) -> Rule:
+        """The rule for problems with such goals."""
+        exact, more = chain.is_exact(goals), 1 + budget.restarts_for_measure
+        finite = exact and chain.held < 0
+        enough = 1 if finite or not measured else SEEDS.compared * more
+        rows = sum(3 * int(each[3] + each[4]) for each in goals.entries)
+        return cls(exact, finite, enough, rows, SEEDS.together * more, measured)
 
 
 def is_free(workspace: Workspace, q: Array, clearances: Array) -> bool:
@@ -300,7 +330,7 @@ def is_free(workspace: Workspace, q: Array, clearances: Array) -> bool:
     return not len(near.number) or not (near.distance < clearances[near.number]).any()
 
 
-def distance_of(problem: Problem, chain: PlainChain, at: Array) -> SquaredDistance | None:
+def distance_of(problem: Problem, chain: PlainChain) -> SquaredDistance | None:
     """The measure, where it is one squared distance that the other joints cannot reduce; else None."""
     measures = problem.measures
     if len(measures) != 1 or type(measures[0]) not in (tasks.Effort, tasks.Displacement):
@@ -312,5 +342,6 @@ def distance_of(problem: Problem, chain: PlainChain, at: Array) -> SquaredDistan
     weights[chain.idx_v] = 0.0
     if not weights.any():
         return distance
+    at = problem.scene.figure.clamp(problem.start)
     rest = weights * pin.difference(problem.scene.model, distance.reference, at)
     return None if rest.any() else distance

@@ -16,6 +16,8 @@ from wholebody.terms.residual_kernel import residuals
 TURN = 2.0 * np.pi
 CLEARLY, NEAR = 1.25, 0.3
 """An end of less than this many radians or metres away is left where it will take this many times another's effort."""
+HARDLY = 1.6
+"""A seed is left from which about this many times another's effort is expected."""
 
 
 class Chain(NamedTuple):
@@ -49,7 +51,9 @@ class Room(NamedTuple):
 
 
 @compiled(error_model="numpy")
-def reach(chain: Chain, goals: Goals, room: Room, seeds: Array, nearest: Array, asked: Array, found: Array) -> int:
+def reach(
+    chain: Chain, goals: Goals, room: Room, seeds: Array, nearest: Array, asked: Array, expected: Array, found: Array
+) -> int:  # fmt: skip
     """Descend from seeds, one after the other, and minimise the effort where the goals are met.
 
     Args:
@@ -61,6 +65,7 @@ def reach(chain: Chain, goals: Goals, room: Room, seeds: Array, nearest: Array, 
         asked: (5,) norm of all errors at which the goals are met, metres and radians; damping of a step at the goals,
             squared; most steps; how many ends that meet the goals are enough; 1 where those that will clearly take more
             effort than others may be left.
+        expected: (k,) effort that the descent from each seed will about lead to; 0 where nothing is known.
         found: (k, 4) written: norm of the errors at an end; its effort, inf where goals are not met; 1 if the effort is
             stationary there or not asked for, -1 where a descent was left for an end of less effort; steps.
 
@@ -73,7 +78,15 @@ def reach(chain: Chain, goals: Goals, room: Room, seeds: Array, nearest: Array, 
         weighed = weighed or weight > 0.0
     for k in range(len(seeds)):
         q = seeds[k]
-        steps = _descend(chain, goals, room, q, tolerance, asked[1], most)
+        if weighed and asked[4] > 0.0 and expected[k] > HARDLY * best:
+            found[k, 0], found[k, 1], found[k, 2], found[k, 3] = np.inf, np.inf, -1.0, 0.0
+            enough -= 1.0
+            if enough <= 0.0:
+                return k + 1
+            continue
+        # Programs for the least effort remove what is left of errors too, where they have a way to go.
+        done = 1e-3 * tolerance if weighed and len(q) > len(room.value) else 0.0
+        steps = _descend(chain, goals, room, q, (tolerance, done), asked[1], most)
         left = _norm(room.value)
         found[k, 0], found[k, 1], found[k, 2], found[k, 3] = left, np.inf, 1.0, steps
         if not left <= tolerance:
@@ -98,23 +111,24 @@ def reach(chain: Chain, goals: Goals, room: Room, seeds: Array, nearest: Array, 
 
 @compiled(inner=True, error_model="numpy")
 def _descend(
-    chain: Chain, goals: Goals, room: Room, q: Array, tolerance: float, damping: float, most: int
+    chain: Chain, goals: Goals, room: Room, q: Array, near: tuple[float, float], damping: float, most: int
 ) -> int:  # fmt: skip
     """Step by damped least squares until the errors of the goals are as small as they get, or hardly fall.
 
     Sugihara 2011, "Solvability-Unconcerned Inverse Kinematics by the Levenberg-Marquardt Method", IEEE Transactions on
-    Robotics 27(5): the damping is half of the squared error. Joints stop at their limits.
+    Robotics 27(5): the damping is half of the squared error. Joints stop at their limits. `near` has the norms of the
+    errors at which the goals are met, and at which no more steps are taken.
 
     Returns:
         Steps taken; `room.value` has the errors at the end.
     """
     size, rows = len(q), len(room.value)
     right, system, dq = np.empty(rows), np.empty((rows, rows)), np.empty(size)
-    before, marked = np.inf, np.inf
+    before, marked, (tolerance, done) = np.inf, np.inf, near
     for count in range(most + 1):
         evaluate(chain, goals, room, q)
         left = _norm(room.value)
-        if count == most or left == 0.0 or (left <= tolerance and count and left > 0.5 * before):
+        if count == most or left <= done or (left <= tolerance and count and left > 0.5 * before):
             return count
         before = left
         if count % 4 == 0:

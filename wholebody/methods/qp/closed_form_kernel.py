@@ -267,25 +267,60 @@ def _target(arm: Arm, goal: Array, frame: Array, target: Array) -> None:
 
 
 @compiled(error_model="numpy")
-def least(found: Array, lower: Array, upper: Array, nearest: Array, effort: Array, order: Indices) -> int:
+def sampled(
+    arm: Arm, goal: Array, limits: tuple[Array, Array], nearest: Array, found: Array, effort: Array, order: Indices
+) -> int:  # fmt: skip
     """Which postures within limits take less effort than the samples beside them in their branch, the least first.
 
+    Samples are those of the joint that is held, all over its limits, but not farther than half a turn from a posture.
+
     Args:
-        found: (v, 8, n) angles, NaN for none; turned by whole turns to where they are within limits and nearest to a
-            posture. Samples that are a little beyond limits are clamped to them.
-        lower: (n,) limits.
-        upper: (n,) limits.
-        nearest: (2, n) the posture, and weights of the effort ``sum w (q - nearest)^2``.
+        arm: the axes.
+        goal: (36,) as in `branches`.
+        limits: (n,) lower and upper ones of the joints.
+        nearest: (2, n) the posture, and weights of the effort ``sum w (q - nearest)^2``; where these are zero, ones.
+        found: (v, 8, n) written: angles, NaN for none; turned by whole turns to where they are within limits and
+            nearest to the posture. Samples that are a little beyond limits are clamped to them.
         effort: (v, 8) written; inf for a posture that does not exist or is nowhere within limits.
-        order: (v * 8,) written: their places in the flattened first two axes.
+        order: (v * 8,) written: places in the flattened first two axes of `found`.
 
     Returns:
         How many there are.
     """
+    (lower, upper), near, values = limits, nearest.copy(), np.zeros(len(found))
+    weighed = False
+    for weight in nearest[1]:
+        weighed = weighed or weight > 0.0
+    if not weighed:
+        near[1] = 1.0
+    if arm.held >= 0:
+        joint = arm.joints[arm.held]
+        low, high = max(lower[joint], near[0, joint] - np.pi), min(upper[joint], near[0, joint] + np.pi)
+        for v in range(len(values)):
+            values[v] = low + (high - low) * v / (len(values) - 1)
+    branches(arm, goal, values, found)
+    return _least(found, lower, upper, near, effort, order)
+
+
+@compiled(inner=True, error_model="numpy")
+def foreseen(effort: Array, v: int, b: int) -> float:
+    """Least effort of the parabola through a sample and those beside it in its branch; 0 at an end of the branch."""
+    if v == 0 or v + 1 == len(effort):
+        return 0.0
+    before, own, after = effort[v - 1, b], effort[v, b], effort[v + 1, b]
+    bent = before - 2.0 * own + after
+    if not 0.0 < bent < np.inf:
+        return 0.0
+    return float(own - 0.125 * (after - before) ** 2 / bent)
+
+
+@compiled(inner=True, error_model="numpy")
+def _least(found: Array, lower: Array, upper: Array, nearest: Array, effort: Array, order: Indices) -> int:
+    """See `sampled`."""
     count, number = 0, len(found)
     for b in range(BRANCHES):
         for v in range(number):
-            effort[v, b] = _within(found[v, b], lower, upper, nearest, BETWEEN if number > 1 else SLACK)
+            effort[v, b] = within(found[v, b], lower, upper, nearest, BETWEEN if number > 1 else SLACK)
         for v in range(number):
             own = effort[v, b]
             if own == np.inf or (v > 0 and effort[v - 1, b] <= own) or (v + 1 < number and effort[v + 1, b] < own):
@@ -300,7 +335,8 @@ def least(found: Array, lower: Array, upper: Array, nearest: Array, effort: Arra
 
 
 @compiled(inner=True, error_model="numpy")
-def _within(q: Array, lower: Array, upper: Array, nearest: Array, slack: float) -> float:
+def within(q: Array, lower: Array, upper: Array, nearest: Array, slack: float) -> float:
+    """Turn angles (n,) by whole turns to within limits and near to a posture; the effort, inf for none."""
     effort = 0.0
     for i in range(len(q)):
         angle = q[i] + FULL * np.floor((nearest[0, i] - q[i]) / FULL + 0.5)

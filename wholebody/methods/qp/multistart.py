@@ -27,6 +27,7 @@ from wholebody.methods.starts import Minima, hooked_hands, restarts, throughout
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
+from wholebody.tasks.distance import Effort
 from wholebody.terms.linearisation import Lineariser
 
 
@@ -119,6 +120,8 @@ class Multistart:
         """The attempts in their order; each is decided on when those before it failed."""
         start, state = self._start, self.lineariser.state
         yield Attempt([begin], self._directly, "directly")
+        rests = (term.distance.reference for term in self.problem.measures if type(term) is Effort)
+        yield Attempt((q for q in rests if (q != start).any()), self._directly, "from the posture of least effort")
         self._first = len(self.trace)
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
         least = least_left(self.contradictions)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.figures.description import Limits
+from wholebody.methods.qp import branch_kernel
 from wholebody.methods.qp.chain_kernel import Chain, Goals, Room
 from wholebody.methods.qp.closed_form import Branches, closed_form
 from wholebody.methods.qp.closed_form import compiled_kernel as closed_form_kernel
@@ -24,7 +25,6 @@ NEARBY = 1e-3  # m, rad
 FIRST = 16  # ends of a closed form's branches that the compiled loop has room for
 _NO_ARM = Arm(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, dtype=np.intp), -1, CROSSING, 0, np.zeros((4, 3)), SLACK)
 _ONE = np.zeros(1)
-_SHARES = np.linspace(0.0, 1.0, SEEDS.samples)
 
 
 class PlainChain:
@@ -33,6 +33,9 @@ class PlainChain:
     Attributes:
         chain: the arrays.
         idx_v: (n,) place of each joint in the tangent.
+        arm: the arm that they are, None where it has no closed form.
+        held: the joint that the closed form holds; -1 for none.
+        samples: how many values of it are looked at, and how many where none of these is within limits.
     """
 
     def __init__(self, model: pin.Model, limits: Limits, joints: tuple[int, ...]) -> None:
@@ -61,6 +64,7 @@ class PlainChain:
         self._rooms: dict[int, Room] = {}
         self.arm = closed_form(self.chain)
         self.held = -1 if self.arm is None or self.arm.held < 0 else int(self.arm.joints[self.arm.held])
+        self.samples = (1, 1) if self.held < 0 else (SEEDS.samples, SEEDS.finer)
 
     def angles(self, q: Array) -> Array:
         """Values (..., n) of the joints at postures (..., nq)."""
@@ -100,17 +104,37 @@ class PlainChain:
         return self._rooms[rows]
 
     def branches(self, goals: Goals, nearest: Array) -> Branches:
-        """The branches of the closed form for the placement of one frame; `nearest` as in `chain_kernel.reach`.
+        """The branches of the closed form for the placement of one frame; `nearest` as in `closed_form_kernel.sampled`.
 
         With six joints these are all postures. With seven they are samples, where one joint has values all over its
-        limits, but not farther than half a turn from the nearest posture.
+        limits, but not farther than half a turn from the nearest posture: more where none of a few is within limits.
         """
+        count = 0
+        for samples in self.samples:
+            if not count:
+                found, effort = np.empty((samples, BRANCHES, len(self.idx_v))), np.empty((samples, BRANCHES))
+                order = np.empty(effort.size, dtype=np.intp)
+                count = closed_form_kernel().sampled(
+                    self.arm, goals.tables[0], (self.chain.lower, self.chain.upper), nearest, found, effort, order
+                )
+        values = found.reshape(-1, len(self.idx_v))
+        return Branches(values, effort.ravel(), values[order[:count]])
+
+    def along(self, goals: Goals, nearest: Array, values: Array) -> Array | None:
+        """Values (n,) of the least effort between the samples beside others of a branch; None where there are none."""
         assert self.arm is not None
-        lower, upper, values = self.chain.lower, self.chain.upper, self.held_values(nearest[0])
-        found, effort = self.angles_of(goals.tables[0], values), np.empty((len(values), BRANCHES))
-        order = np.empty(effort.size, dtype=np.intp)
-        count = closed_form_kernel().least(found.reshape(*effort.shape, -1), lower, upper, nearest, effort, order)
-        return Branches(found, effort.ravel(), found[order[:count]])
+        found, near, held = values.copy(), nearest[0, self.held], self.held
+        turn = min(self.chain.upper[held], near + np.pi) - max(self.chain.lower[held], near - np.pi)
+        spacing, limits = turn / (SEEDS.samples - 1), (self.chain.lower, self.chain.upper)
+        effort = branch_kernel.along(self.arm, goals.tables[0], limits, nearest, spacing, found)
+        return found if effort < np.inf else None
+
+    def beside(self, goals: Goals, nearest: Array, value: float, values: Array) -> Array | None:
+        """The branch (n,) nearest to values (n,) where the joint that is held has a value; None where there is none."""
+        assert self.arm is not None
+        found, limits = np.empty_like(values), (self.chain.lower, self.chain.upper)
+        effort = branch_kernel.beside(self.arm, goals.tables[0], limits, nearest, value, values, found)
+        return found if effort < np.inf else None
 
     def loosely_met(self, goals: Goals, seed: int) -> Array:
         """Postures (k, n) that six joints meet a placement or one nearby with, or nearly so; none is a proof.
@@ -134,18 +158,9 @@ class PlainChain:
             found.append(middle + np.clip(away[within], -half, half))
         return np.concatenate(found)
 
-    def is_exact(self, entries: Sequence[Entry]) -> bool:
+    def is_exact(self, goals: Goals) -> bool:
         """Whether the goals are one placement of a frame that the closed form has the postures of."""
-        return self.arm is not None and [entry.integers[1:] for entry in entries] == [(0, 1, 1, 0)]
-
-    def held_values(self, nearest: Array) -> Array:
-        """Values (v,) of the joint that the closed form holds, not farther than half a turn from values (n,)."""
-        if (held := self.held) < 0:
-            return _ONE
-        near = nearest[held]
-        low, high = max(self.chain.lower[held], near - np.pi), min(self.chain.upper[held], near + np.pi)
-        values: Array = low + (high - low) * _SHARES
-        return values
+        return self.arm is not None and goals.entries[:, 2:].tolist() == [[0, 1, 1, 0]]
 
     def descents(
         self, tables: Array, goals: Goals, nearest: Array, asked: Array, ends: Array, seeds: int = 0
@@ -155,7 +170,7 @@ class PlainChain:
         Args:
             tables: (k, e, 36) floats of the goals.
             goals: of one of them.
-            nearest: (k, 2, 2, n) see `chain_batch_kernel.reach_all`.
+            nearest: (k, 2, n) see `chain_kernel.reach`.
             asked: (5,) see `chain_kernel.reach`.
             ends: (k, m, n) seeds where there are given ones; written.
             seeds: how many; 0 for the branches.
@@ -164,11 +179,10 @@ class PlainChain:
             What was found (k, m, 4) at the ends, and how many there are (k,); -1 for more than there is room for.
         """
         room = self.room(sum(3 * int(each[3] + each[4]) for each in goals.entries))
-        held = np.array([self.held_values(each) for each in nearest[:, 0, 0]])
         found, counts = np.empty((*ends.shape[:2], 4)), np.full(len(ends), seeds)
         arm = _NO_ARM if seeds or self.arm is None else self.arm
         compiled_kernel().reach_all(
-            (self.chain, arm, room), asked, (tables, goals.entries), held, nearest, ends, found, counts
+            (self.chain, arm, room), asked, (tables, goals.entries), self.samples, nearest, ends, found, counts
         )
         return found, counts
 
@@ -252,6 +266,6 @@ def compiled_kernel() -> Any:
     chain, room = _small_chain()
     chain_batch_kernel.reach_all(
         (chain, _NO_ARM, room), np.zeros(5), (np.zeros((0, 0, 36)), np.zeros((0, 6), dtype=np.int64)),
-        np.zeros((0, 1)), np.zeros((0, 2, 2, 1)), np.zeros((0, 1, 1)), np.zeros((0, 1, 4)), np.zeros(0, dtype=np.intp),
+        (1, 1), np.zeros((0, 2, 1)), np.zeros((0, 1, 1)), np.zeros((0, 1, 4)), np.zeros(0, dtype=np.intp),
     )  # fmt: skip
     return chain_batch_kernel

@@ -102,6 +102,7 @@ class SeedNumbers(NamedTuple):
     batches: int = 25  # most. More: fewer problems are left to the slower search, which then begins later.
     compared: int = 5  # ends of which the one of least effort is taken. More: less effort, more time.
     samples: int = 24  # values of the joint of seven that a closed form holds. More: less effort, more time.
+    finer: int = 96  # the same where no posture of these is within limits. More: random seeds are tried less often.
     worth: float = 0.9  # share of the effort of an answer below which a rejected end is descended from too
     near: int = 3  # ends near goals that no posture meets from which the nearest is sought. More: nearer, more time.
     differing: float = 0.1  # rad or m by which these differ

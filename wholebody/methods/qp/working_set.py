@@ -40,9 +40,6 @@ class WorkingSet:
             key: (k,) names of its elastic rows.
         """
         answer = self._corrected(program, key) if self.solver.hot_start else None
-        if answer is None and self.solver.hot_start and self.held is not None:
-            self.reset()  # the last set may have led astray
-            answer = self._corrected(program, key)
         if answer is None:
             answer = self.solver.solve(program)
         self.held = np.array([answer.active.lower, answer.active.upper])
