@@ -90,6 +90,7 @@ def test_terms_are_those_that_python_makes(everything: wb.taskfile.Task) -> None
             wb.PotentialEnergy(0.01),
             wb.Rhythm(2.0),
             wb.RotationEffort(3.0),
+            wb.Stance(weight=4.0),
         ],
     )
     q = pin.integrate(problem.scene.model, problem.start, np.linspace(-0.1, 0.1, 55))

@@ -28,7 +28,6 @@ from wholebody.scene.scene import Scene
 from wholebody.taskfile.reading import Contents, Entry, read_contents
 from wholebody.taskfile.where import Where
 from wholebody.tasks import Soft
-from wholebody.tasks.defaults import default_measures
 
 _OF_BODIES = ("density", "mass", "material", "velocity", "angular_velocity", "joints")
 
@@ -93,9 +92,9 @@ def task_from(contents: Contents, file: Path) -> Task:
     terms = {name: _terms(contents, name, scene, start) for name in ("goal", "constraint", "measure")}
     if soft := [term for term in terms["goal"] if isinstance(term, Soft)]:
         terms["goal"] = [term for term in terms["goal"] if not isinstance(term, Soft)]
-        ranges = options.get("range_of_motion", True)
-        terms["measure"] = [*(terms["measure"] or default_measures(scene, start, ranges=ranges)), *soft]
     options |= {f"{name}s": found for name, found in terms.items() if found}
+    if soft:
+        options["measures"] = [*(terms["measure"] or Problem(scene, start, **options).measures), *soft]
     with contents.top.where.named():
         problem = Problem(scene, start, **options)
     method = contents.one("method")
