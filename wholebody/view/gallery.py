@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from wholebody.base.files import Scratch, read_text, write
+from wholebody.view.page import player
 from wholebody.view.templates import render
 
 LONGEST = 600.0  # s: of one script
@@ -79,6 +80,8 @@ def write_gallery(
 ) -> list[Exhibit]:
     """Run scripts one after the other, and write one page that opens in any browser without a network.
 
+    The player of the scenes is in it once.
+
     Args:
         scripts: files, each with a docstring and an option --out.
         path: of the page.
@@ -88,5 +91,7 @@ def write_gallery(
     for script in scripts:
         made.append(exhibit(script))
         say(made[-1])
-    write(path, render("gallery.html", exhibits=made))
+    slot = "<!-- player -->"
+    shown = [each._replace(scene=each.scene.replace(player(), slot)) for each in made]
+    write(path, render("gallery.html", exhibits=shown, player=player(), slot=slot))
     return made
