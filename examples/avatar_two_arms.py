@@ -9,7 +9,7 @@ from presenting import command_line, film, report_frames
 
 import wholebody as wb
 from wholebody.tracking import Recording, Track, follow
-from wholebody.tracking.scripts import script
+from wholebody.tracking.scenes import script
 
 WALL = 1.2  # m: distance of the wall in front of the avatar's start
 REACHING = {"shoulder_flexion": 85.0, "elbow_flexion": 12.0, "shoulder_abduction": 10.0, "wrist_flexion": -35.0}

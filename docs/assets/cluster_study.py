@@ -1,4 +1,5 @@
-"""A study of 20,000 cases on a dask cluster, with a live table; run again after a kill, it goes on from what its folder has.
+# ruff: noqa: T201
+"""A study of 20,000 cases on a dask cluster, with a live table. Run again after a kill, it goes on from its folder.
 
 python cluster_study.py                                        # two workers on this machine
 python cluster_study.py --cluster tcp://10.0.0.1:8786          # a scheduler that is there

@@ -21,8 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.base.arrays import Array
-from wholebody.base.records import as_dict, with_values
+from wholebody.base.arrays import Array, as_dict, with_values
 from wholebody.bench.rows import Row
 from wholebody.bench.rows import report as tables_of
 from wholebody.bench.suite.problem_sets.registry import NAMED, SETS

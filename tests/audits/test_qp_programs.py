@@ -13,8 +13,8 @@ import pytest
 from tests.audits.qp_programs import files
 from tests.audits.qp_programs.measuring import measure, residuals, summaries
 from tests.audits.qp_programs.recording import Recorded, record
+from wholebody.base.arrays import with_values
 from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
-from wholebody.base.records import with_values
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.registry import make_solver, solver_names
 

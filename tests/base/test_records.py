@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import pytest
 
-from wholebody.base.records import as_dict, with_values
+from wholebody.base.arrays import as_dict, with_values
 
 
 class Interval(NamedTuple):

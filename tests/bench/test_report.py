@@ -26,22 +26,18 @@ def test_a_table_has_a_rule_for_every_column(path: Path) -> None:
             assert head.count("|") == rule.count("|"), head
 
 
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setattr(report, "_environment", report._environment.__wrapped__)
-    return tmp_path
+def test_empty_lines_beside_each_other_become_one(tmp_path: Path) -> None:
+    (tmp_path / "some.md.jinja").write_text(
+        "\n\n{% for k in counts %}\n- {{ k }}\n{% endfor %}\n\n\n\n{{ text }}  \n\n"
+    )
+    assert render("some.md", tmp_path, counts=[1, 2], text="end") == "- 1\n- 2\n\nend"
 
 
-def test_empty_lines_beside_each_other_become_one(folder: Path) -> None:
-    (folder / "some.md.jinja").write_text("\n\n{% for k in counts %}\n- {{ k }}\n{% endfor %}\n\n\n\n{{ text }}  \n\n")
-    assert render("some.md", folder, counts=[1, 2], text="end") == "- 1\n- 2\n\nend"
-
-
-def test_a_name_without_a_value_is_an_error_and_pages_are_escaped(folder: Path) -> None:
-    (folder / "some.html.jinja").write_text("<p>{{ text }}</p>")
-    assert render("some.html", folder, text="<goals>") == "<p>&lt;goals&gt;</p>"
+def test_a_name_without_a_value_is_an_error_and_pages_are_escaped(tmp_path: Path) -> None:
+    (tmp_path / "some.html.jinja").write_text("<p>{{ text }}</p>")
+    assert render("some.html", tmp_path, text="<goals>") == "<p>&lt;goals&gt;</p>"
     with pytest.raises(jinja2.UndefinedError, match="text"):
-        render("some.html", folder)
+        render("some.html", tmp_path)
 
 
 def test_numbers_that_are_not_finite_are_left_out() -> None:

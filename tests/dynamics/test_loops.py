@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from tests.reference import contact_program as clear
-from wholebody.base.records import with_values
+from wholebody.base.arrays import with_values
 from wholebody.dynamics import energy_kernel, impact_kernel, motion_kernel, passing, rows_kernel, solve_kernel
 from wholebody.dynamics.motion_kernel import Bodies
 from wholebody.dynamics.pieces import ContactPoints, SweptPoints

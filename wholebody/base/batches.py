@@ -14,8 +14,8 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager
 from multiprocessing.connection import wait
 from typing import Any, TypeVar
 
+from wholebody.base.arrays import with_values
 from wholebody.base.errors import InputError, MissingPackageError, WholebodyError, one_line
-from wholebody.base.records import with_values
 from wholebody.base.runner import ONE_THREAD, Child, EndedError, Job, Outcome, end_with, interrupt_ignored, run_jobs
 from wholebody.version import __version__
 

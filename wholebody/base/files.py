@@ -17,12 +17,16 @@ import tempfile
 import time
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from wholebody.base import checks
 from wholebody.base.errors import FileFormatError, InputError, one_line
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 LARGEST_TEXT = 10_000_000  # bytes of a file that people write by hand, such as a task
 LARGEST = 1_000_000_000  # bytes of any other file, such as a mesh or a recorded track
@@ -85,6 +89,20 @@ def packaged_table(path: Path) -> tuple[dict[str, str], ...]:
     """The rows of a CSV file of the package, each a mapping from column to text; a line that begins with # is none."""
     with path.open(encoding="utf-8", newline="") as file:
         return tuple(csv.DictReader(line for line in file if not line.startswith("#")))
+
+
+@cache
+def templates(folder: Path) -> Environment:
+    """The templates of a folder, which jinja2 fills in; values are escaped in pages (`.html.jinja`)."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
+
+    return Environment(
+        loader=FileSystemLoader(folder),
+        autoescape=select_autoescape(["html.jinja"]),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
 
 
 def parsed_toml(text: str, name: str) -> dict[str, Any]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from functools import cache
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from wholebody.base.files import templates
 from wholebody.bench.statistics import Interval
 from wholebody.bench.tables import sentence
 
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 TEMPLATES = Path(__file__).parent / "templates"
 
 
-def render(name: str, templates: Path = TEMPLATES, /, **values: Any) -> str:
+def render(name: str, folder: Path = TEMPLATES, /, **values: Any) -> str:
     """Fill in a template of a folder, named without its last suffix; empty lines beside each other become one."""
     lines: list[str] = []
-    for line in _environment(templates).get_template(f"{name}.jinja").render(values).strip().split("\n"):
+    for line in _environment(folder).get_template(f"{name}.jinja").render(values).strip().split("\n"):
         if line.strip() or (lines and lines[-1]):
             lines.append(line.rstrip())
     return "\n".join(lines)
@@ -51,17 +51,8 @@ def _within(svg: Path, caption: str) -> str:
     return f"<figure>{drawn}<figcaption>{caption}</figcaption></figure>"
 
 
-@cache
-def _environment(templates: Path) -> Environment:
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
-
-    made = Environment(
-        loader=FileSystemLoader(templates),
-        autoescape=select_autoescape(["html.jinja"]),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+def _environment(folder: Path) -> Environment:
+    made = templates(folder)
     made.filters |= {
         "f": formatted,
         "measured": sentence,

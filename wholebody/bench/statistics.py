@@ -13,8 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array
-from wholebody.base.records import with_values
+from wholebody.base.arrays import Array, with_values
 
 RESAMPLES = 2000  # of a bootstrap: the ends of its intervals then vary by about 3 % of their width
 LEVEL = 0.95

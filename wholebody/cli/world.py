@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wholebody.cli.arguments import check_overlaps, scene_names, scene_options
-from wholebody.cli.command import command, flag
+from wholebody.cli.command import command, flag, option
 
 if TYPE_CHECKING:
     from wholebody.bench.rows import Row
@@ -30,11 +30,18 @@ without a network).""",
         "out/world",
     ),
     flag("--picture", "draw five moments too, by a headless Chromium"),
+    flag("--live", "open a page instead: drag handles and things with the mouse, and throw them (needs viser)"),
+    option("--port", type=int, default=8080, metavar="N", help="of the live page (default: 8080)"),
+    option("--udp", type=int, metavar="N", help="port at which places of handles arrive for the live page"),
     epilog="""\
+--live runs the scene in a browser without its script: the figure follows its handles, a thing that is let go flies on.
+Datagrams to the port of --udp move handles too: {"head_top": [0.1, 0.0, 1.7], "right_palm": [0.4, -0.2, 1.1]}, metres.
+
 examples:
   wholebody world --list
   wholebody world flick
   wholebody world my_task.toml --frames 300
+  wholebody world room --live --udp 9870
   wholebody world all --out out/world
 exit code: 1 if pieces were deeper in each other than 0.1 mm after a frame, or a collision could not be avoided""",
 )
@@ -50,6 +57,8 @@ def run(arguments: argparse.Namespace) -> int:
     if not names:
         return 0
     check_overlaps([arguments.overlap])
+    if arguments.live:
+        return _live(_scene(names[0], arguments), arguments)
     make_folder(arguments.out)
     check_writable(arguments.out / f"{Path(names[0]).stem}.csv")
     facts = machine()
@@ -58,6 +67,27 @@ def run(arguments: argparse.Namespace) -> int:
     write_text(arguments.out / "world.md", world_report(rows, facts) + "\n")
     print(f"wrote {arguments.out}")
     return 0 if all(row["deepest mm"] <= 0.1 and not row["not avoided"] for row in rows) else 1  # mm
+
+
+def _live(scene: InteractionScene, arguments: argparse.Namespace) -> int:
+    """Let figure and things be dragged in a browser until Ctrl-C."""
+    from wholebody.dynamics.live_world import LiveWorld
+    from wholebody.tracking.receiver import Receiver
+    from wholebody.view.live_page import LivePage
+
+    live = LiveWorld(scene.scene, scene.track.q[0])
+    receiver = None if arguments.udp is None else Receiver(arguments.udp, live.handles)
+    page = LivePage(live, arguments.out, arguments.port, places=None if receiver is None else receiver.latest)
+    print(f"drag handles and things at {page.url}; Ctrl-C ends", flush=True)
+    try:
+        page.wait()
+    except KeyboardInterrupt:
+        pass
+    finally:
+        page.stop()
+        if receiver is not None:
+            receiver.close()
+    return 0
 
 
 def _scene(name: str, arguments: argparse.Namespace) -> InteractionScene:

@@ -10,9 +10,8 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array, brief
+from wholebody.base.arrays import Array, brief, with_values
 from wholebody.base.errors import InputError
-from wholebody.base.records import with_values
 from wholebody.geometry.placement import placement
 
 

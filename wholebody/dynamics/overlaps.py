@@ -21,6 +21,8 @@ class Overlap(NamedTuple):
             half of it where both may.
         pairs: number of overlapping pairs of pieces.
         point: (3,) in the world, between the two surfaces where they overlap most.
+        deepest: metres there. PD_g is much shorter where the normals of several pairs cancel.
+        pieces: numbers of the first's and the second's piece there.
     """
 
     first: str
@@ -30,6 +32,8 @@ class Overlap(NamedTuple):
     moves_second: Array
     pairs: int
     point: Array
+    deepest: float
+    pieces: tuple[int, int]
 
 
 def overlaps(scene: Scene, q: Array) -> tuple[Overlap, ...]:
@@ -44,7 +48,7 @@ def overlaps(scene: Scene, q: Array) -> tuple[Overlap, ...]:
     def whole(owner: str) -> str:
         return owner if owner in objects and objects[owner].segment is None else figure
 
-    found: dict[tuple[str, str], list[tuple[float, Array, Array]]] = {}
+    found: dict[tuple[str, str], list[tuple[float, Array, Array, tuple[int, int]]]] = {}
     middle = 0.5 * (near.point_a + near.point_b)
     for (i, j), distance, normal, point in zip(
         near.pair.tolist(), near.distance.tolist(), near.normal, middle, strict=True
@@ -52,14 +56,16 @@ def overlaps(scene: Scene, q: Array) -> tuple[Overlap, ...]:
         first, second = whole(owners[i]), whole(owners[j])
         if first == second:
             continue
-        key, out = ((first, second), -normal) if first == figure or second != figure else ((second, first), normal)
-        found.setdefault(key, []).append((-distance, out, point))
+        if first == figure or second != figure:
+            found.setdefault((first, second), []).append((-distance, -normal, point, (i, j)))
+        else:
+            found.setdefault((second, first), []).append((-distance, normal, point, (j, i)))
     made = []
     for (first, second), pairs in found.items():
-        depth = global_depth(np.array([d for d, _, _ in pairs]), np.array([n for _, n, _ in pairs]))
+        depth = global_depth(np.array([pair[0] for pair in pairs]), np.array([pair[1] for pair in pairs]))
         free = [name == figure or objects[name].body is not None for name in (first, second)]
         share = 0.5 if all(free) else 1.0
-        deepest = max(pairs, key=lambda pair: pair[0])[2]
+        deepest, _, point, pieces = max(pairs, key=lambda pair: pair[0])
         moves = share * free[0] * depth, -share * free[1] * depth
-        made.append(Overlap(first, second, depth, *moves, len(pairs), deepest))
+        made.append(Overlap(first, second, depth, *moves, len(pairs), point, deepest, pieces))
     return tuple(sorted(made, key=lambda one: -float(np.linalg.norm(one.depth))))

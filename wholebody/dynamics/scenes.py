@@ -15,7 +15,7 @@ from wholebody.base.checks import posture, whole
 from wholebody.base.errors import InputError
 from wholebody.scene.scene import Scene
 from wholebody.tracking.frame import FRAME
-from wholebody.tracking.scripts import InteractionScene, SceneFile
+from wholebody.tracking.scenes import InteractionScene, SceneFile
 from wholebody.tracking.tracks import MOST_FRAMES, Track
 
 _FILE = SceneFile(Path(__file__).with_name("scenes.toml"))

@@ -7,8 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.base.records import with_values
+from wholebody.base.arrays import Array, Indices, Mask, with_values
 from wholebody.dynamics import (
     energy_kernel,
     impact_kernel,

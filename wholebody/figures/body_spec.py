@@ -14,9 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, with_values
 from wholebody.base.errors import InputError
-from wholebody.base.records import with_values
 from wholebody.figures.anthropometry import Person
 
 

@@ -10,10 +10,9 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, as_dict
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.pool import Pool
-from wholebody.base.records import as_dict
 from wholebody.figures.body_spec import geometry_of
 from wholebody.figures.description import Description, followers_of, is_root, limits_of
 from wholebody.figures.grounding import grounded

@@ -10,9 +10,8 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.base.errors import InputError
-from wholebody.base.records import with_values
 from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, ExcludedPair, Member
 from wholebody.figures.motion_ranges import CoupledRange, EllipticRange, MotionRange
 from wholebody.figures.self_pairs import carriers_above

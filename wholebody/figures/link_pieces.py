@@ -12,11 +12,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import known, shown
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Range
-from wholebody.base.records import with_values
 from wholebody.geometry.convex import HULL_VERTICES, coacd_version, convex_pieces, mesh_hull
 from wholebody.geometry.hull import hull_piece
 from wholebody.geometry.mesh_cache import ConvexPieces, cached

@@ -8,9 +8,8 @@ from functools import partial
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, with_values
 from wholebody.base.errors import InputError
-from wholebody.base.records import with_values
 from wholebody.figures.description import Articulated, Chain, Description, ExcludedPair, is_root
 from wholebody.figures.motion_ranges import CoupledRange, EllipticRange, MotionRange
 from wholebody.figures.self_pairs import drop_pairs

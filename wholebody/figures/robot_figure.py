@@ -13,10 +13,9 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError, InputError, WholebodyError
-from wholebody.base.records import with_values
 from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, JointCone
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, LinkShape, link_pieces

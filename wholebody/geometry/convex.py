@@ -13,10 +13,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, with_values
 from wholebody.base.errors import InputError, MissingPackageError
 from wholebody.base.fields import Range
-from wholebody.base.records import with_values
 from wholebody.geometry.components import (
     Component,
     closed_up,

@@ -21,9 +21,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.base.arrays import with_values
 from wholebody.base.errors import InputError
 from wholebody.base.files import write
-from wholebody.base.records import with_values
 from wholebody.geometry.hull import coal_convex
 from wholebody.geometry.pieces import Piece
 from wholebody.version import __version__

@@ -11,10 +11,9 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import posture, time_step
 from wholebody.base.errors import InputError
-from wholebody.base.records import with_values
 from wholebody.methods.control import Progress
 from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.problem import Problem

@@ -16,9 +16,9 @@ from types import MappingProxyType
 import numpy as np
 import pinocchio as pin
 
+from wholebody.base.arrays import with_values
 from wholebody.base.checks import a, flag, function, instance, listed, shown, warn
 from wholebody.base.errors import InputError, UndefinedTermError, UnknownNameError
-from wholebody.base.records import with_values
 from wholebody.methods.control import ctrl_c_ends_all
 from wholebody.motion.avoider import Avoider, MethodResult, Progress, Run, Watch, has_setting
 from wholebody.motion.checking import ClipCheck, check, same_joints

@@ -17,8 +17,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg import solveh_banded
 
-from wholebody.base.arrays import Array
-from wholebody.base.records import with_values
+from wholebody.base.arrays import Array, with_values
 from wholebody.figures.figure import Figure
 from wholebody.motion.held_points import HeldPoint, Holds
 from wholebody.motion.posture_fit import Fitter, Goals, Layout

@@ -10,10 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices, Mask, with_values
 from wholebody.base.errors import InputError
 from wholebody.base.files import checked_target
-from wholebody.base.records import with_values
 from wholebody.motion.footholds import RestLimits, resting, speeds
 from wholebody.motion.roles import ROLES, skeleton_roles
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from wholebody.base.arrays import as_dict
 from wholebody.base.batches import shared
-from wholebody.base.records import as_dict
 from wholebody.base.runner import Job
 from wholebody.problem import Problem
 from wholebody.studies.records import JUDGED

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from wholebody.base import checks
+from wholebody.base.arrays import with_values
 from wholebody.base.checks import shown
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.files import is_file
-from wholebody.base.records import with_values
 from wholebody.geometry.placement import placement
 from wholebody.methods import METHODS
 from wholebody.problem import Problem

@@ -10,12 +10,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, as_dict
 from wholebody.base.checks import instance, posture
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, one_line
 from wholebody.base.files import checked_target, read_text, write
-from wholebody.base.records import as_dict
 from wholebody.figures.state import State
 from wholebody.geometry.placement import FARTHEST
 from wholebody.solution import Solution

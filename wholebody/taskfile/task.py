@@ -12,10 +12,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.base.arrays import with_values
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import UnknownNameError
 from wholebody.base.files import is_file, is_folder, title_of
-from wholebody.base.records import with_values
 from wholebody.figures import Figure, join, load
 from wholebody.figures.joined import member
 from wholebody.geometry.placement import placement

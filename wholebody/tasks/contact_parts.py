@@ -14,8 +14,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Mask
-from wholebody.base.records import with_values
+from wholebody.base.arrays import Array, Mask, with_values
 from wholebody.figures.state import State
 from wholebody.tasks.axis import equidistant_error, equidistant_jacobian
 from wholebody.tasks.base import Constraint, Goal, SupportingPlanes, filled

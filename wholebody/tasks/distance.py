@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
-from wholebody.base.records import with_values
+from wholebody.base.arrays import Array, with_values
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Measure, Surroundings, filled

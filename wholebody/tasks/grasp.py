@@ -8,11 +8,10 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import shown
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Range, called
-from wholebody.base.records import with_values
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across

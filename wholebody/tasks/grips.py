@@ -17,9 +17,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, with_values
 from wholebody.base.errors import InputError
-from wholebody.base.records import with_values
 from wholebody.figures.state import State
 from wholebody.geometry.hull import coal_convex
 from wholebody.geometry.pieces import swept_points

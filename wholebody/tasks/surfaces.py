@@ -13,10 +13,9 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import shown
 from wholebody.base.errors import InputError, UnknownNameError
-from wholebody.base.records import with_values
 from wholebody.figures.link_pieces import drawn_pieces
 from wholebody.figures.state import State
 from wholebody.geometry.pieces import SweptPoints, swept_points

@@ -7,10 +7,9 @@ from dataclasses import KW_ONLY, dataclass, field
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import shown
 from wholebody.base.errors import InputError
-from wholebody.base.records import with_values
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across

@@ -14,9 +14,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody import tasks
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, with_values
 from wholebody.base.errors import TermError
-from wholebody.base.records import with_values
 from wholebody.figures.description import Limits
 from wholebody.figures.state import State, Wrench, extended_columns, free_roots, root_freedoms
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure

@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from wholebody.tracking.loop import FrameLoop, follow
     from wholebody.tracking.paths import circle, read_path, spread
     from wholebody.tracking.recording import Judgement, Recording, judge
-    from wholebody.tracking.scenes import SCENES, build_scene, gallery
-    from wholebody.tracking.scripts import InteractionScene
+    from wholebody.tracking.scenes import SCENES, InteractionScene, build_scene, gallery
     from wholebody.tracking.track_files import read_track, write_track
     from wholebody.tracking.tracks import Track, posed
 
@@ -52,8 +51,7 @@ __getattr__, __dir__ = exported(
         "wholebody.tracking.loop": "FrameLoop follow",
         "wholebody.tracking.paths": "circle read_path spread",
         "wholebody.tracking.recording": "Judgement Recording judge",
-        "wholebody.tracking.scenes": "SCENES build_scene gallery",
-        "wholebody.tracking.scripts": "InteractionScene",
+        "wholebody.tracking.scenes": "SCENES InteractionScene build_scene gallery",
         "wholebody.tracking.track_files": "read_track write_track",
         "wholebody.tracking.tracks": "Track posed",
     },

@@ -8,10 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import time_step, warn
 from wholebody.base.errors import InputError
-from wholebody.base.records import with_values
 from wholebody.figures.figure import Figure
 from wholebody.tracking.tracks import Track, check_figure
 

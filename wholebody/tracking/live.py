@@ -11,10 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import known, numbers, shown
 from wholebody.base.errors import InputError, WholebodyError
-from wholebody.base.records import with_values
 from wholebody.methods import installed_methods
 from wholebody.methods.base import Method
 from wholebody.methods.newton.assembly import Assembly

@@ -16,10 +16,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import array, flag, function, instance, known, listed, time_step
 from wholebody.base.errors import InputError
-from wholebody.base.records import with_values
 from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.geometry.proximity import PENETRATION

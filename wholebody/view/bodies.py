@@ -292,6 +292,12 @@ class Bodies:
         chosen = [index for index in solid if (self.all[index].thing is not None) == things]
         return self._boxes(chosen, data).reshape(-1, 3)
 
+    def beyond(self, data: Any, index: int, start: Array, direction: Array) -> float:
+        """How far the box around a piece extends from a point (3,) along a unit vector (3,), metres; 0 of a plate."""
+        if self.all[index].plate:
+            return 0.0
+        return max(0.0, float(((self._boxes([index], data)[0] - start) @ direction).max()))
+
     def tops(self, data: Any) -> dict[str, tuple[str, Array]]:
         """Labels of things: by node, the name and the top middle (3,) of its boxes; no half-spaces."""
         found: dict[str, list[Array]] = {}
@@ -336,3 +342,23 @@ def _own_color(piece: Any) -> Color:
 def node(name: str) -> str:
     """A name as a node of the page's tree, where a slash would begin a child."""
     return name.replace("/", "|")
+
+
+def scene_glb(scene: ViewedScene, bodies: Bodies, postures: Array, dt: float, title: str) -> bytes:
+    """What `bodies` draw of a scene at postures (n, nq), `dt` seconds apart: y up, z forward, metres.
+
+    A node `joint NAME` is each joint, a node `piece NAME` each piece; of half-spaces a square is written.
+    """
+    from wholebody.motion.files.gltf import JointTree
+
+    tree = JointTree(scene.model, postures, dt)
+    for figure in bodies.drawn:
+        if isinstance(figure.visual, Skin):
+            name = figure.prefix.strip("/") or str(scene.figure.name)
+            tree.skin(name, figure.visual.surface, figure.visual.places, figure.prefix, figure.color)
+        else:
+            tree.visuals(figure.visual.drawn, figure.prefix, figure.color)
+    for index, (piece, body) in enumerate(zip(scene.geometry.geometryObjects, bodies.all, strict=True)):
+        if not bodies.hidden(index):
+            tree.piece(f"piece {piece.name}", body.joint, piece.placement.homogeneous, piece.geometry, body.color)
+    return tree.builder.glb(title)

@@ -92,7 +92,7 @@ class Composition:
             asked = float(problem.clearances.max(initial=0.0))
             near = self.scene.contacts(q, within=asked + self._contact_distance)
             mark_blockers(keyframe, self.scene, state, near, blockers)
-        mark_overlaps(keyframe, overlaps)
+        mark_overlaps(keyframe, bodies, state.data, overlaps)
         mark_frames(keyframe, self.scene, state, self._frames, self._axes)
         if self._names:
             for path, (name, top) in bodies.tops(state.data).items():

@@ -18,7 +18,8 @@ from wholebody.view.scene_graph import Keyframe, Marker
 from wholebody.view.style import LOOK
 from wholebody.view.viewed_scene import ViewedScene
 
-_DEPTH = Marker("arrow", LOOK.depth, 1.3)
+_DEPTH, _GLOBAL = Marker("arrow", LOOK.depth, 1.3), Marker("arrow", LOOK.global_depth, 1.3)
+_CANCELLED = 0.1  # of the deepest overlap: a shorter PD_g has no use as a direction
 
 
 def color_contacts(keyframe: Keyframe, bodies: Bodies, contacts: Any) -> None:
@@ -65,21 +66,35 @@ def checked_overlaps(given: object, what: str) -> list[Overlap]:
     return [checks.instance(one, Overlap, what, "give those of a WorldFrame") for one in found]
 
 
-def mark_overlaps(keyframe: Keyframe, overlaps: Sequence[Overlap]) -> None:
-    """Draw PD_g of every two objects: an arrow for each of them that may move, and its length in words.
+def mark_overlaps(keyframe: Keyframe, bodies: Bodies, data: Any, overlaps: Sequence[Overlap]) -> None:
+    """Draw PD_g of every two objects, and its length in words.
 
-    Where both may move, each arrow has half of it, but at least `LOOK.shortest_depth`.
+    An arrow for each of the two that may move begins where its piece ends; dashes lead there from where the two overlap
+    most. Where both may move, each arrow has half of PD_g, but at least `LOOK.shortest_depth`. A ball is drawn where
+    PD_g is much shorter than the deepest overlap, since the normals of several pairs cancel. `data` is Pinocchio's, at
+    the posture.
     """
     for number, one in enumerate(overlaps):
-        root = f"{LOOK.contact_node}/overlap {number}"
-        for name, move in (("first", one.moves_first), ("second", one.moves_second)):
+        root, depth = f"{LOOK.contact_node}/overlap {number}", float(np.linalg.norm(one.depth))
+        moves = (one.moves_first, one.moves_second)
+        cancelled = depth < _CANCELLED * one.deepest and one.pairs > 1
+        for name, move, piece in zip(("first", "second"), moves, one.pieces, strict=True):
             length = float(np.linalg.norm(move))
-            if length > 1e-9:  # m: shorter moves are none
-                shown = max(length, LOOK.shortest_depth)
-                place = drawing.arrow_placement(one.point, move / length, shown)
-                keyframe.markers[f"{root}/{name}"] = (_DEPTH, place)
-        text = f"{one.first} and {one.second}: {1e3 * float(np.linalg.norm(one.depth)):.1f} mm"
-        label = Marker("label", LOOK.depth_label, LOOK.label_size, text)
+            if length < 1e-9 or cancelled:  # m: shorter moves are none
+                continue
+            way = move / length
+            start = one.point + bodies.beyond(data, piece, one.point, way) * way
+            place = drawing.arrow_placement(start, way, max(length, LOOK.shortest_depth))
+            keyframe.markers[f"{root}/{name}"] = (_GLOBAL, place)
+            line = drawing.rod_placement(one.point, start, LOOK.line_radius)
+            if line is not None:
+                keyframe.markers[f"{root}/{name} inside"] = (Marker("dashes", LOOK.global_depth), line)
+        text = f"PD_g of {one.first} and {one.second}: {1e3 * depth:.1f} mm"
+        if cancelled:
+            ball = Marker("ball", LOOK.global_depth, LOOK.blocker_radius)
+            keyframe.markers[f"{root}/cancelled"] = (ball, drawing.point_placement(one.point))
+            text += f", cancels; {1e3 * one.deepest:.1f} mm deep"
+        label = Marker("label", LOOK.global_depth_label, LOOK.label_size, text)
         keyframe.markers[f"{root}/text"] = (label, drawing.point_placement(one.point))
 
 

@@ -213,6 +213,14 @@ def rod(name: str, color: tuple[float, float, float]) -> Three:
     return _mesh(name, shape, _overlay((*color, 1.0)), matrix=middle, order=5)
 
 
+def dashes(name: str, color: tuple[float, float, float]) -> Three:
+    """A rod of radius 1 and length 1 along z from the origin, in four dashes."""
+    one = np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]]) * (1.0, 0.14)  # a dash from the top down
+    outline = np.concatenate([one + (0.0, start) for start in (0.75, 0.5, 0.25, 0.0)])
+    vertices, faces, normals = revolved(outline, np.broadcast_to([1.0, 0.0], outline.shape), 12)
+    return _mesh(name, _triangles(vertices, faces, normals), _overlay((*color, 1.0)), order=5)
+
+
 def ball(name: str, color: tuple[float, float, float], radius: float) -> Three:
     """A small ball."""
     return _mesh(name, _ball(radius), _overlay((*color, 1.0)), order=7)

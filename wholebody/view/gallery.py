@@ -12,9 +12,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from wholebody.base.files import Scratch, read_text, write
+from wholebody.base.files import Scratch, read_text, templates, write
 from wholebody.view.page import player
-from wholebody.view.templates import render
 
 LONGEST = 600.0  # s: of one script
 
@@ -91,7 +90,6 @@ def write_gallery(
     for script in scripts:
         made.append(exhibit(script))
         say(made[-1])
-    slot = "<!-- player -->"
-    shown = [each._replace(scene=each.scene.replace(player(), slot)) for each in made]
-    write(path, render("gallery.html", exhibits=shown, player=player(), slot=slot))
+    page = templates(Path(__file__).parent).get_template("gallery.html.jinja")
+    write(path, page.render(exhibits=made, player=player(), slot="<!-- player -->"))
     return made

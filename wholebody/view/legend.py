@@ -25,8 +25,9 @@ def legend(keyframes: Sequence[Keyframe]) -> list[tuple[str, Any]]:
     marked = (  # end of a marker's node, its folder, its colour and its meaning
         ("/normal", LOOK.contact_node, LOOK.normal, "normal of a contact"),
         ("/depth", LOOK.contact_node, LOOK.depth, "way out of an overlap"),
-        ("/first", LOOK.contact_node, LOOK.depth, "way out of an overlap"),
-        ("/second", LOOK.contact_node, LOOK.depth, "way out of an overlap"),
+        ("/first", LOOK.contact_node, LOOK.global_depth, "global penetration depth PD_g"),
+        ("/second", LOOK.contact_node, LOOK.global_depth, "global penetration depth PD_g"),
+        ("/cancelled", LOOK.contact_node, LOOK.global_depth, "global penetration depth PD_g"),
         ("/target", LOOK.goal_node, LOOK.target, "goal, and the way to it"),
         ("/wanted", LOOK.goal_node, LOOK.target, "goal, and the way to it"),
         ("/ball", LOOK.blocker_node, LOOK.blocker, "in the way"),

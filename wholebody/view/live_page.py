@@ -14,30 +14,41 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import WholebodyError
+from wholebody.dynamics.live_world import LiveWorld
 from wholebody.motion.files.gltf import triangles
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.live import LiveDrag, LiveFrame
+from wholebody.view.style import LOOK
 from wholebody.view.viser_server import viser_server
 
 STILL = 1e-5  # m, rad: what moves less is not sent
 
 
 class LivePage:
-    """Shows a live drag in browsers until it is stopped.
+    """Shows a live drag, or a live world, in browsers until it is stopped.
 
     Attributes:
-        drag: what is dragged.
+        drag: what is dragged. Frames of a world are made whether something is dragged or not.
         url: where browsers find the page.
         server: the viser.ViserServer.
         frames: frames that were made.
     """
 
-    def __init__(self, drag: LiveDrag, save_to: Path, port: int = 8080, save: Callable[[Path], Path] | None = None):
+    def __init__(
+        self,
+        drag: LiveDrag | LiveWorld,
+        save_to: Path,
+        port: int = 8080,
+        save: Callable[[Path], Path] | None = None,
+        places: Callable[[], Mapping[str, Array]] | None = None,
+    ) -> None:
         """Open the page at the port, or the next free one; its button "save" writes the posture to `save_to`.
+
+        `places` are asked for before every frame of a world: where handles are to follow from outside.
 
         Raises MissingPackageError where viser is not installed.
         """
-        self.drag, self.frames = drag, 0
+        self.drag, self.frames, self._places = drag, 0, places
         self._save_to, self._save = save_to, save
         self._lock = threading.RLock()
         self._target: Any = None
@@ -84,7 +95,10 @@ class LivePage:
         pieces = []
         for number, piece in enumerate(scene.geometry.geometryObjects):
             thing = scene.objects.get(scene.piece_owner[number])
-            color = (214, 180, 150) if thing is None else _bytes(thing.color, number)
+            given = None if thing is None else thing.color
+            if given is None and type(piece.geometry).__name__ == "Halfspace":
+                given = LOOK.floor
+            color = (214, 180, 150) if thing is None else _bytes(given, number)
             # opacity of the figure, so that the handles in it are seen
             opacity = 0.7 if thing is None else None if thing.color is None else thing.color[3]
             mesh = triangles(piece.geometry)
@@ -116,7 +130,10 @@ class LivePage:
                 if event.phase == "start":
                     offset = self.drag.place(name) - np.array(event.start_position)
                 self._target = np.array(event.end_position) + offset
-                if event.phase == "end":
+                if event.phase == "end" and isinstance(self.drag, LiveWorld):
+                    self.drag.let_go()  # what was thrown flies on
+                    self._target = None
+                elif event.phase == "end":
                     # frames after the mouse lets go in which the figure still follows to where it
                     # let go
                     self._settling = 90
@@ -145,7 +162,8 @@ class LivePage:
         for name in self.drag.handles:
             self._boxes[name] = gui.add_checkbox(f"hold {name}", name in self.drag.held)
             self._boxes[name].on_update(partial(self._ticked, name))
-        gui.add_button("undo").on_click(self._undo)
+        again = "start again" if isinstance(self.drag, LiveWorld) else "undo"
+        gui.add_button(again).on_click(self._undo)
         if self._save is not None:
             gui.add_button(f"save as {self._save_to.name}").on_click(self._write)
 
@@ -178,9 +196,19 @@ class LivePage:
         while not self._stopped.is_set():
             began = time.perf_counter()
             with self._lock:
-                if self._target is not None and (self._target is not self._reached):
+                if isinstance(self.drag, LiveWorld):
+                    self.go_on(self.drag)
+                elif self._target is not None and (self._target is not self._reached):
                     self.follow(self._target)
             self._stopped.wait(max(FRAME - (time.perf_counter() - began), 0.001))
+
+    def go_on(self, world: LiveWorld) -> None:
+        """Make one frame of a world and show it."""
+        if self._places is not None:
+            world.follow(self._places())
+        frame = world.move(self._target)
+        self.frames += 1
+        self._show(frame)
 
     def follow(self, target: Any) -> LiveFrame:
         """Make one frame towards a place (3,) of the mouse, and show it, with the way within it."""

@@ -22,7 +22,7 @@ class Marker:
     """A small object drawn on top of the picture. It is made once and then only moved.
 
     Attributes:
-        kind: "arrow", "rod", "ball" or "label".
+        kind: "arrow", "rod", "dashes", "ball" or "label".
         color: red, green, blue; of a label, its CSS colour.
         size: of an arrow its width relative to the usual, of a ball its radius, of a label its height.
         text: of a label.
@@ -157,6 +157,8 @@ class SceneGraph:
             self.put(path, drawing.arrow(path, marker.color, marker.size))
         elif marker.kind == "rod":
             self.put(path, drawing.rod(path, marker.color))
+        elif marker.kind == "dashes":
+            self.put(path, drawing.dashes(path, marker.color))
         else:
             self.put(path, drawing.ball(path, marker.color, marker.size))
 

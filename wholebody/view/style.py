@@ -35,6 +35,7 @@ class Style:
     normal: Mark = (0.13, 0.36, 0.60)
     witness: Mark = (0.10, 0.22, 0.38)
     depth: Mark = (0.34, 0.00, 0.14)
+    global_depth: Mark = (0.86, 0.05, 0.58)
     target: Mark = (0.10, 0.62, 0.33)
     blocker: Mark = (0.47, 0.15, 0.64)
     axes: tuple[Mark, Mark, Mark] = ((0.85, 0.22, 0.20), (0.22, 0.65, 0.28), (0.20, 0.40, 0.85))
@@ -42,6 +43,7 @@ class Style:
     goal_label: str = "#0d6b38"
     depth_label: str = "#a30023"
     blocker_label: str = "#6a1b9a"
+    global_depth_label: str = "#a3005f"
 
     normal_length: float = 0.09
     widest_arrow: float = 0.12  # an arrow up to this long keeps its proportions, a longer one keeps this one's width

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from wholebody.base.checks import instance
 from wholebody.base.errors import InputError
-from wholebody.base.files import Scratch
+from wholebody.base.files import Scratch, templates
 from wholebody.motion.checking import ClipCheck
 from wholebody.motion.clip_contacts import Contact
 from wholebody.scene.scene import Scene
-from wholebody.view.templates import render
 from wholebody.view.viewer import Viewer
 
 MOST_POSTURES = 1200
@@ -41,7 +41,8 @@ def timeline(found: ClipCheck, scene: Scene | None = None) -> str:
         viewer.play(clip.q[::every], clip.dt * every)
         page = viewer.save(folder / "clip.html").read_text("utf-8")
     data = _json(_data(found))
-    return render("timeline.html", check=found, clip=clip, contacts=found.contacts, data=data, page=page)
+    page_of = templates(Path(__file__).parent).get_template("timeline.html.jinja")
+    return page_of.render(check=found, clip=clip, contacts=found.contacts, data=data, page=page)
 
 
 def _data(found: ClipCheck) -> dict[str, Any]:

@@ -23,6 +23,7 @@ from wholebody.dynamics.overlaps import Overlap
 from wholebody.geometry.placement import FARTHEST
 from wholebody.problem import Problem
 from wholebody.view import commands
+from wholebody.view.bodies import scene_glb
 from wholebody.view.composition import Composition
 from wholebody.view.contact_markers import checked_overlaps
 from wholebody.view.legend import panel
@@ -303,8 +304,6 @@ class Viewer:
         if place.suffix.lower() == ".png":
             return self.picture(place)
         if place.suffix.lower() == ".glb":
-            from wholebody.view.gltf import scene_glb
-
             postures, dt = self._motion or (np.array(self._seen[:1]), 1.0)
             return write(place, scene_glb(self._composition.scene, self._composition.bodies, postures, dt, self.title))
         return write(place, static_page(drawn, self.title))

@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.reference.second_order import curvature, stays_above
 from wholebody import InputError
 from wholebody.base.arrays import Array
 from wholebody.geometry.continuous import sweep as module
@@ -177,17 +178,17 @@ def test_bounds_hold_for_every_point() -> None:
         q0 = pin.integrate(arena.model, pin.neutral(arena.model), rng.normal(size=arena.model.nv))
         velocity = rng.normal(size=arena.model.nv) * (rng.random(arena.model.nv) < 0.6)
         sweep._place(q0, velocity)
-        bounds.update(sweep._data, velocity, np.array([m.translation for m in sweep._places]))
+        bounds.update(sweep._data, velocity, sweep._distances.placed[:, 3])
         for first, second in ((5, 0), (0, 5), (4, 6), (3, 1)):
-            point = sweep._swept[first].points[0]
+            point = sweep._table.swept[first].points[0]
             h, places = 1e-3, []
             for t in 0.3 + h * np.arange(-1, 2):
                 sweep._place(pin.integrate(arena.model, q0, t * velocity), velocity)
-                oMg = sweep._places
+                oMg = sweep._distances.data.oMg
                 places.append(oMg[second].actInv(oMg[first].act(point)))
             pair = np.array([first]), np.array([second])
             far = np.linalg.norm(places[1]) + 1.0
-            bend = bounds.curvature(first, second, far)
+            bend = curvature(bounds, first, second, far)
             speed = np.linalg.norm(places[2] - places[0]) / (2 * h)
             acceleration = np.linalg.norm(places[2] - 2 * places[1] + places[0]) / h**2
             assert acceleration <= bend + 1e-4
@@ -201,6 +202,37 @@ def test_bounds_hold_for_every_point() -> None:
                 speed_used = max(speed_used, speed / max(limit, 1e-9))
     assert speed_used > 0.3  # not so wide that they would hold for anything
     assert bend_used > 0.02
+
+
+def test_compiled_loops_keep_pairs_apart_as_long_as_array_code() -> None:
+    """Of all pairs at random postures, in all kinds of pieces; and no pair comes nearer than that in the time."""
+    arena = Arena(flying=True)
+    arena.add(6, coal.Ellipsoid(0.04, 0.05, 0.06), (0.1, 0.0, 0.2))
+    arena.add(5, wb.Hull(np.random.default_rng(1).normal(size=(12, 3)) * 0.05).pieces()[0].geometry, (0.0, 0.1, 0.1))
+    for extra in (10, 11):
+        for thing in (6, 7, 8, 9):
+            arena.geometry.addCollisionPair(pin.CollisionPair(thing, extra))
+    sweep, rng, kept = Sweep(arena.model, arena.geometry), np.random.default_rng(5), 0
+    arena.results = pin.GeometryData(arena.geometry)
+    numbers = np.arange(len(sweep._pairs))
+    for _ in range(15):
+        q = pin.integrate(arena.model, pin.neutral(arena.model), rng.normal(size=arena.model.nv))
+        velocity = rng.normal(size=arena.model.nv) * 10.0 ** rng.uniform(-2.0, 0.0)
+        sweep._place(q, velocity)
+        sweep._bounds.update(sweep._data, velocity, sweep._distances.placed[:, 3].copy())
+        rows = sweep._distances.measured(numbers).copy()
+        level = np.minimum(rows[:, 0], 0.0) - 1e-4
+        mine = sweep._second_order(numbers, rows, level, np.zeros(len(numbers)))
+        asked = zip(sweep._pairs.tolist(), rows, level, strict=True)
+        wanted = [stays_above(sweep, *pair, row, low) for pair, row, low in asked]
+        assert mine == pytest.approx(np.array(wanted), rel=1e-9, abs=1e-12)
+        kept += int((mine > 0.0).sum())
+        for share in (0.3, 0.7, 1.0):
+            times = np.minimum(share * mine, 1.0)
+            for number in rng.choice(np.flatnonzero(mine > 0.0), 4):
+                there = arena.distances(pin.integrate(arena.model, q, times[number] * velocity))
+                assert there[number] > level[number] - 2e-6
+    assert kept > 100
 
 
 def test_a_half_space_that_is_carried() -> None:

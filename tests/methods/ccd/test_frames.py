@@ -205,18 +205,27 @@ def test_a_forearm_that_lies_on_a_table_keeps_its_direction_while_it_is_held_the
     assert np.ptp(turns[-10:]) < 0.01
 
 
-@pytest.mark.parametrize(("shoulder", "elbow"), [(0.0, 0.6), (-0.2, 0.5)])
-def test_a_hanging_forearm_that_a_thing_moves_aside_keeps_its_direction(
-    shoulder: float, elbow: float, avatar: wb.Figure
+@pytest.mark.parametrize(
+    ("turns", "direction"),
+    [
+        ((0.0, 0.2, 0.43), (0.0, -1.0, 0.0)),
+        ((-0.2, 0.2, 0.33), (0.0, -1.0, 0.0)),
+        ((0.429, 0.073, 0.803), (0.099, 0.299, 0.949)),
+    ],
+)
+def test_a_forearm_that_a_thing_moves_aside_keeps_its_direction(
+    turns: tuple[float, ...], direction: tuple[float, ...], avatar: wb.Figure
 ) -> None:
-    """A plate flush with the forearm moves it 5 cm towards the body: it is translated, however often."""
+    """A plate flush with the forearm moves it: it is translated, however often.
+
+    Once nearly along the upper arm, where the elbow gets out on its sphere only by a longer way aside.
+    """
     start = avatar.posture("standing").copy()
-    turns = {"shoulder_flexion": shoulder, "shoulder_abduction": 0.2, "elbow_flexion": elbow - 0.17}
-    for joint, turn in turns.items():
-        start[avatar.model.joints[avatar.joint_id(f"right_{joint}")].idx_q] += turn
+    for name, turn in zip(("shoulder_flexion", "shoulder_abduction", "elbow_flexion"), turns, strict=True):
+        start[avatar.model.joints[avatar.joint_id(f"right_{name}")].idx_q] += turn
     joint, wrist = (avatar.placement(start, name).translation for name in ("right_forearm", "right_hand"))
     along = (wrist - joint) / np.linalg.norm(wrist - joint)
-    out = np.array([0.0, -1.0, 0.0]) + along[1] * along
+    out = np.array(direction) - along * (along @ direction)
     out /= np.linalg.norm(out)
     axes, middle = np.stack([out, np.cross(along, out), along], axis=1), joint + 0.45 * (wrist - joint)
     scene = wb.Scene(avatar).add(wb.Box((0.04, 0.5, 0.16)), name="plate")

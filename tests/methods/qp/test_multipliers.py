@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.base.records import with_values
+from wholebody.base.arrays import with_values
 from wholebody.bench.suite.problem_sets.bodies import TIPS
 from wholebody.bench.suite.problem_sets.reaching import reach_among
 from wholebody.bench.suite.stability.catalogue import cases

@@ -9,7 +9,7 @@ import pytest
 
 from tests.reference import active_set as reference
 from wholebody import UnknownNameError
-from wholebody.base.records import with_values
+from wholebody.base.arrays import with_values
 from wholebody.methods.qp.active_set import guess_active_set, solve_from
 from wholebody.methods.qp.face_kernel import Face, minimise_on_face
 from wholebody.methods.qp.quadratic_program import ActiveSet

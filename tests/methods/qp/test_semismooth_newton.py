@@ -8,7 +8,7 @@ import pytest
 from tests.methods.qp.test_programs import by_quadprog
 from tests.reference import active_set as reference
 from tests.reference import semismooth_newton
-from wholebody.base.records import with_values
+from wholebody.base.arrays import with_values
 from wholebody.methods.qp.active_set import minimise, solve_from
 from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram
 from wholebody.methods.qp.solvers.registry import make_solver

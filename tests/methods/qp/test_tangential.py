@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.reference import active_set as reference
-from wholebody.base.records import with_values
+from wholebody.base.arrays import with_values
 from wholebody.methods.qp.active_set import room_for
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.settings import DESCENT

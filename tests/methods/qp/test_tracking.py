@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.base.records import with_values
+from wholebody.base.arrays import with_values
 from wholebody.methods.qp import tracking
 from wholebody.methods.qp.active_set import solve_from, violated_set
 from wholebody.methods.qp.quadratic_program import QuadraticProgram

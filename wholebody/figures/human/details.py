@@ -16,7 +16,7 @@ from typing import Any
 import coal
 import pinocchio as pin
 
-from wholebody.base.records import with_values
+from wholebody.base.arrays import with_values
 from wholebody.figures import hulls
 from wholebody.figures.body_spec import Solid, place
 from wholebody.figures.dimensions import Dimensions

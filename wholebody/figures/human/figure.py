@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from wholebody.base.records import with_values
+from wholebody.base.arrays import with_values
 from wholebody.figures.anthropometry import Person, make_person
 from wholebody.figures.body_spec import BodySpec, geometry_of, model_of
 from wholebody.figures.description import Chain, Description, JointCone

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
 
+from wholebody.base.arrays import with_values
 from wholebody.base.errors import InputError
-from wholebody.base.records import with_values
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, check_concavity
 from wholebody.figures.robot_figure import Robot, check_size, geometry_of_links, robot_figure, visual_of_links

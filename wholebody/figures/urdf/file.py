@@ -9,10 +9,10 @@ from typing import NamedTuple
 from urllib.parse import unquote
 from xml.etree.ElementTree import Element
 
+from wholebody.base.arrays import with_values
 from wholebody.base.checks import color, shown
 from wholebody.base.errors import FileFormatError, InputError
 from wholebody.base.files import is_file
-from wholebody.base.records import with_values
 from wholebody.figures.link_pieces import LinkShape
 from wholebody.figures.urdf.joints import UrdfJoint, read_joints
 from wholebody.figures.urdf.xml_reading import bounded, numbers, placement, read_xml, unique_names

@@ -10,9 +10,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.base.arrays import with_values
 from wholebody.base.checks import UNLIMITED, shown, warn_of_degrees
 from wholebody.base.errors import FileFormatError
-from wholebody.base.records import with_values
 from wholebody.figures.urdf.xml_reading import bounded, numbers, placement, unique_names
 from wholebody.geometry.pieces import LARGEST
 

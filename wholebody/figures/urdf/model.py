@@ -14,9 +14,9 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 import pinocchio as pin
 
+from wholebody.base.arrays import with_values
 from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError
-from wholebody.base.records import with_values
 from wholebody.figures.urdf.file import UrdfFile
 from wholebody.figures.urdf.joints import Mimic, UrdfJoint
 from wholebody.figures.urdf.writing import ANY_LIMIT, add_joint

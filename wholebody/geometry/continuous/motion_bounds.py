@@ -108,23 +108,6 @@ class MotionBounds:
         against = self.speed @ ~self.carries.T  # of each piece against what each joint carries
         return np.asarray(against[first, self.joint[second]] + against[second, self.joint[first]])
 
-    def curvature(self, first: int, second: int, gap: float) -> float:
-        """Largest acceleration of a point of the first piece relative to the second, metres per squared duration.
-
-        With the joints between the two pieces taken as a product of exponentials, the second derivative of the point
-        is a sum over pairs of joints: each velocity counts twice for every joint nearer to the second piece, and once
-        by its own. The first piece is of finite reach; `gap` is the present distance of the two, metres.
-        """
-        a, b = self.carries[self.joint[first]], self.carries[self.joint[second]]
-        near, far = a & ~b, b & ~a
-        turn = self.turn * (near | far)
-        speed = self.speed[first] * near + self.speed[second] * far
-        # A joint under the second piece is as far from the first one's points as from the second's, the gap, and
-        # what is across the first.
-        across = max(gap, 0.0) + float(speed.sum()) + 2.0 * float(self.reach[first])
-        speed = speed + self.turn * far * across
-        return float((speed * (2.0 * turn.sum() - turn)).sum())
-
 
 def largest_approach(table: PairTable, centres: Array, most: Array) -> Array:
     """Most by which the distance of every pair can fall (pairs,), metres; infinite where nothing is known.

@@ -21,9 +21,9 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, brief
 from wholebody.base.errors import InputError
 from wholebody.geometry.continuous.motion_bounds import MotionBounds
-from wholebody.geometry.large_models import pairs_of
+from wholebody.geometry.continuous.swept_depth import compiled_kernel, shapes_of
 from wholebody.geometry.pair_distances import PairDistances
-from wholebody.geometry.pieces import swept_points
+from wholebody.geometry.proximity import PairTable
 
 TOLERANCE = 1e-4
 """Depth up to which an overlap is no contact, metres."""
@@ -64,15 +64,13 @@ class Sweep:
 
     def __init__(self, model: pin.Model, geometry: pin.GeometryModel) -> None:
         """Read the pieces and pairs once; an InputError for a joint whose motion cannot be bounded, or other shapes."""
-        self.model, self.geometry = model, geometry
-        self._data, self._pairs = model.createData(), pairs_of(geometry)
+        self.model, self.geometry, self._table = model, geometry, PairTable(model, geometry)
+        self._data, self._pairs = model.createData(), self._table.pairs
         self._distances = PairDistances(geometry, self._pairs)
-        self._places = self._distances.data.oMg
-        self._swept = [swept_points(piece.geometry) for piece in geometry.geometryObjects]
-        joint = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
-        reach = np.array([swept.reach for swept in self._swept], dtype=float)
-        self._bounds = MotionBounds(model, joint, reach)
-        self._reach = reach[self._pairs].sum(axis=1)
+        self._bounds = MotionBounds(model, self._table.joint, self._table.reach)
+        self._reach = self._table.reach[self._pairs].sum(axis=1)
+        self._shapes, self._kernel = shapes_of(self._table), compiled_kernel()
+        self._twist = np.zeros((model.njoints, 6))
 
     def first_contact(
         self,
@@ -144,8 +142,9 @@ class Sweep:
             safe = room / speed[due]
             asked[due] += 1
             # Queries after which a pair is bounded to second order, which costs more and helps only if pieces slide.
-            for k in np.flatnonzero((asked[due] > 3) & (safe < TOGETHER)):
-                safe[k] = max(safe[k], self._second_order(int(index[due[k]]), rows[k], float(level[due[k]])))
+            slow = np.flatnonzero((asked[due] > 3) & (safe < TOGETHER))
+            if len(slow):
+                safe[slow] = self._second_order(index[due[slow]], rows[slow], level[due[slow]], safe[slow])
             free[due] = np.maximum(free[due], now + safe)
             if free.min() < 1.0 and over():
                 break
@@ -159,62 +158,18 @@ class Sweep:
         first, second = (int(k) for k in self._pairs[index])
         return FirstContact(fraction, q, index, (first, second), distance, certain)
 
-    def _second_order(self, index: int, row: Array, level: float) -> float:
-        """Share of the motion for which a plane between the pair, fixed to either piece, keeps them above `level`."""
-        first, second = (int(k) for k in self._pairs[index])
-        normal = row[1:4]
-        if not normal @ normal > 0.25:
-            return 0.0
-        best = 0.0
-        for points, plane, out in ((first, second, -normal), (second, first, normal)):
-            if len(self._swept[points].points) and (
-                len(self._swept[plane].points) or np.isinf(self._swept[plane].reach)
-            ):
-                best = max(best, self._planes_keep(points, plane, self._planes(plane, out), float(row[0]), level))
-        return best
-
-    def _planes(self, piece: int, normal: Array) -> Array:
-        """Directions (k, 3) in which to bound a piece: a normal of coal's, and that of the face nearest to it.
-
-        Every direction gives a valid bound, but a wide face needs its exact normal for a useful one: where faces touch,
-        coal's normal can be 1e-4 rad off.
-        """
-        swept, rotation = self._swept[piece], self._places[piece].rotation
-        if not len(swept.faces):
-            return normal[None]
-        faces = swept.faces[:, :3] @ rotation.T
-        face = faces[int(np.argmax(faces @ normal))]
-        return face[None] if np.isinf(swept.reach) else np.array([face, normal])
-
-    def _planes_keep(self, points: int, plane: int, normals: Array, distance: float, level: float) -> float:
-        """Time until a swept point of `points` can reach `level` above supporting planes (k, 3) of `plane`."""
-        swept, base = self._swept[points], self._swept[plane]
-        at, below = self._places[points], self._places[plane]
-        if np.isinf(base.reach):
-            heights = base.faces[0, 3] + normals @ below.translation
-        else:
-            heights = (base.points @ below.rotation.T @ normals.T).max(axis=0) + normals @ below.translation
-        corners = swept.points @ at.rotation.T + at.translation
-        room = corners @ normals.T - (heights + swept.radius + base.radius + level)
-        above = room.min(axis=0) > 0.0
-        if not above.any():
-            return 0.0
-        room = room[:, above]
-        rate = (self._velocities(points, corners) - self._velocities(plane, corners)) @ normals[above].T
-        bend = self._bounds.curvature(points, plane, distance)
-        if bend <= 0.0:
-            times = np.where(rate < 0.0, room / np.maximum(-rate, 1e-300), np.inf)
-        else:
-            times = (rate + np.sqrt(rate * rate + 2.0 * bend * room)) / bend
-        return float(times.min(axis=0).max())
-
-    def _velocities(self, piece: int, places: Array) -> Array:
-        """Velocities (k, 3) of points at `places` that move with the piece's body."""
-        joint = int(self._bounds.joint[piece])
-        if joint == 0:
-            return np.zeros_like(places)
-        motion = self._data.oMi[joint].act(self._data.v[joint])
-        return np.asarray(motion.linear + places @ pin.skew(motion.angular).T)
+    def _second_order(self, numbers: Indices, rows: Array, level: Array, safe: Array) -> Array:
+        """Shares of the motion (k,), at least `safe`, for which planes between pairs keep them above `level` (k,)."""
+        data, joint = self._data, self._table.joint[self._pairs[numbers]]
+        for number in set(joint.ravel().tolist()) - {0}:
+            motion = data.oMi[number].act(data.v[number])
+            self._twist[number, :3], self._twist[number, 3:] = motion.linear, motion.angular
+        speeds = self._kernel.Speeds(self._bounds.turn, self._bounds.speed, self._bounds.carries)
+        sliding = self._kernel.Sliding(
+            numbers, np.ascontiguousarray(rows[:, :4]), level, self._distances.placed, self._twist
+        )
+        self._kernel.keep_apart(sliding, self._shapes, speeds, safe)
+        return safe
 
     def _place(self, q: Array, velocity: Array) -> None:
         pin.forwardKinematics(self.model, self._data, q, velocity)

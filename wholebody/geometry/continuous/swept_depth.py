@@ -55,10 +55,7 @@ class SweptDepth:
         self._table, self._geometry, self._tolerance = table, geometry, tolerance
         self._bounds = MotionBounds(table.model, table.joint, table.reach)
         self._kernel = compiled_kernel()
-        self._shapes = self._kernel.Shapes(
-            table.pairs, table.joint, table.reach, table.points, table.first_point, table.radius,
-            _radii(table.geometry), table.faces, table.first_face,
-        )  # fmt: skip
+        self._shapes = shapes_of(table)
         self._before, self._now, self._middle = (_Postures(table, geometry) for _ in range(3))
         count = len(table.pairs)
         self._extent, self._index = np.zeros((geometry.ngeoms, 3)), np.zeros(count, dtype=np.intp)
@@ -230,12 +227,14 @@ class _Postures:
         self.exact[numbers] = True
 
 
-def _radii(geometry: pin.GeometryModel) -> Array:
-    """(n, 3) of ellipsoids; 0 for other pieces."""
-    shapes = [piece.geometry for piece in geometry.geometryObjects]
-    return np.array([shape.radii if isinstance(shape, coal.Ellipsoid) else (0.0,) * 3 for shape in shapes]).reshape(
-        -1, 3
-    )
+def shapes_of(table: PairTable) -> Any:
+    """The pieces and pairs of a table as the loops take them."""
+    ellipsoids = [isinstance(piece.geometry, coal.Ellipsoid) for piece in table.geometry.geometryObjects]
+    radii = np.where(np.array(ellipsoids, dtype=bool)[:, None], table.half, 0.0)
+    return compiled_kernel().Shapes(
+        table.pairs, table.joint, table.reach, table.points, table.first_point, table.radius, radii, table.faces,
+        table.first_face,
+    )  # fmt: skip
 
 
 @lru_cache(maxsize=1)
@@ -246,14 +245,11 @@ def compiled_kernel() -> Any:
     places, none, index = np.zeros((0, 4, 3)), np.zeros(0), np.zeros(0, dtype=np.intp)
     pairs, rows, one = np.zeros((0, 2), dtype=np.intp), np.zeros((0, 4)), np.zeros(1, dtype=np.intp)
     lines = np.zeros((0, 3))
+    shapes = swept_depth_kernel.Shapes(pairs, index, none, lines, one, none, lines, rows, one)
+    speeds = swept_depth_kernel.Speeds(none, np.zeros((0, 0)), np.zeros((0, 0), dtype=bool))
     swept_depth_kernel.screen(places, (pairs, none, lines), none, none, none, lines, index)
-    swept_depth_kernel.lower_bounds(
-        swept_depth_kernel.Parts(index, index, index, rows, rows, none, none),
-        np.zeros((0, 0, 4, 3)),
-        swept_depth_kernel.Shapes(pairs, index, none, np.zeros((0, 3)), one, none, np.zeros((0, 3)), rows, one),
-        swept_depth_kernel.Speeds(none, np.zeros((0, 0)), np.zeros((0, 0), dtype=bool)),
-        1.0,
-        0.0,
-        none,
-    )
+    parts = swept_depth_kernel.Parts(index, index, index, rows, rows, none, none)
+    swept_depth_kernel.lower_bounds(parts, np.zeros((0, 0, 4, 3)), shapes, speeds, 1.0, 0.0, none)
+    sliding = swept_depth_kernel.Sliding(index, rows, none, places, np.zeros((0, 6)))
+    swept_depth_kernel.keep_apart(sliding, shapes, speeds, none)
     return swept_depth_kernel

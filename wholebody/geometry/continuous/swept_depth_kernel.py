@@ -1,4 +1,4 @@
-"""Lower bounds of distances at a posture and during a motion, as compiled loops: see `swept_depth`."""
+"""Lower bounds of distances at a posture and during a motion, as compiled loops: see `sweep` and `swept_depth`."""
 
 from __future__ import annotations
 
@@ -171,11 +171,119 @@ def lower_bounds(
         bound[k] = best
 
 
+class Sliding(NamedTuple):
+    """Pairs at a posture of a motion, each to be kept above a distance.
+
+    Attributes:
+        number: (k,) places of the pairs.
+        rows: (k, 4) distance and normal, from the first piece to the second.
+        level: (k,) the distance.
+        place: (n, 4, 3) where the pieces are.
+        twist: (njoints, 6) velocity of each joint's body, linear at the world's origin, then angular, per duration.
+    """
+
+    number: Indices
+    rows: Array
+    level: Array
+    place: Array
+    twist: Array
+
+
+@compiled()
+def keep_apart(sliding: Sliding, shapes: Shapes, motion: Speeds, safe: Array) -> None:
+    """Raise the shares of a motion for which pairs stay apart, from heights above planes to second order.
+
+    A plane that moves with one piece and supports it bounds the distance from below by the least height of the other
+    piece's swept points. Each height has its exact rate now, and an acceleration of at most `_curvature`. The plane is
+    across coal's normal, and across that of the face nearest to it: a wide face needs its exact normal for a useful
+    bound, and where faces touch, coal's normal can be 1e-4 rad off.
+
+    Args:
+        sliding: the pairs.
+        shapes: of the pieces.
+        motion: bounds of the whole motion.
+        safe: (k,) raised to what is found.
+    """
+    asked, rows, level, place, _ = sliding
+    pairs, joint, reach, points, first_point, radius, radii, faces, first_face = shapes
+    outline, limits = (points, first_point, radius, radii), (motion.turn, motion.speed, motion.carries)
+    normal, local = np.empty(3), np.empty(3)
+    for k in range(len(asked)):
+        if not rows[k, 1] ** 2 + rows[k, 2] ** 2 + rows[k, 3] ** 2 > 0.25:
+            continue
+        for side in range(2):
+            other, carrier = pairs[asked[k], side], pairs[asked[k], 1 - side]
+            if first_point[other] == first_point[other + 1]:
+                continue
+            bend = _curvature(other, carrier, rows[k, 0], joint, limits, reach)
+            for j in range(3):
+                local[j] = 0.0
+                for i in range(3):
+                    normal[i] = rows[k, 1 + i] if side else -rows[k, 1 + i]
+                    local[j] += place[carrier, j, i] * normal[i]
+            if np.isfinite(reach[carrier]):
+                height = _support(carrier, local[0], local[1], local[2], outline)
+                safe[k] = max(safe[k], _stays_above(other, carrier, normal, height, bend, level[k], sliding, shapes))
+            face, most = -1, -np.inf
+            for f in range(first_face[carrier], first_face[carrier + 1]):
+                along = faces[f, 0] * local[0] + faces[f, 1] * local[1] + faces[f, 2] * local[2]
+                if along > most:
+                    face, most = f, along
+            if face >= 0:
+                height = faces[face, 3]
+                if np.isfinite(reach[carrier]):  # coplanar triangles of a hull are one face, to 1e-7
+                    height = _support(carrier, faces[face, 0], faces[face, 1], faces[face, 2], outline)
+                for i in range(3):
+                    normal[i] = 0.0
+                    for j in range(3):
+                        normal[i] += place[carrier, j, i] * faces[face, j]
+                safe[k] = max(safe[k], _stays_above(other, carrier, normal, height, bend, level[k], sliding, shapes))
+
+
+@compiled(inner=True)
+def _stays_above(
+    other: int, carrier: int, normal: Array, height: float, bend: float, level: float, sliding: Sliding, shapes: Shapes
+) -> float:  # fmt: skip
+    """Share of a motion for which the points of a piece stay `level` above a plane of another one.
+
+    The plane is at a height above the carrier's origin, along a normal in the world; 0 where it is not above now.
+    """
+    place, twist = sliding.place, sliding.twist
+    a, b, points = shapes.joint[other], shapes.joint[carrier], shapes.points
+    ground = height + shapes.radius[other] + level
+    for i in range(3):
+        ground += normal[i] * place[carrier, 3, i]
+    turn = (twist[a, 3] - twist[b, 3], twist[a, 4] - twist[b, 4], twist[a, 5] - twist[b, 5])
+    least = np.inf
+    for p in range(shapes.first_point[other], shapes.first_point[other + 1]):
+        u, v, w = points[p, 0], points[p, 1], points[p, 2]
+        x = place[other, 3, 0] + place[other, 0, 0] * u + place[other, 1, 0] * v + place[other, 2, 0] * w
+        y = place[other, 3, 1] + place[other, 0, 1] * u + place[other, 1, 1] * v + place[other, 2, 1] * w
+        z = place[other, 3, 2] + place[other, 0, 2] * u + place[other, 1, 2] * v + place[other, 2, 2] * w
+        room = normal[0] * x + normal[1] * y + normal[2] * z - ground
+        if not room > 0.0:
+            return 0.0
+        rate = normal[0] * (twist[a, 0] - twist[b, 0] + turn[1] * z - turn[2] * y)
+        rate += normal[1] * (twist[a, 1] - twist[b, 1] + turn[2] * x - turn[0] * z)
+        rate += normal[2] * (twist[a, 2] - twist[b, 2] + turn[0] * y - turn[1] * x)
+        if bend > 0.0:
+            least = min(least, (rate + np.sqrt(rate * rate + 2.0 * bend * room)) / bend)
+        elif rate < 0.0:
+            least = min(least, room / -rate)
+    return least
+
+
 @compiled(inner=True)
 def _curvature(
     first: int, second: int, gap: float, joint: Indices, motion: tuple[Array, Array, Mask], reach: Array
 ) -> float:
-    """Bound of the acceleration of the first piece's points relative to the second; `MotionBounds.curvature`."""
+    """Bound of the acceleration of the first piece's points relative to the second, metres per squared duration.
+
+    With the joints between the two pieces taken as a product of exponentials, the second derivative of the point is a
+    sum over pairs of joints: each velocity counts twice for every joint nearer to the second piece, and once by its
+    own. A joint under the second piece is as far from the first one's points as from the second's, the gap, and what is
+    across the first, which is of finite reach.
+    """
     turn, speeds, carries = motion
     a, b = joint[first], joint[second]
     turns, travel = 0.0, 0.0

@@ -18,6 +18,7 @@ from wholebody.scene.workspace import Workspace
 MARGIN = 2e-4  # m: distance of a goal outside the obstacle, so that the next query finds no overlap
 SWEEPS = 5  # for one goal; it is computed anew afterwards, so more sweeps waste time
 PARALLEL = 0.26  # sine of 15 degrees: a bone at a smaller angle to the obstacle's surface is nearly parallel to it
+LONGER = 3  # motions of a joint's origin for one translation; more take the time of a frame
 SHORT = 0.02  # m: a link shorter than this has no meaningful direction
 
 
@@ -171,13 +172,24 @@ class ChainResolver:
     def _translate(self, link: Link, push: Vector, inner: Sequence[int], there: Array) -> None:
         """Move the link by pure translation: its joint's origin moves, and its axes become `there` (3, 3).
 
-        Inner joints whose axes pass through the origin keep it too: an upper arm's rotation moves no elbow.
+        Inner joints whose axes pass through the origin keep it too: an upper arm's rotation moves no elbow. An elbow
+        moves on a sphere, so it moves aside too, as far as it must to get out by the length of the push.
         """
         limbs = self.limbs
         own = tuple(node for node in link.nodes if node not in inner)
-        first = limbs.frame(own[-1])
+        own_origin = own[-1]
+        first = limbs.frame(own_origin)
         own += tuple(node for node in inner if self._passes(node, first[9:]))
-        self._reach_out(inner[0], inner, (first[9], first[10], first[11]), push)
+        way, square, done, gain = 1.0, sum(part * part for part in push), 0.0, 1.0
+        for _ in range(LONGER):
+            origin = three(limbs.frames[own_origin, 9:])
+            self._reach_out(inner[0], inner, origin, (way * push[0], way * push[1], way * push[2]))
+            moved = np.subtract(limbs.frame(own_origin)[9:], first[9:])
+            before, done = done, float(moved @ push) / square
+            gain = (done - before) / way
+            if done > 0.9 or gain < 0.05:
+                break
+            way = (1.0 - done) / gain
         aims = Aims(limbs, [link.node] * 3, np.eye(3), there, [False] * 3)
         plan = aims.plan(own)
         for _ in range(SWEEPS):

@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.base.arrays import Array
-from wholebody.base.records import with_values
+from wholebody.base.arrays import Array, with_values
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.iteration import Iteration
 from wholebody.methods.newton.linear_algebra import LinearSystem, QuasiDefinite, SingularSystemError

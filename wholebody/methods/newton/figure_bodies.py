@@ -66,6 +66,7 @@ class FigureBodies:
         self.q = self._start = pin.neutral(self.model) if start is None else start
         self._state: State | None = None
         self._state_of: Array | None = None
+        self._rows_of: tuple[Array | None, Any] = (None, None)
 
     def index(self, joint: int) -> int:
         """Index of the body of one of Pinocchio's joints; -1, the world, for joint 0."""
@@ -106,30 +107,40 @@ class FigureBodies:
         self._state_of = None
         return self._present.update(q)
 
-    def tangent_rows(self, x: Array) -> Array:
-        """Derivative (nv, 7 count) of the tangent displacement of postures by the bodies x (count + 1, 7)."""
-        result = np.zeros((self.model.nv, 7 * (self.count + 1)))
-        columns = 7 * self.angles.bodies[:, :, None] + np.arange(7)
-        result[self._tangent[:, None], columns.reshape(len(columns), 14)] = self.angles.jacobian(x)[:, 0]
+    def tangent_rows(self, x: Array) -> Any:
+        """Derivative (nv, 7 count) of the tangent displacement of postures by bodies x (count + 1, 7), a csr_matrix.
+
+        A row has at most eight non-zeros: the rotations of two bodies, or the place or the rotation of a free root.
+        """
+        if self._rows_of[0] is not x:
+            self._rows_of = x, self._tangent_rows(x)
+        return self._rows_of[1]
+
+    def _tangent_rows(self, x: Array) -> Any:
+        from scipy.sparse import csr_matrix
+
+        rows, columns = np.repeat(self._tangent, 8), 7 * self.angles.bodies[:, :, None] + np.arange(3, 7)
+        slopes = self.angles.jacobian(x).reshape(-1, 2, 7)[:, :, 3:]
+        held = np.flatnonzero(columns >= 0)  # not by the world
+        parts = [(rows[held], columns.ravel()[held], slopes.ravel()[held])]
         for body, _, v in self.roots:
             a, b, c, w = x[body, 3:].tolist()
-            first = 7 * body
-            result[v : v + 3, first : first + 3] = pin.Quaternion(x[body, 3:]).toRotationMatrix().T
+            place = pin.Quaternion(x[body, 3:]).toRotationMatrix().T
             # the rotation is 2 vec(conj(e) de), in the root's own axes
             turn = 2.0 * np.array(((w, c, -b, -a), (-c, w, a, -b), (b, -a, w, -c)))
-            result[v + 3 : v + 6, first + 3 : first + 7] = turn
-        return result[:, : 7 * self.count]
+            for row, column, block in ((v, 7 * body, place), (v + 3, 7 * body + 3, turn)):
+                at = np.indices(block.shape).reshape(2, -1)
+                parts.append((row + at[0], column + at[1], block.ravel()))
+        row, column, value = (np.concatenate(part) for part in zip(*parts, strict=True))
+        return csr_matrix((value, (row, column)), (self.model.nv, 7 * self.count))
 
     @property
     def chart(self) -> Mask:
         """(nv, 7 count) the variables of bodies that each degree of freedom is a function of."""
-        result = np.zeros((self.model.nv, 7 * (self.count + 1)), dtype=bool)
-        columns = 7 * self.angles.bodies[:, :, None] + np.arange(7)
-        result[self._tangent[:, None], columns.reshape(len(columns), 14)] = self.angles.pattern
-        for body, _, v in self.roots:
-            first = 7 * body
-            result[v : v + 3, first : first + 3] = result[v + 3 : v + 6, first + 3 : first + 7] = True
-        return result[:, : 7 * self.count]
+        found = self.tangent_rows(with_world(self.variables(self._start))).tocoo()
+        result: Mask = np.zeros(found.shape, dtype=bool)
+        result[found.row, found.col] = True
+        return result
 
     def bound_step(self, q: Array, lower: Array, upper: Array) -> None:
         """Keep later postures within tangent displacements (nv,) of q (nq,), for the velocity bounds of a frame."""

@@ -88,7 +88,7 @@ class Iteration:
         self.goal_rows = np.flatnonzero(self.system.goal)
         self.objective = np.flatnonzero(self.system.objective)
         self.one_sided = np.flatnonzero(self.system.inequality)
-        self._move(x, None)
+        self._move(x)
         self.state: Inequalities = inequalities(self.kind, self.residual[self.one_sided])
 
     def mark(self) -> tuple[Array, tuple[Array, ...], bool]:
@@ -100,11 +100,21 @@ class Iteration:
         x, self.active_system.path, self.stationary = mark
         self.begin(x)
 
-    def _move(self, x: Array, residual: Array | None) -> None:
-        residual = self.system.residual(x) if residual is None else residual
-        values = self.system.values(x)
-        self.x, self.residual, self.values = x, residual, values
+    def _move(self, x: Array) -> None:
+        residual = self.system.residual(x)
+        values = self.system.values(x) if self.active_system.own_terms else None
+        self.x, self.residual, self._values = x, residual, values
         self.hard, self.goal = self.system.largest_errors(self.residual)
+
+    @property
+    def values(self) -> Array:
+        """Values (nnz,) of the Jacobian here; asked for when a step needs them, as the last state of a frame has none.
+
+        Those of terms of one's own are asked for where a step ends: it is taken back where they are not finite.
+        """
+        if self._values is None:
+            self._values = self.system.values(self.x)
+        return self._values
 
     def _error(self, residual: Array) -> Array:
         error: Array = residual.copy()
@@ -215,7 +225,7 @@ class Iteration:
             if self.active_system.arrive(trial):
                 self.begin(trial)
             else:
-                self._move(trial, None)
+                self._move(trial)
                 self.state.accept(length, self.residual[self.one_sided])
         except UndefinedTermError as error:
             self.active_system.control.step_back(error)

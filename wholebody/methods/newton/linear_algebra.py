@@ -136,6 +136,26 @@ class NormalEquations:
         return result
 
 
+class Products(NamedTuple):
+    """Pairs of entries of J that share a column, one row of the Jacobian after the other.
+
+    An entry (row, column) is paired with the entries of its column from itself on, by row.
+
+    Attributes:
+        by_row: (nnz,) the entries, row after row and in each row by column.
+        row_start: (height + 1,) where those of each row begin.
+        by_column: (nnz,) the entries, column after column and in each column by row.
+        place: (nnz,) where each entry is in `by_column`.
+        column_end: (nnz,) where the column of each entry ends there.
+    """
+
+    by_row: Places
+    row_start: Places
+    by_column: Places
+    place: Places
+    column_end: Places
+
+
 class Gram:
     """Lower triangle of J D^-1 J' + M as scipy's csc_matrix, whose data `refill` overwrites."""
 
@@ -144,64 +164,101 @@ class Gram:
         from scipy.sparse import csc_matrix
 
         self.pattern = pattern
-        first, second = _pairs(pattern)
-        rows = np.concatenate([pattern.rows[first], np.arange(pattern.height)])
-        columns = np.concatenate([pattern.rows[second], np.arange(pattern.height)])
-        key = columns * pattern.height + rows
-        places, index = np.unique(key, return_inverse=True)
-        column = places // max(pattern.height, 1)
-        pointer = np.searchsorted(column, np.arange(pattern.height + 1)).astype(np.int32)
-        shape = (pattern.height, pattern.height)
-        inner = (places % max(pattern.height, 1)).astype(np.int32)
-        self.matrix = csc_matrix((np.zeros(len(places)), inner, pointer), shape=shape)
-        order = np.argsort(index[: len(first)], kind="stable")
-        target = index[: len(first)][order]
-        filled = np.unique(target)
-        starts = np.append(np.searchsorted(target, filled), len(first))
-        self._diagonal = index[len(first) :]
         compiled_kernel()
-        self._first, self._second = first[order].astype(np.int32), second[order].astype(np.int32)
-        self._starts, self._filled = starts.astype(np.int32), filled.astype(np.int32)
+        rows, columns = (part.astype(np.int32) for part in (pattern.rows, pattern.columns))
+        self._products = _paired(rows, columns, pattern.height, pattern.width)
+        self._target, inner, pointer = _laid_products(self._products, rows)
+        shape = (pattern.height, pattern.height)
+        self.matrix = csc_matrix((np.zeros(len(inner)), inner, pointer), shape=shape)
 
     def refill(self, values: Array, weight: Array, damping: Array) -> None:
         """Compute the matrix for values (nnz,) of J, diagonals D and M."""
-        scaled = values / weight[self.pattern.columns]
         data = self.matrix.data
         data[:] = 0.0
-        _sum_products(scaled, values, self._first, self._second, self._starts, self._filled, data)
-        data[self._diagonal] += damping
+        _sum_products(values / weight[self.pattern.columns], values, self._products, self._target, data)
+        data[self.matrix.indptr[:-1]] += damping
 
 
 @compiled()
-def _sum_products(
-    scaled: Array, values: Array, first: Places, second: Places, starts: Places, filled: Places, data: Array
-) -> None:
-    """Write the sums of scaled[first] values[second] between starts into data, at the indices `filled`."""
-    for k in range(len(filled)):
-        total = 0.0
-        for p in range(starts[k], starts[k + 1]):
-            total += scaled[first[p]] * values[second[p]]
-        data[filled[k]] = total
+def _paired(rows: Places, columns: Places, height: int, width: int) -> Products:
+    """The pairs of the entries (nnz,) of a Jacobian."""
+    by_row, row_start = _sorted(rows, np.arange(len(rows)).astype(np.int32), height)
+    by_column, column_start = _sorted(columns, by_row, width)
+    place, column_end = np.empty_like(rows), np.empty_like(rows)
+    for k in range(len(by_column)):
+        place[by_column[k]] = k
+    for entry in range(len(rows)):
+        column_end[entry] = column_start[columns[entry] + 1]
+    return Products(by_row, row_start, by_column, place, column_end)
+
+
+@compiled(inner=True)
+def _sorted(keys: Places, order: Places, count: int) -> tuple[Places, Places]:
+    """Entries by their keys below `count`, those of one key as in `order`; and where those of each key begin."""
+    start, result = np.zeros(count + 2, np.int32), np.empty_like(order)
+    for key in keys:
+        start[key + 2] += 1
+    start = np.cumsum(start).astype(np.int32)
+    for entry in order:
+        result[start[keys[entry] + 1]] = entry
+        start[keys[entry] + 1] += 1
+    return result, start[:-1]
+
+
+@compiled()
+def _laid_products(products: Products, rows: Places) -> tuple[Places, Places, Places]:
+    """Lay out the lower triangle of J J' with its diagonal, by columns; `rows` (nnz,) are those of the entries.
+
+    Returns:
+        The place (pairs,) of each product in the triangle; the rows of the triangle's entries, ascending in each
+        column; and (height + 1,) where the columns begin.
+    """
+    by_row, row_start, by_column, place, column_end = products
+    height, pairs = len(row_start) - 1, (column_end - place).sum()
+    target, inner = np.empty(pairs, np.int32), np.empty(pairs + height, np.int32)
+    pointer = np.zeros(height + 1, np.int32)
+    seen, where, count, pair = np.full(height, -1), np.zeros(height, np.int32), 0, 0
+    for row in range(height):
+        begin = count
+        seen[row], inner[count] = row, row
+        count += 1
+        for k in range(row_start[row], row_start[row + 1]):
+            for p in range(place[by_row[k]], column_end[by_row[k]]):
+                other = rows[by_column[p]]
+                if seen[other] != row:
+                    seen[other], inner[count] = row, other
+                    count += 1
+        inner[begin:count].sort()
+        for p in range(begin, count):
+            where[inner[p]] = p
+        for k in range(row_start[row], row_start[row + 1]):
+            for p in range(place[by_row[k]], column_end[by_row[k]]):
+                target[pair] = where[rows[by_column[p]]]
+                pair += 1
+        pointer[row + 1] = count
+    return target, inner[:count].copy(), pointer
+
+
+@compiled()
+def _sum_products(scaled: Array, values: Array, products: Products, target: Places, data: Array) -> None:
+    """Add the products of pairs of entries, one scaled and the other not, to data, at the places `target`."""
+    by_row, _, by_column, place, column_end = products
+    pair = 0
+    for k in range(len(by_row)):
+        value = values[by_row[k]]
+        for p in range(place[by_row[k]], column_end[by_row[k]]):
+            data[target[pair]] += scaled[by_column[p]] * value
+            pair += 1
 
 
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
-    """This module, after its loop is compiled or loaded from the cache, before a solve."""
+    """This module, after its loops are compiled or loaded from the cache, before a solve."""
     none, places = np.zeros(0), np.zeros(0, dtype=np.int32)
-    _sum_products(none, none, places, places, np.zeros(1, dtype=np.int32), places, none)
+    products = _paired(places, places, 0, 0)
+    _laid_products(products, places)
+    _sum_products(none, none, products, places, none)
     return sys.modules[__name__]
-
-
-def _pairs(pattern: Pattern) -> tuple[Indices, Indices]:
-    """Pairs of entries (row >= row of the other) in one column."""
-    order = np.lexsort((pattern.rows, pattern.columns))
-    columns = pattern.columns[order]
-    counts = np.bincount(columns, minlength=pattern.width)
-    place = np.arange(len(columns)) - np.repeat(np.cumsum(counts) - counts, counts)
-    after = counts[columns] - place  # partners of an entry: itself and all that follow in its column
-    first = np.repeat(np.arange(len(columns)), after)
-    offset = np.arange(len(first)) - np.repeat(np.cumsum(after) - after, after)
-    return order[first + offset], order[first]
 
 
 class QuasiDefinite:

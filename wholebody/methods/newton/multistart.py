@@ -12,10 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from wholebody.assessment.posture import Assessment, assess
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import known
 from wholebody.base.fields import Checked
-from wholebody.base.records import with_values
 from wholebody.methods.conclusion import Ending, assessed_tolerance, concluded, meets
 from wholebody.methods.contradictions import Contradiction, contradictions, least_left
 from wholebody.methods.inputs import Iterations, Restarts, Seed, TimeLimit, Tolerance

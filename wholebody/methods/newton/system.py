@@ -168,13 +168,14 @@ class ActiveSystem:
         control: may end the iteration early.
         path: the states (7 n,) since `begin`.
         even: whether goals count alike, whatever their weights.
+        own_terms: whether there are terms of users' classes, which may not be finite everywhere.
         structures: number of patterns that were analysed.
     """
 
     system: System
     algebra: LinearAlgebra
     path: tuple[Array, ...] = ()
-    even = False
+    even = own_terms = False
     longest = np.inf
     control = Control(np.inf)
     contacts: ContactSet | None = None

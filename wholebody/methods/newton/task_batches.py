@@ -140,22 +140,25 @@ class Cone(Batch):
         super().__init__(bodies, labels)
         self.cones, self.turns, self.axes = cones, turns, axes
 
-    def _directions(self, x: Array) -> tuple[Array, Array, Array]:
-        """(k, 3) the axes in the world, and in the polygons' frames of unit length, which was (k, 1)."""
-        first, second = x[self.bodies[:, 0], TURN], x[self.bodies[:, 1], TURN]
-        world = quat.rotate(second, self.axes)
-        local = np.einsum("kji,kj->ki", self.turns, quat.rotate(quat.conjugate(first), world))
-        length = np.sqrt((local * local).sum(axis=1, keepdims=True))
-        return world, local / length, length
+    def _angles(self, x: Array) -> tuple[Array, ...]:
+        """Axes (k, 3) in the world and as units in the polygons' frames, lengths (k, 1) there; angles and slopes."""
+        if self._seen is None or self._seen[0] is not x:
+            first, second = x[self.bodies[:, 0], TURN], x[self.bodies[:, 1], TURN]
+            world = quat.rotate(second, self.axes)
+            local = np.einsum("kji,kj->ki", self.turns, quat.rotate(quat.conjugate(first), world))
+            length = np.sqrt((local * local).sum(axis=1, keepdims=True))
+            unit = local / length
+            found = [cone.signed_angle(axis) for cone, axis in zip(self.cones, unit, strict=True)]
+            angles, slopes = (np.array(part).reshape(len(self), -1) for part in zip(*found, strict=True))
+            self._seen = x, world, unit, length, angles, slopes
+        return self._seen[1:]
 
     def residual(self, x: Array) -> Array:  # noqa: D102
-        unit = self._directions(x)[1]
-        return np.array([[cone.signed_angle(axis)[0]] for cone, axis in zip(self.cones, unit, strict=True)])
+        return self._angles(x)[3]
 
     def jacobian(self, x: Array) -> Array:  # noqa: D102
         first, second = quat.conjugate(x[self.bodies[:, 0], TURN]), x[self.bodies[:, 1], TURN]
-        world, unit, length = self._directions(x)
-        slopes = np.array([cone.signed_angle(axis)[1] for cone, axis in zip(self.cones, unit, strict=True)])
+        world, unit, length, _, slopes = self._angles(x)
         slopes = (slopes - (slopes * unit).sum(axis=1, keepdims=True) * unit) / length
         slopes = np.einsum("kij,kj->ki", self.turns, slopes)  # by the axis in the first body
         result = np.zeros((len(self), 1, 14))

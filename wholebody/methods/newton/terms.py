@@ -210,6 +210,7 @@ class FigureSystem(ActiveSystem):
         super().__init__([*held, *self.objective.batches()], bodies.weight, algebra, [bodies])
         self._find_contacts(problem.clearances, workspace, bodies.data)
         self._own = tuple(filter(is_own, problem.measures))
+        self.own_terms = any(map(is_own, (*problem.goals, *problem.constraints, *problem.measures)))
         self.retarget()
         self.arrive(self.variables(problem.start))
 

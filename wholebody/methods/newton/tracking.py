@@ -8,10 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import posture, time_step
 from wholebody.base.pool import OneAtATime
-from wholebody.base.records import with_values
 from wholebody.geometry.continuous.passing_through import SHORT
 from wholebody.methods.base import begun, judged, nearest_to
 from wholebody.methods.control import BUDGET

@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.base.arrays import Array
-from wholebody.base.records import with_values
+from wholebody.base.arrays import Array, with_values
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram, Room, work_size
 from wholebody.methods.qp.settings import CORRECTIONS
 

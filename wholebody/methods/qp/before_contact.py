@@ -15,7 +15,7 @@ from itertools import chain
 
 import numpy as np
 
-from wholebody.base.records import with_values
+from wholebody.base.arrays import with_values
 from wholebody.methods.qp.closest import ENDLESS
 from wholebody.methods.qp.iterates import LocalSolution, Run
 from wholebody.methods.qp.sqp import SQP

@@ -15,9 +15,8 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody import tasks
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, with_values
 from wholebody.base.pool import Pool
-from wholebody.base.records import with_values
 from wholebody.figures.figure import Figure
 from wholebody.methods.control import Control
 from wholebody.methods.qp.chain_kernel import Goals

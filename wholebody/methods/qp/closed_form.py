@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wholebody.base.arrays import Array
-from wholebody.base.records import with_values
+from wholebody.base.arrays import Array, with_values
 from wholebody.methods.qp.chain_kernel import Chain
 from wholebody.methods.qp.closed_form_kernel import BRANCHES, CROSSING, PARALLEL, SLACK, THREE_PARALLEL, Arm
 

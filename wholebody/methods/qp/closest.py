@@ -16,8 +16,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wholebody.base.arrays import Array
-from wholebody.base.records import with_values
+from wholebody.base.arrays import Array, with_values
 from wholebody.figures.state import State, Wrench
 from wholebody.methods.qp.iterates import Iterate, LocalSolution, Stage
 from wholebody.methods.qp.rows import Rows, StepSize

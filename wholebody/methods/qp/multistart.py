@@ -10,8 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.assessment.posture import assess
-from wholebody.base.arrays import Array
-from wholebody.base.records import with_values
+from wholebody.base.arrays import Array, with_values
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
 from wholebody.methods.control import Control
 from wholebody.methods.qp.at_place import at_its_place

@@ -10,8 +10,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array, Indices
-from wholebody.base.records import with_values
+from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.figures.description import Limits
 from wholebody.methods.qp.chain_kernel import Chain, Goals, Room
 from wholebody.methods.qp.closed_form import Branches, closed_form

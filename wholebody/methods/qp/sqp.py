@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wholebody.base.arrays import Array
-from wholebody.base.records import with_values
+from wholebody.base.arrays import Array, with_values
 from wholebody.methods.qp.iterates import Iterate, LocalSolution, PredictedReduction, Stage, Step, StepAcceptance, judge
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.rows import Multipliers, StepSize

@@ -14,8 +14,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array
-from wholebody.base.records import with_values
+from wholebody.base.arrays import Array, with_values
 from wholebody.figures.state import State
 from wholebody.methods.qp.quadratic_program import QuadraticProgram, work_size
 from wholebody.methods.qp.rows import NUMBERS, Rows, StepParts, StepRoom, StepSize, Terms

@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, with_values
 from wholebody.base.errors import InputError
-from wholebody.base.records import with_values
 from wholebody.figures.state import State
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.rows import LinearRows, Multipliers, Rows, StepSize, Terms, Violation

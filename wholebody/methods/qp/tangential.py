@@ -11,8 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.base.arrays import Array
-from wholebody.base.records import with_values
+from wholebody.base.arrays import Array, with_values
 from wholebody.methods.acceleration import STRETCH, Anderson
 from wholebody.methods.qp.active_set import without_gradient
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram

@@ -8,11 +8,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import flag, posture, time_step
 from wholebody.base.errors import TermError
 from wholebody.base.pool import OneAtATime
-from wholebody.base.records import with_values
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
 from wholebody.methods.base import Method, begun, goal_error, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem

@@ -190,15 +190,8 @@ def _scene(whole: Scene, figure: Figure, geometry: pin.GeometryModel, kept: list
     made = geometry_model([pin.GeometryObject(geometry.geometryObjects[old]) for old in kept], pairs)
     owners = tuple(whole.piece_owner[old] for old in kept)
     objects: list[SceneObject] = [thing for name, thing in whole.objects.items() if name in set(owners)]
-    pieces: dict[str, list[int]] = {}
-    for index, owner in enumerate(owners):
-        pieces.setdefault(owner, []).append(index)
-    places = {
-        thing.name: [
-            (index, part.placement) for index, part in zip(pieces[thing.name], thing.shape.pieces(), strict=True)
-        ]
-        for thing in objects
-    }
+    known = whole.built.pieces_of
+    places = {thing.name: [(int(place[old]), local) for old, local in known[thing.name]] for thing in objects}
     return Scene.of_parts(figure, objects, SceneGeometry(figure.model, made, owners, places, pairs))
 
 

@@ -14,8 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.base.records import with_values
+from wholebody.base.arrays import Array, Indices, Mask, with_values
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.clip_torques import CUTOFF, smoothed

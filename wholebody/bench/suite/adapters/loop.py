@@ -9,8 +9,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 import numpy as np
 
 import wholebody as wb
-from wholebody.base.arrays import Array
-from wholebody.base.records import with_values
+from wholebody.base.arrays import Array, with_values
 from wholebody.bench.suite.adapters.base import Outside
 from wholebody.figures.figure import Figure
 from wholebody.methods import differential

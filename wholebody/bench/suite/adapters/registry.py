@@ -11,9 +11,9 @@ from inspect import signature
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from wholebody.base.arrays import with_values
 from wholebody.base.errors import MissingPackageError, UnknownNameError
 from wholebody.base.files import parsed_toml
-from wholebody.base.records import with_values
 from wholebody.bench.measure.track import Track
 from wholebody.bench.suite.adapters.base import LADDER, Adapter, Outside, Tool, made
 from wholebody.bench.suite.adapters.own import NEWTONS, ccd_adapter, dls_adapter, newton_adapter, one_start, qp_adapter

@@ -164,7 +164,8 @@ def as_markdown(given: Material, charts: str) -> str:
     for one in ranked:
         leading.setdefault(re.split(r"[/,+ ]", one.method)[0], one)
     return render(
-        "compare.md", given=given, leading=list(leading.values()), charts=charts, advice=advice(results, given.rows), picked=choices(results, given.rows),
+        "compare.md", given=given, leading=list(leading.values()), charts=charts, advice=advice(results, given.rows),
+        picked=choices(results, given.rows),
         ranked=ranked, reference=reference(results), named=named, chart=chart_name,
         groups=groups(results.adapters), counts=[row.cases for row in given.rows],
         left_out=left_out(given.settings, given.chunks, given.rows), kernel=kernel_of(given.chunks),

@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array
-from wholebody.base.records import with_values
+from wholebody.base.arrays import Array, with_values
 from wholebody.methods.qp.active_set import last_resort, solve_from, violated_set
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram, SparseForm
 from wholebody.methods.qp.settings import CORRECTIONS

@@ -1,0 +1,102 @@
+"""A world that is dragged by hand: handles reach places, bodies are lifted and thrown, lost trackers ease back."""
+
+from __future__ import annotations
+
+import json
+import socket
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.dynamics.live_world import LiveWorld
+from wholebody.tracking.receiver import Receiver
+from wholebody.view.live_page import LivePage
+
+DT = 1.0 / 60.0
+
+
+@pytest.fixture
+def live() -> LiveWorld:
+    scene = wb.Scene(wb.load("avatar")).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Box((0.4, 0.6, 0.04)), name="shelf", at=(0.9, 0.0, 1.0))
+    scene.add(wb.Sphere(0.1), name="ball", at=(0.9, -0.1, 1.1205), body=wb.Body(mass=0.5))
+    return LiveWorld(scene, scene.figure.posture("standing"))
+
+
+def test_a_hand_is_dragged_and_pushes_a_ball_off_its_shelf(live: LiveWorld) -> None:
+    live.take("right_palm")
+    began, feet = live.place("ball"), np.array([live.place(name) for name in ("left_sole", "right_sole")])
+    way = np.linspace(live.place("right_palm"), began + [0.0, -0.25, 0.05], 60)
+    for place in [*way, *np.linspace(way[-1], began + [0.0, 0.15, 0.05], 60)]:
+        assert live.move(place).overlap < 2e-4
+    for _ in range(60):
+        live.move()
+    assert live.place("ball")[2] < 0.2  # on the floor
+    assert np.array([live.place(name) for name in ("left_sole", "right_sole")]) == pytest.approx(feet, abs=2e-3)
+    assert live.undo()
+    assert live.place("ball") == pytest.approx(began, abs=1e-3)
+
+
+def test_a_body_follows_the_mouse_and_flies_on_when_it_is_let_go(live: LiveWorld) -> None:
+    live.take("ball")
+    began = live.place("ball")
+    for number in range(40):
+        live.move(began + [0.0, 0.0, min(0.4, 0.02 * number)])
+    assert live.place("ball") == pytest.approx(began + [0.0, 0.0, 0.4], abs=0.03)  # against its weight
+    for number in range(12):
+        live.move(began + [0.04 * number, 0.0, 0.4])
+    live.let_go()
+    place, speed = live.place("ball"), live.world.engine.twist("ball")[:3]  # type: ignore[union-attr]
+    assert speed[0] > 0.8
+    for _ in range(12):
+        live.move()
+    # free flight, by steps of 1/240 s
+    assert live.place("ball") == pytest.approx(place + 0.2 * speed + [0.0, 0.0, -0.5 * 9.81 * 0.2**2], abs=0.01)
+
+
+def test_a_lost_tracker_holds_then_eases_back_and_a_jump_is_followed_at_a_bounded_speed(live: LiveWorld) -> None:
+    began = live.place("left_palm")
+    places = [began]
+    for _ in range(40):
+        live.follow({"left_palm": began + [0.0, 0.15, 0.3]})
+        live.move()
+        places.append(live.place("left_palm"))
+    assert places[-1] == pytest.approx(began + [0.0, 0.15, 0.3], abs=0.01)
+    assert np.linalg.norm(np.diff(places, axis=0), axis=1).max() < 3.5 * DT
+    for _ in range(12):  # 0.2 s without a word
+        live.move()
+    assert live.place("left_palm") == pytest.approx(places[-1], abs=0.01)
+    for _ in range(120):
+        live.move()
+    assert live.place("left_palm") == pytest.approx(began, abs=0.02)
+    with pytest.raises(wb.UnknownNameError, match="left_palm"):
+        live.follow({"left_pal": began})
+    with pytest.raises(wb.InputError, match="place of left_palm"):
+        live.follow({"left_palm": [np.nan, 0.0, 0.0]})
+
+
+def test_datagrams_move_handles_on_the_page_and_bad_ones_are_told(live: LiveWorld, tmp_path: Path) -> None:
+    pytest.importorskip("viser")
+    receiver = Receiver(0, live.handles)
+    page = LivePage(live, tmp_path, 8391, places=receiver.latest)
+    began, sender = live.place("right_palm"), socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    wanted = began + [0.05, 0.0, 0.2]
+    try:
+        for bad in (b"hello", b'{"nose": [0, 0, 1]}', b'{"right_palm": [0, 0, NaN]}'):
+            sender.sendto(bad, ("127.0.0.1", receiver.port))
+        end = time.monotonic() + 60.0
+        while np.linalg.norm(live.place("right_palm") - wanted) > 0.01 and time.monotonic() < end:
+            sender.sendto(json.dumps({"right_palm": wanted.tolist()}).encode(), ("127.0.0.1", receiver.port))
+            time.sleep(0.02)
+        assert live.place("right_palm") == pytest.approx(wanted, abs=0.01)
+        assert receiver.refused == 3
+    finally:
+        page.stop()
+        sender.close()
+        receiver.close()
+    assert page.frames > 3
+    with pytest.raises(wb.InputError, match="port"):
+        Receiver(-1, live.handles)

@@ -1,0 +1,226 @@
+"""A world whose figure and things are dragged by hand, or by a tracker elsewhere, while time goes on.
+
+A handle of the figure moves the posture that the figure follows, by one quadratic program a frame, through things that
+stand or move: `World` keeps the figure out of them. A body is drawn to the mouse by a critically damped spring, and
+flies on when it is let go.
+"""
+
+from __future__ import annotations
+
+import copy
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from wholebody.base.arrays import Array
+from wholebody.base.checks import instance, known, numbers
+from wholebody.base.errors import InputError
+from wholebody.dynamics.actuated import Actuated
+from wholebody.dynamics.coupling import Spring
+from wholebody.dynamics.world import World
+from wholebody.methods.qp.method import QP
+from wholebody.problem import Problem
+from wholebody.scene.scene import Scene
+from wholebody.tasks import Hold, Point
+from wholebody.tracking.live import LiveFrame
+from wholebody.tracking.live_subjects import LiveProblem, things_of
+
+RATE = 12.0  # 1/s: of the spring between the mouse and a body
+STRONGEST = 80.0  # m/s^2: a body is not drawn faster than this
+FASTEST = 3.0  # m/s: a goal that jumps is followed at this speed
+HELD = 0.25  # s: a goal from outside that is not renewed holds for so long
+BACK = 1.0  # s: then it eases back to where its handle began, in about this time
+
+
+class LiveWorld:
+    """The same things to take and move as `LiveDrag`, in a world that does not wait.
+
+    Attributes:
+        world: what moves.
+        scene: its scene, a copy of the given one.
+        handles: names of the frames that can be dragged.
+        things: names of the things that can be dragged: those that move by themselves, and those that stand.
+        held: frames that the tracked posture keeps where they are.
+        taken: the handle that the mouse holds; "" for none.
+        methods, chosen: of the tracker: "qp" alone.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        start: Array | None = None,
+        *,
+        constraints: Sequence[Any] | None = None,
+        spring: Spring | Actuated | None = None,
+    ) -> None:
+        """Begin at a start (nq,), with constraints of the tracked posture: the soles of people are held by default.
+
+        Holds of handles can be released.
+
+        Raises:
+            InputError: the scene is none, or a start, constraints or spring that `Problem` or `World` refuses.
+        """
+        instance(scene, Scene, "LiveWorld: scene", "make one with wb.Scene(figure)")
+        self._given, self._spring = scene, spring
+        empty = Scene(scene.figure)
+        soles = [Hold(name) for name in ("left_sole", "right_sole") if name in scene.figure.frames]
+        stated = Problem(empty, start, constraints=soles if constraints is None else constraints, balance=False)
+        self._subject = LiveProblem(stated)
+        self.handles, self.held = tuple(self._subject.handles), set(self._subject.held)
+        self.things = things_of(scene)
+        self.methods, self.chosen = {"qp": "qp"}, "qp"
+        self._begin()
+        self.take(self.handles[0])
+        self.move(self.place(self.handles[0]))  # what is loaded or set up at the first frame is there then
+        self._begin()
+
+    def _begin(self) -> None:
+        self.scene, self.taken = copy.copy(self._given), ""
+        self.world = World(self.scene, self._subject.q, spring=self._spring)
+        self._bodies = frozenset(() if self.world.engine is None else self.world.engine.bodies)
+        self._state = self.scene.state(self.world.q)
+        self._tracked, self._goals, self._renewed = np.array(self.world.q), dict[str, Array](), dict[str, float]()
+        self._tracker: Any = None
+        self._places = {name: self.place(name) for name in self.handles}
+        self._note = ""
+
+    @property
+    def q(self) -> Array:
+        """(nq,) the posture that is shown."""
+        return self.world.q
+
+    # ---- what the mouse, the buttons and trackers do
+
+    def take(self, name: str) -> None:
+        """Take the handle of a frame or a thing; raises UnknownNameError where there is none."""
+        known(name, {*self.handles, *self.things}, "handle")
+        self.taken = name
+        if name in self.handles:
+            self._goal(name, self._tracked_place(name))
+
+    def let_go(self) -> None:
+        """Let the handle go: a body flies on, a frame of the figure stays."""
+        self.taken = ""
+
+    def follow(self, places: Mapping[str, ArrayLike]) -> None:
+        """Handles are to follow places (3,) [m] from outside, such as a tracked head and hands, from the next frame on.
+
+        One that is not renewed within 0.25 s stays, and after it eases back to where it began.
+
+        Raises:
+            InputError: a place is not three finite numbers.
+            UnknownNameError: there is no such handle.
+        """
+        for name, place in instance(places, Mapping, "places", "give handles with their places").items():
+            self._goal(known(name, self.handles, "handle"), numbers(place, (3,), f"the place of {name}"), clamped=True)
+            self._renewed[name] = self.world.time
+
+    def move(self, place: ArrayLike | None = None) -> LiveFrame:
+        """Make a frame, with what was taken on its way to a place (3,); raises InputError where nothing was taken."""
+        began = time.perf_counter()
+        target = None if place is None else numbers(place, (3,), "the place of a handle")
+        if target is not None:
+            if not self.taken:
+                raise InputError("no handle was taken; take one first")
+            self._pull(target)
+        self._ease()
+        frame = self.world.step(self._track())
+        self._note = frame.note
+        error = 0.0 if target is None else float(np.linalg.norm(self.place(self.taken) - target))
+        seconds = time.perf_counter() - began
+        return LiveFrame(frame.q, error, len(frame.collisions), frame.deepest, seconds, self._status())
+
+    def toggle(self, name: str) -> bool:
+        """Hold a frame where it is, or release it; whether it is held now. Raises UnknownNameError for other names."""
+        known(name, self.handles, "handle")
+        self.held ^= {name}
+        self._tracker = None
+        return name in self.held
+
+    def choose(self, method: object) -> None:
+        """Nothing: the tracker is "qp"; raises UnknownNameError for another name."""
+        known(method, self.methods, "method")
+
+    def undo(self) -> bool:
+        """Begin anew: figure and things are where they were at first."""
+        self._begin()
+        return True
+
+    # ---- what is seen
+
+    def place(self, name: str) -> Array:
+        """Where (3,) the handle of a frame or a thing is."""
+        if name in self.things:
+            return np.array(self.scene.objects[name].placement.translation)
+        return self._handle_place(self._state, self.q, name)
+
+    def report(self) -> LiveFrame:
+        """What there is to say without a frame."""
+        return LiveFrame(self.q, 0.0, 0, 0.0, 0.0, self._status())
+
+    def _status(self) -> str:
+        doing = f"dragging {self.taken}" if self.taken else "take a handle or a thing and drag it; click one to hold it"
+        return f"{doing}: {self._note}" if self._note else doing
+
+    def _handle_place(self, state: Any, q: Array, name: str) -> Array:
+        handle = self._subject.handles[name]
+        return np.array(state.update(q).data.oMi[handle.joint].act(handle.local.translation))
+
+    def _tracked_place(self, name: str) -> Array:
+        return self._handle_place(self._state, self._tracked, name)
+
+    # ---- a frame
+
+    def _goal(self, name: str, place: Array, clamped: bool = False) -> None:
+        """Follow a place with a handle; a place from outside that jumps is followed at a bounded speed."""
+        if name not in self._goals:
+            self._goals[name], self._tracker = self._tracked_place(name), None
+        if clamped:
+            way = place - self._goals[name]
+            length = float(np.linalg.norm(way))
+            place = self._goals[name] + way * min(1.0, FASTEST * self.world.dt / max(length, 1e-12))
+        self._goals[name] = place
+
+    def _pull(self, place: Array) -> None:
+        """Bring what was taken towards a place (3,)."""
+        name, dt = self.taken, self.world.dt
+        if name in self.handles:
+            self._goal(name, place, clamped=True)
+            return
+        way = place - self.place(name)
+        engine = self.world.engine
+        if name not in self._bodies or engine is None:
+            length = float(np.linalg.norm(way))
+            at = self.scene.objects[name].placement
+            way *= min(1.0, FASTEST * dt / max(length, 1e-12))
+            self.scene.move(name, at=pin.SE3(at.rotation, at.translation + way), over=dt)
+            return
+        drawn = RATE**2 * way - 2.0 * RATE * engine.twist(name)[:3]
+        drawn *= min(1.0, STRONGEST / max(float(np.linalg.norm(drawn)), 1e-12))
+        mass = float(np.linalg.norm(engine.weight(name)) / np.linalg.norm(engine.gravity))
+        engine.push(name, dt * (mass * drawn - engine.weight(name)), engine.centre(name))
+
+    def _ease(self) -> None:
+        """Bring handles back that a tracker has lost."""
+        for name, renewed in list(self._renewed.items()):
+            if self.world.time - renewed > HELD:
+                share = min(1.0, self.world.dt / (0.3 * BACK))
+                self._goals[name] = self._goals[name] + share * (self._places[name] - self._goals[name])
+
+    def _track(self) -> Array:
+        """The tracked posture of this frame."""
+        if not self._goals:
+            return self._tracked
+        goals = [Point(name, place) for name, place in self._goals.items()]
+        if self._tracker is None:
+            held = self.held - set(self._goals)
+            self._problem = self._subject.stated(self._tracked, goals, held)
+            self._tracker = QP().tracker(self._problem, dt=self.world.dt)
+        else:
+            self._problem.retarget(goals)
+        self._tracked = np.array(self._tracker.step(self._tracked).q)
+        return self._tracked

@@ -1,0 +1,83 @@
+"""Places of handles from a tracker elsewhere: datagrams (UDP) of JSON, such as {"head_top": [0.1, 0.0, 1.7]}."""
+
+from __future__ import annotations
+
+import json
+import math
+import socket
+from collections.abc import Collection
+
+import numpy as np
+
+from wholebody.base.arrays import Array
+from wholebody.base.checks import shown
+from wholebody.base.errors import InputError
+
+LONGEST = 65536  # bytes of a datagram
+MOST = 1000  # datagrams that are read at once
+
+
+class Receiver:
+    """Listens at a port of this machine.
+
+    Attributes:
+        port: where datagrams arrive.
+        refused: number of datagrams that were not understood.
+        note: what was wrong with the last of them; "" if it was understood.
+    """
+
+    def __init__(self, port: int, handles: Collection[str]) -> None:
+        """Listen for places of some handles at a port; 0 for any that is free.
+
+        Raises InputError where the port is taken.
+        """
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self._socket.bind(("127.0.0.1", port))
+        except (OSError, OverflowError) as error:
+            self._socket.close()
+            raise InputError(f"port {port} cannot be listened at ({error}); give another, such as 9870") from None
+        self._socket.setblocking(False)
+        self.port: int = self._socket.getsockname()[1]
+        self._handles, self.refused, self.note = frozenset(handles), 0, ""
+
+    def latest(self) -> dict[str, Array]:
+        """The last place (3,) [m] of every handle that has arrived since the last call."""
+        found: dict[str, Array] = {}
+        for _ in range(MOST):
+            try:
+                data = self._socket.recv(LONGEST)
+            except BlockingIOError:
+                break
+            places = self._read(data)
+            self.refused += bool(self.note)
+            found.update(places)
+        return found
+
+    def close(self) -> None:
+        """Listen no longer."""
+        self._socket.close()
+
+    def _read(self, data: bytes) -> dict[str, Array]:
+        """Places of one datagram; none where it is not understood, and `note` says why."""
+        self.note = ""
+        try:
+            given = json.loads(data)
+        except (ValueError, RecursionError):
+            given = None
+        if not isinstance(given, dict):
+            self.note = 'a datagram is no JSON object; send {"head_top": [0.1, 0.0, 1.7]}'
+            return {}
+        for name, place in given.items():
+            if name not in self._handles:
+                self.note = f"a datagram names {shown(name)}; send {', '.join(sorted(self._handles))}"
+            elif not _is_place(place):
+                self.note = f"a datagram gives {name} the place {shown(place)}; send three finite numbers, metres"
+        return {} if self.note else {name: np.array(place, dtype=float) for name, place in given.items()}
+
+
+def _is_place(value: object) -> bool:
+    if not isinstance(value, list) or len(value) != 3:
+        return False
+    real = all(isinstance(one, (int, float)) and not isinstance(one, bool) for one in value)
+    return real and all(math.isfinite(one) and abs(one) < 1e4 for one in value)  # m
