@@ -39,7 +39,7 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> wb.Solution:
     report("People at the edge of a population", problem, solution)
     if pictures:
         middle = 0.5 * APART * (len(CHOSEN) - 1)
-        picture("boundary_people", problem, solution, out, eye=(3.6, middle - 1.2, 1.6), target=(0.0, middle, 0.6))
+        picture("boundary_people", problem, solution, out, eye=(5.0, middle - 1.5, 1.8), target=(0.0, middle, 0.75))
     return solution
 
 

@@ -49,11 +49,11 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> tuple[wb.Soluti
     taken = wb.solve(problem)
     report("Take the box", problem, taken)
     if pictures:
-        picture("take_a_box", problem, taken, out, eye=(2.2, -2.6, 1.8), target=(0.3, 0.0, 0.85))
+        picture("take_a_box", problem, taken, out, eye=(2.6, -3.1, 1.8), target=(0.3, 0.0, 0.95))
     higher, lifted = lift(taken, problem)
     report("Lift it", higher, lifted)
     if pictures:
-        picture("lift_a_box", higher, lifted, out, eye=(2.2, -2.6, 1.8), target=(0.3, 0.0, 0.85))
+        picture("lift_a_box", higher, lifted, out, eye=(2.6, -3.1, 1.8), target=(0.3, 0.0, 0.95))
     return taken, lifted
 
 

@@ -1,4 +1,4 @@
-"""The page within a saved page, which is compressed and unpacks itself in a browser."""
+"""The scene within a saved page, which is compressed and unpacks itself in a browser."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 def unpacked(path: str | Path) -> str:
-    """The text of the page that a browser shows."""
-    packed = re.search(r'<script id="page"[^>]*>(.*?)</script>', Path(path).read_text(encoding="utf-8"))
+    """The commands that draw the scene, among them names as they are."""
+    packed = re.search(r'<script id="picture"[^>]*>(.*?)</script>', Path(path).read_text(encoding="utf-8"))
     assert packed
-    return gzip.decompress(base64.b64decode(packed[1])).decode()
+    return gzip.decompress(base64.b64decode(packed[1])).decode("latin-1")

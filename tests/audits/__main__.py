@@ -25,13 +25,6 @@ from wholebody.cli.command import command, count, option
 QUICK = 45  # quadratic programs
 
 
-def publish_page(name: str, text: str, arguments: argparse.Namespace) -> None:
-    """Write a page that a command makes whole, and into the documentation where that is asked for."""
-    for folder in filter(None, (arguments.out, arguments.update_docs)):
-        write_text(folder / name, text)
-        print(f"wrote {folder / name}")
-
-
 @measuring(
     "newton",
     "sparse Newton by size, shape and factorisation",
@@ -52,7 +45,7 @@ def newton(arguments: argparse.Namespace) -> None:
     linear = list(newton.linear_rows(sizes, repeats))
     found: dict[str, Any] = {"linear": linear, "solves": solves, "agreements": agreements, "drags": drags}
     tables = {f"newton-{name}": rows for name, rows in found.items()}
-    publish("newton", newton.report(**found, facts=facts), arguments, facts=facts, tables=tables)
+    publish("newton", newton.report(**found, facts=facts), arguments, facts=facts, tables=tables, page=None)
 
 
 @measuring(
@@ -114,7 +107,9 @@ def human(arguments: argparse.Namespace) -> None:
             print(told, flush=True)
     assert found is not None
     write_text(arguments.out / "human.json", figures(found, facts))
-    publish_page("human.md", page(found, facts, pictures=drawn), arguments)
+    for folder in filter(None, (arguments.out, arguments.update_docs)):
+        write_text(folder / "human.md", page(found, facts, pictures=drawn))
+        print(f"wrote {folder / 'human.md'}")
     if arguments.update_docs is not None and drawn:
         folder = arguments.update_docs / "assets" / "human"
         make_folder(folder)
@@ -181,7 +176,7 @@ def loads(arguments: argparse.Namespace) -> None:
         rows.append(row)
         write_rows(arguments.out / "loads.csv", facts, rows)
         print(f"{row.clip}, {row.equipment}, {row.way}", flush=True)
-    publish("loads", loads.report(rows, facts), arguments)
+    publish("loads", loads.report(rows, facts), arguments, page=None)
 
 
 @measuring(
@@ -202,7 +197,7 @@ def clip_constants(arguments: argparse.Namespace) -> None:
     unnoticed = sorted({row.case for row in rows} - {row.case for row in shown})
     about = "Constants of `wb.avoid`, halved and doubled on clips: changes, summed over the cases."
     text = report(about, {"": shown}, facts, [f"changes nothing: {name}" for name in unnoticed])
-    publish("clip-constants", text, arguments, facts=facts, tables={"clip-constants": rows})
+    publish("clip-constants", text, arguments, facts=facts, tables={"clip-constants": rows}, page=None)
 
 
 @measuring(
@@ -227,7 +222,7 @@ def detail(arguments: argparse.Namespace) -> None:
     )
     shown = [row for row in detail.detail_summary(rows) if row.tool.endswith(("all", "simplified"))]
     text = report(about, {"": only(shown, *detail.SHOWN)}, facts, list(refused))
-    publish("detail", text, arguments, facts=facts, tables={"detail": rows})
+    publish("detail", text, arguments, facts=facts, tables={"detail": rows}, page=None)
 
 
 @measuring(
@@ -246,27 +241,27 @@ def ablation(arguments: argparse.Namespace) -> None:
     whole, rows = ablation.ablation(method, given, ablation.mechanisms(method), print)
     text = ablation.report(method, len(given), whole, rows, ablation.constants(method)[1], facts)
     name = f"ablation-{method}"
-    publish(name, text, arguments, facts=facts, tables={name: rows})
+    publish(name, text, arguments, facts=facts, tables={name: rows}, page=None)
 
 
 @measuring(
     "robots",
     "load every robot description of a folder, and reach with its tips",
     "Load every URDF and MJCF file below a folder, with an empty cache and again, and bring the tips "
-    "of each robot to where random postures free of contact have them. With --update-docs the table becomes "
-    "docs/robots.md.",
+    "of each robot to where random postures free of contact have them.",
     option("folder", type=Path, metavar="FOLDER", help="folder that holds robot descriptions"),
 )
 def robots(arguments: argparse.Namespace) -> None:
     """Measure all descriptions; --quick makes three reaches instead of twelve."""
-    from tests.audits.robots import measure, page
+    from tests.audits.robots import measure, robots_report
 
     facts, reaches, found = machine(), 3 if arguments.quick else 12, []
     for row in measure(arguments.folder, reaches):
         found.append(row)
         told = f"{row.figures.get('solved', 'no reach')} of {reaches} solved" if row.tool != "refused" else "refused"
         print(f"{row.case}: {told}", flush=True)
-    publish_page("robots.md", page(found, facts, reaches), arguments)
+    text = robots_report(found, facts, reaches)
+    publish("robots", text, arguments, facts=facts, tables={"robots": found}, page=None)
 
 
 @measuring(
@@ -282,7 +277,7 @@ def pen(arguments: argparse.Namespace) -> None:
     minutes = 0.05 if arguments.quick else number(arguments.minutes, "--minutes", 0.01, 1000.0, "minutes")
     facts, row = machine(), long_run(minutes)
     text = report("Dominoes, stacks and balls in a pen; a ball is kicked every ten seconds.", {"": [row]}, facts)
-    publish("pen", text, arguments, facts=facts, tables={"pen": [row]})
+    publish("pen", text, arguments, facts=facts, tables={"pen": [row]}, page=None)
 
 
 @measuring(
@@ -301,7 +296,7 @@ def plans(arguments: argparse.Namespace) -> None:
     cases, seeds = (1, 1) if arguments.quick else (arguments.cases, arguments.seeds)
     facts, found = machine(), rows(sets, cases, seeds)
     text = report("Motions from starts to goals; lengths by the shortest of each problem.", {"": found}, facts)
-    publish("plans", text, arguments, facts=facts, tables={"plans": found})
+    publish("plans", text, arguments, facts=facts, tables={"plans": found}, page=None)
 
 
 COMMANDS = (newton, qp, human, regress, loads, clip_constants, detail, ablation, robots, pen, plans)

@@ -130,14 +130,13 @@ def _examined(path: Path, reaches: int, cache: str) -> dict[str, Figure]:
     return found
 
 
-def page(rows: Sequence[Row], facts: Mapping[str, str], reaches: int) -> str:
-    """Return the page on robots as Markdown."""
+def robots_report(rows: Sequence[Row], facts: Mapping[str, str], reaches: int) -> str:
+    """Return what was found as Markdown."""
     loaded = [row for row in rows if row.tool != "refused"]
     whole = sum(row.figures.get("solved") == reaches for row in loaded)
     about = (
-        "# Robots\n\nWhich robot descriptions load, how long that takes, and whether the robots reach. The files come "
-        "from other people and are loaded without changes; `python -m tests.audits robots FOLDER --update-docs` writes "
-        f"this page.\n\n{len(loaded)} of {len(rows)} descriptions load; {whole} robots solve all of their {reaches} "
+        "Robot descriptions by other people, loaded without changes.\n\n"
+        f"{len(loaded)} of {len(rows)} descriptions load; {whole} robots solve all of their {reaches} "
         "reaches. A reach moves the tip of a chain to where a random posture free of contact has it; it begins at the "
         "default posture, and the robot may not touch itself. The chains take turns, the longest first. First is the "
         "CPU time of loading with an empty cache, again that of loading once more; free is the least distance of any "
@@ -145,4 +144,4 @@ def page(rows: Sequence[Row], facts: Mapping[str, str], reaches: int) -> str:
     )  # fmt: skip
     refused = [f"refused: {row['refused']}" for row in rows if row.tool == "refused"]
     shown = only(loaded, "first s", "again s", "freedoms", "pairs", "free mm", "solved", "median ms", "p95 ms")
-    return report(about, {"": shown}, facts, refused) + "\n"
+    return report(about, {"": shown}, facts, refused)

@@ -9,7 +9,7 @@ import pytest
 
 import wholebody as wb
 from tests.audits.__main__ import main
-from tests.audits.robots import descriptions, examine, measure, page, tip_targets
+from tests.audits.robots import descriptions, examine, measure, robots_report, tip_targets
 from wholebody.base.errors import InputError
 
 ROBOT = """<robot name="r"><link name="a"/>
@@ -53,7 +53,7 @@ def test_every_description_is_loaded_twice_or_refused(folder: Path) -> None:
     assert (good["freedoms"], good["pieces"], good["pairs"]) == (3, 3, 1)
     assert good["free mm"] > 0.0
     assert (good["solved"], good["reaches"]) == (3, 3)
-    text = page([bad, good], {"wholebody": "1"}, 3)
+    text = robots_report([bad, good], {"wholebody": "1"}, 3)
     assert "1 of 2 descriptions load" in text
     assert "| `good/robot.urdf` | URDF |" in text
     assert "- refused: bad.urdf: there are no links in it" in text
@@ -87,11 +87,11 @@ def test_targets_are_of_free_postures_where_most_are_not(tmp_path: Path) -> None
     assert (np.abs(np.arctan2(targets[:, 0], targets[:, 2])) < np.arctan2(0.04, 0.6)).all()
 
 
-def test_the_command_writes_the_page(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_publishes_its_table(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     docs, out = folder / "docs", folder / "out"
     wanted = ["robots", str(folder / "good"), "--quick", "--out", str(out), "--update-docs", str(docs)]
     assert main(wanted) == 0
     assert "robot.urdf" in capsys.readouterr().out
-    assert (docs / "robots.md").read_text().startswith("# Robots\n")
-    assert (docs / "robots.md").read_text() == (out / "robots.md").read_text()
+    assert "1 of 1 descriptions load" in (out / "robots.md").read_text()
+    assert (docs / "assets" / "bench" / "robots.txt").read_text() == (out / "robots.md").read_text()
     assert main(["robots", str(folder / "nowhere")]) == 2

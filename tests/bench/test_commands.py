@@ -48,7 +48,9 @@ def test_step(tmp_path: Path, docs: Path, capsys: pytest.CaptureFixture[str], mo
         assert int(row["pairs"]) >= 700
         assert float(row["beyond limits rad"]) < 1e-9
     page = (docs / "results.md").read_text()
-    assert "| contact | placo |" in page
+    assert "contact, median × placo" in page
+    assert "[Everything measured](assets/bench/step.txt)" in page
+    assert "| contact | placo |" in (docs / "assets/bench/step.txt").read_text()
     assert "assets/bench/step.svg" in page
     assert (docs / "assets" / "bench" / "step.svg").read_text().startswith("<?xml")
     assert (tmp_path / "out" / "step.png").read_bytes().startswith(b"\x89PNG")

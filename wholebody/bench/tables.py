@@ -7,8 +7,10 @@ import dataclasses
 import io
 import os
 import platform
+import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from datetime import date
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -25,6 +27,7 @@ def machine() -> dict[str, str]:
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     facts = {
         "wholebody": __version__,
+        "date": date.today().isoformat(),
         "processor": _processor(),
         "cores": str(usable),
         "load": f"{os.getloadavg()[0]:.1f} in the minute before",
@@ -43,7 +46,7 @@ def machine() -> dict[str, str]:
 
 def sentence(facts: Mapping[str, str]) -> str:
     """The facts in one sentence of Markdown, without the system and the versions of packages: CSV files have these."""
-    kept = "wholebody", "processor", "cores", "load", "OMP_NUM_THREADS"
+    kept = "wholebody", "date", "processor", "cores", "load", "OMP_NUM_THREADS"
     told = [f"{name} {value}" for name, value in facts.items() if name in kept]
     return f"Measured with {'; '.join(told)}."
 
@@ -177,6 +180,22 @@ def summed_programs(texts: Iterable[str]) -> str:
             by, _, count = part.rpartition(" ")
             total[by] += int(count)
     return programs_text(total)
+
+
+def publish_text(docs: Path, name: str, report: str, page: str | None, pictures: Sequence[str] = ()) -> Path:
+    """Write a report into ``assets/bench/NAME.txt`` of the documentation; return the file that shows it.
+
+    A page gets the pictures, the first table, and the line about the machine, which leads to the rest. Raises
+    FileFormatError where the page has no section NAME.
+    """
+    whole = docs / "assets" / "bench" / f"{name}.txt"
+    if page is not None:
+        table = re.search(r"^\|.*(?:\n\|.*)*", report, re.MULTILINE)
+        measured = re.search(r"^Measured (?:with|on) .*", report, re.MULTILINE)
+        parts = [*pictures, *(found[0] for found in (table, measured) if found)]
+        replace_section(docs / page, name, "\n\n".join(parts) + f" [Everything measured](assets/bench/{whole.name}).")
+    write_text(whole, report + "\n")
+    return whole if page is None else docs / page
 
 
 def replace_section(path: Path, name: str, text: str) -> None:

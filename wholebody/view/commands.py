@@ -74,11 +74,11 @@ def set_skin(path: str, skeleton: str, patch: Patch, color: tuple[float, ...], u
         "path": path,
         "skeleton": skeleton,
         "unit": unit,
-        "position": _numbers(np.round(patch.vertices / unit), "<i2"),
-        "normal": _numbers(np.round(127.0 * patch.normals), "i1"),
+        "position": _differences(np.round(patch.vertices / unit), "<i2"),
+        "normal": _differences(np.round(127.0 * patch.normals), "i1"),
         "bones": _numbers(patch.bones, "u1"),
         "weights": _numbers(weights, "u1"),
-        "index": _numbers(np.concatenate([patch.faces, patch.coarse]), "<u2"),
+        "index": _differences(np.concatenate([patch.faces, patch.coarse]).reshape(-1, 1), "<u2"),
         "fine": patch.faces.size,
         "color": [float(part) for part in color],
     }
@@ -87,6 +87,11 @@ def set_skin(path: str, skeleton: str, patch: Patch, color: tuple[float, ...], u
 
 def _numbers(values: Any, kind: str) -> bytes:
     return np.ascontiguousarray(values).astype(kind).tobytes()
+
+
+def _differences(rows: Array, kind: str) -> bytes:
+    """Rows less those before them, which compress better; the page adds them up, modulo the range of the numbers."""
+    return _numbers(np.diff(rows.astype(np.int64), axis=0, prepend=0), kind)
 
 
 def set_transform(path: str, matrix: Array) -> Command:

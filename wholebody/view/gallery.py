@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from wholebody.base.files import Scratch, read_text, templates, write
+from wholebody.view.page import player
 
 LONGEST = 600.0  # s: of one script
 
@@ -78,6 +79,8 @@ def write_gallery(
 ) -> list[Exhibit]:
     """Run scripts one after the other, and write one page that opens in any browser without a network.
 
+    The player of the scenes is in it once.
+
     Args:
         scripts: files, each with a docstring and an option --out.
         path: of the page.
@@ -87,5 +90,6 @@ def write_gallery(
     for script in scripts:
         made.append(exhibit(script))
         say(made[-1])
-    write(path, templates(Path(__file__).parent).get_template("gallery.html.jinja").render(exhibits=made))
+    page = templates(Path(__file__).parent).get_template("gallery.html.jinja")
+    write(path, page.render(exhibits=made, player=player(), slot="<!-- player -->"))
     return made

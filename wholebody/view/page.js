@@ -116,6 +116,11 @@
   const skeletons = new Map();
   const parts = path => path.split("/").filter(x => x);
   const numbers = (Kind, bytes) => new Kind(new Uint8Array(bytes).buffer);
+  // Sent are the differences between neighbours, which are small; the sums go round as whole numbers do.
+  const summed = (values, stride) => {
+    for (let at = stride; at < values.length; at++) values[at] += values[at - stride];
+    return values;
+  };
   const matrices = bytes => {
     const values = numbers(Float32Array, bytes), found = [];
     for (let at = 0; at < values.length; at += 16) found.push(new THREE.Matrix4().fromArray(values, at));
@@ -151,13 +156,13 @@
 
   function skin(cmd) {
     const shape = new THREE.BufferGeometry();
-    const position = Float32Array.from(numbers(Int16Array, cmd.position), x => x * cmd.unit);
+    const position = Float32Array.from(summed(numbers(Int16Array, cmd.position), 3), x => x * cmd.unit);
     shape.setAttribute("position", new THREE.BufferAttribute(position, 3));
-    const normal = Float32Array.from(numbers(Int8Array, cmd.normal), x => x / 127);
+    const normal = Float32Array.from(summed(numbers(Int8Array, cmd.normal), 3), x => x / 127);
     shape.setAttribute("normal", new THREE.BufferAttribute(normal, 3));
     shape.setAttribute("skinIndex", new THREE.BufferAttribute(numbers(Uint8Array, cmd.bones), 4));
     shape.setAttribute("skinWeight", new THREE.BufferAttribute(numbers(Uint8Array, cmd.weights), 4, true));
-    shape.setIndex(new THREE.BufferAttribute(numbers(Uint16Array, cmd.index), 1));
+    shape.setIndex(new THREE.BufferAttribute(summed(numbers(Uint16Array, cmd.index), 1), 1));
     const [r, g, b, alpha] = cmd.color;
     const material = new THREE.MeshPhongMaterial({
       color: new THREE.Color(r, g, b), opacity: alpha, transparent: alpha < 1, shininess: 10, specular: 0x141414,
@@ -425,9 +430,8 @@
   }
 
   set_up_scene();
-  const picture = document.getElementById("picture");
-  if (picture) {
-    page.take(bytes(picture.textContent.trim()));
+  if (window.picture) page.take(window.picture); // of a saved page
+  if (window.picture || pane.dataset.still !== undefined) {
     page.ready = true;
   } else {
     connect();

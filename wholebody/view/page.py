@@ -39,56 +39,67 @@ body {{ margin: 0; background: #dfe3e7; }}
 <div id="bar">
 <button title="play or pause"></button><input type="range" min="0" max="1000" value="0"><span></span>
 </div>
-{picture}
-<script>{meshcat}</script>
-<script>{page}</script>
-</body>
+{parts}</body>
 </html>
 """
 
 
-_PACKED = """<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"><title>{title}</title></head><body>
-<script id="page" type="application/octet-stream">{page}</script>
-<script>
-(async function () {{
-  const bytes = Uint8Array.from(atob(document.getElementById("page").textContent), c => c.charCodeAt(0));
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-  const text = await new Response(stream).text();
-  document.open();
-  document.write(text);
-  document.close();
-}})();
-</script></body></html>
+_UNPACK = """
+(async function () {
+  async function unpacked(id) {
+    const packed = Uint8Array.from(atob(document.getElementById(id).textContent), c => c.charCodeAt(0));
+    return new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
+  }
+  window.picture = new Uint8Array(await unpacked("picture"));
+  for (const text of new TextDecoder().decode(await unpacked("player")).split("\\0")) {
+    const script = document.createElement("script");
+    script.textContent = text;
+    document.body.append(script);
+  }
+})();
 """
 
 
 def live_page(title: str = "wholebody") -> str:
     """HTML of a page that connects to its server."""
-    return _page(title, "")
+    return _page(title, _script(_meshcat_script()) + _script(_page_script()))
 
 
 def static_page(commands: list[Command], title: str = "wholebody") -> str:
     """HTML of a page that contains its scene, drawn by these commands in order, and makes no network requests.
 
-    The page is compressed, to half of its size, and unpacks itself.
+    Scene and player are compressed, and unpack themselves.
     """
-    data = base64.b64encode(bundle([command.payload for command in commands])).decode("ascii")
-    page = _page(title, f'<script id="picture" type="application/octet-stream">{data}</script>')
-    packed = base64.b64encode(gzip.compress(page.encode(), mtime=0)).decode("ascii")
-    return _PACKED.format(title=html.escape(title), page=packed)
+    scene = _data("picture", bundle([command.payload for command in commands]))
+    return _page(title, scene + player() + _script(_UNPACK))
+
+
+@lru_cache(maxsize=1)
+def player() -> str:
+    """The part that all static pages have in common. A page with many scenes has it once, and puts it into each."""
+    return _data("player", f"{_meshcat_script()}\0{_page_script()}".encode())
 
 
 def picture_page() -> str:
     """HTML of an empty page for `Screenshots`: it gets its commands from outside, and draws only when asked to."""
-    return _page("wholebody", '<script id="picture" type="application/octet-stream"></script>', " data-still")
+    return _page("wholebody", _script(_meshcat_script()) + _script(_page_script()), " data-still")
 
 
-def _page(title: str, picture: str, still: str = "") -> str:
-    script = (Path(__file__).with_name("page.js")).read_text(encoding="utf-8")
-    return _TEMPLATE.format(
-        title=html.escape(title), still=still, picture=picture, meshcat=_meshcat_script(), page=script
-    )
+def _page(title: str, parts: str, still: str = "") -> str:
+    return _TEMPLATE.format(title=html.escape(title), still=still, parts=parts)
+
+
+def _script(text: str) -> str:
+    return f"<script>{text}</script>\n"
+
+
+def _data(name: str, content: bytes) -> str:
+    packed = base64.b64encode(gzip.compress(content, mtime=0)).decode("ascii")
+    return f'<script id="{name}" type="application/octet-stream">{packed}</script>\n'
+
+
+def _page_script() -> str:
+    return Path(__file__).with_name("page.js").read_text(encoding="utf-8")
 
 
 @lru_cache(maxsize=1)

@@ -26,7 +26,7 @@ def bench(*words: str) -> int:
 def test_counts_failures_and_page_are_written(tmp_path: Path) -> None:
     docs, out = tmp_path / "docs", tmp_path / "out"
     docs.mkdir()
-    (docs / "reliability.md").write_text("<!-- bench:attack -->\nold\n<!-- /bench:attack -->\n")
+    (docs / "where-methods-fail.md").write_text("<!-- bench:attack -->\nold\n<!-- /bench:attack -->\n")
     words = ("--cases", "12", "--kinds", "file", "argument", "--seed", "2", "--seconds", "900", "--out", str(out))
     code = bench(*words, "--update-docs", str(docs))
     _, rows = read_rows(out / "attack.csv", Row)
@@ -36,7 +36,7 @@ def test_counts_failures_and_page_are_written(tmp_path: Path) -> None:
     assert code == int(bool(wrong))
     for row in wrong:
         assert (out / row.case / "repeat.py").is_file()
-    page = (docs / "reliability.md").read_text()
+    page = (docs / "where-methods-fail.md").read_text()
     assert "\nold\n" not in page
     assert "calls with odd arguments" in page
 

@@ -80,13 +80,12 @@ def test_a_figure_that_cannot_reach_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_command_writes_the_same_tables(tmp_path: Path, root: Path) -> None:
-    (tmp_path / "results.md").write_text("<!-- bench:step-figures -->\n<!-- /bench:step-figures -->")
     out, file = str(tmp_path / "out"), str(root / "tests/data/arm/arm.urdf")
     words = ("--figure", file, "--repeats", "1", "--steps", "8", "--tools", "wholebody", "--out", out)
     assert main(["bench", "step", *words, "--update-docs", str(tmp_path)]) == 0
     rows = csv_rows(tmp_path / "out" / "step-figures-time.csv")
     assert list(dict.fromkeys(row["case"] for row in rows)) == ["arm, free", "arm, contact", "arm, alone"]
-    page = (tmp_path / "results.md").read_text()
+    page = (tmp_path / "assets/bench/step-figures.txt").read_text()
     assert "| arm, contact | wholebody |" in page
     assert "standing human" not in page
     assert "does not take" not in page

@@ -94,5 +94,5 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     assert {row["case"].partition(" ")[2] for row in found} == {*sizes}
     page = (tmp_path / "results.md").read_text()
     assert "assets/bench/scaling.svg" in page
-    assert "| things around | ccd |" in page
+    assert "| things around | ccd |" in (tmp_path / "assets/bench/scaling.txt").read_text()
     assert "Measured with" in capsys.readouterr().out

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from wholebody.bench.tables import replace_section, write_rows, write_text
+from wholebody.bench.tables import publish_text, write_rows, write_text
 from wholebody.cli.command import Command, Measure, Option, command, flag, option
 
 
@@ -60,12 +60,13 @@ def publish(
     facts: Mapping[str, str] | None = None,
     tables: Mapping[str, Sequence[Any]] | None = None,
     charts: Mapping[str, Chart] | None = None,
-    page: str = "results.md",
+    page: str | None = "results.md",
 ) -> None:
     """Write tables and report, draw charts, and write both into the documentation where that is asked for.
 
     What was measured is written before anything is drawn, so that a chart that fails loses no measurement. Rows are by
-    the name of their CSV file, charts by those of their files, `page` is of the documentation.
+    the name of their CSV file, charts by those of their files. `page` is of the documentation: it gets the charts and
+    the first table; the whole report becomes a file beside the charts, and is all there is where `page` is None.
     """
     for table, rows in (tables or {}).items():
         write_rows(arguments.out / f"{table}.csv", facts or {}, rows)
@@ -76,9 +77,6 @@ def publish(
     if arguments.update_docs is None:
         return
     pictures = [f"![{caption}](assets/bench/{svg.name})" for (svg, _), caption in drawn]
-    replace_section(arguments.update_docs / page, name, "\n\n".join([*pictures, report]))
-    folder = arguments.update_docs / "assets" / "bench"
-    folder.mkdir(parents=True, exist_ok=True)
+    print(f"wrote {publish_text(arguments.update_docs, name, report, page, pictures)}")
     for (svg, _), _ in drawn:
-        shutil.copyfile(svg, folder / svg.name)
-    print(f"wrote {arguments.update_docs / page}")
+        shutil.copyfile(svg, arguments.update_docs / "assets" / "bench" / svg.name)

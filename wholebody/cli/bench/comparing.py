@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -81,7 +80,7 @@ def compare(arguments: argparse.Namespace) -> int:
 
 
 def _facts(beside: str) -> dict[str, str]:
-    return machine() | {"date": date.today().isoformat(), "cases beside each other": beside}
+    return machine() | {"cases beside each other": beside}
 
 
 def _settings(arguments: argparse.Namespace) -> Settings:

@@ -132,7 +132,12 @@ def attack(arguments: argparse.Namespace) -> int:
     rows.sort(key=lambda one: (one["seed"], one["number"]))
     facts = machine()
     publish(
-        "attack", report.report(rows, facts), arguments, facts=facts, tables={"attack": rows}, page="reliability.md"
+        "attack",
+        report.report(rows, facts),
+        arguments,
+        facts=facts,
+        tables={"attack": rows},
+        page="where-methods-fail.md",
     )
     return 130 if interrupted else int(any(one["outcome"] == "wrong" for one in rows))  # exit code after Ctrl-C
 

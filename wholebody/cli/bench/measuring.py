@@ -11,7 +11,7 @@ from pathlib import Path
 from wholebody.base import checks
 from wholebody.base.errors import InputError
 from wholebody.base.files import make_folder
-from wholebody.bench.rows import Panel, Row, chart, only, report, texts
+from wholebody.bench.rows import Panel, Row, across, chart, only, report, texts
 from wholebody.bench.tables import machine, write_rows
 from wholebody.cli.bench.command import Chart, listed, measuring, publish
 from wholebody.cli.command import count, option
@@ -63,7 +63,7 @@ def step(arguments: argparse.Namespace) -> None:
     text = step.step_report(spent, judged, facts, bool(figures), notes)
     rows = {f"{name}-time": spent, f"{name}-result": judged}
     charts = _charts(name, step.panels(runs, tracks), "Share of steps within a time, and least distance of any pair")
-    publish(name, text, arguments, facts=facts, tables=rows, charts=charts)
+    publish(name, text, arguments, facts=facts, tables=rows, charts=charts, page=None if figures else "results.md")
 
 
 @measuring(
@@ -91,9 +91,9 @@ def scaling(arguments: argparse.Namespace) -> None:
     if "newton" in methods:
         bodies = sizes["joints"] if arguments.quick else (*sizes["joints"], 500)
         rows += scaling.assembly_rows(bodies, repeats)
-    text = report(
-        texts()["scaling"], {"": scaling.exponents(rows)}, facts, [line for line in said if "left out" in line]
-    )
+    found = scaling.exponents(rows)
+    tables = {"Exponents of a solve": across(found, "a solve"), "All exponents": found}
+    text = report(texts()["scaling"], tables, facts, [line for line in said if "left out" in line])
     charts = _charts("scaling", scaling.panels(rows), "Time of a solve and of a step, as one size grows")
     publish("scaling", text, arguments, facts=facts, tables={"scaling": rows}, charts=charts)
 
@@ -220,5 +220,5 @@ def files(arguments: argparse.Namespace) -> int:
     known = [row["bones median deg"] for row in rows if "bones median deg" in row.figures]
     about = f"{sum(row['read'] == 'yes' for row in rows)} of {len(rows)} files are read; {len(known)} recordings are "
     about += f"retargeted, {sum(error < 5.0 for error in known)} of them with a median error of bones below 5 degrees."
-    publish("files", report(about, {"": rows}, facts), arguments, facts=facts, tables={"files": rows})
+    publish("files", report(about, {"": rows}, facts), arguments, facts=facts, tables={"files": rows}, page=None)
     return int(any(row["read"] == "FAULT" for row in rows))

@@ -13,13 +13,13 @@ from wholebody.bench import plot_style
 from wholebody.bench.plot_style import MOST, method_style
 from wholebody.bench.report import page, render
 from wholebody.bench.rows import Panel, chart
-from wholebody.bench.suite.compare.advice import OURS, advice, choices, named, reference, standings
+from wholebody.bench.suite.compare.advice import OURS, Standing, advice, choices, named, reference, standings
 from wholebody.bench.suite.compare.lock import NAME as LOCK
 from wholebody.bench.suite.compare.lock import locked, write_lock
 from wholebody.bench.suite.compare.results import COARSE, DEFAULT, FLOOR, Quantity, Results, Store, middle
 from wholebody.bench.suite.compare.settings import Settings
 from wholebody.bench.suite.compare.summary import GOOD, Material, Summary, kernel_of, left_out, material
-from wholebody.bench.tables import replace_section, write_rows, write_text
+from wholebody.bench.tables import publish_text, write_rows, write_text
 
 
 def curve(results: Results, family: str, adapter: str, quantity: Quantity) -> tuple[list[float], list[float]]:
@@ -142,25 +142,30 @@ def publish(
 
 
 def to_docs(given: Material, folder: Path, docs: Path, section: str = "compare") -> None:
-    """Write the short report into a section of the page of results, with its charts and its lock file beside.
+    """Write the report, its charts and its lock file into the documentation, and its table into the page of results.
 
-    Raises FileFormatError where the page has no place for it.
+    Only the section "compare" has a place on the page; FileFormatError where the page lacks it.
     """
-    text = as_markdown(given, "assets/bench", "compare_page.md")
-    replace_section(docs / "results.md", section, text.replace("assets/bench/compare-", f"assets/bench/{section}-"))
+    pictures = [
+        f"![Every set: {', '.join(methods)}](assets/bench/{chart_name('overview', number)}.svg)"
+        for number, methods in enumerate(groups(given.results.adapters))
+    ]
+    publish_text(docs, section, as_markdown(given, "."), "results.md" if section == "compare" else None, pictures)
     assets = docs / "assets" / "bench"
     write_lock(assets / f"{section}-{LOCK}", locked(given))
     for svg in (folder / "charts").glob("*.svg"):
         shutil.copyfile(svg, assets / svg.name.replace("compare-", f"{section}-", 1))
 
 
-def as_markdown(given: Material, charts: str, template: str = "compare.md") -> str:
-    """The report as Markdown; `charts` is the folder of the charts, "compare_page.md" the template of the docs."""
+def as_markdown(given: Material, charts: str) -> str:
+    """The report as Markdown; `charts` is the folder of the charts."""
     results, ranked = given.results, standings(given.results, given.rows)
-    kinds = {re.split(r"[/,+ ]", one.method)[0]: one.method for one in reversed(ranked)}
+    leading: dict[str, Standing] = {}  # the best of each algorithm
+    for one in ranked:
+        leading.setdefault(re.split(r"[/,+ ]", one.method)[0], one)
     return render(
-        template, kinds=list(kinds.values())[::-1], cells={(row.set, row.method): row for row in given.rows},
-        given=given, charts=charts, advice=advice(results, given.rows), picked=choices(results, given.rows),
+        "compare.md", given=given, leading=list(leading.values()), charts=charts, advice=advice(results, given.rows),
+        picked=choices(results, given.rows),
         ranked=ranked, reference=reference(results), named=named, chart=chart_name,
         groups=groups(results.adapters), counts=[row.cases for row in given.rows],
         left_out=left_out(given.settings, given.chunks, given.rows), kernel=kernel_of(given.chunks),
