@@ -335,7 +335,7 @@ class Problem(checks.FixedAttributes):
     def _clearances(self, workspace: Workspace) -> Array:
         built = self.scene.built
         asked = np.full(len(built.table.pairs), self.clearance)
-        brought = [pair for term in (*self.goals, *self.constraints) for pair in term.touching]
+        brought = [pair for term in (*self.goals, *self.constraints, *self.measures) for pair in term.touching]
         allowed = frozenset((*self.touching, *brought))
         if allowed:
             asked[built.known(("touching", allowed), partial(_between, built, allowed))] = 0.0

@@ -85,18 +85,51 @@ def test_datagrams_move_handles_on_the_page_and_bad_ones_are_told(live: LiveWorl
     began, sender = live.place("right_palm"), socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     wanted = began + [0.05, 0.0, 0.2]
     try:
-        for bad in (b"hello", b'{"nose": [0, 0, 1]}', b'{"right_palm": [0, 0, NaN]}'):
+        for bad in (
+            b"hello",
+            b'{"nose": [0, 0, 1]}',
+            b'{"right_palm": [0, 0, NaN]}',
+            b'{"pelvis": [0, 0, 1' + b"0" * 400 + b"]}",
+        ):
             sender.sendto(bad, ("127.0.0.1", receiver.port))
         end = time.monotonic() + 60.0
         while np.linalg.norm(live.place("right_palm") - wanted) > 0.01 and time.monotonic() < end:
             sender.sendto(json.dumps({"right_palm": wanted.tolist()}).encode(), ("127.0.0.1", receiver.port))
             time.sleep(0.02)
         assert live.place("right_palm") == pytest.approx(wanted, abs=0.01)
-        assert receiver.refused == 3
+        assert receiver.refused == 4
     finally:
         page.stop()
         sender.close()
         receiver.close()
     assert page.frames > 3
-    with pytest.raises(wb.InputError, match="port"):
-        Receiver(-1, live.handles)
+    for port in (-1, 70000, "a"):
+        with pytest.raises(wb.InputError, match="port"):
+            Receiver(port, live.handles)  # type: ignore[arg-type]
+        with pytest.raises(wb.InputError, match="port"):
+            LivePage(live, tmp_path, port)  # type: ignore[arg-type]
+
+
+def test_a_released_handle_moves_with_the_figure_and_the_mouse_takes_one_from_a_tracker() -> None:
+    live = LiveWorld(wb.Scene(wb.load("avatar")))
+    pelvis, hand = live.place("pelvis"), live.place("right_palm")
+    live.follow({"right_palm": hand})
+    live.take("right_palm")
+    for _ in range(60):  # 1 s: the tracker is lost
+        live.move(hand + [0.05, 0.0, 0.1])
+    assert live.place("right_palm") == pytest.approx(hand + [0.05, 0.0, 0.1], abs=1e-4)
+    live.undo()
+    for sole in ("left_sole", "right_sole"):
+        live.take(sole)  # as a click does, which takes, lets go, and holds or releases
+        live.let_go()
+        assert not live.toggle(sole)
+    live.take("pelvis")
+    for _ in range(60):
+        live.move(pelvis + [0.0, 0.0, 0.4])
+    assert live.place("pelvis") == pytest.approx(pelvis + [0.0, 0.0, 0.4], abs=1e-3)
+
+
+def test_the_soles_of_every_one_of_several_people_are_held() -> None:
+    two = wb.figures.join({"one": wb.load("avatar"), "two": wb.load("avatar")})
+    held = {f"{name}/{side}_sole" for name in ("one", "two") for side in ("left", "right")}
+    assert LiveWorld(wb.Scene(two)).held == held

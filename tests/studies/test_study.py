@@ -153,6 +153,16 @@ def test_what_cannot_vary_is_refused(folder: Path) -> None:
         wb.study(folder / "task.toml", targets=[(0.0, 1.0)])
 
 
+def test_targets_take_the_place_of_a_goal_that_is_to_be_met(folder: Path) -> None:
+    task = folder / "task.toml"
+    head, found, rest = task.read_text().partition("[[goal]]")
+    assert found
+    soft = '[[goal]]\ntype = "point"\nframe = "left_palm"\ntarget = [0.3, 0.3, 1.0]\nsoft = 1.0\n'
+    task.write_text(head + soft + found + rest)
+    (record,) = wb.study(task, targets=[(3.0, 0.0, 1.0)])
+    assert record.goal_error > 1.0
+
+
 def test_a_function_of_the_figure_alone_is_refused() -> None:
     def task(figure: wb.Figure) -> wb.Problem:
         return wb.Problem(wb.Scene(figure))

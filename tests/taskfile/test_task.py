@@ -10,6 +10,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.figures.state import State
+from wholebody.taskfile.result import describe
 from wholebody.taskfile.schema import CONSTRAINTS, GOALS, MEASURES, TABLES
 
 TURNED = [0.0, 0.0, 0.7071067811865476, 0.7071067811865476]
@@ -146,3 +147,23 @@ def test_a_figure_with_fewer_joints_and_a_urdf_by_path(tmp_path: Path, root: Pat
     (tmp_path / "man.urdf").write_text((root / "urdf" / "human.urdf").read_text())
     (tmp_path / "own.toml").write_text('[figure]\npath = "man.urdf"\nroot = "free"\n')
     assert wb.read_task(tmp_path / "own.toml").problem.scene.model.nv == 55
+
+
+def test_soft_goals_leave_the_default_measures_of_who_is_to_kneel_and_are_told_apart(tmp_path: Path) -> None:
+    file = tmp_path / "kneel.toml"
+    asked = (
+        '[figure]\nname = "human"\n[[object]]\nname = "floor"\nshape = "halfspace"\n[[constraint]]\ntype = "stand"\n'
+        'on = "floor"\nfeet = ["left_shank", "right_shank"]\nknees = ["left_shank", "right_shank"]\n'
+    )
+    soft = '[[goal]]\ntype = "point"\nframe = "{}_palm"\ntarget = [0.4, 0.2, 0.6]\nsoft = 5.0\n'
+    file.write_text(asked)
+    rest = wb.read_task(file).problem.measures[0].distance.reference  # type: ignore[attr-defined]
+    file.write_text(asked + soft.format("left") + soft.format("right"))
+    problem = (task := wb.read_task(file)).problem
+    assert problem.measures[0].distance.reference == pytest.approx(rest)  # type: ignore[attr-defined]
+    told = describe(task, wb.solve(problem), tmp_path)["measures"]
+    assert list(told) == ["Effort", "Rhythm", "Soft", "Soft 2"]
+    with pytest.raises(wb.InputError, match="all Soft"):
+        wb.taskfile.write_task(
+            wb.Problem(problem.scene, measures=[wb.Soft(wb.Point("left_palm", (0.4, 0.2, 0.6)))]), file
+        )

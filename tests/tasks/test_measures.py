@@ -124,6 +124,11 @@ def test_a_soft_goal_gives_way_to_goals_and_is_weighed_against_effort(planar_arm
     problem = wb.Problem(scene, np.full(3, 0.2), goals=[goal], measures=[wb.Displacement(), wb.Soft(wrong)])
     assert wb.solve(problem).solved
     assert wb.solve(wb.Problem(scene, np.full(3, 0.2), goals=[goal, wrong])).status == "unreachable"
+    soft = wb.Problem(
+        wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.1), name="ball", at=(0.6, 0.6, 0.0)),
+        np.full(3, 0.2), measures=[wb.Soft(wb.Touch("link2", "ball"))], clearance=0.02,
+    )  # fmt: skip
+    assert (soft.clearances == 0.0).any()  # what it brings together may touch
     with pytest.raises(wb.InputError, match="Soft: goal"):
         wb.Soft(wb.Effort())  # type: ignore[arg-type]
 

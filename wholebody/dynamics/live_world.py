@@ -27,7 +27,7 @@ from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
 from wholebody.tasks import Hold, Point
 from wholebody.tracking.live import LiveFrame
-from wholebody.tracking.live_subjects import LiveProblem, things_of
+from wholebody.tracking.live_subjects import LiveProblem, handle_frames, things_of
 
 RATE = 12.0  # 1/s: of the spring between the mouse and a body
 STRONGEST = 80.0  # m/s^2: a body is not drawn faster than this
@@ -67,7 +67,7 @@ class LiveWorld:
         instance(scene, Scene, "LiveWorld: scene", "make one with wb.Scene(figure)")
         self._given, self._spring = scene, spring
         empty = Scene(scene.figure)
-        soles = [Hold(name) for name in ("left_sole", "right_sole") if name in scene.figure.frames]
+        soles = [Hold(name) for name in handle_frames(scene.figure.frames) if name.endswith("_sole")]
         stated = Problem(empty, start, constraints=soles if constraints is None else constraints, balance=False)
         self._subject = LiveProblem(stated)
         self.handles, self.held = tuple(self._subject.handles), set(self._subject.held)
@@ -139,6 +139,9 @@ class LiveWorld:
         known(name, self.handles, "handle")
         self.held ^= {name}
         self._tracker = None
+        if name not in self.held:
+            self._goals.pop(name, None)
+            self._renewed.pop(name, None)
         return name in self.held
 
     def choose(self, method: object) -> None:
@@ -189,6 +192,7 @@ class LiveWorld:
         """Bring what was taken towards a place (3,)."""
         name, dt = self.taken, self.world.dt
         if name in self.handles:
+            self._renewed.pop(name, None)  # the mouse has it now
             self._goal(name, place, clamped=True)
             return
         way = place - self.place(name)

@@ -84,9 +84,9 @@ class TaskFile:
 
     def _goal(self) -> int:
         for number, entry in enumerate(self.contents.tables.get("goal", ())):
-            if entry.name in ("point", "frame"):  # types of goals whose target is a place
+            if entry.name in ("point", "frame") and "soft" not in entry.values:  # types whose target is a place
                 return number
-        raise InputError(f"study: {self.path.name} has no goal of type point or frame, so targets mean nothing")
+        raise InputError(f"study: {self.path.name} has no goal of type point or frame to be met; targets mean nothing")
 
     def _things(self, layout: Any) -> dict[str, Any]:
         if not isinstance(layout, Mapping):

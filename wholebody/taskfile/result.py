@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,6 +20,7 @@ from wholebody.figures.state import State
 from wholebody.geometry.placement import FARTHEST
 from wholebody.solution import Solution
 from wholebody.taskfile.task import Task, read_task
+from wholebody.tasks.base import Measure
 from wholebody.version import __version__
 
 
@@ -60,12 +62,22 @@ def describe(task: Task, solution: Solution, folder: Path) -> dict[str, Any]:
         "iterations": solution.iterations,
         "programs": dict(solution.programs),
         "goals": [as_dict(goal) for goal in goals_left(task, q)],
-        "measures": {type(term).__name__: float(term.value(state)) for term in task.problem.measures},
+        "measures": _values(task.problem.measures, state),
         "assessment": solution.assessment.summary(),
         "root": roots.get("root", roots or None),
         "joints": figure.joint_values(q),
         "q": q.tolist(),
     }
+
+
+def _values(measures: Sequence[Measure], state: State) -> dict[str, float]:
+    """The value of each measure by its class; the second and later ones of a class have a number."""
+    found: dict[str, float] = {}
+    for number, term in enumerate(measures):
+        kind = type(term).__name__
+        count = sum(type(one) is type(term) for one in measures[: number + 1])
+        found[kind if count == 1 else f"{kind} {count}"] = float(term.value(state))
+    return found
 
 
 def as_json(description: dict[str, Any]) -> str:

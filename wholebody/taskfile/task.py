@@ -93,10 +93,11 @@ def task_from(contents: Contents, file: Path) -> Task:
     if soft := [term for term in terms["goal"] if isinstance(term, Soft)]:
         terms["goal"] = [term for term in terms["goal"] if not isinstance(term, Soft)]
     options |= {f"{name}s": found for name, found in terms.items() if found}
-    if soft:
-        options["measures"] = [*(terms["measure"] or Problem(scene, start, **options).measures), *soft]
     with contents.top.where.named():
-        problem = Problem(scene, start, **options)
+        usual = Problem(scene, start, **options).measures if soft and not terms["measure"] else ()
+        problem = Problem(scene, start, **(options | {"measures": [*terms["measure"], *soft]} if soft else options))
+        if usual:  # as they are: who is to kneel spares effort from elsewhere than the start
+            problem.measures = (*usual, *problem.measures)
     method = contents.one("method")
     return Task(
         path=file,

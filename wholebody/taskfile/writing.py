@@ -43,7 +43,7 @@ def write_task(problem: Problem | Scene, path: str | PathLike[str], *, title: st
 
     Raises:
         InputError: a figure that was not loaded or was reduced, or a term, measure or shape that task files do not
-            have; or the file cannot be written or does not end in .toml.
+            have, or no measures but `Soft`; or the file cannot be written or does not end in .toml.
     """
     target = files.checked_target(path, "write_task: path", "a task", (".toml",))
     if isinstance(problem, Scene):
@@ -68,6 +68,8 @@ def write_task(problem: Problem | Scene, path: str | PathLike[str], *, title: st
     held = (*problem.stated, *problem.bounds)
     parts += [_table("[[constraint]]", _term(term, CONSTRAINTS, "constraints", n)) for n, term in enumerate(held)]
     if problem.measures_given:
+        if problem.measures and all(isinstance(term, tasks.Soft) for term in problem.measures):
+            raise InputError("write_task: measures are all Soft, and a file would have the usual ones too; add another")
         parts += [_measure(term, n) for n, term in enumerate(problem.measures)]
     for file, text in beside.items():
         files.write(file, text)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import math
 import socket
 from collections.abc import Collection
 
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import shown
+from wholebody.base.checks import shown, whole
 from wholebody.base.errors import InputError
 
 LONGEST = 65536  # bytes of a datagram
@@ -29,12 +28,13 @@ class Receiver:
     def __init__(self, port: int, handles: Collection[str]) -> None:
         """Listen for places of some handles at a port; 0 for any that is free.
 
-        Raises InputError where the port is taken.
+        Raises InputError where the port is taken, or no number of a port.
         """
+        whole(port, "the port of handles", 0, 65535)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.bind(("127.0.0.1", port))
-        except (OSError, OverflowError) as error:
+        except OSError as error:
             self._socket.close()
             raise InputError(f"port {port} cannot be listened at ({error}); give another, such as 9870") from None
         self._socket.setblocking(False)
@@ -80,4 +80,4 @@ def _is_place(value: object) -> bool:
     if not isinstance(value, list) or len(value) != 3:
         return False
     real = all(isinstance(one, (int, float)) and not isinstance(one, bool) for one in value)
-    return real and all(math.isfinite(one) and abs(one) < 1e4 for one in value)  # m
+    return real and all(abs(one) < 1e4 for one in value)  # m; not of NaN

@@ -7,6 +7,7 @@ from http import HTTPStatus
 from types import SimpleNamespace
 from typing import Any
 
+from wholebody.base.checks import whole
 from wholebody.base.errors import MissingPackageError
 from wholebody.view.server import Guard
 
@@ -19,8 +20,11 @@ def viser_server(port: int, label: str) -> Any:
     viser passes no check of requests on to the library websockets, which serves its page: so what it calls to serve is
     another function while the server starts, which adds the check. If viser does not call that, there is no server.
 
-    Raises MissingPackageError where viser is not installed, or in a version that serves its page in another way.
+    Raises:
+        InputError: the port is no number of a port.
+        MissingPackageError: viser is not installed, or in a version that serves its page in another way.
     """
+    whole(port, "the port of the page", 0, 65535)
     try:
         import rich
         import viser
