@@ -18,16 +18,15 @@ from wholebody.methods.inputs import check_problem
 from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
 from wholebody.studies.at_once import at_once
+from wholebody.studies.neighbours import Family, Work, lower, name_changes, solve_from_neighbours
 from wholebody.studies.records import ENDED, Records, RecordStore, SolveRecord
 from wholebody.studies.sending import Sender, sent_to
-from wholebody.studies.solving import Make, Run, Start, solve_from, solve_runs
+from wholebody.studies.solving import Case, Run, solve_runs
 from wholebody.tasks.answers import is_own
 
 MOST_JOBS = 4096
 LONGEST = 1e7  # s: a greater deadline of a solve is a mistake
 RUN = 16  # problems that warm-start one from the other: longer = fewer cold starts, fewer processes busy at the end
-
-NEIGHBOURS = 4  # answers of others that are tried for one problem: more find more, and cost where there is no answer
 
 T = TypeVar("T")
 
@@ -44,23 +43,6 @@ class SolveProgress(NamedTuple):
     done: int
     total: int
     record: SolveRecord | None
-
-
-@dataclass(frozen=True)
-class Case:
-    """A problem that is made where it is solved.
-
-    Attributes:
-        record: its record before it is done: name and factors.
-        make: makes the problem.
-        asked: fingerprint; a case with the same is not done again.
-        place: numbers of its factors; cases are neighbours as far as these are alike.
-    """
-
-    record: SolveRecord
-    make: Make
-    asked: str = ""
-    place: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -118,8 +100,10 @@ def solve_many(
         cluster: address of a dask scheduler that runs them; None for this machine.
         warm_start: begin each problem at the answer of the one before it, if that is solved and of the same figure.
             One that is not solved from there is solved from its own start. Runs of 16 problems in the order given are
-            linked so, and their first ones, whatever `jobs` is. An answer may then be another local solution than
-            without.
+            linked so, and their first ones, whatever `jobs` is. Where neighbours differ by more than 10 degrees in a
+            joint, both are solved from their own starts and each other's answers, and the lower measure stays: at most
+            four more solves of a problem. `SolveRecord.change` names the jumps that are left. An answer may be another
+            local solution than without.
         seconds: deadline of each problem, by the clock; its record's outcome is then "ended". None for none.
         folder: keeps the records (`records.sqlite`). What it holds already of the same problem and method is not solved
             again: a run that was ended goes on. Made if it does not exist.
@@ -194,7 +178,8 @@ def run_cases(runs: Sequence[Sequence[Case]], running: Running, store: RecordSto
             begun = {k: done[k - 1].q for run in tails for k in run[:1] if heads and work is tails and k - 1 in done}
             over = _run(work, order, running, keep, alone, begun)
     if not over and waiting:
-        _from_neighbours(order, done, running, keep)
+        family = Family(order, done, partial(_computed, order, running), keep)
+        _ = solve_from_neighbours(family) or (linked and (lower(family) or name_changes(family)))
     return Records([done.get(k, order[k].record) for k in range(len(order))])
 
 
@@ -208,56 +193,20 @@ def _at_once(
         yield numbers[place], answer
 
 
-def _from_neighbours(
-    order: Sequence[Case], done: dict[int, SolveRecord], running: Running, keep: Callable[[int, SolveRecord], bool]
-) -> None:
-    """Try the answers of solved cases as starts of their neighbours that are not solved, until nothing new is solved.
+def _computed(order: Sequence[Case], running: Running, function: Callable[..., Any], work: Work) -> dict[Any, Any]:
+    """Answers of a function of `solving` by key, see `Family`."""
+    given, sender = {key: (order[k].make, *rest) for key, (k, *rest) in work.items()}, Sender()
 
-    Args:
-        order: the cases.
-        done: their records; those of cases that are solved now are put in their place.
-        running: how.
-        keep: keeps a record; whether the caller ends the run.
-    """
-    tried: dict[int, dict[int, int]] = {k: {} for k, one in done.items() if one.q is not None and not one.solved}
-    while True:
-        work = {k: near for k in tried if not done[k].solved and (near := _nearest(k, order, done, tried[k]))}
-        given = {k: (order[k].make, done[j].q) for k, (j, _) in work.items()}
-        ways = partial(_started, given, running), partial(_starting, given, running, Sender())
-        with closing(_done([*work], [order[k] for k in work], running, ways)) as outcomes:
-            found = {k: answer for k, answer, error in outcomes if error is None and answer is not None}
-        for k, (j, distance) in work.items():
-            tried[k][j] = distance
-            if k in found and keep(k, replace(order[k].record, **found[k], neighbour=order[j].record.name)):
-                return
-        if not work:
-            return
+    def here(key: Any) -> Any:
+        return function([given[key]], running.method)[0]
 
+    def there(keys: list[Any], full: bool) -> Job:
+        sent = sender.sent([given[key] for key in keys], full)
+        return Job(keys, sent_to, (function, sent, running.method), running.seconds or 0.0)
 
-def _started(given: Mapping[int, Start], running: Running, k: int) -> dict[str, Any] | None:
-    return solve_from([given[k]], running.method)[0]
-
-
-def _starting(given: Mapping[int, Start], running: Running, sender: Sender, cases: list[int], full: bool) -> Job:
-    sent = sender.sent([given[k] for k in cases], full)
-    return Job(cases, sent_to, (solve_from, sent, running.method), running.seconds or 0.0)
-
-
-def _nearest(
-    k: int, order: Sequence[Case], done: Mapping[int, SolveRecord], tried: Mapping[int, int]
-) -> tuple[int, int] | None:
-    """The nearest solved case that was not tried for a case, and how far it is; None where enough were tried.
-
-    After `NEIGHBOURS` only those count that are nearer than all before: an answer spreads from neighbour to neighbour.
-    """
-    q, found = done[k].q, []
-    for j, one in done.items():
-        if one.solved and j not in tried and one.q is not None and q is not None and one.q.shape == q.shape:
-            found.append((sum(abs(a - b) for a, b in zip(order[k].place, order[j].place, strict=True)), j))
-    if not found:
-        return None
-    distance, j = min(found)
-    return (j, distance) if len(tried) < NEIGHBOURS or distance < min(tried.values()) else None
+    cases = [order[k] for k, *_ in work.values()]
+    with closing(_done([*work], cases, running, (here, there))) as outcomes:
+        return {key: answer for key, answer, error in outcomes if error is None and answer is not None}
 
 
 def _run(

@@ -47,6 +47,8 @@ class SolveRecord:
         q: (nq,) the posture; None where there is none. Numbers of a record without a posture are 0.
         factors: what the case is made of, such as {"person": "F5", "target": "shelf"}.
         neighbour: name of the case whose answer was the start that led to the posture; "" where it was its own start.
+        change: of strategy, in a warm-started run: the joint that turns by more than 10 degrees from a neighbouring
+            case, such as "left_hip_flexion by 60 degrees from 1"; "" where the posture goes on from its neighbours.
     """
 
     __repr__ = brief
@@ -65,6 +67,7 @@ class SolveRecord:
     q: Array | None = None
     factors: Mapping[str, str] | None = None
     neighbour: str = ""
+    change: str = ""
 
     @property
     def solved(self) -> bool:
@@ -135,8 +138,10 @@ class Records(Shown, Sequence[SolveRecord]):
         )  # fmt: skip
 
     def remarks(self) -> str:
-        """Lines about those solved from a neighbour's answer, and the first that was refused or whose process ended."""
+        """Lines about answers of neighbours, changes of strategy, and the first refused and the first ended case."""
         lines = f"\n  {self.from_neighbours} solved from the answer of a neighbour" if self.from_neighbours else ""
+        changed = [f"{one.name}, {one.change}" for one in self._records if one.change]
+        lines += f"\n  {len(changed)} changes of strategy, first: {changed[0]}" if changed else ""
         for outcome in (REFUSED, ENDED):
             first = next((one for one in self._records if one.outcome == outcome), None)
             lines += "" if first is None else f"\n  first {outcome}: {first.name}, {first.message}"
@@ -144,7 +149,7 @@ class Records(Shown, Sequence[SolveRecord]):
 
     @property
     def from_neighbours(self) -> int:
-        """How many are solved from the answer of a neighbouring case, and were not from their own start."""
+        """How many are solved from the answer of a neighbouring case: they were not from their own start, or worse."""
         return sum(bool(one.neighbour) for one in self._records)
 
     def counts(self) -> dict[str, int]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,16 +14,36 @@ from wholebody.base.errors import WholebodyError, one_line
 from wholebody.methods.base import Method
 from wholebody.methods.inputs import check_problem
 from wholebody.problem import Problem
-from wholebody.studies.records import REFUSED, answer_of
+from wholebody.studies.records import REFUSED, SolveRecord, answer_of
 from wholebody.tasks.bounds import Freeze
 
 Make = Callable[[], Problem]
 
 Start = tuple[Make, Any]
-"""A problem, and the posture (nq,) from which it is solved."""
+"""A problem, and the posture (nq,) from which it is solved, None for its own start."""
+
+SHIFTING = ("JointModelP", "JointModelTranslation")
+"""How the names of Pinocchio's joints begin that shift: prismatic, planar and translation."""
 
 Run = tuple[Any, Sequence[Make]]
 """The posture (nq,) from which the first of some problems is tried, None for its own start; and the problems."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A problem that is made where it is solved.
+
+    Attributes:
+        record: its record before it is done: name and factors.
+        make: makes the problem.
+        asked: fingerprint; a case with the same is not done again.
+        place: numbers of its factors; cases are neighbours as far as these are alike.
+    """
+
+    record: SolveRecord
+    make: Make
+    asked: str = ""
+    place: tuple[int, ...] = ()
 
 
 def solve_runs(runs: Sequence[Run], method: Method) -> list[list[dict[str, Any]]]:
@@ -65,8 +85,32 @@ def _warm_answer(problem: Problem, method: Method, q: Array) -> dict[str, Any] |
 
 
 def solve_from(given: Sequence[Start], method: Method) -> list[dict[str, Any] | None]:
-    """Solve problems from others' answers (nq,): what their records say; None for one that is not solved."""
-    return [_warm_answer(check_problem(make(), "the task's answer"), warmed(method), q) for make, q in given]
+    """Solve problems from given starts: what their records say; None for one that is not solved."""
+    answers: list[dict[str, Any] | None] = []
+    for make, q in given:
+        if q is None:
+            own = _solved(make, method, None)
+            answers.append(own if own["outcome"] == "solved" else None)
+        else:
+            answers.append(_warm_answer(check_problem(make(), "the task's answer"), warmed(method), q))
+    return answers
+
+
+def most_turned(given: Sequence[tuple[Make, Array, Array]], _method: Method) -> list[tuple[str, float]]:
+    """Of each problem, the joint that turns most between two postures (nq,), and the angle in radians.
+
+    Joints that shift, and the root, are left out; ("", 0.0) where there is no other.
+    """
+    found = []
+    for make, one, other in given:
+        model = make().scene.model
+        turned = np.asarray(pin.difference(model, one, other))
+        hinges = [(float(np.linalg.norm(turned[joint.idx_v : joint.idx_v + joint.nv])), name)
+                  for joint, name in zip(model.joints, model.names, strict=True)
+                  if joint.nv in (1, 3) and not joint.shortname().startswith(SHIFTING)]  # fmt: skip
+        angle, name = max(hinges, default=(0.0, ""))
+        found.append((name, angle))
+    return found
 
 
 def begun_at(problem: Problem, q: Array) -> Problem:

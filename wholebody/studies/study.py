@@ -20,8 +20,9 @@ from wholebody.figures import Figure, load
 from wholebody.figures.anthropometry import Person, design_cases, make_person
 from wholebody.methods.base import Method
 from wholebody.problem import Problem
-from wholebody.studies.many import RUN, Case, Running, SolveProgress, run_cases, runs_of
+from wholebody.studies.many import RUN, Running, SolveProgress, run_cases, runs_of
 from wholebody.studies.records import Records, RecordStore, SolveRecord
+from wholebody.studies.solving import Case
 from wholebody.studies.study_files import SIZE, TaskFile
 
 MOST_CASES = 1_000_000

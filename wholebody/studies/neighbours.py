@@ -1,0 +1,156 @@
+"""Neighbouring cases of many give each other starts: where one is not solved, and where its posture jumps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from math import radians
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wholebody.base.arrays import Array
+from wholebody.studies.records import SolveRecord
+from wholebody.studies.solving import Case, most_turned, solve_from
+
+NEIGHBOURS = 4  # answers of others that are tried for one problem: more find more, and cost where there is no answer
+TRIES = 4  # more solves of a case whose posture jumps: its own start, both neighbours, and one that changed since
+JUMP = radians(10.0)  # a posture that turns a joint further from one case to the next is another strategy
+LOWER = 1e-3  # part of a measure: less is the tolerance of a solve, no better posture
+
+Pair = tuple[int, int]
+Work = Mapping[Any, tuple[Any, ...]]
+
+
+class Family(NamedTuple):
+    """Cases that give each other starts.
+
+    Attributes:
+        order: the cases.
+        done: their records by number.
+        compute: answers of a function of `solving` for work by key: the number of a case, and what goes with it. Those
+            that are None, or whose process ended, are left out.
+        keep: puts a record into its place; whether the caller ends the run.
+    """
+
+    order: Sequence[Case]
+    done: dict[int, SolveRecord]
+    compute: Callable[[Callable[..., Any], Work], dict[Any, Any]]
+    keep: Callable[[int, SolveRecord], bool]
+
+
+def solve_from_neighbours(family: Family) -> bool:
+    """Try the answers of solved cases as starts of their neighbours that are not solved, until nothing new is solved.
+
+    Returns:
+        Whether the caller ended the run.
+    """
+    order, done, compute, keep = family
+    tried: dict[int, dict[int, int]] = {k: {} for k, one in done.items() if one.q is not None and not one.solved}
+    while True:
+        work = {k: near for k in tried if not done[k].solved and (near := _nearest(k, order, done, tried[k]))}
+        found = compute(solve_from, {k: (k, done[j].q) for k, (j, _) in work.items()})
+        for k, (j, distance) in work.items():
+            tried[k][j] = distance
+            if k in found and keep(k, replace(order[k].record, **found[k], neighbour=order[j].record.name)):
+                return True
+        if not work:
+            return False
+
+
+def _nearest(
+    k: int, order: Sequence[Case], done: Mapping[int, SolveRecord], tried: Mapping[int, int]
+) -> tuple[int, int] | None:
+    """The nearest solved case that was not tried for a case, and how far it is; None where enough were tried.
+
+    After `NEIGHBOURS` only those count that are nearer than all before: an answer spreads from neighbour to neighbour.
+    """
+    q, found = done[k].q, []
+    for j, one in done.items():
+        if one.solved and j not in tried and one.q is not None and q is not None and one.q.shape == q.shape:
+            found.append((sum(abs(a - b) for a, b in zip(order[k].place, order[j].place, strict=True)), j))
+    if not found:
+        return None
+    distance, j = min(found)
+    return (j, distance) if len(tried) < NEIGHBOURS or distance < min(tried.values()) else None
+
+
+def lower(family: Family) -> bool:
+    """Solve both cases of each jump from their own starts and from the answers of all neighbours; the lowest stays.
+
+    A jump is between neighbours that are solved and whose coordinates differ by more than `JUMP`. A warm start may
+    follow a family of postures that is no longer the lowest, and an own start may lead to a worse one: the lower family
+    spreads from a jump to the next case, until nothing is lower. A case is solved at most `TRIES` times more, whatever
+    the count of cases is, and not where nothing is measured. Each round takes the answers of the one before, so that
+    the order in which solves end does not matter.
+
+    Returns:
+        Whether the caller ended the run.
+    """
+    order, done, compute, keep = family
+    pairs = _neighbours(order)
+    beside: dict[int, list[int]] = {k: [] for k in range(len(order))}
+    for a, b in pairs:
+        beside[a].append(b)
+        beside[b].append(a)
+    tried: dict[int, set[tuple[int, bytes]]] = {k: set() for k in beside}
+    while True:
+        work: dict[tuple[int, int], tuple[int, Array | None]] = {}
+        for k in sorted({k for pair in pairs if _jumps(done, *pair) for k in pair if done[k].measure != 0.0}):
+            for j in (-1, *(j for j in beside[k] if _alike(done, k, j))):
+                q = None if j < 0 else done[j].q
+                mark = j, b"" if q is None else q.tobytes()
+                if mark not in tried[k] and len(tried[k]) < TRIES:
+                    tried[k].add(mark)
+                    work[k, j] = k, q
+        if not work:
+            return False
+        best: dict[int, tuple[float, int]] = {}
+        found = compute(solve_from, work)
+        for k, j in work:
+            if (k, j) in found:
+                best[k] = min(best.get(k, (np.inf, 0)), (found[k, j]["measure"], j))
+        for k, (measure, j) in best.items():
+            if measure < done[k].measure - LOWER * abs(done[k].measure):
+                neighbour = "" if j < 0 else order[j].record.name
+                if keep(k, replace(order[k].record, **found[k, j], neighbour=neighbour)):
+                    return True
+
+
+def name_changes(family: Family) -> bool:
+    """Write into the later case of each jump that is left which joint turns, how far, and from which case.
+
+    Returns:
+        Whether the caller ended the run.
+    """
+    order, done, compute, keep = family
+    work = {(a, b): (b, done[a].q, done[b].q) for a, b in _neighbours(order) if _jumps(done, a, b)}
+    largest: dict[int, tuple[float, str]] = {}
+    for (a, b), (joint, angle) in sorted(compute(most_turned, work).items()):
+        if angle > max(JUMP, largest.get(b, (0.0, ""))[0]):
+            largest[b] = angle, f"{joint} by {np.degrees(angle):.0f} degrees from {order[a].record.name}"
+    return any(keep(k, replace(done[k], change=told)) for k, (_, told) in largest.items())
+
+
+def _neighbours(order: Sequence[Case]) -> list[Pair]:
+    """Pairs of cases that are one step of one factor apart, the earlier one first."""
+    at = {case.place: k for k, case in enumerate(order)}
+    pairs = []
+    for k, case in enumerate(order):
+        for n, number in enumerate(case.place):
+            before = at.get((*case.place[:n], number - 1, *case.place[n + 1 :]))
+            if before is not None:
+                pairs.append((before, k))
+    return pairs
+
+
+def _alike(done: Mapping[int, SolveRecord], a: int, b: int) -> bool:
+    """Whether two cases are solved and their postures have as many coordinates."""
+    one, other = done.get(a), done.get(b)
+    if one is None or other is None or one.q is None or other.q is None:
+        return False
+    return one.solved and other.solved and one.q.shape == other.q.shape
+
+
+def _jumps(done: Mapping[int, SolveRecord], a: int, b: int) -> bool:
+    return _alike(done, a, b) and float(np.abs(done[a].q - done[b].q).max(initial=0.0)) > JUMP  # type: ignore[operator]
