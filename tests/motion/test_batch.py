@@ -163,7 +163,7 @@ def test_checking_many_gives_a_line_each(clip: wb.Clip, tmp_path: Path, capsys: 
 
 def test_retargeting_many_writes_a_folder(clip: wb.Clip, tmp_path: Path) -> None:
     files = [str(clip.write(tmp_path / f"arm{k}.npz")) for k in range(2)]
-    assert main(["clip", "retarget", *files, str(tmp_path / "out")]) == 0
+    assert main(["clip", "retarget", *files, "--out", str(tmp_path / "out")]) == 0
     for k in range(2):
         made = wb.read_clip(tmp_path / "out" / "originals" / f"arm{k}.npz", clip.figure)
         assert np.array_equal(made.q, clip.q)

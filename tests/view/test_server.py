@@ -177,7 +177,7 @@ def test_closing_ends_the_server_and_can_be_repeated(exhibit: Any, tmp_path: Pat
     with pytest.raises(urllib.error.URLError):
         status(url)
     viewer.show(exhibit.posture(1))
-    assert viewer.save(tmp_path / "scene.html").stat().st_size > 500_000
+    assert viewer.save(tmp_path / "scene.html").stat().st_size > 200_000
 
 
 def test_a_server_that_has_died_is_reported(exhibit: Any) -> None:

@@ -150,7 +150,7 @@ def lower_bounds(
                 bend = _curvature(other, carrier, gap, joint, limits, reach)
                 sags[side % 2] = share * share / 8.0 * bend
             sag = sags[side % 2]
-            if np.isfinite(reach[carrier]):
+            if reach[carrier] < np.inf:
                 for j in range(3):
                     normal[j] /= np.sqrt(square)
                 height = _support(carrier, normal[0], normal[1], normal[2], outline)
@@ -209,7 +209,7 @@ def keep_apart(sliding: Sliding, shapes: Shapes, motion: Speeds, safe: Array) ->
     outline, limits = (points, first_point, radius, radii), (motion.turn, motion.speed, motion.carries)
     normal, local = np.empty(3), np.empty(3)
     for k in range(len(asked)):
-        if not rows[k, 1] ** 2 + rows[k, 2] ** 2 + rows[k, 3] ** 2 > 0.25:
+        if not rows[k, 1] * rows[k, 1] + rows[k, 2] * rows[k, 2] + rows[k, 3] * rows[k, 3] > 0.25:
             continue
         for side in range(2):
             other, carrier = pairs[asked[k], side], pairs[asked[k], 1 - side]
@@ -221,7 +221,7 @@ def keep_apart(sliding: Sliding, shapes: Shapes, motion: Speeds, safe: Array) ->
                 for i in range(3):
                     normal[i] = rows[k, 1 + i] if side else -rows[k, 1 + i]
                     local[j] += place[carrier, j, i] * normal[i]
-            if np.isfinite(reach[carrier]):
+            if reach[carrier] < np.inf:
                 height = _support(carrier, local[0], local[1], local[2], outline)
                 safe[k] = max(safe[k], _stays_above(other, carrier, normal, height, bend, level[k], sliding, shapes))
             face, most = -1, -np.inf
@@ -231,7 +231,7 @@ def keep_apart(sliding: Sliding, shapes: Shapes, motion: Speeds, safe: Array) ->
                     face, most = f, along
             if face >= 0:
                 height = faces[face, 3]
-                if np.isfinite(reach[carrier]):  # coplanar triangles of a hull are one face, to 1e-7
+                if reach[carrier] < np.inf:  # coplanar triangles of a hull are one face, to 1e-7
                     height = _support(carrier, faces[face, 0], faces[face, 1], faces[face, 2], outline)
                 for i in range(3):
                     normal[i] = 0.0

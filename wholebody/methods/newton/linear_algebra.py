@@ -198,7 +198,8 @@ def _sorted(keys: Places, order: Places, count: int) -> tuple[Places, Places]:
     start, result = np.zeros(count + 2, np.int32), np.empty_like(order)
     for key in keys:
         start[key + 2] += 1
-    start = np.cumsum(start).astype(np.int32)
+    for key in range(count + 1):  # array functions such as `cumsum` would load scipy.linalg with the kept loop
+        start[key + 1] += start[key]
     for entry in order:
         result[start[keys[entry] + 1]] = entry
         start[keys[entry] + 1] += 1
@@ -214,19 +215,21 @@ def _laid_products(products: Products, rows: Places) -> tuple[Places, Places, Pl
         column; and (height + 1,) where the columns begin.
     """
     by_row, row_start, by_column, place, column_end = products
-    height, pairs = len(row_start) - 1, (column_end - place).sum()
+    height, pairs = len(row_start) - 1, 0
+    for k in range(len(place)):  # a sum of an array would load scipy.linalg with the kept loop
+        pairs += column_end[k] - place[k]
     target, inner = np.empty(pairs, np.int32), np.empty(pairs + height, np.int32)
     pointer = np.zeros(height + 1, np.int32)
-    seen, where, count, pair = np.full(height, -1), np.zeros(height, np.int32), 0, 0
+    seen, where, count, pair = np.zeros(height, np.int32), np.zeros(height, np.int32), 0, 0
     for row in range(height):
         begin = count
-        seen[row], inner[count] = row, row
+        seen[row], inner[count] = row + 1, row
         count += 1
         for k in range(row_start[row], row_start[row + 1]):
             for p in range(place[by_row[k]], column_end[by_row[k]]):
                 other = rows[by_column[p]]
-                if seen[other] != row:
-                    seen[other], inner[count] = row, other
+                if seen[other] != row + 1:
+                    seen[other], inner[count] = row + 1, other
                     count += 1
         inner[begin:count].sort()
         for p in range(begin, count):
@@ -236,7 +239,7 @@ def _laid_products(products: Products, rows: Places) -> tuple[Places, Places, Pl
                 target[pair] = where[rows[by_column[p]]]
                 pair += 1
         pointer[row + 1] = count
-    return target, inner[:count].copy(), pointer
+    return target, inner[:count], pointer
 
 
 @compiled()
