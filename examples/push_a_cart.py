@@ -1,6 +1,6 @@
 """Push a heavy cart: a woman leans into its handle, so that the ground presses under her feet and no joint is too weak.
 
-The cart resists with 220 N. The same posture is searched with the balance of somebody who pushes nothing, to compare.
+The cart resists with 260 N. The same posture is searched with the balance of somebody who pushes nothing, to compare.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from presenting import CARDBOARD, DARK, STEEL, command_line, picture, report
 
 import wholebody as wb
 
-PUSH = 220.0  # N: of both hands, forward
+PUSH = 260.0  # N: of both hands, forward
 HANDLE = (0.62, 0.0, 1.00)  # m: its middle
 STEP = (0.15, -0.18)  # m: of the left and of the right foot, forward
 STRENGTH = wb.motion.Strength(25, sex="female")
