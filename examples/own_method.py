@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -55,8 +56,8 @@ class JacobianTranspose(SolvesAnew):
         )  # fmt: skip
 
 
-def main() -> None:
-    """Reach with a hand, and compare with the QP method."""
+def main(out: Path = Path("pictures"), pictures: bool = True) -> None:
+    """Reach with a hand, compare with the QP method, and draw."""
     problem = wb.Problem(
         wb.Scene(wb.load("human")), "standing", goals=[wb.Point("right_palm", (0.5, -0.3, 1.1))],
         constraints=[wb.Freeze("root")], range_of_motion=False,
@@ -64,7 +65,11 @@ def main() -> None:
     for method in (JacobianTranspose(), wb.QP()):
         solution = wb.solve(problem, method)
         print(f"{solution.method}: {solution.message}, {solution.iterations} iterations")
+        if pictures and solution.method == "transpose":
+            picture("own_method", problem, solution, out, eye=(2.9, -2.9, 1.7), target=(0.1, 0.0, 0.85))
 
 
 if __name__ == "__main__":
-    main()
+    from presenting import command_line, picture  # here, so that a command finds the class from any folder
+
+    command_line(main, __doc__)

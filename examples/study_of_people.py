@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from presenting import STEEL, command_line
+from presenting import STEEL, command_line, picture
 
 import wholebody as wb
 
@@ -36,6 +36,9 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> wb.studies.Reco
     if pictures:
         out.mkdir(parents=True, exist_ok=True)
         print(f"  wrote {records.to_csv(out / 'study_of_people.csv')}")
+        last = build(people["small woman"], HEIGHTS["high"])  # the one that is out of reach
+        answer = next(one for one in records if one.name == "small woman, high")
+        picture("study_of_people", last, answer, out, eye=(-1.6, -3.9, 1.9), target=(0.3, 0.0, 1.05))
     return records
 
 

@@ -26,7 +26,7 @@ SINGLE = ("shelf", "carry_box_past_table", "behind_the_back", "look_and_touch_ov
 OTHERS = (
     *("chair", "console_two_people", "hand_on_table", "avatar_two_arms"),
     *("sit_on_chair", "four_bar", "assemble_shelf", "free_a_clip"),
-    *("four_bar_among_obstacles", "scissor_lift", "carry_together", "take_a_seat", "lift_a_box"),
+    *("four_bar_among_obstacles", "scissor_lift", "carry_together", "take_a_seat", "lift_a_box", "push_a_cart"),
     *("reach_map", "study_of_people", "own_method", "two_arms_one_bar", "person_and_arm"),
     *("boundary_people", "branches_of_an_arm", "dominoes", "driver", "hold_a_pole", "plan_for_an_arm"),
 )
@@ -360,7 +360,7 @@ def test_two_figures_meet(example: Example, name: str, tmp_path: Path) -> None:
 
 
 def test_a_method_of_ones_own_reaches(example: Example, capsys: Any) -> None:
-    example("own_method").main()
+    example("own_method").main(pictures=False)
     assert capsys.readouterr().out.count(": solved ") == 2
 
 
@@ -377,6 +377,24 @@ def test_takes_a_seat_and_lifts_a_box(example: Example, tmp_path: Path) -> None:
     left, right = (places(higher, lifted.q)(f"{side}_palm").translation for side in ("left", "right"))
     assert min(left[2], right[2]) > box.LIFTED[2] - 0.14
     assert np.linalg.norm(left - right) < 0.42
+
+
+def test_who_pushes_a_cart_leans_into_it(example: Example, tmp_path: Path) -> None:
+    """The ground presses between heel and toes only in the posture that was searched with the force."""
+    cart = example("push_a_cart")
+    pressed = []
+    for solution, pushing in zip(cart.main(out=tmp_path, pictures=False), (True, False), strict=True):
+        problem = cart.build(pushing)
+        assert solution.status == "solved"
+        assert wb.assess(problem, solution.q).holds(1e-5)
+        assert deepest(problem, solution.q)[0] > -1e-5
+        model, place = problem.scene.model, places(problem, solution.q)
+        middle = pin.centerOfMass(model, model.createData(), solution.q)[0]
+        height = np.mean([place(f"{side}_palm").translation[2] for side in ("left", "right")])
+        weight = 9.81 * sum(one.mass for one in list(model.inertias)[1:])
+        pressed.append(middle - cart.PUSH * height / weight - place("right_heel").translation[0])
+    assert pressed[0] > 0.0 > pressed[1]
+    assert not list(tmp_path.iterdir())
 
 
 def test_every_example_is_tested_and_listed(root: Path) -> None:

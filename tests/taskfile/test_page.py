@@ -31,8 +31,9 @@ def test_the_page_has_every_key_of_every_table(page: str) -> None:
     read = ""
     for name, table in TABLES.items():
         section = sections[name]
-        read += section  # types that an earlier table has are named there
-        assert rows(section, table.keys) == [], name
+        read += section  # keys and types that an earlier table has are named there
+        assert rows(read, table.keys) == [], name
+        assert all(f"`{key.name}`" in section for key in table.keys), name
         for form_name, form in (table.forms or {}).items():
             assert f'{table.chooser} = "{form_name}"' in section or f"`{form_name}`" in section, (name, form_name)
             assert rows(read, tuple(key for key in form.keys if key.name != "weight")) == [], (name, form_name)
