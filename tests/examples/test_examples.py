@@ -423,7 +423,7 @@ def test_ends_in_a_picture_and_a_page(example: Example, tmp_path: Path, monkeypa
     module = example("robot_arm_among_obstacles")
     module.main(out=tmp_path / "made", pictures=True)
     page = unpacked(tmp_path / "made" / "robot_arm_among_obstacles.html")
-    assert "gripper" in page
+    assert "post" in page
     picture = tmp_path / "made" / "robot_arm_among_obstacles.png"
     if not picture.exists() and os.environ.get("WHOLEBODY_REQUIRE_BROWSER") != "1":
         pytest.skip("no Chromium here")
