@@ -36,6 +36,8 @@ def test_lists_the_scenes(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["world", "flik"]) == 2
     assert "did you mean flick" in capsys.readouterr().err
     assert main(["world", "flick", "--overlap", "none"]) == 2
+    assert main(["world", "flick", "--udp", "9870"]) == 2
+    assert main(["world", "all", "--live"]) == 2
 
 
 def test_a_run_writes_numbers_chart_and_animation(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

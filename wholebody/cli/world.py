@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from wholebody.base.errors import InputError
 from wholebody.cli.arguments import check_overlaps, scene_names, scene_options
 from wholebody.cli.command import command, flag, option
 
 if TYPE_CHECKING:
+    from wholebody.base.arrays import Array
     from wholebody.bench.rows import Row
     from wholebody.dynamics.overlaps import Overlap
     from wholebody.dynamics.world import WorldFrame
@@ -31,7 +34,7 @@ without a network).""",
     ),
     flag("--picture", "draw five moments too, by a headless Chromium"),
     flag("--live", "open a page instead: drag handles and things with the mouse, and throw them (needs viser)"),
-    option("--port", type=int, default=8080, metavar="N", help="of the live page (default: 8080)"),
+    option("--port", type=int, metavar="N", help="of the live page (default: 8080)"),
     option("--udp", type=int, metavar="N", help="port at which places of handles arrive for the live page"),
     epilog="""\
 --live runs the scene in a browser without its script: the figure follows its handles, a thing that is let go flies on.
@@ -58,7 +61,12 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     check_overlaps([arguments.overlap])
     if arguments.live:
+        if len(names) > 1:
+            raise InputError("--live shows one scene, not all; name one")
         return _live(_scene(names[0], arguments), arguments)
+    for name in ("port", "udp"):
+        if getattr(arguments, name) is not None:
+            raise InputError(f"--{name} is of the live page; add --live or leave it out")
     make_folder(arguments.out)
     check_writable(arguments.out / f"{Path(names[0]).stem}.csv")
     facts = machine()
@@ -77,7 +85,17 @@ def _live(scene: InteractionScene, arguments: argparse.Namespace) -> int:
 
     live = LiveWorld(scene.scene, scene.track.q[0])
     receiver = None if arguments.udp is None else Receiver(arguments.udp, live.handles)
-    page = LivePage(live, arguments.out, arguments.port, places=None if receiver is None else receiver.latest)
+    told = {""}
+
+    def places() -> Mapping[str, Array]:
+        assert receiver is not None
+        found = receiver.latest()
+        if receiver.note not in told and len(told) < 20:
+            told.add(receiver.note)
+            print(f"refused: {receiver.note}", flush=True)
+        return found
+
+    page = LivePage(live, arguments.out, arguments.port or 8080, places=None if receiver is None else places)
     print(f"drag handles and things at {page.url}; Ctrl-C ends", flush=True)
     try:
         page.wait()

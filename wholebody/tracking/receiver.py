@@ -22,7 +22,7 @@ class Receiver:
     Attributes:
         port: where datagrams arrive.
         refused: number of datagrams that were not understood.
-        note: what was wrong with the last of them; "" if it was understood.
+        note: what was wrong with the last of these; "" if there was none.
     """
 
     def __init__(self, port: int, handles: Collection[str]) -> None:
@@ -49,9 +49,10 @@ class Receiver:
                 data = self._socket.recv(LONGEST)
             except BlockingIOError:
                 break
-            places = self._read(data)
-            self.refused += bool(self.note)
-            found.update(places)
+            try:
+                found.update(self._read(data))
+            except InputError as error:
+                self.refused, self.note = self.refused + 1, str(error)
         return found
 
     def close(self) -> None:
@@ -59,21 +60,19 @@ class Receiver:
         self._socket.close()
 
     def _read(self, data: bytes) -> dict[str, Array]:
-        """Places of one datagram; none where it is not understood, and `note` says why."""
-        self.note = ""
+        """Places of one datagram; raises InputError where it is not understood."""
         try:
             given = json.loads(data)
         except (ValueError, RecursionError):
             given = None
         if not isinstance(given, dict):
-            self.note = 'a datagram is no JSON object; send {"head_top": [0.1, 0.0, 1.7]}'
-            return {}
+            raise InputError('a datagram is no JSON object; send {"head_top": [0.1, 0.0, 1.7]}')
         for name, place in given.items():
             if name not in self._handles:
-                self.note = f"a datagram names {shown(name)}; send {', '.join(sorted(self._handles))}"
-            elif not _is_place(place):
-                self.note = f"a datagram gives {name} the place {shown(place)}; send three finite numbers, metres"
-        return {} if self.note else {name: np.array(place, dtype=float) for name, place in given.items()}
+                raise InputError(f"a datagram names {shown(name)}; send {', '.join(sorted(self._handles))}")
+            if not _is_place(place):
+                raise InputError(f"a datagram gives {name} the place {shown(place)}; send three finite numbers, metres")
+        return {name: np.array(place, dtype=float) for name, place in given.items()}
 
 
 def _is_place(value: object) -> bool:
