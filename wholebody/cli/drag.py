@@ -123,12 +123,7 @@ def live(arguments: argparse.Namespace) -> int:
 
     page = LivePage(drag, out / "posture.toml", arguments.port, saved)
     print(f"drag the handles at {page.url}; Ctrl-C ends", flush=True)
-    try:
-        page.wait()
-    except KeyboardInterrupt:
-        pass
-    finally:
-        page.stop()
+    page.serve()
     return 0
 
 

@@ -97,14 +97,9 @@ def _live(scene: InteractionScene, arguments: argparse.Namespace) -> int:
 
     page = LivePage(live, arguments.out, arguments.port or 8080, places=None if receiver is None else places)
     print(f"drag handles and things at {page.url}; Ctrl-C ends", flush=True)
-    try:
-        page.wait()
-    except KeyboardInterrupt:
-        pass
-    finally:
-        page.stop()
-        if receiver is not None:
-            receiver.close()
+    page.serve()
+    if receiver is not None:
+        receiver.close()
     return 0
 
 

@@ -45,7 +45,7 @@ def default_measures(
 
 
 def stances(scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal]) -> tuple[tuple[str, ...], ...]:
-    """The feet of each that stands and keeps the balance, but for those who kneel at the start.
+    """The feet of each that stands and keeps the balance, or is to kneel, but for those who kneel at the start.
 
     Who sits, leans or holds on puts the feet where they belong.
     """
@@ -55,7 +55,7 @@ def stances(scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal
         return float(np.maximum(np.maximum(stand.lower - at_start, at_start - stand.upper), 0.0).max()) <= KNEELS
 
     stand = (one for one in terms if isinstance(one, Stand))
-    return tuple(tuple(one.feet) for one in stand if one.balance and not (one.knees and kneels(one)))
+    return tuple(tuple(one.feet) for one in stand if (one.balance or one.knees) and not (one.knees and kneels(one)))
 
 
 def _kneeling(scene: Surroundings, start: Array, shanks: Set[str]) -> Array:

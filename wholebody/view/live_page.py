@@ -83,6 +83,15 @@ class LivePage:
         while not self._stopped.wait(0.2):
             pass
 
+    def serve(self) -> None:
+        """Wait until the page is stopped or Ctrl-C, then end it."""
+        try:
+            self.wait()
+        except KeyboardInterrupt:
+            pass
+        finally:
+            self.stop()
+
     def _look(self) -> None:
         """Look at the middle of the handles from the front right."""
         middle = np.mean([self.drag.place(name) for name in self.drag.handles], axis=0)
