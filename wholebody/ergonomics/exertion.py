@@ -57,7 +57,7 @@ class Statics(NamedTuple):
 
     def torques(self, state: State, joints: Indices, carriers: Indices) -> tuple[Array, Array]:
         """Torques (k,) of some joints [N m], and their derivative (k, nv)."""
-        model, data = state.model, state.spare
+        model, data = state.model, state.companion(Statics, state.model).data
         torque = np.array(pin.computeGeneralizedGravity(model, data, state.q))[joints]
         moves = np.array(pin.computeGeneralizedGravityDerivatives(model, data, state.q))[joints]
         for joint, point, rows, force, turn in self._acting(state):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from math import isfinite
 from typing import Any, NamedTuple
 
@@ -72,6 +71,8 @@ class State:
         self._joints = placement_view(self.data.oMi)
         self._frames: dict[int, pin.SE3] = {}
         self._centers: dict[range | None, Array] = {}
+        self._spare: pin.Data | None = None
+        self._companions: dict[object, State] = {}
         self.update(self.q)
 
     def update(self, q: Array) -> State:
@@ -106,10 +107,12 @@ class State:
             return self._joints
         return np.array([[*M.rotation.T, M.translation] for M in self.data.oMi], dtype=float)
 
-    @cached_property
-    def spare(self) -> pin.Data:
-        """Pinocchio's data for computations of a term, which leave those of the state as they are."""
-        return pin.Data(self.model)
+    def companion(self, key: object, model: pin.Model) -> State:
+        """A state of another model that goes along with this one: the same for the same key, and of this run alone."""
+        other = self._companions.get(key)
+        if other is None:
+            other = self._companions[key] = State(model)
+        return other
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return model and posture; Pinocchio's data are computed anew."""
@@ -179,7 +182,9 @@ class State:
             linear, turn = self.columns[:, :3], self.columns[:, 3:]
             rows = (moved @ mass)[:, None] * linear + np.cross(turn, moved @ moment)
             return self.folded(rows.T / mass.sum())
-        return np.array(pin.jacobianCenterOfMass(self.model, self.spare, self.q)).reshape(3, -1)
+        if self._spare is None:
+            self._spare = self.model.createData()
+        return np.array(pin.jacobianCenterOfMass(self.model, self._spare, self.q)).reshape(3, -1)
 
 
 def _restored(model: pin.Model, q: Array) -> State:

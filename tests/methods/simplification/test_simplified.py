@@ -14,7 +14,7 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State
 from wholebody.methods.simplification.simplify import Simplified
-from wholebody.tasks.base import Measure
+from wholebody.tasks.base import Constraint, Goal, Measure
 
 FEET = [wb.Hold("left_foot"), wb.Hold("right_foot")]
 TARGET = (0.45, -0.25, 1.1)
@@ -27,17 +27,52 @@ def standing(human: Figure, **more: object) -> wb.Problem:
     return wb.Problem(scene, "standing", **settings)  # type: ignore[arg-type]
 
 
-def test_pairs_of_frozen_joints_do_not_move(human: Figure) -> None:
-    """Of a right arm alone no pair is left that does not move with it."""
-    frozen = set(human.joints) - {name for name in human.joints if name.startswith("right_")}
-    whole = standing(human, constraints=[wb.Freeze("root", *sorted(frozen))])
+FROZEN = [wb.Freeze("root", "legs", "spine", "neck", "left_arm")]
+
+
+def test_frozen_joints_and_pairs_between_them_are_left_out(human: Figure) -> None:
+    whole = standing(human, constraints=[*FEET, *FROZEN], measures=[wb.Effort(), wb.Discomfort()])
     part = wb.simplify(whole)
+    model = part.problem.scene.model
+    assert {*part.left_out.joints, *model.names} == {*human.model.names}
+    assert part.left_out.counts["degrees of freedom"] == (55, model.nv)
+    assert part.problem.constraints == ()  # nothing moves the feet any more
     assert part.left_out.rigid > 100
     owners = [[part.problem.scene.piece_owner[k] for k in pair] for pair in part.problem.scene.pair_table.pairs]
-    assert owners
     assert all(any(name.startswith("right_") for name in pair) for pair in owners)
-    assert part.problem.constraints == whole.constraints
-    assert str(part.left_out.rigid) in str(part.left_out)
+    here, there = State(model), State(human.model)
+    for q in random_postures(model, 3, 0):
+        here.update(q), there.update(part.posture(q))
+        for one, other in zip(part.problem.goals, whole.goals, strict=True):
+            np.testing.assert_allclose(one.error(here), other.error(there), atol=1e-9)
+        slopes = [sum(term.weight * term.gradient(at) for term in of) for of, at in (
+            (part.problem.measures, here), (whole.measures, there))]  # fmt: skip
+        moved = [human.model.joints[human.model.getJointId(name)].idx_v for name in list(model.names)[1:]]
+        np.testing.assert_allclose(slopes[0], slopes[1][moved], atol=1e-9)
+
+
+class Lean(Constraint):
+    """A term of a user's own that asks the whole posture by index."""
+
+    def value(self, state: State) -> np.ndarray:
+        return np.array([state.q[52] - state.q[49] ** 2])
+
+    def jacobian(self, state: State) -> np.ndarray:
+        row = np.zeros((1, state.model.nv))
+        row[0, 51], row[0, 48] = 1.0, -2.0 * state.q[49]
+        return row
+
+
+@pytest.mark.parametrize("term", [wb.Posture(np.zeros(56), joints=["right_arm"]), Lean()])
+def test_frozen_joints_stay_where_a_term_needs_the_whole_figure(human: Figure, term: Goal | Constraint) -> None:
+    if isinstance(term, Goal):
+        whole = standing(human, goals=[wb.Posture(human.posture("standing"), joints=["right_arm"])], constraints=FROZEN)
+    else:
+        whole = standing(human, constraints=[*FROZEN, term])
+    part = wb.simplify(whole)
+    assert part.left_out.joints == ()
+    assert part.problem.scene.figure is human
+    assert [type(bound) for bound in part.problem.bounds] == [wb.Freeze]
 
 
 def solved(problem: wb.Problem) -> tuple[Simplified, wb.Solution]:
@@ -88,7 +123,7 @@ def test_an_answer_that_does_not_hold_in_the_whole_problem_is_not_called_solved(
     assert part.restored(answer).status == "solved"
     crowded = wb.Scene(human).add(wb.Sphere(0.1), name="late", at=TARGET)
     late = wb.Problem(crowded, "standing", goals=[wb.Point("right_index_tip", TARGET)], constraints=FEET)
-    stale = Simplified(part.problem, late, part.left_out)
+    stale = Simplified(part.problem, late, part.left_out, part._part)
     assert stale.restored(answer).status == "infeasible"
 
 
