@@ -86,6 +86,7 @@ def test_terms_are_those_that_python_makes(everything: wb.taskfile.Task) -> None
             wb.Grasp("right", "rod", "power"),
             wb.ergonomics.LoadedBalance(held, margin=0.02),
             wb.ergonomics.StrengthLimit(held, strength=wb.motion.Strength(25, "female"), standing=False),
+            wb.ergonomics.Look((1.0, 0.5, 0.2)),
         ],
         measures=[
             wb.Effort(),

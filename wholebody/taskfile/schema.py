@@ -138,6 +138,7 @@ CONSTRAINTS = {
     "strength_limit": _form(
         ergonomics.StrengthLimit, "forces strength standing share compression", forces=FORCES, strength=STRENGTH
     ),
+    "look": _form(ergonomics.Look, "at eyes", eyes=FRAME),
     **{name: replace(form, keys=form.keys[:-1]) for name, form in CONTACTS.items()},  # a constraint has no weight
 }
 
