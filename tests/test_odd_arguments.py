@@ -414,7 +414,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "assess", Call(wb.assess, {"problem": ask, "q": q})
     checked = {"term": wb.Point("link4", at), "scene": ask.scene, "q": q}
     yield "check_derivatives", Call(wb.check_derivatives, checked, str)
-    yield "simplify", Call(wb.simplify, {"problem": ask, "lock": True})
+    yield "simplify", Call(wb.simplify, {"problem": ask})
     part = wb.simplify(ask)
     yield "Simplified.posture", Call(part.posture, {"q": part.problem.start})
     yield "Solution.plot", Call(wb.solve(part.problem).plot, {})
