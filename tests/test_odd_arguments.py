@@ -174,6 +174,16 @@ class Level(wb.methods.AssemblyConstraint):
         return result
 
 
+class Still(wb.Measure):
+    """The same at all placements."""
+
+    def value(self, state: Any) -> float:
+        return 1.0
+
+    def gradient(self, state: Any) -> Any:
+        return np.zeros(state.model.nv)
+
+
 def assembly() -> wb.Assembly:
     made = wb.Assembly()
     made.body("crank", size=0.1).body("rod", (0.06, 0.0, 0.08), size=0.3)
@@ -497,7 +507,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     def solve_parts(made: Any) -> Any:
         return made.solve(iterations=3)
 
-    yield "Assembly", Call(wb.Assembly, {"clearance": 0.01})
+    yield "Assembly", Call(wb.Assembly, {"clearance": 0.01, "metric": "rim"})
     third = {"name": "third", "at": at, "shape": wb.Sphere(0.1), "size": 0.1, "color": (1.0, 0.0, 0.0)}
     yield "Assembly.body", Call(assembly().body, third, solve_parts)
     given = {"name": "arm", "figure": arm, "start": q, "constraints": [], "color": (1.0, 0.0, 0.0)}
@@ -523,6 +533,12 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     placed = assembly()
     yield "Assembly.place", Call(placed.place, {"variables": placed.variables()}, solve_parts)
     yield "Assembly.drop_goals", Call(assembly().drop_goals, {})
+    yield "Assembly.drop_measures", Call(assembly().drop_measures, {})
+    yield "Assembly.minimise", Call(assembly().minimise, {"measure": Still()})
+    joined = assembly().fixed("crank", "rod")
+    yield "Assembly.release", Call(joined.release, {"constraint": "fixed joint of 'crank' and 'rod'"})
+    yield "Assembly.hold", Call(joined.hold, {"constraint": "fixed joint of 'crank' and 'rod'"})
+    yield "Assembly.orientation_goal", Call(assembly().orientation_goal, {"body": "rod", "target": (0, 0, 0, 1)})
     fixed = {"first": "crank", "second": "rod", "placement_second": at}
     yield "Assembly.fixed", Call(assembly().fixed, fixed, solve_parts)
     yield "Assembly.frame_goal", Call(assembly().frame_goal, {"body": "rod", "target": at}, solve_parts)
