@@ -272,6 +272,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     moves = {"ball": ((1.0, 1.0, 1.0), (1.0, 0.9, 1.0))}
     yield "Scene.sweep", Call(there.sweep, {"q0": q, "q1": q + 0.1, "tolerance": 1e-4, "moves": moves})
     world = {"scene": there, "start": q, "dt": 0.1, "overlap": "qp", "seed": 0, "spring": wb.dynamics.Spring()}
+    world["give_way"] = "both"
     yield "World", Call(wb.World, world, lambda made: made.step(q))
     yield "World.step", Call(wb.World(there, q).step, {"tracked": q})
     body = {"mass": 0.5, "material": "wood", "velocity": (0.1, 0.0, 0.0), "angular_velocity": (0.0, 0.0, 0.1)}
@@ -583,6 +584,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     }
     yield "follow", Call(tracking.follow, followed)
     loop = {"scene": there, "start": q, "overlap": "qp", "dt": 0.1, "seed": 0, "rigid": False, "touching": ["ball"]}
+    loop["give_way"] = "both"
     yield "FrameLoop", Call(tracking.FrameLoop, loop, lambda made: made.frame(q))
     yield "FrameLoop.frame", Call(tracking.FrameLoop(there, q).frame, {"tracked": q})
     recording = tracking.follow(there, track)

@@ -18,6 +18,7 @@ from wholebody.dynamics.live_world import LiveWorld
 from wholebody.motion.files.gltf import triangles
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.live import LiveDrag, LiveFrame
+from wholebody.tracking.overlaps import GIVE_WAY
 from wholebody.view.style import LOOK
 from wholebody.view.viser_server import viser_server
 
@@ -184,6 +185,9 @@ class LivePage:
             self._boxes[name] = gui.add_checkbox(f"hold {name}", name in self.drag.held)
             self._boxes[name].on_update(partial(self._ticked, name))
         again = "start again"
+        if isinstance(self.drag, LiveWorld):
+            self._give_way = gui.add_dropdown("gives way", GIVE_WAY, initial_value=self.drag.give_way)
+            self._give_way.on_update(partial(self._shared, self.drag))
         if isinstance(self.drag, LiveDrag):
             again = "undo"
             self._add_rings(self.drag)
@@ -253,6 +257,10 @@ class LivePage:
         with self._lock:
             if self._constraints[name].value != drag.constraints[name]:
                 drag.constrain(name, self._constraints[name].value)
+
+    def _shared(self, world: LiveWorld, _: Any) -> None:
+        with self._lock:
+            world.give_way = self._give_way.value
 
     def _choose(self, _: Any) -> None:
         with self._lock:

@@ -19,9 +19,9 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.base.files import checked_target, write
-from wholebody.dynamics.overlaps import Overlap
 from wholebody.geometry.placement import FARTHEST
 from wholebody.problem import Problem
+from wholebody.tracking.overlaps import Overlap
 from wholebody.view import commands
 from wholebody.view.bodies import scene_glb
 from wholebody.view.composition import Composition
