@@ -15,6 +15,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.batches import fingerprint, run_batch
 from wholebody.base.errors import InputError, WholebodyError
 from wholebody.base.files import is_file, read_bytes
+from wholebody.base.progress import reporter
 from wholebody.base.runner import Job
 from wholebody.figures.figure import Figure
 from wholebody.motion.avoidance import as_avoider, avoid
@@ -67,7 +68,7 @@ def avoid_many(
     methods: Iterable[str | Avoider] = ("trajectory",),
     jobs: int = 1,
     cluster: str | None = None,
-    progress: Callable[[BatchProgress], Any] | None = None,
+    progress: Callable[[BatchProgress], Any] | bool | None = None,
     **options: Unpack[AvoidOptions],
 ) -> tuple[AvoidedCase, ...]:
     """Free clips of collisions: each clip, with each equipment, by each method.
@@ -86,7 +87,7 @@ def avoid_many(
         methods: names or settings, see `avoid`.
         jobs: cases at a time.
         cluster: address of a dask scheduler that runs them; None for this machine.
-        progress: called with a `BatchProgress` after each case.
+        progress: called with a `BatchProgress` after each case; True for a line that counts.
         options: `constraints`, `hold_feet` and `keep_ends`, as of `avoid`.
 
     Returns:
@@ -117,7 +118,7 @@ def avoid_many(
     jobs = checks.whole(jobs, f"{what}: jobs", 1, 4096)
     if cluster is not None:
         checks.text(cluster, f"{what}: cluster")
-    checks.function(progress, f"{what}: progress")
+    told = reporter(progress, f"{what}: progress")
     owners = [source.figure if isinstance(source, Clip) else figure for source in sources.values()]
     for owner in {id(owner): owner for owner in owners if owner is not None}.values():
         for one in pieces:  # what does not fit is said before anything is computed
@@ -130,7 +131,7 @@ def avoid_many(
         for wears, one in worn.items()
         for way, method in ways.items()
     ]
-    return batch.freed(asked, faults, held, progress)
+    return batch.freed(asked, faults, held, told)
 
 
 class _Batch(NamedTuple):

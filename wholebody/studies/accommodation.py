@@ -194,7 +194,7 @@ def accommodation(
     method: str | Method | None = None,
     jobs: int = 1,
     folder: str | os.PathLike[str] | None = None,
-    progress: Callable[[SolveProgress], Any] | None = None,
+    progress: Callable[[SolveProgress], Any] | bool | None = None,
 ) -> Accommodation:
     """Solve a task for many people, and count who reaches, fits and sees.
 

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from wholebody.base import checks
 from wholebody.base.batches import fingerprint, run_batch, shared
+from wholebody.base.progress import reporter
 from wholebody.base.runner import EndedError, Job
 from wholebody.methods.base import Method
 from wholebody.methods.control import ctrl_c_ends_all
@@ -70,7 +71,7 @@ class Running:
             checks.whole(jobs, f"{what}: jobs", 1, MOST_JOBS),
             None if cluster is None else checks.text(cluster, f"{what}: cluster"),
             None if seconds is None else checks.number(seconds, f"{what}: seconds", 1e-3, LONGEST, "s"),
-            checks.function(progress, f"{what}: progress"),
+            reporter(progress, f"{what}: progress"),
         )
 
 
@@ -83,7 +84,7 @@ def solve_many(
     warm_start: bool = False,
     seconds: float | None = None,
     folder: str | os.PathLike[str] | None = None,
-    progress: Callable[[SolveProgress], Any] | None = None,
+    progress: Callable[[SolveProgress], Any] | bool | None = None,
 ) -> Records:
     """Solve many problems, several at a time, in processes that keep the scenes which they have seen.
 
@@ -107,8 +108,8 @@ def solve_many(
         seconds: deadline of each problem, by the clock; its record's outcome is then "ended". None for none.
         folder: keeps the records (`records.sqlite`). What it holds already of the same problem and method is not solved
             again: a run that was ended goes on. Made if it does not exist.
-        progress: called with a `SolveProgress` after each problem; if it returns True, the run ends and the problems
-            that are left are "cancelled".
+        progress: called with a `SolveProgress` after each problem; if it returns True, the run ends, and the
+            remaining problems are "cancelled". True in place of a function prints a line that counts.
 
     Returns:
         The records, in the order of the problems.
