@@ -63,6 +63,9 @@ class Problem(checks.FixedAttributes):
 
     Threads may solve and assess one problem at the same time; only one thread may change it. It can be pickled; a copy
     shares the scene, a deep copy has its own.
+
+    Examples:
+        >>> reach = wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.55, -0.25, 0.95))], clearance=0.005)
     """
 
     _settable = frozenset({"start", "goals", "constraints", "bounds", "measures", "measures_given", "clearances"})

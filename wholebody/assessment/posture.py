@@ -47,6 +47,11 @@ class Assessment:
         goal_errors: (goals,) norm of each goal's error, metres or radians (whichever is larger).
         first_order: optimality and blockers, computed when they are asked for.
         seconds: wall time that the judgement itself took; a method's own time is its solution's less this.
+
+    Examples:
+        >>> judged = wb.assess(problem, solution.q)
+        >>> judged.goal_error < 1e-5, judged.penetration < 1e-5
+        (True, True)
     """
 
     goal_error: float
@@ -119,6 +124,10 @@ def assess(problem: Problem, q: Array) -> Assessment:
     Raises:
         InputError: q has the wrong shape or a value that is not finite.
         TermError: a term of one's own answers what is not finite there, or no numbers of its shape; it is named.
+
+    Examples:
+        >>> wb.assess(problem, solution.q).goal_error < 1e-5
+        True
     """
     began = time.perf_counter()
     if not isinstance(problem, Problem):

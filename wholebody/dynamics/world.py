@@ -85,6 +85,16 @@ class World(NotCopyable):
         dt: seconds a frame.
         time: seconds since the start.
         engine: the things that move by themselves; None if there are none.
+
+    Raises:
+        InputError: a value of the wrong kind or range, or a figure that penetrates something and cannot leave it.
+
+    Examples:
+        >>> room = wb.Scene(human).add(wb.HalfSpace(), name="floor")
+        >>> _ = room.add(wb.Sphere(0.1), name="ball", at=(0.5, 0.0, 1.0), body=wb.Body(mass=0.5))
+        >>> frame = wb.World(room).step()
+        >>> bool(frame.placements["ball"].translation[2] < 1.0)
+        True
     """
 
     def __init__(

@@ -42,6 +42,10 @@ class Ergonomics:
         rula, reba, owas: the scores.
         torques: static torques against strength.
         seat: whether the person was taken to sit, and what told it.
+
+    Examples:
+        >>> wb.ergonomics.ergonomics_of(human, standing).rula.left.score
+        2
     """
 
     angles: BodyAngles
@@ -115,6 +119,10 @@ def ergonomics_of(
 
     Raises:
         InputError: no person, no posture, no work or no strength.
+
+    Examples:
+        >>> scores = wb.ergonomics.ergonomics_of(human, standing, wb.ergonomics.Work(load=6.0))
+        >>> rows = scores.rows()
     """
     person = seen(figure, q, work, "ergonomics_of")
     angles, told = person.angles, person.work

@@ -34,6 +34,11 @@ class DenavitHartenberg(NamedTuple):
         a: (n,) metres along the common normal.
         alpha: (n,) radians about the common normal.
         tool: placement of the tip in the last DH frame.
+
+    Examples:
+        >>> table = wb.figures.denavit_hartenberg(human, "right_arm")
+        >>> table.d.shape == table.a.shape == (len(table.joints),)
+        True
     """
 
     joints: tuple[str, ...]
@@ -73,6 +78,10 @@ def denavit_hartenberg(figure: Figure, branch: str) -> DenavitHartenberg:
     Raises:
         UnknownNameError: no such chain.
         InputError: the chain has a joint that is not revolute.
+
+    Examples:
+        >>> wb.figures.denavit_hartenberg(human, "right_arm").tip
+        'right_index_tip'
     """
     if branch not in figure.chains:
         raise UnknownNameError("branch", branch, figure.chains)

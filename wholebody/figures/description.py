@@ -21,7 +21,12 @@ ROOT_JOINT = "root_joint"
 
 
 class Chain(NamedTuple):
-    """Joints from the root outwards, and the frame at the end."""
+    """Joints from the root outwards, and the frame at the end.
+
+    Examples:
+        >>> human.chains["right_arm"].tip
+        'right_index_tip'
+    """
 
     joints: tuple[str, ...]
     tip: str
@@ -35,6 +40,10 @@ class JointCone(NamedTuple):
         reference: frame to which the cone is fixed.
         limb: frame that carries the limb.
         axis: (3,) unit direction of the limb in its own frame.
+
+    Examples:
+        >>> human.cones["left_shoulder"].axis.shape
+        (3,)
     """
 
     cone: ReachCone
@@ -59,6 +68,10 @@ class Limits(NamedTuple):
         idx_v: (n,) indices in the tangent vector.
         lower: (n,) radians or metres.
         upper: (n,)
+
+    Examples:
+        >>> bool((human.limits.lower <= human.limits.upper).all())
+        True
     """
 
     idx_q: Indices

@@ -56,6 +56,10 @@ class Shape(Checked, ABC):
 
     Raises:
         InputError: a size that is no number or not within 0.1 mm and 10 km, as every shape raises it when it is made.
+
+    Examples:
+        >>> isinstance(wb.Sphere(0.1), wb.Shape)
+        True
     """
 
     @abstractmethod
@@ -74,6 +78,12 @@ class Box(Shape):
 
     Attributes:
         size: full lengths along x, y and z, metres.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> table = wb.Box((1.2, 0.7, 0.04))
     """
 
     size: Lengths
@@ -89,6 +99,12 @@ class Sphere(Shape):
 
     Attributes:
         radius: metres.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> ball = wb.Sphere(radius=0.1)
     """
 
     radius: Length
@@ -105,6 +121,12 @@ class Capsule(Shape):
     Attributes:
         radius: metres.
         length: of the segment, without the two half balls, metres.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> rail = wb.Capsule(radius=0.02, length=0.8)
     """
 
     radius: Length
@@ -125,6 +147,12 @@ class Cylinder(Shape):
     Attributes:
         radius: metres.
         length: along z, metres.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> post = wb.Cylinder(radius=0.05, length=2.0)
     """
 
     radius: Length
@@ -155,6 +183,9 @@ class Torus(Shape):
 
     Raises:
         InputError: a length out of range, or the tube is not thinner than the ring.
+
+    Examples:
+        >>> wheel = wb.Torus(radius=0.18, tube=0.015)
     """
 
     radius: Length
@@ -194,6 +225,12 @@ class Ellipsoid(Shape):
 
     Attributes:
         semi_axes: half lengths along x, y and z, metres.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> egg = wb.Ellipsoid((0.03, 0.03, 0.04))
     """
 
     semi_axes: Lengths
@@ -214,6 +251,9 @@ class HalfSpace(Shape):
 
     Raises:
         InputError: the normal has no length, or a value is no number or out of range.
+
+    Examples:
+        >>> ground = wb.HalfSpace()
     """
 
     normal: Annotated[tuple[float, float, float], unit_vector] = (0.0, 0.0, 1.0)
@@ -233,6 +273,9 @@ class Hull(Shape):
 
     Raises:
         InputError: not such points, or none that span a solid.
+
+    Examples:
+        >>> wedge = wb.Hull([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)])
     """
 
     __repr__ = brief
@@ -317,6 +360,10 @@ class Mesh(Shape):
         FileFormatError: the file is no mesh that can be read.
         MissingPackageError: trimesh, or for a COLLADA file pycollada, is not installed.
         InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> corners = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+        >>> wedge = wb.Mesh((corners, [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)]))
     """
 
     __repr__ = brief

@@ -36,7 +36,11 @@ Source = Clip | str | os.PathLike[str]
 
 
 class BatchProgress(NamedTuple):
-    """Told when a case is done: how many are, those of an earlier run included, of how many, and which was the last."""
+    """Told when a case is done: how many are, those of an earlier run included, of how many, and which was the last.
+
+    Examples:
+        >>> done = wb.motion.BatchProgress(3, 12, None)
+    """
 
     done: int
     total: int
@@ -99,6 +103,11 @@ def avoid_many(
         FileFormatError: the folder holds another table.
         MissingPackageError: dask is not installed.
         WholebodyError: the cluster does not answer.
+
+    Examples:
+        >>> rows = wb.motion.avoid_many([clip], folder)
+        >>> rows[0].outcome
+        'free'
     """
     what = "avoid_many"
     if unknown := options.keys() - AvoidOptions.__annotations__.keys():
@@ -259,6 +268,9 @@ def read_many(
     Raises:
         InputError: two files of one name, or no figure.
         WholebodyError: as for `avoid_many`.
+
+    Examples:
+        >>> made = wb.motion.read_many([recording], folder, human)
     """
     what = "read_many"
     check_figure(figure, what)

@@ -42,6 +42,10 @@ class AvoidedCase:
         missed: largest miss of a constraint, metres or radians.
         frames_changed, posture_solves, programs: counts.
         asked: fingerprint of clip, figure, equipment, method and constraints; a case with the same is not done again.
+
+    Examples:
+        >>> wb.motion.avoid_many([clip], folder)[0].colliding
+        0
     """
 
     clip: str

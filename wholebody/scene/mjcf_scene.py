@@ -43,6 +43,9 @@ def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Co
         FileFormatError: a file that cannot be read, with the place and the correction.
         InputError: several robots and a root for all, or a concavity out of range.
         MissingPackageError: MuJoCo is not installed.
+
+    Examples:
+        >>> cell = wb.read_scene("cell.xml")  # doctest: +SKIP
     """
     place = as_path(path, "read_scene: path")
     check_file(place, "scene")

@@ -39,6 +39,9 @@ class SolveProgress(NamedTuple):
         done: problems, those of an earlier run included.
         total: how many there are in all.
         record: the one that was done last; None before the first.
+
+    Examples:
+        >>> records = wb.solve_many([problem], progress=lambda now: now.done >= 100)  # ends after a hundred
     """
 
     done: int
@@ -120,6 +123,11 @@ def solve_many(
         FileFormatError: the folder holds other records.
         MissingPackageError: dask is not installed.
         WholebodyError: the cluster does not answer.
+
+    Examples:
+        >>> records = wb.solve_many({"first": problem, "second": problem})
+        >>> [record.outcome for record in records]
+        ['solved', 'solved']
     """
     what = "solve_many"
     named = _named(problems, what)

@@ -94,6 +94,11 @@ def reach_map(
         UnknownNameError: no such frame or method.
         MissingPackageError: dask is not installed.
         WholebodyError: the cluster does not answer.
+
+    Examples:
+        >>> found = wb.reach_map(problem, "right_index_tip", (0.3, -0.3, 1.0), (0.5, -0.1, 1.0), 0.2)
+        >>> found.verdict.shape
+        (2, 2, 1)
     """
     what = "reach_map"
     check_problem(problem, f"{what}: problem").check_fresh()

@@ -80,6 +80,13 @@ def study(
         FileFormatError: the task file cannot be read, or the folder holds other records.
         MissingPackageError: dask is not installed.
         WholebodyError: the cluster does not answer.
+
+    Examples:
+        >>> def task(figure, target, layout):
+        ...     return wb.Problem(wb.Scene(figure), goals=[wb.Point("right_index_tip", target)])
+        >>> records = wb.study(task, people=["F5", "M95"], targets=[(0.3, -0.2, 1.2)])
+        >>> [record.outcome for record in records]
+        ['solved', 'solved']
     """
     what = "study"
     make: TaskFile | TaskFunction

@@ -52,6 +52,11 @@ class Task:
         method: the method that it names, with its settings.
         goal_names: the name of each goal in tables: its type and its frame.
         view: the camera of a picture.
+
+    Examples:
+        >>> task = wb.read_task(task_file)
+        >>> task.problem.goals[0].frame
+        'right_index_tip'
     """
 
     path: Path
@@ -73,6 +78,11 @@ def read_task(path: str | PathLike[str]) -> Task:
             are named.
         UnknownNameError: an unknown key, type, joint, frame or posture, or a missing file, with the nearest names.
         InputError: values that contradict each other.
+
+    Examples:
+        >>> path = wb.taskfile.write_task(problem, folder / "reach.toml")
+        >>> wb.solve(wb.read_task(path).problem).status
+        'solved'
     """
     file = checked_path(path, "path")
     return task_from(read_contents(file), file)

@@ -112,6 +112,12 @@ class Assembly(AssemblyJoints):
 
     Attributes:
         clearance: least distance of every tested pair, metres.
+
+    Examples:
+        >>> swing = wb.Assembly().body("seat", (0.0, 0.0, -1.0))
+        >>> swing = swing.revolute("world", "seat", at=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0))
+        >>> swing.point_goal("seat", (1.0, 0.0, 0.0)).solve().status
+        'solved'
     """
 
     def __init__(self, *, clearance: float = 0.0) -> None:

@@ -126,6 +126,11 @@ def simplify(problem: Problem, *, lock: bool = True) -> Simplified:
 
     Raises:
         InputError: it is no problem, or objects were added to or removed from its scene after it was made.
+
+    Examples:
+        >>> part = wb.simplify(problem)
+        >>> part.restored(wb.solve(part.problem)).status
+        'solved'
     """
     checks.instance(problem, Problem, "simplify: problem", "state one with wb.Problem(scene, goals=[...])")
     return leave_out(problem, Parts(lock=checks.flag(lock, "lock")))
