@@ -1,4 +1,4 @@
-"""Every public name has an example in its docstring, which says what it does."""
+"""Every public name has an example in its docstring, and what it makes is shown in a few lines."""
 
 from __future__ import annotations
 
@@ -58,5 +58,12 @@ def test_an_example_does_what_it_says(
     examples = doctest.DocTestParser().get_doctest(inspect.cleandoc(text), {**known}, name, None, None)
     assert examples.examples, f"{name} has no example"
     told: list[str] = []
-    doctest.DocTestRunner(optionflags=FLAGS).run(examples, out=told.append)
+    doctest.DocTestRunner(optionflags=FLAGS).run(examples, out=told.append, clear_globs=False)
     assert not told, "".join(told)
+    for made in examples.globs.keys() - known.keys() - {"__builtins__"}:
+        for one in each if isinstance(each := examples.globs[made], (list, tuple)) else [each]:
+            if type(one).__module__.startswith("wholebody"):
+                shown = repr(one)
+                assert max(map(len, shown.splitlines())) < 300, shown
+                assert len(shown.splitlines()) < 5, shown
+                assert " object at 0x" not in shown

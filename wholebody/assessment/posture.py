@@ -18,7 +18,7 @@ import numpy as np
 from wholebody.assessment.all_pairs import AllPairs, all_pairs
 from wholebody.assessment.first_order import MET, Blocker, FirstOrder
 from wholebody.assessment.motion import limit_violation
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.base.checks import a, number, posture
 from wholebody.base.errors import InputError, TermError
 from wholebody.figures.state import State
@@ -65,6 +65,8 @@ class Assessment:
     goal_errors: tuple[float, ...]
     first_order: FirstOrder = field(compare=False, repr=False)
     seconds: float = field(default=0.0, compare=False, repr=False)
+
+    __repr__ = brief
 
     @property
     def optimality(self) -> float:

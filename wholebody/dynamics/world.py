@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.base.checks import array, instance, time_step
 from wholebody.base.errors import InputError
 from wholebody.dynamics.actuated import Actuated
@@ -72,6 +72,8 @@ class WorldFrame(NamedTuple):
     deepest: float
     seconds: float
     note: str
+
+    __repr__ = brief
 
 
 class World(NotCopyable):

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.joined import one_figure
@@ -82,6 +82,8 @@ class BodyAngles:
     neck_twist: float
     left_share: float
     center_ahead: float
+
+    __repr__ = brief
 
     def side(self, name: str) -> SideAngles:
         """The angles of "left" or "right"."""

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from math import degrees
 from typing import Any
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.ergonomics.angles import SIDES, BodyAngles, check_person
 from wholebody.ergonomics.owas_score import Owas, owas_code
 from wholebody.ergonomics.posture_torques import StaticTorques, static_torques
@@ -54,6 +54,8 @@ class Ergonomics:
     owas: Owas
     torques: StaticTorques
     seat: str = ""
+
+    __repr__ = brief
 
     def rows(self) -> list[tuple[str, str, str, str]]:
         """Rows of a table: method, left, right, and what it says of the worse side."""

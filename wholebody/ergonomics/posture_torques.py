@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.ergonomics.angles import SIDES, check_person
 from wholebody.ergonomics.work import LOAD
 from wholebody.figures.figure import Figure
@@ -38,6 +38,8 @@ class StaticTorques:
 
     torque: Mapping[str, float]
     share: Mapping[str, float]
+
+    __repr__ = brief
 
     @property
     def worst(self) -> tuple[str, float]:

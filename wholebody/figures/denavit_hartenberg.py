@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures.figure import Figure
 
@@ -50,6 +50,8 @@ class DenavitHartenberg(NamedTuple):
     a: Array
     alpha: Array
     tool: pin.SE3
+
+    __repr__ = brief
 
     def forward(self, values: Array) -> pin.SE3:
         """Return the placement of the tip in the reference frame at joint values (n,)."""

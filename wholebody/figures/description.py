@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, brief
 from wholebody.figures.anthropometry import Person
 from wholebody.figures.body_spec import Solid
 from wholebody.figures.motion_ranges import MotionRange
@@ -31,6 +31,8 @@ class Chain(NamedTuple):
     joints: tuple[str, ...]
     tip: str
 
+    __repr__ = brief
+
 
 class JointCone(NamedTuple):
     """Reach cone of a limb.
@@ -50,6 +52,8 @@ class JointCone(NamedTuple):
     reference: str
     limb: str
     axis: Array
+
+    __repr__ = brief
 
 
 class ExcludedPair(NamedTuple):
@@ -78,6 +82,8 @@ class Limits(NamedTuple):
     idx_v: Indices
     lower: Array
     upper: Array
+
+    __repr__ = brief
 
 
 class Follower(NamedTuple):

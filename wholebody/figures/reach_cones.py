@@ -62,6 +62,9 @@ class ReachCone:
         sides = np.cross(self.visible, self.vertices)
         self.planes: Array = np.vstack([self.boundaries, *across, self.vertices, sides])
 
+    def __repr__(self) -> str:
+        return f"ReachCone({len(self.vertices)} corners)"
+
     def contains(self, direction: Any) -> bool:
         """Whether a direction (3,) is inside, on the edge included."""
         return self.signed_angle(direction)[0] >= 0.0

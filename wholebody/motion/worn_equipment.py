@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.base.checks import choice, color, instance, known, listed, numbers, shown, text
 from wholebody.base.checks import text as checked_text
 from wholebody.base.errors import InputError
@@ -62,6 +62,8 @@ class Equipment:
     rests_on: tuple[str, ...] = ()
     color: tuple[float, float, float, float] | None = None
     filling: SphereFilling | None = field(default=None, init=False)
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         """Check the values."""

@@ -17,7 +17,8 @@ from wholebody.figures.link_pieces import Concavity
 from wholebody.figures.mjcf.compiled import Compiled, is_mjcf, placement
 from wholebody.figures.mjcf.figure import mjcf_figure
 from wholebody.figures.mjcf.geoms import SHAPES, height_field
-from wholebody.geometry.shapes import Box, Capsule, Compound, Cylinder, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
+from wholebody.geometry.compound import Compound
+from wholebody.geometry.shapes import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
 from wholebody.scene.matter.body import Body
 from wholebody.scene.scene import Scene
 

@@ -10,6 +10,7 @@ from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
 from wholebody.base import checks
+from wholebody.base.arrays import brief
 from wholebody.base.batches import fingerprint, run_batch, shared
 from wholebody.base.progress import reporter
 from wholebody.base.runner import EndedError, Job
@@ -47,6 +48,8 @@ class SolveProgress(NamedTuple):
     done: int
     total: int
     record: SolveRecord | None
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True)

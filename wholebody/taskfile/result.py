@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wholebody.base.arrays import Array, as_dict
+from wholebody.base.arrays import Array, as_dict, brief
 from wholebody.base.checks import instance, posture
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, one_line
@@ -108,6 +108,8 @@ class Result(NamedTuple):
     message: str
     method: str
     joints: dict[str, float]
+
+    __repr__ = brief
 
 
 def read_result(path: str | os.PathLike[str]) -> Result:

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import with_values
+from wholebody.base.arrays import brief, with_values
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import UnknownNameError
 from wholebody.base.files import is_file, is_folder, title_of
@@ -65,6 +65,8 @@ class Task:
     method: Method
     goal_names: tuple[str, ...]
     view: View
+
+    __repr__ = brief
 
 
 def read_task(path: str | PathLike[str]) -> Task:

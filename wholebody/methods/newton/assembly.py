@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from wholebody.assessment.all_pairs import all_pairs
 from wholebody.base.arrays import Array
-from wholebody.base.checks import choice, flag, known, number, shown, whole
+from wholebody.base.checks import choice, flag, known, number, shown, some, whole
 from wholebody.base.errors import InputError
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
@@ -139,6 +139,9 @@ class Assembly(AssemblyJoints):
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self._prepared, self._scene, self._alone = None, None, OneAtATime("assembly")
+
+    def __repr__(self) -> str:
+        return f"Assembly of {len(self.bodies)} bodies and {len(self._goals)} goals: {some(self.bodies) or 'none'}"
 
     def __copy__(self) -> Assembly:
         return copy.deepcopy(self)

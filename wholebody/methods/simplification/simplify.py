@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from wholebody.assessment.posture import assess
 from wholebody.base import checks
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, brief
 from wholebody.figures.description import is_root
 from wholebody.figures.figure import Figure
 from wholebody.geometry.large_models import geometry_model
@@ -98,6 +98,8 @@ class Simplified:
     whole: Problem
     left_out: LeftOut
     _embedding: Embedding = field(repr=False)
+
+    __repr__ = brief
 
     def posture(self, q: Array) -> Array:
         """Posture of the whole figure, (nq,), of one of the smaller figure (small nq,)."""

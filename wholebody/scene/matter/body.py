@@ -10,15 +10,15 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.base.checks import settle
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range, Vector
+from wholebody.geometry.compound import Compound
 from wholebody.geometry.placement import FARTHEST, unit_vector
 from wholebody.geometry.shapes import (
     Box,
     Capsule,
-    Compound,
     Cylinder,
     Ellipsoid,
     HalfSpace,
@@ -110,6 +110,8 @@ class Body(Checked):
     velocity: Annotated[Three, Vector(3, Range(-1e3, 1e3, "m/s"))] = (0.0, 0.0, 0.0)
     angular_velocity: Annotated[Three, Vector(3, Range(-1e3, 1e3, "rad/s"))] = (0.0, 0.0, 0.0)
     joints: Annotated[Sequence[BallJoint], joints] = ()
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         if self.density is not None and self.mass is not None:
