@@ -73,7 +73,8 @@ class WorldFrame(NamedTuple):
     seconds: float
     note: str
 
-    __repr__ = brief
+    def __repr__(self) -> str:
+        return brief(self)
 
 
 class World(NotCopyable):

@@ -51,7 +51,8 @@ class DenavitHartenberg(NamedTuple):
     alpha: Array
     tool: pin.SE3
 
-    __repr__ = brief
+    def __repr__(self) -> str:
+        return brief(self)
 
     def forward(self, values: Array) -> pin.SE3:
         """Return the placement of the tip in the reference frame at joint values (n,)."""

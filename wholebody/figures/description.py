@@ -31,7 +31,8 @@ class Chain(NamedTuple):
     joints: tuple[str, ...]
     tip: str
 
-    __repr__ = brief
+    def __repr__(self) -> str:
+        return brief(self)
 
 
 class JointCone(NamedTuple):
@@ -53,7 +54,8 @@ class JointCone(NamedTuple):
     limb: str
     axis: Array
 
-    __repr__ = brief
+    def __repr__(self) -> str:
+        return brief(self)
 
 
 class ExcludedPair(NamedTuple):
@@ -83,7 +85,8 @@ class Limits(NamedTuple):
     lower: Array
     upper: Array
 
-    __repr__ = brief
+    def __repr__(self) -> str:
+        return brief(self)
 
 
 class Follower(NamedTuple):

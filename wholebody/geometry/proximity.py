@@ -48,7 +48,8 @@ class Contacts(NamedTuple):
     number: Indices
     placements: Array
 
-    __repr__ = brief
+    def __repr__(self) -> str:
+        return brief(self)
 
     def nearest_first(self) -> Contacts:
         """The same in the order of their distances."""

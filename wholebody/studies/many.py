@@ -49,7 +49,8 @@ class SolveProgress(NamedTuple):
     total: int
     record: SolveRecord | None
 
-    __repr__ = brief
+    def __repr__(self) -> str:
+        return brief(self)
 
 
 @dataclass(frozen=True)

@@ -109,7 +109,8 @@ class Result(NamedTuple):
     method: str
     joints: dict[str, float]
 
-    __repr__ = brief
+    def __repr__(self) -> str:
+        return brief(self)
 
 
 def read_result(path: str | os.PathLike[str]) -> Result:

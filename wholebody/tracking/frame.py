@@ -71,4 +71,5 @@ class Frame(NamedTuple):
     collisions: tuple[Collision, ...] = ()
     path: tuple[tuple[float, Array], ...] = ()
 
-    __repr__ = brief
+    def __repr__(self) -> str:
+        return brief(self)

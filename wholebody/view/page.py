@@ -9,6 +9,7 @@ import importlib.util
 import sys
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 from wholebody.base.errors import MissingPackageError
 from wholebody.view.server import Command, bundle
@@ -107,7 +108,7 @@ def notebook_frame(commands: list[Command], title: str = "wholebody") -> str:
 
 def _cell() -> tuple[str, str] | None:
     """The present cell of a notebook and its run, None where no kernel runs it. A cell without a name is its code."""
-    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    shell: Any = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     if not hasattr(shell, "get_parent"):
         return None
     message, code = shell.get_parent(), shell.user_ns.get("In", [""])[-1]

@@ -30,7 +30,8 @@ class QPStep(NamedTuple):
     # which term of one's own is not finite where the step would have ended, so that it was cut; else empty
     note: str = ""
 
-    __repr__ = brief
+    def __repr__(self) -> str:
+        return brief(self)
 
 
 class FrameStep(NamedTuple):
