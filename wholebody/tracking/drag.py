@@ -254,6 +254,15 @@ class Drag(NotCopyable, Generic[Answer]):
 
     With a budget a frame ends with what it has found by then, and the next goes on from there. Where it was not enough
     to get half as far as the goal went, the goal goes half as far next, down to 2 mm; otherwise it goes twice as far.
+
+    Raises:
+        InputError: a problem that the method cannot take, a goal that cannot be moved, or a value out of range.
+        UnknownNameError: there is no such method.
+
+    Examples:
+        >>> drag = wb.Drag(problem.with_start(solution.q))
+        >>> drag.to((0.55, -0.25, 0.96)).error < 0.01
+        True
     """
 
     @overload
