@@ -5,7 +5,7 @@ The public names are loaded when they are first used, so that ``import wholebody
     import wholebody as wb
 
     scene = wb.Scene(wb.load("human"))
-    scene.add(wb.Box((1.2, 0.7, 0.04)), name="table", at=(0.6, 0.0, 0.72))
+    scene.add(wb.Box((1.2, 0.7, 0.04)), name="table", at=(0.9, 0.0, 0.72))
     problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.55, -0.25, 0.95))])
     solution = wb.solve(problem, method="qp")
 

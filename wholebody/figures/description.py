@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, brief
 from wholebody.figures.anthropometry import Person
 from wholebody.figures.body_spec import Solid
 from wholebody.figures.motion_ranges import MotionRange
@@ -21,10 +21,18 @@ ROOT_JOINT = "root_joint"
 
 
 class Chain(NamedTuple):
-    """Joints from the root outwards, and the frame at the end."""
+    """Joints from the root outwards, and the frame at the end.
+
+    Examples:
+        >>> human.chains["right_arm"].tip
+        'right_index_tip'
+    """
 
     joints: tuple[str, ...]
     tip: str
+
+    def __repr__(self) -> str:
+        return brief(self)
 
 
 class JointCone(NamedTuple):
@@ -35,12 +43,19 @@ class JointCone(NamedTuple):
         reference: frame to which the cone is fixed.
         limb: frame that carries the limb.
         axis: (3,) unit direction of the limb in its own frame.
+
+    Examples:
+        >>> human.cones["left_shoulder"].axis.shape
+        (3,)
     """
 
     cone: ReachCone
     reference: str
     limb: str
     axis: Array
+
+    def __repr__(self) -> str:
+        return brief(self)
 
 
 class ExcludedPair(NamedTuple):
@@ -59,12 +74,19 @@ class Limits(NamedTuple):
         idx_v: (n,) indices in the tangent vector.
         lower: (n,) radians or metres.
         upper: (n,)
+
+    Examples:
+        >>> bool((human.limits.lower <= human.limits.upper).all())
+        True
     """
 
     idx_q: Indices
     idx_v: Indices
     lower: Array
     upper: Array
+
+    def __repr__(self) -> str:
+        return brief(self)
 
 
 class Follower(NamedTuple):

@@ -18,9 +18,18 @@ EXTRAS = {"placo": "placo"}
 
 
 def installed_methods() -> tuple[str, ...]:
-    """Names of the methods that can be used here: all except those whose package is not installed."""
+    """Names of the methods that can be used here: all except those whose package is not installed.
+
+    Examples:
+        >>> wb.methods.installed_methods()[0]
+        'qp'
+    """
     return tuple(name for name in METHODS if name not in EXTRAS or find_spec(EXTRAS[name]) is not None)
 
 
 __getattr__, _, _lazy = exported(__name__, __file__)
 __all__ = ["EXTRAS", "METHODS", *_lazy, "installed_methods"]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

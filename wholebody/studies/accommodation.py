@@ -79,6 +79,12 @@ class Accommodation:
             NaN for who was refused. Empty where nobody is joined with an adjustable figure.
 
     Who was refused has no posture, and is neither in shares nor in exclusions; see `tried`.
+
+    Examples:
+        >>> def task(figure, target, layout):
+        ...     return wb.Problem(wb.Scene(figure), goals=[wb.Point("right_index_tip", (0.3, -0.2, 1.2))])
+        >>> wb.accommodation(task, wb.people(1)).fits
+        (True, True)
     """
 
     records: Records
@@ -184,7 +190,7 @@ def accommodation(
     method: str | Method | None = None,
     jobs: int = 1,
     folder: str | os.PathLike[str] | None = None,
-    progress: Callable[[SolveProgress], Any] | None = None,
+    progress: Callable[[SolveProgress], Any] | bool | None = None,
 ) -> Accommodation:
     """Solve a task for many people, and count who reaches, fits and sees.
 
@@ -205,6 +211,12 @@ def accommodation(
         InputError: a value of the wrong kind or range, or everybody is refused.
         UnknownNameError: there is no such task file or method.
         FileFormatError: the task file cannot be read.
+
+    Examples:
+        >>> def task(figure, target, layout):
+        ...     return wb.Problem(wb.Scene(figure), goals=[wb.Point("right_index_tip", (0.3, -0.2, 1.2))])
+        >>> wb.accommodation(task, wb.people(1)).reaches  # a woman and a man
+        (True, True)
     """
     point = None if sees is None else inputs.point(sees, "accommodation: sees")
     given = sampled(100) if people is None else people

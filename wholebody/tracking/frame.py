@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple, Protocol
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.scene.moving_obstacles import Collision
 
 FRAME = 1.0 / 60.0  # s: of a display, from frame to frame
@@ -66,3 +66,6 @@ class Frame(NamedTuple):
     note: str
     collisions: tuple[Collision, ...] = ()
     path: tuple[tuple[float, Array], ...] = ()
+
+    def __repr__(self) -> str:
+        return brief(self)

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from wholebody.assessment.posture import assess
 from wholebody.base import checks
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, brief
 from wholebody.figures.description import is_root
 from wholebody.figures.figure import Figure
 from wholebody.figures.self_pairs import random_postures
@@ -125,6 +125,8 @@ class Simplified:
     left_out: LeftOut
     _part: _Part = field(repr=False)
 
+    __repr__ = brief
+
     def posture(self, q: Array) -> Array:
         """Posture of the whole figure, (nq,), of one of the smaller figure (small nq,)."""
         return self._part.embed(checks.posture(q, self.problem.scene.model.nq))
@@ -148,6 +150,11 @@ def simplify(problem: Problem) -> Simplified:
 
     Raises:
         InputError: it is no problem, or objects came to or left its scene after it was stated.
+
+    Examples:
+        >>> part = wb.simplify(problem)
+        >>> part.restored(wb.solve(part.problem)).status
+        'solved'
     """
     checks.instance(problem, Problem, "simplify: problem", "state one with wb.Problem(scene, goals=[...])")
     problem.check_fresh()
