@@ -315,7 +315,7 @@ def test_a_four_bar_among_obstacles_stops_where_geometry_says(example: Example, 
 
 def test_a_scissor_lift_stops_at_its_load_limit_and_at_a_beam(example: Example, tmp_path: Path) -> None:
     module = example("scissor_lift")
-    module.FRAMES = 12  # of a drag; the example has more to look at
+    module.FRAMES = 6  # of a drag; the example has more to look at
     for load, (low, high) in module.main(out=tmp_path, pictures=False).items():
         angle = np.arcsin(low / (module.STAGES * module.BAR))
         assert module.STAGES * load * module.GRAVITY / np.tan(angle) == pytest.approx(module.STRONGEST, rel=1e-3)
