@@ -25,17 +25,17 @@ def test_a_run_prints_a_table_and_writes_numbers_chart_and_animation(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    assert main(["interact", "hand_on_table", "--frames", "60", "--out", str(out)]) == 0
+    assert main(["interact", "hand_on_table", "--frames", "100", "--out", str(out)]) == 0
     assert "hand_on_table" in capsys.readouterr().out
     assert {path.suffix for path in out.iterdir()} == {".csv", ".html", ".md", ".png", ".svg"}
     rows = csv_rows(out / "hand_on_table-qp.csv")
-    assert [int(row["frame"]) for row in rows] == list(range(60))
+    assert [int(row["frame"]) for row in rows] == list(range(100))
     assert max(float(row["tracked deepest mm"]) for row in rows) > 5.0
     assert max(float(row["deepest mm"]) for row in rows) < 0.1
     page = unpacked(out / "hand_on_table-qp.html")
     assert "ghosts" in page
     page = (out / "hand_on_table-qp.md").read_text()
-    assert "| hand_on_table | qp | 60 |" in page
+    assert "| hand_on_table | qp | 100 |" in page
     assert "| arm in corner | paper | 2146 | 20.5 |" in page
 
 

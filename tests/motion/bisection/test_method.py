@@ -42,8 +42,8 @@ def person() -> Figure:
 
 @pytest.fixture(scope="module")
 def swing(person: Figure) -> Clip:
-    """Arms swing as in a walk, a period of 40 frames."""
-    phase = 2.0 * np.pi * np.arange(41) / 40.0
+    """Arms swing as in a walk, two periods of 40 frames."""
+    phase = 2.0 * np.pi * np.arange(61) / 40.0
     q = [
         person.with_joints(
             person.neutral,
