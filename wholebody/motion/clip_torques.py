@@ -257,19 +257,13 @@ PLACE = 2e-3
 
 @dataclass(frozen=True, eq=False)
 class LoadChange:
-    """Loads before and after a change.
-
-    Attributes:
-        before: torques of the clip as it was.
-        after: torques of the answer; both are those of `wb.motion.torques`.
-        times: (m,) place of each frame of the answer in the frames before.
-    """
+    """Loads before and after a change."""
 
     __repr__ = brief
 
-    before: Torques
-    after: Torques
-    times: Array
+    before: Torques  # torques of the clip as it was
+    after: Torques  # torques of the answer; both are those of `wb.motion.torques`
+    times: Array  # (m,) place of each frame of the answer in the frames before
 
     @property
     def bounds(self) -> tuple[Array, Array]:

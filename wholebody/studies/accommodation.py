@@ -48,25 +48,15 @@ class Share(NamedTuple):
 
 
 class Exclusion(NamedTuple):
-    """A dimension that tells who is left out.
+    """A dimension that tells who is left out."""
 
-    Attributes:
-        sex: "male" or "female".
-        verdict: "reach", "fit" or "see": what they do not.
-        dimension: its name, see `wb.people`.
-        side: "over" or "under".
-        value: metres (mass: kilograms) over or under which they are.
-        excluded: how many are left out for it.
-        told: share of these that are on that side, less the share of those that are accommodated.
-    """
-
-    sex: str
-    verdict: str
-    dimension: str
-    side: str
-    value: float
-    excluded: int
-    told: float
+    sex: str  # "male" or "female"
+    verdict: str  # "reach", "fit" or "see": what they do not
+    dimension: str  # its name, see `wb.people`
+    side: str  # "over" or "under"
+    value: float  # metres (mass: kilograms) over or under which they are
+    excluded: int  # how many are left out for it
+    told: float  # share of these that are on that side, less the share of those that are accommodated
 
     def __str__(self) -> str:
         unit = "kg" if self.dimension == "mass" else "m"

@@ -33,23 +33,16 @@ Answer = TypeVar("Answer", Solution, AssemblySolution)
 
 
 class DragFrame(NamedTuple):
-    """Answer of one frame of a drag.
+    """Answer of one frame of a drag."""
 
-    Attributes:
-        q: (nq,) the posture, of an assembly that of its `scene`.
-        error: largest remaining goal error, metres or radians.
-        iterations: iterations of the method.
-        seconds: wall time.
-        collisions: what things that move (`Scene.move` with `over`) passed through, or are inside of.
-        path: shares of the frame, from 0 to 1, and the postures (nq,) there, if things moved; otherwise empty. Straight
-            from one to the next nothing was passed but the collisions.
-    """
-
-    q: Array
-    error: float
-    iterations: int
-    seconds: float
+    q: Array  # (nq,) the posture, of an assembly that of its `scene`
+    error: float  # largest remaining goal error, metres or radians
+    iterations: int  # iterations of the method
+    seconds: float  # wall time
+    # what things that move (`Scene.move` with `over`) passed through, or are inside of
     collisions: tuple[Collision, ...] = ()
+    # shares of the frame, from 0 to 1, and the postures (nq,) there, if things moved; otherwise empty. Straight from
+    # one to the next nothing was passed but the collisions.
     path: tuple[tuple[float, Array], ...] = ()
 
     def __repr__(self) -> str:
