@@ -62,7 +62,7 @@ def step(arguments: argparse.Namespace) -> None:
     name = "step-figures" if figures else "step"
     text = step.step_report(spent, judged, facts, bool(figures), notes)
     rows = {f"{name}-time": spent, f"{name}-result": judged}
-    charts = _charts(name, step.panels(runs, tracks), "Share of steps within a time, and least distance of any pair")
+    charts = _charts(name, step.panels(runs), "Share of steps within a time, and least distance of any pair")
     publish(name, text, arguments, facts=facts, tables=rows, charts=charts, page=None if figures else "results.md")
 
 
