@@ -49,7 +49,7 @@ def run(tmp_path: Path, root: Path):
     """
     place = tmp_path / "wholebody"
     place.mkdir()
-    for path in (root / "wholebody").glob("*.py"):
+    for path in (root / "wholebody").glob("*.py*"):
         (place / path.name).symlink_to(path)
     (place / "base").symlink_to(root / "wholebody" / "base")
     (place / "loop_of_a_test.py").write_text(LOOP)

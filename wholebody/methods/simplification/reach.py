@@ -145,7 +145,7 @@ def still_dofs(problem: Problem) -> list[int]:
     for bound in problem.bounds:
         low, high = bound.bounds(state, None)
         still |= (low == 0.0) & (high == 0.0)
-    return np.flatnonzero(still).tolist()
+    return [int(dof) for dof in np.flatnonzero(still)]
 
 
 def reachable_pairs(problem: Problem, still: Iterable[int], numbers: Indices) -> Mask:

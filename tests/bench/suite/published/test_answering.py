@@ -42,3 +42,16 @@ def test_files_that_hold_another_problem_are_refused(folder: Path, tmp_path: Pat
         Answering(changed, adapters(["qp"])[0]).answer("free_reach", 0)
     with pytest.raises(UnknownNameError, match="free_reach"):
         chosen_problems(folder, ["free_reech"])
+
+
+@pytest.mark.parametrize("command", ["answer", "judge"])
+def test_no_file_of_the_export_is_written_over(
+    command: str, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    problem = folder / "problems" / "free_reach" / "0001.json"
+    before = problem.read_bytes()
+    (tmp_path / "a.json").write_text("{}")
+    asked = [str(folder)] if command == "answer" else [str(tmp_path / "a.json"), "--problems", str(folder)]
+    assert main(["bench", command, *asked, "--out", str(problem)]) == 2
+    assert "is a file that is read" in capsys.readouterr().err
+    assert problem.read_bytes() == before
