@@ -155,7 +155,7 @@ def _shapes(link: Element, path: Path, package_dirs: tuple[Path, ...]) -> Iterat
 def _shape(element: Element, link: str, path: Path, package_dirs: tuple[Path, ...]) -> LinkShape:
     """The shape of a ``<collision>`` or ``<visual>``."""
     place = f"{path}: {element.tag} of link {shown(link)}"
-    shapes = list(element.find("geometry") or ())
+    shapes = element.findall("geometry/*")
     if len(shapes) != 1:
         raise FileFormatError(f"{place} has {len(shapes)} shapes in its <geometry>; give one")
     shape = shapes[0]
