@@ -14,16 +14,17 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import known, numbers, shown
 from wholebody.base.errors import InputError, WholebodyError
+from wholebody.geometry.continuous.passing_through import GRAZE
 from wholebody.methods import installed_methods
 from wholebody.methods.base import Method
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.solve import method_for_motions
 from wholebody.problem import Problem
-from wholebody.tracking.drag import Drag
+from wholebody.tracking.drag import Drag, DragFrame
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.live_subjects import LiveSubject, live_subject, things_of
 
-FARTHEST_STEP = 0.5  # m: a thing does not jump farther than this in a frame
+FARTHEST_STEP = 0.05  # m: a thing does not move farther than this in a frame, 3 m/s
 
 
 class LiveFrame(NamedTuple):
@@ -85,10 +86,9 @@ class LiveDrag:
         if isinstance(problem, Assembly):
             self.methods = {"newton": "newton"}
             method = "newton" if method == "qp" else method
-        self._undo: list[tuple[Array, Any]] = []
-        self.taken = ""
-        self._drag: Drag[Any] | None = None
-        self._trouble = ""
+        self._undo: list[Any] = []
+        self._deepest = 0.0
+        self.let_go()
         self._state = self.scene.state(self.q)
         self.choose(method)
 
@@ -97,37 +97,36 @@ class LiveDrag:
     def take(self, name: str) -> None:
         """Take the handle of a frame or a thing; raises UnknownNameError where there is none."""
         known(name, {*self.handles, *self.things}, "handle")
-        self._undo.append((self.q.copy(), self._subject.remembered()))
+        self._undo.append(self._subject.remembered(self.q))
         del self._undo[:-100]  # postures that are remembered
         self.taken = name
         self._restart()
 
     def let_go(self) -> None:
         """Let the handle go; the figure stays."""
-        self.taken, self._drag, self._trouble = "", None, ""
+        self.taken, self._trouble, self._stopped = "", "", ""
+        self._drag: Drag[Any] | None = None
 
     def move(self, place: Array) -> LiveFrame:
         """Move the handle that was taken to a place (3,), and make one frame; raises InputError where none was taken.
 
-        A frame has a budget of the processor's time, see `Drag`; moved to the same place again, the figure goes on. A
-        figure that cannot follow keeps its posture, and the status says why.
+        A frame has a budget of the processor's time, see `Drag`; moved to the same place again, figure and thing go on.
+        A figure that cannot follow keeps its posture, and the status says why. A thing moves 50 mm in a frame at most. It
+        stays before what does not get out of its way, which the status names, and tries half as far in the next frame.
         """
         if not self.taken:
             raise InputError("no handle was taken; take one first")
         place = numbers(place, (3,), "the place of a handle")
-        began, error, path = time.perf_counter(), 0.0, tuple[tuple[float, Array], ...]()
+        began, path = time.perf_counter(), tuple[tuple[float, Array], ...]()
         if self._drag is not None:
             try:
-                if self.taken in self.things:
-                    self._push(place)
-                    frame = self._drag.to(self.place(next(iter(self.handles))))
-                else:
-                    frame = self._drag.to(place)
-                    error = float(np.linalg.norm(self.place_at(frame.q, self.taken) - place))
-                self.q, path = np.array(frame.q), frame.path
-                self._subject.arrived()
+                frame = self._pushed(self._drag, place) if self.taken in self.things else self._drag.to(place)
+                if frame is not None:
+                    self.q, path = np.array(frame.q), frame.path
+                    self._subject.arrived()
             except WholebodyError as trouble:
                 self._trouble = str(trouble)
+        error = float(np.linalg.norm(self.place(self.taken) - place))
         return with_values(self._report(error, time.perf_counter() - began), path=path)
 
     def toggle(self, name: str) -> bool:
@@ -157,8 +156,7 @@ class LiveDrag:
         if not self._undo:
             return False
         self.let_go()
-        self.q, remembered = self._undo.pop()
-        self._subject.restore(remembered)
+        self.q = self._subject.restore(self._undo.pop())
         return True
 
     # ---- what is seen
@@ -170,9 +168,12 @@ class LiveDrag:
     def place_at(self, q: Array, name: str) -> Array:
         """The same at a posture (nq,)."""
         if name in self.things:
-            return np.array(self.scene.objects[name].placement.translation)
+            return np.array(self._at(name).translation)
         handle = self._subject.handles[name]
         return np.array(self._state.update(q).data.oMi[handle.joint].act(handle.local.translation))
+
+    def _at(self, thing: str) -> pin.SE3:
+        return self.scene.objects[thing].placement
 
     def report(self) -> LiveFrame:
         """What there is to say without a frame."""
@@ -184,7 +185,7 @@ class LiveDrag:
 
     def _restart(self) -> None:
         """Begin to follow anew: holds, handle or method are others."""
-        self._trouble = ""
+        self._trouble, self._stopped, self._reach = "", "", FARTHEST_STEP
         followed = self.taken if self.taken in self.handles else next(iter(self.handles))
         held = self.held - {self.taken}
         try:
@@ -202,14 +203,14 @@ class LiveDrag:
 
         A handle stays where it is, and a thing moves by a micrometre.
         """
-        q, remembered = self.q, self._subject.remembered()
+        q, remembered = self.q, self._subject.remembered(self.q)
         name = next(iter(self.handles))
         place = self.place(name)
         try:
             drag = self._subject.drag(q, name, place, self.held - {name}, self.method)
             drag.to(place)
             for thing in self.things[:1]:
-                at = self.scene.objects[thing].placement
+                at = self._at(thing)
                 self._subject.move(thing, pin.SE3(at.rotation, at.translation + 1e-6), FRAME)
                 drag.to(place)
             self.report()
@@ -218,20 +219,29 @@ class LiveDrag:
         finally:
             self._subject.restore(remembered)
 
-    def _push(self, place: Array) -> None:
-        at = self.scene.objects[self.taken].placement
+    def _pushed(self, drag: Drag[Any], place: Array) -> DragFrame | None:
+        """A frame in which the thing that was taken comes nearer to a place (3,); None where it has to stay."""
+        at, before, deep = self._at(self.taken), self._subject.remembered(self.q), self._deepest
         way = place - at.translation
-        length = float(np.linalg.norm(way))
-        if length > FARTHEST_STEP:
-            way *= FARTHEST_STEP / length
+        way *= min(1.0, self._reach / max(float(np.linalg.norm(way)), 1e-12))
         self._subject.move(self.taken, pin.SE3(at.rotation, at.translation + way), FRAME)
+        frame = drag.to(self.place(next(iter(self.handles))))
+        met = [one for one in frame.collisions if one.depth > max(deep, GRAZE)]
+        if not met:
+            self._stopped, self._reach = "", min(1.25 * self._reach, FARTHEST_STEP)
+            return frame
+        self._subject.restore(before)
+        self._stopped = f"{self.taken} stays: {met[0]}"
+        # m: a thing tries to move at least so far
+        self._reach = max(0.5 * self._reach, 0.002)
+        return None
 
     def _report(self, error: float, seconds: float) -> LiveFrame:
         # m: pairs nearer than this are counted as contacts
         contacts = self.scene.contacts(self.q, within=0.002)
-        overlap = float(-contacts.distance.min(initial=0.0))
+        overlap = self._deepest = float(-contacts.distance.min(initial=0.0))
         doing = f"dragging {self.taken}" if self.taken else "take a handle and drag it; click one to hold it"
         status = f"{doing}, by {self.method.name}"
-        if self._trouble:
-            status = f"{status}: {self._trouble}"
+        if self._trouble or self._stopped:
+            status = f"{status}: {self._trouble or self._stopped}"
         return LiveFrame(self.q, error, len(contacts.distance), overlap, seconds, status)

@@ -74,6 +74,7 @@ class LiveProblem:
         stated = (*problem.stated, *problem.bounds)
         self._fixed: tuple[Any, ...] = tuple(term for term in stated if not _handle_of(term, self.handles))
         self.held: Set[str] = {_handle_of(term, self.handles) for term in problem.constraints} - {""}
+        self._drag: Drag[Any] | None = None
 
     def stated(self, q: Array, goals: object, held: Collection[str]) -> Problem:
         """The problem with the start q (nq,), goals, and holds."""
@@ -93,7 +94,8 @@ class LiveProblem:
 
     def drag(self, q: Array, followed: str, place: Array, held: Collection[str], method: Method) -> Drag[Any]:
         """What follows a handle from the posture q (nq,), while others are held where they are."""
-        return Drag(self.stated(q, [Point(followed, place), *self.problem.goals], held), method, budget=BUDGET)
+        self._drag = Drag(self.stated(q, [Point(followed, place), *self.problem.goals], held), method, budget=BUDGET)
+        return self._drag
 
     def move(self, name: str, at: pin.SE3, over: float | None = None) -> None:
         """Move a thing."""
@@ -102,14 +104,19 @@ class LiveProblem:
     def arrived(self) -> None:
         """Note that what follows has made a frame: nothing."""
 
-    def remembered(self) -> Any:
-        """What `restore` goes back to: the placements of the things."""
-        return {name: self.scene.objects[name].placement for name in things_of(self.scene)}
+    def remembered(self, q: Array) -> Any:
+        """What `restore` goes back to: the placements of the things, and the posture q (nq,)."""
+        return {name: self.scene.objects[name].placement for name in things_of(self.scene)}, q.copy()
 
-    def restore(self, remembered: Any) -> None:
-        """Put the things back."""
-        for name, at in remembered.items():
-            self.scene.move(name, at=at)
+    def restore(self, remembered: Any) -> Array:
+        """Put the things back; returns the posture (nq,), from which what follows goes on."""
+        things, q = remembered
+        for name, at in things.items():
+            if not at.isApprox(self.scene.objects[name].placement, 0.0):
+                self.scene.move(name, at=at)
+        if self._drag is not None:
+            self._drag.q = q
+        return np.array(q)
 
 
 class LiveAssembly:
@@ -149,18 +156,20 @@ class LiveAssembly:
         if self._dragged is not None:
             self._still.place(self._dragged.variables())
 
-    def remembered(self) -> Any:
+    def remembered(self, q: Array) -> Any:
         """The placements of the things, and of the bodies."""
         things = {name: self.scene.objects[name].placement for name in things_of(self.scene)}
         return things, self._still.variables()
 
-    def restore(self, remembered: Any) -> None:
+    def restore(self, remembered: Any) -> Array:
         """Put things and bodies back."""
         things, variables = remembered
-        self._dragged = None
-        self._still.place(variables)
-        for name, at in things.items():
-            self._still.move(name, at=at)
+        for made in (self._still, self._dragged):
+            if made is not None:
+                made.place(variables)
+                for name, at in things.items():
+                    made.move(name, at=at)
+        return self._still.q
 
     def stated(self, q: Array, goals: object, held: Collection[str]) -> Problem:
         """Raise InputError."""
