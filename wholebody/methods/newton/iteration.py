@@ -139,8 +139,9 @@ class Iteration:
         begun, most = self.x, FRAMES.time_share if early_exit else 1.0
         for _ in range(iterations):
             over = active.control.over or active.control.spent > most
-            # a frame gets on in any case: its budget ends it after a step
-            if self._holds(goals) or active.control.reason or (over and self.x is not begun):
+            # a frame gets on if it can: its budget ends it after a step, or where none was found in another budget
+            late = over and (self.x is not begun or active.control.spent > most + 1.0)
+            if self._holds(goals) or active.control.reason or late:
                 return
             active.control.tell(TraceEntry(self.goal, self.hard, 0.0, 0.0))
             before = self._norms(self.residual)
