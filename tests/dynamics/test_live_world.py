@@ -81,7 +81,8 @@ def test_a_lost_tracker_holds_then_eases_back_and_a_jump_is_followed_at_a_bounde
 def test_datagrams_move_handles_on_the_page_and_bad_ones_are_told(live: LiveWorld, tmp_path: Path) -> None:
     pytest.importorskip("viser")
     receiver = Receiver(0, live.handles)
-    page = LivePage(live, tmp_path, 8391, places=receiver.latest)
+    live.places = receiver.latest
+    page = LivePage(live, tmp_path, 8391)
     began, sender = live.place("right_palm"), socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     wanted = began + [0.05, 0.0, 0.2]
     try:

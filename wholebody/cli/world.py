@@ -95,7 +95,8 @@ def _live(scene: InteractionScene, arguments: argparse.Namespace) -> int:
             print(f"refused: {receiver.note}", flush=True)
         return found
 
-    page = LivePage(live, arguments.out, arguments.port or 8080, places=None if receiver is None else places)
+    live.places = None if receiver is None else places
+    page = LivePage(live, arguments.out, arguments.port or 8080)
     print(f"drag handles and things at {page.url}; Ctrl-C ends", flush=True)
     page.serve()
     if receiver is not None:

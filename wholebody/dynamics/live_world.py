@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import copy
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -26,8 +26,7 @@ from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
 from wholebody.tasks import Hold, Point
-from wholebody.tracking.live import LiveFrame
-from wholebody.tracking.live_subjects import LiveProblem, handle_frames, things_of
+from wholebody.tracking.live_subjects import LiveFrame, LiveProblem, handle_frames, things_of
 
 RATE = 12.0  # 1/s: of the spring between the mouse and a body
 STRONGEST = 80.0  # m/s^2: a body is not drawn faster than this
@@ -47,7 +46,11 @@ class LiveWorld:
         held: frames that the tracked posture keeps where they are.
         taken: the handle that the mouse holds; "" for none.
         methods, chosen: of the tracker: "qp" alone.
+        goes_on: True: frames are made whether something is dragged or not.
+        places: asked before every frame for where handles are to follow from outside, see `follow`; None for nothing.
     """
+
+    goes_on = True
 
     def __init__(
         self,
@@ -66,6 +69,7 @@ class LiveWorld:
         """
         instance(scene, Scene, "LiveWorld: scene", "make one with wb.Scene(figure)")
         self._given, self._spring = scene, spring
+        self.places: Callable[[], Mapping[str, ArrayLike]] | None = None
         empty = Scene(scene.figure)
         soles = [Hold(name) for name in handle_frames(scene.figure.frames) if name.endswith("_sole")]
         stated = Problem(empty, start, constraints=soles if constraints is None else constraints, balance=False)
@@ -101,6 +105,8 @@ class LiveWorld:
         self.taken = name
         if name in self.handles:
             self._goal(name, self._tracked_place(name))
+            if self._tracker is None:
+                self._prepare()
 
     def let_go(self) -> None:
         """Let the handle go: a body flies on, a frame of the figure stays."""
@@ -127,6 +133,8 @@ class LiveWorld:
             if not self.taken:
                 raise InputError("no handle was taken; take one first")
             self._pull(target)
+        if self.places is not None:
+            self.follow(self.places())
         self._ease()
         frame = self.world.step(self._track())
         self._note = frame.note
@@ -219,12 +227,18 @@ class LiveWorld:
         """The tracked posture of this frame."""
         if not self._goals:
             return self._tracked
-        goals = [Point(name, place) for name, place in self._goals.items()]
         if self._tracker is None:
-            held = self.held - set(self._goals)
-            self._problem = self._subject.stated(self._tracked, goals, held)
-            self._tracker = QP().tracker(self._problem, dt=self.world.dt)
+            self._prepare()
         else:
-            self._problem.retarget(goals)
+            self._problem.retarget(self._points())
         self._tracked = np.array(self._tracker.step(self._tracked).q)
         return self._tracked
+
+    def _points(self) -> list[Point]:
+        return [Point(name, place) for name, place in self._goals.items()]
+
+    def _prepare(self) -> None:
+        """Make a tracker of the present goals and holds: for two people it takes as long as a frame."""
+        held = self.held - set(self._goals)
+        self._problem = self._subject.stated(self._tracked, self._points(), held)
+        self._tracker = QP().tracker(self._problem, dt=self.world.dt)

@@ -6,15 +6,17 @@ The page that shows it is elsewhere; this is what happens when a handle is taken
 from __future__ import annotations
 
 import time
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import known, numbers, shown
 from wholebody.base.errors import InputError, WholebodyError
 from wholebody.geometry.continuous.passing_through import GRAZE
+from wholebody.geometry.proximity import Contacts
 from wholebody.methods import installed_methods
 from wholebody.methods.base import Method
 from wholebody.methods.newton.assembly import Assembly
@@ -22,31 +24,9 @@ from wholebody.methods.solve import method_for_motions
 from wholebody.problem import Problem
 from wholebody.tracking.drag import Drag, DragFrame
 from wholebody.tracking.frame import FRAME
-from wholebody.tracking.live_subjects import LiveSubject, live_subject, things_of
+from wholebody.tracking.live_subjects import LiveFrame, LiveSubject, live_subject, things_of
 
 FARTHEST_STEP = 0.05  # m: a thing does not move farther than this in a frame, 3 m/s
-
-
-class LiveFrame(NamedTuple):
-    """What a frame has to say.
-
-    Attributes:
-        q: (nq,) the posture.
-        error: how far the handle that is held by the mouse is from it, metres; 0 without one.
-        contacts: number of pairs that touch.
-        overlap: deepest overlap, metres.
-        seconds: that the frame took.
-        status: one line: what is dragged, by which method, and what is wrong if something is.
-        path: as in `DragFrame`: the way within the frame, where a thing was moved.
-    """
-
-    q: Array
-    error: float
-    contacts: int
-    overlap: float
-    seconds: float
-    status: str
-    path: tuple[tuple[float, Array], ...] = ()
 
 
 class LiveDrag:
@@ -67,7 +47,10 @@ class LiveDrag:
         methods: what can be chosen: names of methods, and the configured one that was given.
         method: what follows the handles.
         chosen: its name among them.
+        goes_on: False: nothing moves without the mouse.
     """
+
+    goes_on = False
 
     def __init__(self, problem: Problem | Assembly, method: str | Method = "qp") -> None:
         """Begin at the problem's start, or where the assembly's bodies are.
@@ -107,12 +90,12 @@ class LiveDrag:
         self.taken, self._trouble, self._stopped = "", "", ""
         self._drag: Drag[Any] | None = None
 
-    def move(self, place: Array) -> LiveFrame:
+    def move(self, place: ArrayLike | None) -> LiveFrame:
         """Move the handle that was taken to a place (3,), and make one frame; raises InputError where none was taken.
 
         A frame has a budget of the processor's time, see `Drag`; moved to the same place again, figure and thing go on.
-        A figure that cannot follow keeps its posture, and the status says why. A thing moves 50 mm in a frame at most. It
-        stays before what does not get out of its way, which the status names, and tries half as far in the next frame.
+        A figure that cannot follow keeps its posture, and the status says why. A thing moves by 50 mm at most. Where
+        the figure does not get out of its way, which the status says, it stays and tries half as far in the next frame.
         """
         if not self.taken:
             raise InputError("no handle was taken; take one first")
@@ -226,7 +209,11 @@ class LiveDrag:
         way *= min(1.0, self._reach / max(float(np.linalg.norm(way)), 1e-12))
         self._subject.move(self.taken, pin.SE3(at.rotation, at.translation + way), FRAME)
         frame = drag.to(self.place(next(iter(self.handles))))
-        met = [one for one in frame.collisions if one.depth > max(deep, GRAZE)]
+        met = [str(one) for one in frame.collisions if one.depth > max(deep, GRAZE)]
+        left = self._contacts(np.array(frame.q))
+        if -left.distance.min(initial=0.0) > max(deep, GRAZE):  # bodies that are held are not tested in a drag
+            first, second = (self.scene.piece_owner[piece] for piece in left.pair[0])
+            met.append(f"{first} and {second} would overlap")
         if not met:
             self._stopped, self._reach = "", min(1.25 * self._reach, FARTHEST_STEP)
             return frame
@@ -236,9 +223,12 @@ class LiveDrag:
         self._reach = max(0.5 * self._reach, 0.002)
         return None
 
-    def _report(self, error: float, seconds: float) -> LiveFrame:
+    def _contacts(self, q: Array) -> Contacts:
         # m: pairs nearer than this are counted as contacts
-        contacts = self.scene.contacts(self.q, within=0.002)
+        return self.scene.contacts(q, within=0.002)
+
+    def _report(self, error: float, seconds: float) -> LiveFrame:
+        contacts = self._contacts(self.q)
         overlap = self._deepest = float(-contacts.distance.min(initial=0.0))
         doing = f"dragging {self.taken}" if self.taken else "take a handle and drag it; click one to hold it"
         status = f"{doing}, by {self.method.name}"

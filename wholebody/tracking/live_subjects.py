@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Collection, Set
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
@@ -25,6 +26,80 @@ BUDGET = 0.5 * FRAME  # s of the processor for a frame's search; a last iteratio
 
 HANDLES = ("left_palm", "right_palm", "left_sole", "right_sole", "pelvis", "head_top")
 """Frames of people with handles: hands, feet, pelvis, head."""
+
+
+class LiveFrame(NamedTuple):
+    """What a frame has to say.
+
+    Attributes:
+        q: (nq,) the posture.
+        error: how far the handle that is held by the mouse is from it, metres; 0 without one.
+        contacts: number of pairs that touch.
+        overlap: deepest overlap, metres.
+        seconds: that the frame took.
+        status: one line: what is dragged, by which method, and what is wrong if something is.
+        path: as in `DragFrame`: the way within the frame, where a thing was moved.
+    """
+
+    q: Array
+    error: float
+    contacts: int
+    overlap: float
+    seconds: float
+    status: str
+    path: tuple[tuple[float, Array], ...] = ()
+
+
+class Live(Protocol):
+    """What a page shows and the mouse moves: `LiveDrag`, or `LiveWorld`, where time goes on without the mouse.
+
+    Attributes:
+        scene: a copy of the given one; its things are moved.
+        handles: names of the frames, or bodies, that can be dragged.
+        things: names of the things that can be dragged.
+        held: frames that stay where they are.
+        taken: the handle that the mouse holds; "" for none.
+        methods: what can be chosen.
+        chosen: the name of what follows the handles.
+        goes_on: whether frames are made, and what was let go flies on, while nothing is dragged.
+    """
+
+    scene: Scene
+    handles: tuple[str, ...]
+    things: tuple[str, ...]
+    held: set[str]
+    taken: str
+    methods: dict[str, Any]
+    chosen: str
+    goes_on: bool
+
+    @property
+    def q(self) -> Array:
+        """(nq,) the present posture."""
+
+    def take(self, name: str) -> None:
+        """Take the handle of a frame or a thing; raises UnknownNameError where there is none."""
+
+    def let_go(self) -> None:
+        """Let the handle go."""
+
+    def move(self, place: ArrayLike | None) -> LiveFrame:
+        """Make a frame, with what was taken on its way to a place (3,); raises InputError where nothing was taken."""
+
+    def toggle(self, name: str) -> bool:
+        """Hold a frame where it is, or release it; whether it is held now. Raises UnknownNameError for other names."""
+
+    def choose(self, method: Any) -> None:
+        """Follow by another of `methods`; raises UnknownNameError where there is none."""
+
+    def undo(self) -> bool:
+        """Go back; False if there is nothing to go back to."""
+
+    def place(self, name: str) -> Array:
+        """Where (3,) the handle of a frame or a thing is."""
+
+    def report(self) -> LiveFrame:
+        """What there is to say without a frame."""
 
 
 class Handle(NamedTuple):

@@ -14,10 +14,9 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import WholebodyError
-from wholebody.dynamics.live_world import LiveWorld
 from wholebody.motion.files.gltf import triangles
 from wholebody.tracking.frame import FRAME
-from wholebody.tracking.live import LiveDrag, LiveFrame
+from wholebody.tracking.live_subjects import Live, LiveFrame
 from wholebody.view.style import LOOK
 from wholebody.view.viser_server import viser_server
 
@@ -28,7 +27,7 @@ class LivePage:
     """Shows a live drag, or a live world, in browsers until it is stopped.
 
     Attributes:
-        drag: what is dragged. Frames of a world are made whether something is dragged or not.
+        drag: what is dragged.
         url: where browsers find the page.
         server: the viser.ViserServer.
         frames: frames that were made.
@@ -36,19 +35,16 @@ class LivePage:
 
     def __init__(
         self,
-        drag: LiveDrag | LiveWorld,
+        drag: Live,
         save_to: Path,
         port: int = 8080,
         save: Callable[[Path], Path] | None = None,
-        places: Callable[[], Mapping[str, Array]] | None = None,
     ) -> None:
         """Open the page at the port, or the next free one; its button "save" writes the posture to `save_to`.
 
-        `places` are asked for before every frame of a world: where handles are to follow from outside.
-
         Raises MissingPackageError where viser is not installed.
         """
-        self.drag, self.frames, self._places = drag, 0, places
+        self.drag, self.frames = drag, 0
         self._save_to, self._save = save_to, save
         self._lock = threading.RLock()
         self._target: Any = None
@@ -139,7 +135,7 @@ class LivePage:
                 if event.phase == "start":
                     offset = self.drag.place(name) - np.array(event.start_position)
                 self._target = np.array(event.end_position) + offset
-                if event.phase == "end" and isinstance(self.drag, LiveWorld):
+                if event.phase == "end" and self.drag.goes_on:
                     self.drag.let_go()  # what was thrown flies on
                     self._target = None
                 elif event.phase == "end":
@@ -171,7 +167,7 @@ class LivePage:
         for name in self.drag.handles:
             self._boxes[name] = gui.add_checkbox(f"hold {name}", name in self.drag.held)
             self._boxes[name].on_update(partial(self._ticked, name))
-        again = "start again" if isinstance(self.drag, LiveWorld) else "undo"
+        again = "start again" if self.drag.goes_on else "undo"
         gui.add_button(again).on_click(self._undo)
         if self._save is not None:
             gui.add_button(f"save as {self._save_to.name}").on_click(self._write)
@@ -187,7 +183,7 @@ class LivePage:
     def _undo(self, _: Any) -> None:
         with self._lock:
             self.drag.undo()
-            self._target, self._settling = None, 0
+            self._target, self._reached, self._settling = None, None, 0
             self._show(self.drag.report())
 
     def _write(self, _: Any) -> None:
@@ -205,29 +201,19 @@ class LivePage:
         while not self._stopped.is_set():
             began = time.perf_counter()
             with self._lock:
-                if isinstance(self.drag, LiveWorld):
-                    self.go_on(self.drag)
-                elif self._target is not None and (self._target is not self._reached):
+                if self.drag.goes_on or self._target is not self._reached:
                     self.follow(self._target)
             self._stopped.wait(max(FRAME - (time.perf_counter() - began), 0.001))
 
-    def go_on(self, world: LiveWorld) -> None:
-        """Make one frame of a world and show it."""
-        if self._places is not None:
-            world.follow(self._places())
-        frame = world.move(self._target)
-        self.frames += 1
-        self._show(frame)
-
     def follow(self, target: Any) -> LiveFrame:
-        """Make one frame towards a place (3,) of the mouse, and show it, with the way within it."""
+        """Make one frame towards a place (3,) of the mouse, None for none, and show it, with the way within it."""
         name, before, drag = self.drag.taken, self.drag.q, self.drag
-        place, things = drag.place(name), drag.scene.objects
+        place, things = drag.place(name) if name else np.zeros(3), drag.scene.objects
         began = things[name].placement if name in things else None
         frame = drag.move(target)
         self.frames += 1
-        moved = max(np.abs(frame.q - before).max(), np.abs(drag.place(name) - place).max())
-        still = moved < STILL
+        gone = np.abs(drag.place(name) - place).max() if name else 0.0
+        still = max(np.abs(frame.q - before).max(), gone) < STILL
         if still:
             self._reached = target  # nothing to send until the mouse moves on
         last = 0.0
@@ -240,7 +226,7 @@ class LivePage:
             self._settling = 0 if still else self._settling - 1
             if not self._settling:
                 drag.let_go()
-                self._target, frame = None, drag.report()
+                self._target, self._reached, frame = None, None, drag.report()
         self._show(frame)
         return frame
 

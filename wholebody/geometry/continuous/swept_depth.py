@@ -111,7 +111,8 @@ class SweptDepth:
             now.places, (table.pairs, table.reach, table.half), speed, before, now.least, self._extent, self._index
         )
         now.exact[:] = False
-        return self._index[:count].copy()
+        screened: Indices = self._index[:count].copy()
+        return screened
 
     def _overlaps(self, numbers: Indices) -> Depths:
         """Those of some pairs that overlap at the present posture."""
