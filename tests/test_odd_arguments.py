@@ -345,6 +345,8 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Exertion", Call(wb.ergonomics.Exertion, {**strong, "weight": 1.0}, lambda term: term.weight)
     limited = {**strong, "share": 1.0, "compression": 3400.0}
     yield "StrengthLimit", Call(wb.ergonomics.StrengthLimit, limited, on_a_person)
+    look = {"at": (1.0, 0.0, 1.0), "view": wb.ergonomics.FieldOfView(), "eyes": "gaze"}
+    yield "Look", Call(wb.ergonomics.Look, look, on_a_person)
     settings = {"parts": {"seat": wb.Sphere(0.1)}, "slide": (0.0, 0.1), "height": (0.0, 0.1), "tilt": (0.0, 0.1)}
     yield "adjustable", Call(wb.figures.adjustable, settings)
     yield "ReachCones", Call(wb.ReachCones, {"names": ["left_shoulder"]}, on_a_person)
@@ -412,7 +414,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "assess", Call(wb.assess, {"problem": ask, "q": q})
     checked = {"term": wb.Point("link4", at), "scene": ask.scene, "q": q}
     yield "check_derivatives", Call(wb.check_derivatives, checked, str)
-    yield "simplify", Call(wb.simplify, {"problem": ask, "lock": True})
+    yield "simplify", Call(wb.simplify, {"problem": ask})
     part = wb.simplify(ask)
     yield "Simplified.posture", Call(part.posture, {"q": part.problem.start})
     yield "Solution.plot", Call(wb.solve(part.problem).plot, {})

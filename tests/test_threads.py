@@ -143,7 +143,6 @@ def test_questions_to_one_scene_are_answered_as_to_one_thread(scene: wb.Scene) -
 
 
 def test_a_simplified_problem_is_solved_by_threads_as_by_one(scene: wb.Scene) -> None:
-    """Terms that are stated on the whole figure keep nothing that another thread could move."""
     whole = wb.Problem(
         scene, goals=[wb.Point("right_index_tip", (0.45, -0.25, 1.15))], constraints=[wb.Hold(foot) for foot in FEET],
         measures=[wb.PotentialEnergy(), wb.Displacement()],

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from wholebody.ergonomics.assessment import Ergonomics, ergonomics_of
     from wholebody.ergonomics.exertion import Exertion, StrengthLimit, back_compression
     from wholebody.ergonomics.lifting import Lift, lift_between
+    from wholebody.ergonomics.looking import Look
     from wholebody.ergonomics.owas_score import Owas, owas
     from wholebody.ergonomics.posture_torques import StaticTorques, static_torques
     from wholebody.ergonomics.reba_score import Reba, RebaParts, reba
@@ -26,6 +27,7 @@ __all__ = [
     "FieldOfView",
     "Lift",
     "LoadedBalance",
+    "Look",
     "Owas",
     "Reba",
     "RebaParts",
@@ -53,6 +55,7 @@ __getattr__, __dir__ = exported(
         "wholebody.ergonomics.assessment": "Ergonomics ergonomics_of",
         "wholebody.ergonomics.exertion": "Exertion StrengthLimit back_compression",
         "wholebody.ergonomics.lifting": "Lift lift_between",
+        "wholebody.ergonomics.looking": "Look",
         "wholebody.ergonomics.owas_score": "Owas owas",
         "wholebody.ergonomics.reba_score": "Reba RebaParts reba",
         "wholebody.ergonomics.rula_score": "Rula RulaParts rula",

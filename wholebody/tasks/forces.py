@@ -21,14 +21,14 @@ from wholebody.tasks.base import Constraint, Surroundings, filled
 GRAVITY = 9.81
 """m/s^2, as in Pinocchio's models."""
 
-MOST = 1e5  # N: a greater force is a mistake of units
+MOST_FORCE = 1e5  # N: a greater force is a mistake of units
 
 
 def _force(value: object, where: str) -> Array:
     """Force (3,), N."""
     found = checks.numbers(value, (3,), where)
-    if np.linalg.norm(found) > MOST:
-        raise InputError(f"{where} is {np.linalg.norm(found):.4g} N; forces are in newtons, at most {MOST:g}")
+    if np.linalg.norm(found) > MOST_FORCE:
+        raise InputError(f"{where} is {np.linalg.norm(found):.4g} N; forces are in newtons, at most {MOST_FORCE:g}")
     return found
 
 
