@@ -137,10 +137,10 @@ class Iteration:
         enough = FRAMES.least_progress if early_exit else STEPS.least_progress
         patience = FRAMES.patience if early_exit else STEPS.patience
         begun, most = self.x, FRAMES.time_share if early_exit else 1.0
-        for _ in range(iterations):
+        for tried in range(iterations):
             over = active.control.over or active.control.spent > most
-            # a frame gets on if it can: its budget ends it after a step, or where none was found in another budget
-            late = over and (self.x is not begun or active.control.spent > most + 1.0)
+            # a frame gets on if it can: its budget ends it after a step, or three that failed
+            late = over and (self.x is not begun or tried >= 3)
             if self._holds(goals) or active.control.reason or late:
                 return
             active.control.tell(TraceEntry(self.goal, self.hard, 0.0, 0.0))
