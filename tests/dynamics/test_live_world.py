@@ -69,7 +69,7 @@ def test_a_lost_tracker_holds_then_eases_back_and_a_jump_is_followed_at_a_bounde
     for _ in range(12):  # 0.2 s without a word
         live.move()
     assert live.place("left_palm") == pytest.approx(places[-1], abs=0.01)
-    for _ in range(120):
+    for _ in range(80):
         live.move()
     assert live.place("left_palm") == pytest.approx(began, abs=0.02)
     with pytest.raises(wb.UnknownNameError, match="left_palm"):
@@ -81,8 +81,7 @@ def test_a_lost_tracker_holds_then_eases_back_and_a_jump_is_followed_at_a_bounde
 def test_datagrams_move_handles_on_the_page_and_bad_ones_are_told(live: LiveWorld, tmp_path: Path) -> None:
     pytest.importorskip("viser")
     receiver = Receiver(0, live.handles)
-    live.places = receiver.latest
-    page = LivePage(live, tmp_path, 8391)
+    page = LivePage(live, tmp_path, 8391, places=receiver.latest)
     began, sender = live.place("right_palm"), socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     wanted = began + [0.05, 0.0, 0.2]
     try:

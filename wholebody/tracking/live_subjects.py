@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Collection, Set
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Collection, Mapping, Set
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array
+from wholebody.base.checks import known
 from wholebody.base.errors import InputError
 from wholebody.figures.joining import joint_in
 from wholebody.geometry.shapes import HalfSpace
@@ -18,7 +18,7 @@ from wholebody.methods.base import Method
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
-from wholebody.tasks import Hold, Point
+from wholebody.tasks import Hold, Orientation, Point
 from wholebody.tracking.drag import Drag
 from wholebody.tracking.frame import FRAME
 
@@ -26,80 +26,6 @@ BUDGET = 0.5 * FRAME  # s of the processor for a frame's search; a last iteratio
 
 HANDLES = ("left_palm", "right_palm", "left_sole", "right_sole", "pelvis", "head_top")
 """Frames of people with handles: hands, feet, pelvis, head."""
-
-
-class LiveFrame(NamedTuple):
-    """What a frame has to say.
-
-    Attributes:
-        q: (nq,) the posture.
-        error: how far the handle that is held by the mouse is from it, metres; 0 without one.
-        contacts: number of pairs that touch.
-        overlap: deepest overlap, metres.
-        seconds: that the frame took.
-        status: one line: what is dragged, by which method, and what is wrong if something is.
-        path: as in `DragFrame`: the way within the frame, where a thing was moved.
-    """
-
-    q: Array
-    error: float
-    contacts: int
-    overlap: float
-    seconds: float
-    status: str
-    path: tuple[tuple[float, Array], ...] = ()
-
-
-class Live(Protocol):
-    """What a page shows and the mouse moves: `LiveDrag`, or `LiveWorld`, where time goes on without the mouse.
-
-    Attributes:
-        scene: a copy of the given one; its things are moved.
-        handles: names of the frames, or bodies, that can be dragged.
-        things: names of the things that can be dragged.
-        held: frames that stay where they are.
-        taken: the handle that the mouse holds; "" for none.
-        methods: what can be chosen.
-        chosen: the name of what follows the handles.
-        goes_on: whether frames are made, and what was let go flies on, while nothing is dragged.
-    """
-
-    scene: Scene
-    handles: tuple[str, ...]
-    things: tuple[str, ...]
-    held: set[str]
-    taken: str
-    methods: dict[str, Any]
-    chosen: str
-    goes_on: bool
-
-    @property
-    def q(self) -> Array:
-        """(nq,) the present posture."""
-
-    def take(self, name: str) -> None:
-        """Take the handle of a frame or a thing; raises UnknownNameError where there is none."""
-
-    def let_go(self) -> None:
-        """Let the handle go."""
-
-    def move(self, place: ArrayLike | None) -> LiveFrame:
-        """Make a frame, with what was taken on its way to a place (3,); raises InputError where nothing was taken."""
-
-    def toggle(self, name: str) -> bool:
-        """Hold a frame where it is, or release it; whether it is held now. Raises UnknownNameError for other names."""
-
-    def choose(self, method: Any) -> None:
-        """Follow by another of `methods`; raises UnknownNameError where there is none."""
-
-    def undo(self) -> bool:
-        """Go back; False if there is nothing to go back to."""
-
-    def place(self, name: str) -> Array:
-        """Where (3,) the handle of a frame or a thing is."""
-
-    def report(self) -> LiveFrame:
-        """What there is to say without a frame."""
 
 
 class Handle(NamedTuple):
@@ -167,9 +93,22 @@ class LiveProblem:
             balance=problem.balance,
         )
 
-    def drag(self, q: Array, followed: str, place: Array, held: Collection[str], method: Method) -> Drag[Any]:
-        """What follows a handle from the posture q (nq,), while others are held where they are."""
-        self._drag = Drag(self.stated(q, [Point(followed, place), *self.problem.goals], held), method, budget=BUDGET)
+    @property
+    def constraints(self) -> Mapping[str, bool]:
+        """Constraints that can be released, and whether they hold: none, as holds are those of handles."""
+        return {}
+
+    def constrain(self, name: str, holds: bool) -> None:
+        """Let a constraint hold or not; raises UnknownNameError, as there is none."""
+        known(name, self.constraints, "constraint")
+
+    def drag(self, q: Array, followed: str, target: Array, held: Collection[str], method: Method) -> Drag[Any]:
+        """What follows a handle from the posture q (nq,), while others are held where they are.
+
+        The target is a place (3,), or an orientation (4,) as a quaternion.
+        """
+        goal = Point(followed, target) if len(target) == 3 else Orientation(followed, target)
+        self._drag = Drag(self.stated(q, [goal, *self.problem.goals], held), method, budget=BUDGET)
         return self._drag
 
     def move(self, name: str, at: pin.SE3, over: float | None = None) -> None:
@@ -187,8 +126,7 @@ class LiveProblem:
         """Put the things back; returns the posture (nq,), from which what follows goes on."""
         things, q = remembered
         for name, at in things.items():
-            if not at.isApprox(self.scene.objects[name].placement, 0.0):
-                self.scene.move(name, at=at)
+            self.scene.move(name, at=at)
         if self._drag is not None:
             self._drag.q = q
         return np.array(q)
@@ -200,7 +138,7 @@ class LiveAssembly:
     def __init__(self, assembly: Assembly) -> None:
         self._still = copy.copy(assembly)  # without holds
         self._dragged: Assembly | None = None
-        self.scene, self.q, self.held = self._still.scene, self._still.q, frozenset[str]()
+        self.q, self.held = self._still.q, frozenset[str]()
         model, self.handles = self.scene.model, dict[str, Handle]()
         figures = self._still.figures
         for name in self._still.bodies:
@@ -212,12 +150,26 @@ class LiveAssembly:
                 joint = joint_in(model, f"{name}/", str(figure.model.names[own.parentJoint]))
                 self.handles[f"{name}/{frame}"] = Handle(joint, own.placement)
 
-    def drag(self, q: Array, followed: str, place: Array, held: Collection[str], method: Method) -> Drag[Any]:
+    @property
+    def scene(self) -> Scene:
+        """The scene of the bodies; another one after a constraint was released or holds again."""
+        return self._still.scene
+
+    @property
+    def constraints(self) -> Mapping[str, bool]:
+        """Joints and constraints, and whether they hold."""
+        return self._still.constraints
+
+    def constrain(self, name: str, holds: bool) -> None:
+        """Let a joint or constraint hold or not; raises UnknownNameError where there is none."""
+        (self._still.hold if holds else self._still.release)(name)
+
+    def drag(self, q: Array, followed: str, target: Array, held: Collection[str], method: Method) -> Drag[Any]:
         """As of a problem; the method is Newton's, whatever is asked."""
         made = self._dragged = copy.copy(self._still)
         for name in held:
             made.fixed("world", name)
-        made.point_goal(followed, place)
+        (made.point_goal if len(target) == 3 else made.orientation_goal)(followed, target)
         return Drag(made, goal=len(made.goals) - 1, budget=BUDGET)
 
     def move(self, name: str, at: pin.SE3, over: float | None = None) -> None:
@@ -232,13 +184,16 @@ class LiveAssembly:
             self._still.place(self._dragged.variables())
 
     def remembered(self, q: Array) -> Any:
-        """The placements of the things, and of the bodies."""
+        """The placements of the things and of the bodies, and what holds."""
         things = {name: self.scene.objects[name].placement for name in things_of(self.scene)}
-        return things, self._still.variables()
+        return things, self._still.variables(), self.constraints
 
     def restore(self, remembered: Any) -> Array:
-        """Put things and bodies back."""
-        things, variables = remembered
+        """Put things, bodies and constraints back."""
+        things, variables, constraints = remembered
+        for name, holds in constraints.items():
+            if holds != self.constraints[name]:
+                self.constrain(name, holds)
         for made in (self._still, self._dragged):
             if made is not None:
                 made.place(variables)
