@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -22,11 +22,7 @@ from wholebody.motion.trajectory.window_run import ClipRun
 from wholebody.motion.windows import Window
 
 BEYOND = 1.5e-3  # m, see `loads.LENGTH`: loads beyond their bounds by more are computed again; the judge allows 2e-3
-
-
-def _worst(loads: ClipLoads, q: Array) -> float:
-    """How far loads of postures (n, nq), as `torques` measures them, are beyond their bounds, see `loads.LENGTH`."""
-    return float(loads.corrected(q).of(q).worst().max(initial=0.0))
+LOADED = 0.2  # s, smoothness with loads: a push that spreads farther accelerates less, and filters change less of it
 
 
 @dataclass(frozen=True)
@@ -39,8 +35,7 @@ class Trajectory(Checked):
         clearance: least distance of every pair, metres.
         time: seconds: how far a push at one frame spreads to its neighbours; larger = smoother, farther off. None is
             0.1 s at first. Where an answer has over 1.2 of the jerk of the original, 0.15 s follow, else 0.04 s if that
-            brings it nearer with no more jerk than this. With `dynamics` it stays 0.1 s, or is 0.2 s where loads are
-            beyond their bounds then.
+            brings it nearer with no more jerk than this. With `dynamics` it is 0.2 s.
         margin: seconds before and after a collision in which frames may be changed.
         stretch: factor by which the clip may be slowed, at most and anywhere, so that joints keep to their speed
             limits. The postures stay on their path, and the clip gets more frames of the same time step. 1 keeps the
@@ -75,13 +70,7 @@ class Trajectory(Checked):
         freed, missed = self._freed(run, run.terms.q, loads, self.stretch)
         new = None if run.ended else self._timing(freed, run.terms, loads)
         if new is None:
-            q = self._measured(run, q, freed, loads, self.stretch)
-            result = MethodResult(q, message="; ".join(missed))
-            if loads is None or self.time is not None or run.ended or (worst := _worst(loads, q)) <= BEYOND:
-                return result
-            # a push that spreads farther accelerates less, and its program has other optima
-            other = replace(self, time=0.2, stretch=1.0).avoid(run)
-            return other if not run.faults(other.q).number and _worst(loads, other.q) < worst else result
+            return MethodResult(self._measured(run, q, freed, loads, self.stretch), message="; ".join(missed))
         # On the same path nothing is new but chords, which cut its corners; what they touch is freed from there.
         slower = run.of(run.terms.at(new.times))
         passed = between(run.scene.model, freed, new.times / run.terms.dt)
@@ -98,15 +87,13 @@ class Trajectory(Checked):
         """
         if loads is None:
             return q
-        # s: smoothness of the answers, the next where one gets no farther; filters change less of what is smoother
-        times = [0.2, 0.1]
         faults, corrected = run.faults(reference), loads.corrected(q)
         worst = corrected.of(q).worst()
         for _ in range(6):  # more leave fewer loads beyond their bounds, and take longer where these cannot be kept
             beyond = worst > BEYOND
-            if not beyond.any() or not times or run.ended:
+            if not beyond.any() or run.ended:
                 break
-            windows = ClipRun(run, reference, times[0], rate, corrected)
+            windows = ClipRun(run, reference, LOADED, rate, corrected)
             changed: Mask = beyond | (q != reference).any(axis=1)
             other = np.array(q)
             for window in run.windows(changed, self.margin):
@@ -117,16 +104,15 @@ class Trajectory(Checked):
             again = loads.corrected(other)
             now = again.of(other).worst()
             if run.faults(other).number or now.max() > 0.9 * worst.max():
-                times.pop(0)
-            else:
-                q, corrected, worst = other, again, now
+                break
+            q, corrected, worst = other, again, now
         return q
 
     def _freed(
         self, run: Run, reference: Array, loads: ClipLoads | None, rate: float, beyond: Mask | None = None
     ) -> tuple[Array, list[str]]:
         """Postures (n, nq) that are free, near reference postures (n, nq), and what is missed; `beyond` change too."""
-        windows = ClipRun(run, reference, self.time, rate, loads)
+        windows = ClipRun(run, reference, LOADED if loads and self.time is None else self.time, rate, loads)
         q: Array = np.array(reference)
         run.watch.tell(0.0, "looking for collisions")
         faults = run.faults(reference)
