@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
@@ -13,15 +14,17 @@ from wholebody.base.arrays import Array, Mask
 from wholebody.base.fields import Checked, Range
 from wholebody.motion.avoider import CLEARANCE, MethodResult, Run
 from wholebody.motion.clip import Clip
+from wholebody.motion.faults import Faults
 from wholebody.motion.frame_terms import FrameTerms, between
 from wholebody.motion.stance import standing_feet
 from wholebody.motion.strength import Strength
 from wholebody.motion.trajectory.loads import ClipLoads
 from wholebody.motion.trajectory.retiming import Timing, allowance, slowed, speed_bounds, timing
-from wholebody.motion.trajectory.window_run import ClipRun
+from wholebody.motion.trajectory.window_run import ClipRun, WindowResult
 from wholebody.motion.windows import Window
 
 BEYOND = 1.5e-3  # m, see `loads.LENGTH`: loads beyond their bounds by more are computed again; the judge allows 2e-3
+LONG = 2.0  # s: a window over twice as long is freed in parts of this length
 LOADED = 0.2  # s, smoothness with loads: a push that spreads farther accelerates less, and filters change less of it
 
 
@@ -122,7 +125,10 @@ class Trajectory(Checked):
         while found:
             window = found.pop(0)
             told = run.watch.teller(done / total, len(window) / total, f"frames {window.first} to {window.end - 1}")
-            freed = windows.window(window, faults, told)
+            if loads is None:
+                freed = _in_parts(run, windows, window, q, faults, told)
+            else:  # loads of a frame are those of its neighbours too
+                freed = windows.window(window, faults, told)
             q[window.first : window.end] = freed.q
             if freed.missed and not run.ended:
                 window, freed = windows.kept_back(window, freed, q, faults, told, self.margin)
@@ -151,3 +157,26 @@ class Trajectory(Checked):
             for _ in range(3):  # the ground's forces are split as the timing before makes them
                 b = slowed(most, terms.dt, stretch, path.timed(b))
         return timing(b, terms.dt)
+
+
+def _in_parts(
+    run: Run, windows: ClipRun, window: Window, reference: Array, faults: Faults, told: Callable[[float], bool]
+) -> WindowResult:
+    """A window freed part by part, each from where the one before it is; at once where a part is not freed.
+
+    What is tried again is then a part, and not all of a long window.
+    """
+    length, shared = run.frames(LONG, 2), run.frames(LONG / 4.0, 1)
+    q, first = np.array(reference), window.first
+    while window.end - first > 2 * length:
+        part = Window(first, first + length)
+        freed = windows.window(part, faults, told, around=q, whole=False)
+        if freed.missed or run.ended:
+            return windows.window(window, faults, told)
+        q[part.first : part.end] = freed.q
+        first = part.end - shared
+    freed = windows.window(Window(first, window.end), faults, told, around=q)
+    if freed.missed and first > window.first:
+        return windows.window(window, faults, told)
+    q[first : window.end] = freed.q
+    return WindowResult(q[window.first : window.end], freed.missed)
