@@ -97,13 +97,9 @@ joint beside the middle and before the clavicle's inner end, and by how much it 
 def arm_sizes(
     sex: str, of: Mapping[str, float], stated: Collection[str], frame: Skeleton
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the sizes of the arms, and those dimensions of the body that follow from them, metres.
+    """Return the sizes of the arms that hang on a frame, and the dimensions that follow from them, metres.
 
-    Args:
-        sex: "male" or "female".
-        of: all dimensions.
-        stated: names of those that are met before others.
-        frame: what the arms hang on.
+    Of all dimensions the stated ones, by name, are met before others.
     """
     rows = keyed("arm_sizes", "name")
     usual = np.array([float(rows[name][sex]) for name in ARM]) * of["stature"]

@@ -122,14 +122,10 @@ class Fitter:
     def step(
         self, q: Array, goals: Goals, *, damping: float = DAMPING, among: bool = True, most: Array | None = None
     ) -> Array:
-        """The posture (nq,) after one program from q.
+        """The posture (nq,) after one program from q (nq,), which is within the limits.
 
-        Args:
-            q: (nq,) within the limits.
-            goals: what is to be reached.
-            damping: m²/rad² of every joint.
-            among: whether contacts count.
-            most: (2, nv) least and greatest displacement; None for any.
+        `damping` is that of every joint, m²/rad²; contacts count if `among`; `most` (2, nv) are the least and greatest
+        displacement.
         """
         near = self._workspace.near(q, WITHIN) if among else None
         self._state.update(q)

@@ -144,15 +144,10 @@ class Lineariser:
         dt: float | None = None,
         plan: TermPlan | None = None,
     ) -> None:
-        """Take the resolved terms of a problem.
+        """Take the resolved terms of a problem, and a workspace of this run alone.
 
-        Args:
-            workspace: of this run alone.
-            limits: of the figure's joints; see `Figure.limits`.
-            terms: all resolved.
-            clearances: (pairs,) least distance asked of every collision pair, metres.
-            dt: step in seconds for bounds that need one.
-            plan: of the same constraints, bounds, measures and step, and of any goals; None to make it here.
+        Clearances (pairs,) are asked of every collision pair, metres; `dt` is the step in seconds for bounds that need
+        one. The plan is of the same constraints, bounds, measures and step, and of any goals; None to make it here.
         """
         self.workspace, self.state, self._limits = workspace, workspace.state, limits
         self.goals, self.constraints, self.bounds, self.measures = terms

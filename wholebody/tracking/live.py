@@ -29,25 +29,15 @@ FARTHEST_STEP = 0.5  # m: a thing does not jump farther than this in a frame
 
 
 class LiveFrame(NamedTuple):
-    """What a frame has to say.
+    """What a frame has to say."""
 
-    Attributes:
-        q: (nq,) the posture.
-        error: how far the handle that was taken is from where it is drawn, metres or radians; 0 without one.
-        contacts: number of pairs that touch.
-        overlap: deepest overlap, metres.
-        seconds: that the frame took.
-        status: one line: what is dragged, by which method, and what is wrong if something is.
-        path: as in `DragFrame`: the way within the frame, where a thing was moved.
-    """
-
-    q: Array
-    error: float
-    contacts: int
-    overlap: float
-    seconds: float
-    status: str
-    path: tuple[tuple[float, Array], ...] = ()
+    q: Array  # (nq,) the posture
+    error: float  # how far the handle that was taken is from where it is drawn, metres or radians; 0 without one
+    contacts: int  # number of pairs that touch
+    overlap: float  # deepest overlap, metres
+    seconds: float  # that the frame took
+    status: str  # one line: what is dragged, by which method, and what is wrong if something is
+    path: tuple[tuple[float, Array], ...] = ()  # as in `DragFrame`: the way within the frame, where a thing was moved
 
 
 class LiveDrag:

@@ -77,13 +77,7 @@ def entered(sweep: Sweep, depths: SweptDepth, path: Sequence[Array], watched: ND
     """The pairs that one motion after the other leads through each other, and those that overlap where it ends.
 
     They get deeper on the way than at the beginning by `OVERLAP`, or overlap at the end by `INSIDE`: if they are not
-    watched, by that much more than at the beginning.
-
-    Args:
-        sweep: of the model and geometry.
-        depths: of the same.
-        path: configurations (nq,), at least one.
-        watched: (pairs,) of which pairs an overlap at the end counts too that was there at the beginning.
+    watched (pairs,), by that much more than at the beginning. The path has one configuration (nq,) or more.
     """
     last = _by_pair(depths.start(path[-1]), len(watched))
     if not (last > INSIDE).any() and all(
