@@ -103,6 +103,12 @@ def test_forces_and_strength_go_round(tmp_path: Path) -> None:
     assert again.measures[0].weight * again.measures[0].value(state) == 2.0 * problem.measures[0].value(state)
 
 
+def test_the_field_of_a_look_goes_round_and_a_balance_without_forces(tmp_path: Path) -> None:
+    look = wb.ergonomics.Look((1.0, 0.2, 0.3), view=wb.ergonomics.FieldOfView(horizontal=0.1, down=0.2))
+    problem = wb.Problem(wb.Scene(wb.load("human")), constraints=[look, wb.ergonomics.LoadedBalance([])])
+    same(problem, wb.read_task(wb.taskfile.write_task(problem, tmp_path / "look.toml")).problem)
+
+
 def test_a_scene_alone_and_a_result(tmp_path: Path) -> None:
     scene = wb.Scene(wb.load("human", sex="female", stature=1.6)).add(wb.HalfSpace(), name="floor")
     task = wb.read_task(wb.taskfile.write_task(scene, tmp_path / "scene.toml"))

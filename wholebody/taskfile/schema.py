@@ -122,9 +122,13 @@ SOFT = kind_of(tasks.Soft, "weight")
 
 _NEWTONS = Numbers(Vector(3, Range(-MOST_FORCE, MOST_FORCE, "N")), "[x, y, z]")
 _FORCE = _form(tasks.Force, "frame force", frame=FRAME, force=_NEWTONS)
-FORCES = Several(Part("force", 'frame = "right_palm", force = [0.0, 0.0, -98.0]', {"": _FORCE}))
+FORCES = Several(Part("force", 'frame = "right_palm", force = [0.0, 0.0, -98.0]', {"": _FORCE}), 0)
 _STRENGTH = _form(Strength, "percentile sex", sex=Choice(("male", "female")))
 STRENGTH = Part("strength", 'percentile = 50, sex = "male"', {"": _STRENGTH})
+_FIELD = _form(ergonomics.FieldOfView, "horizontal up down declination")
+VIEW = Part(
+    "field of view", "horizontal = 0.26, up = 0.26, down = 0.26, declination = 0.26", {"": _FIELD}, note=", rad"
+)
 
 CONSTRAINTS = {
     "hold": _form(tasks.Hold, "frame at orientation relative_to", frame=FRAME, relative_to=FRAME),
@@ -138,7 +142,7 @@ CONSTRAINTS = {
     "strength_limit": _form(
         ergonomics.StrengthLimit, "forces strength standing share compression", forces=FORCES, strength=STRENGTH
     ),
-    "look": _form(ergonomics.Look, "at eyes", eyes=FRAME),
+    "look": _form(ergonomics.Look, "at view eyes", view=VIEW, eyes=FRAME),
     **{name: replace(form, keys=form.keys[:-1]) for name, form in CONTACTS.items()},  # a constraint has no weight
 }
 
