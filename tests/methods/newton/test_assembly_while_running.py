@@ -126,6 +126,14 @@ def test_the_nearest_state_is_that_of_the_metric(metric: Any, turns: float) -> N
     assert found == pytest.approx(minimize(distance, [0.0], tol=1e-12).x[0], abs=1e-5)
 
 
+def test_what_a_solve_has_laid_out_cannot_be_changed_unseen() -> None:
+    made = wb.Assembly(clearance=0.01, metric="variables").body("bar")
+    for name, value in (("metric", "variables"), ("clearance", 0.01)):
+        assert getattr(made, name) == value
+        with pytest.raises(AttributeError):
+            setattr(made, name, value)
+
+
 def test_wrong_measures_are_named() -> None:
     made = wb.Assembly().body("bar")
     with pytest.raises(wb.InputError, match="correct the gradient"):

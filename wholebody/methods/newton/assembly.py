@@ -60,10 +60,6 @@ class Assembly(AssemblyJoints):
     methods raise an `UnknownNameError` for a name that nothing has, and an `InputError` for a value of another kind,
     shape or range, a name that is taken, and a body that is joined to itself.
 
-    Attributes:
-        clearance: least distance of every tested pair, metres.
-        metric: what the least motion is measured by.
-
     Examples:
         >>> swing = wb.Assembly().body("seat", (0.0, 0.0, -1.0))
         >>> swing = swing.revolute("world", "seat", at=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0))
@@ -80,7 +76,7 @@ class Assembly(AssemblyJoints):
                 1 itself, the sum of the squared changes of all seven variables of each body.
         """
         super().__init__(clearance)
-        self.metric = choice(metric, METRICS, "Assembly: metric")
+        self._metric: Metric = choice(metric, METRICS, "Assembly: metric")
         self._goals: list[AssemblyGoal] = []
         self._measures: list[Measure] = []
         self._prepared: AssemblySystem | None = None
@@ -104,6 +100,11 @@ class Assembly(AssemblyJoints):
 
     def __copy__(self) -> Assembly:
         return copy.deepcopy(self)
+
+    @property
+    def metric(self) -> Metric:
+        """What the least motion is measured by."""
+        return self._metric
 
     # ---- goals
 
@@ -344,7 +345,7 @@ class Assembly(AssemblyJoints):
     def _weight(self) -> Array:
         """(7 n,) weight of each variable in the least motion."""
         weight = np.concatenate([np.zeros(0), *self._sizes])
-        return np.ones_like(weight) if self.metric == "variables" else weight
+        return np.ones_like(weight) if self._metric == "variables" else weight
 
     def _least_distance(self) -> float:
         """Of the tested pairs, metres; inf without shapes."""

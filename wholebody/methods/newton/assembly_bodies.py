@@ -48,7 +48,7 @@ class AssemblyBodies:
     """Bodies, figures and things of an assembly; `wholebody.Assembly` adds joints, goals and solving."""
 
     def __init__(self, clearance: float = 0.0) -> None:
-        self.clearance = CLEARANCE(clearance, "Assembly: clearance")
+        self._clearance = CLEARANCE(clearance, "Assembly: clearance")
         self._names: dict[str, int] = {}
         self._places: list[Array] = []
         self._sizes: list[Array] = []  # (7,) weights of each body's variables in the least motion
@@ -63,6 +63,11 @@ class AssemblyBodies:
         self._fixed_pairs: list[tuple[int, int]] = []
         self._scene: Scene | None = None
         self.revision = 0
+
+    @property
+    def clearance(self) -> float:
+        """Least distance of every tested pair, metres."""
+        return self._clearance
 
     # ---- bodies
 
