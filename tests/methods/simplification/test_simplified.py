@@ -75,6 +75,30 @@ def test_frozen_joints_stay_where_a_term_needs_the_whole_figure(human: Figure, t
     assert [type(bound) for bound in part.problem.bounds] == [wb.Freeze]
 
 
+class Behind(Constraint):
+    """The right palm stays behind a plane, as a hinge that is level where the palm is."""
+
+    lower, upper = np.array([-np.inf]), np.array([0.0])
+
+    def value(self, state: State) -> np.ndarray:
+        return np.array([max(0.0, self._palm(state).translation[0] - 0.4)])
+
+    def jacobian(self, state: State) -> np.ndarray:
+        data, palm = state.model.createData(), state.model.getFrameId("right_palm")
+        row = pin.computeFrameJacobian(state.model, data, state.q, palm, pin.LOCAL_WORLD_ALIGNED)[:1]
+        return row * (self.value(state)[0] > 0.0)
+
+    def _palm(self, state: State) -> pin.SE3:
+        return state.frame(state.model.getFrameId("right_palm"))
+
+
+def test_a_constraint_of_ones_own_that_does_not_act_at_the_start_stays(human: Figure) -> None:
+    goals = [wb.Point("right_index_tip", (0.6, -0.2, 1.2))]
+    part, answer = solved(standing(human, goals=goals, constraints=[*FROZEN, Behind()]))
+    assert [type(term) for term in part.problem.constraints] == [Behind]
+    assert answer.status == "unreachable"
+
+
 def solved(problem: wb.Problem) -> tuple[Simplified, wb.Solution]:
     part = wb.simplify(problem)
     return part, part.restored(wb.solve(part.problem))

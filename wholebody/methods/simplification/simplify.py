@@ -22,6 +22,7 @@ from wholebody.problem import Problem
 from wholebody.scene.geometry_model import SceneGeometry, SceneObject
 from wholebody.scene.scene import Scene
 from wholebody.solution import Solution
+from wholebody.tasks.answers import is_own
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
 from wholebody.tasks.bounds import Freeze
 
@@ -199,7 +200,7 @@ def _without(problem: Problem, frozen: list[int], numbers: Indices) -> tuple[Pro
     _, geometries = pin.buildReducedModel(model, [scene.geometry], frozen, problem.start)
     part = _Part(model, figure.model, problem.start)
     judge = _Comparison(problem, part, figure.model)
-    constraints = [term for term in problem.constraints if judge.matters(term)]
+    constraints = [term for term in problem.constraints if is_own(term) or judge.matters(term)]
     try:
         small = _stated(problem, constraints, part, _scene(problem, figure, geometries[0], numbers))
     except Exception:  # a term of one's own may raise any error on another figure
