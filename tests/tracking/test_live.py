@@ -175,6 +175,8 @@ def test_an_assembly_is_opened_closed_and_turned_by_hand() -> None:
     assert drag.constraints[joint]
     np.testing.assert_allclose(drag.place("ball"), (0, 0, 1.0), atol=1e-9)
     drag.take("rod", turn=True)
+    assert "length 2" in drag.move((0, 0, 0, 2)).status
+    assert drag.move((0, 0, 0, 1)).status == f"turning rod, by {drag.method.name}"  # the next frame is right again
     for turn in np.linspace(0.0, 0.5, 30):
         frame = drag.move((0, np.sin(0.5 * turn), 0, np.cos(0.5 * turn)))
     assert frame.error < 1e-3

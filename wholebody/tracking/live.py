@@ -119,6 +119,7 @@ class LiveDrag:
                 if frame is not None:
                     self.q, path = np.array(frame.q), frame.path
                     self._subject.arrived()
+                self._trouble = ""
             except WholebodyError as trouble:
                 self._trouble = str(trouble)
         return with_values(self._report(self._away(self.q, place), time.perf_counter() - began), path=path)
@@ -280,7 +281,7 @@ class LiveDrag:
 
     def _report(self, error: float, seconds: float) -> LiveFrame:
         contacts = self._contacts(self.q)
-        overlap = self._deepest = float(-contacts.distance.min(initial=0.0))
+        overlap = self._deepest = max(0.0, -float(contacts.distance.min(initial=0.0)))
         verb = "turning" if self._turns else "dragging"
         doing = f"{verb} {self.taken}" if self.taken else "take a handle and drag it; click one to hold it"
         status = f"{doing}, by {self.method.name}"

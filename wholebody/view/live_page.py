@@ -344,9 +344,10 @@ class LivePage:
             ball.position = self.drag.place(name)
         self._show_rings()
         self._status.content = f"**{frame.status}**"
+        unit = "mm" if self._target is None or len(self._target) == 3 else "mrad"
         self._numbers.content = (
             f"{frame.contacts} contacts, deepest overlap {1e3 * frame.overlap:.2f} mm  \n"
-            f"handle off by {1e3 * frame.error:.1f} mm; frame {1e3 * frame.seconds:.1f} ms"
+            f"handle off by {1e3 * frame.error:.1f} {unit}; frame {1e3 * frame.seconds:.1f} ms"
         )
 
     def _place(self, q: Array, at: Mapping[str, pin.SE3]) -> None:
