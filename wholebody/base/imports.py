@@ -17,7 +17,8 @@ def exported(package: str, modules: Mapping[str, str]) -> tuple[Callable[[str], 
 
     def load(name: str) -> object:
         if name not in home:
-            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+            told = f"module {package!r} has no attribute {name!r}"
+            raise AttributeError(told, name=name, obj=sys.modules[package])  # Python names the nearest
         value = getattr(import_module(home[name]), name)
         setattr(sys.modules[package], name, value)
         return value
