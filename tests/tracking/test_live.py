@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wholebody as wb
@@ -74,6 +75,32 @@ def test_a_thing_pushes_the_hand_away_and_undo_brings_both_back(drag: LiveDrag) 
     assert not drag.undo()
 
 
+@pytest.mark.parametrize("method", ["qp", "newton", "assembly"])
+def test_a_thing_that_is_thrown_at_what_is_held_stays_before_it(drag: LiveDrag, method: str) -> None:
+    if method == "assembly":
+        drag, thing, aim = LiveDrag(jointed()), "block", np.array((-0.4, 0.0, 0.5))
+        assert drag.toggle("rod")
+    else:
+        drag.choose(method)
+        drag.toggle("pelvis")
+        thing, aim = "table", drag.place("pelvis")
+    drag.take(thing)
+    stays = 0
+    for _ in range(40):
+        before = drag.q, drag.place(thing)
+        frame = drag.move(aim)
+        assert np.linalg.norm(drag.place(thing) - before[1]) < 0.05 + 1e-9
+        assert frame.error == pytest.approx(np.linalg.norm(drag.place(thing) - aim), abs=1e-12)
+        assert frame.overlap <= 5e-4  # m
+        if f"{thing} stays: " in frame.status:
+            stays += 1
+            assert np.array_equal(drag.place(thing), before[1])
+            np.testing.assert_allclose(frame.q, before[0], atol=1e-12)
+    assert stays
+    assert frame.error > 0.05
+    assert "stays" not in drag.move(drag.place(thing)).status
+
+
 def test_the_posture_is_a_task(drag: LiveDrag, tmp_path: Any) -> None:
     along(drag, "right_palm", (0.1, 0.0, 0.2))
     task = wb.read_task(wb.taskfile.write_task(drag.stated(), tmp_path / "posture.toml"))
@@ -132,6 +159,37 @@ def test_an_assembly_is_dragged_by_its_bodies() -> None:
     np.testing.assert_allclose(drag.q, before, atol=1e-12)
     with pytest.raises(wb.InputError, match="no task file"):
         drag.stated()
+
+
+def test_an_assembly_is_opened_closed_and_turned_by_hand() -> None:
+    drag = LiveDrag(jointed())
+    joint = "spherical joint of 'rod' and 'ball'"
+    drag.constrain(joint, False)
+    along(drag, "ball", (0.3, 0.0, 0.0))
+    np.testing.assert_allclose(drag.place("rod"), (0, 0, 0.5), atol=1e-6)  # it no longer follows
+    drag.constrain(joint, True)
+    along(drag, "ball", (0.05, 0.0, -0.15))
+    assert np.linalg.norm(drag.place("rod") - drag.place("ball")) < 0.5 + 1e-3  # closed again: 0.4 and 0.1 m
+    for _ in range(4):
+        assert drag.undo()
+    assert drag.constraints[joint]
+    np.testing.assert_allclose(drag.place("ball"), (0, 0, 1.0), atol=1e-9)
+    drag.take("rod", turn=True)
+    for turn in np.linspace(0.0, 0.5, 30):
+        frame = drag.move((0, np.sin(0.5 * turn), 0, np.cos(0.5 * turn)))
+    assert frame.error < 1e-3
+    assert frame.status == "turning rod, by newton/auto"
+    np.testing.assert_allclose(drag.place("rod"), (0.4 * np.sin(0.5), 0, 0.1 + 0.4 * np.cos(0.5)), atol=1e-3)
+
+
+def test_a_hand_is_turned(drag: LiveDrag) -> None:
+    before = pin.Quaternion(drag.orientation("right_palm"))
+    drag.take("right_palm", turn=True)
+    for turn in np.linspace(0.0, 0.4, 20):
+        wanted = pin.Quaternion(pin.exp3(np.array((turn, 0.0, 0.0)))) * before
+        frame = drag.move(wanted.coeffs())
+    assert frame.error < 5e-3
+    assert np.linalg.norm(drag.place("left_sole") - drag.place_at(drag.problem.start, "left_sole")) < 2e-3
 
 
 def test_a_thing_pushes_an_assembly() -> None:

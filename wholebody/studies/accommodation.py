@@ -29,44 +29,29 @@ REACHED = 1e-3  # m, rad: by which a goal may be missed by somebody who reaches 
 
 
 class Share(NamedTuple):
-    """Share of some people.
+    """Share of some people."""
 
-    Attributes:
-        share: of those that were tried.
-        low, high: between which the share of all such people is, at 95 % confidence, were they drawn at random
-            (Wilson 1927). Those of `wb.people` stand for all more closely than that.
-        tried: how many were tried.
-    """
-
-    share: float
+    share: float  # of those that were tried
+    # low and high: between which the share of all such people is, at 95 % confidence, were they drawn at random (Wilson
+    # 1927). Those of `wb.people` stand for all more closely than that.
     low: float
     high: float
-    tried: int
+    tried: int  # how many were tried
 
     def __str__(self) -> str:
         return f"{self.share:.0%} ({self.low:.0%} to {self.high:.0%})"
 
 
 class Exclusion(NamedTuple):
-    """A dimension that tells who is left out.
+    """A dimension that tells who is left out."""
 
-    Attributes:
-        sex: "male" or "female".
-        verdict: "reach", "fit" or "see": what they do not.
-        dimension: its name, see `wb.people`.
-        side: "over" or "under".
-        value: metres (mass: kilograms) over or under which they are.
-        excluded: how many are left out for it.
-        told: share of these that are on that side, less the share of those that are accommodated.
-    """
-
-    sex: str
-    verdict: str
-    dimension: str
-    side: str
-    value: float
-    excluded: int
-    told: float
+    sex: str  # "male" or "female"
+    verdict: str  # "reach", "fit" or "see": what they do not
+    dimension: str  # its name, see `wb.people`
+    side: str  # "over" or "under"
+    value: float  # metres (mass: kilograms) over or under which they are
+    excluded: int  # how many are left out for it
+    told: float  # share of these that are on that side, less the share of those that are accommodated
 
     def __str__(self) -> str:
         unit = "kg" if self.dimension == "mass" else "m"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Collection, Set
+from collections.abc import Collection, Mapping, Set
 from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
+from wholebody.base.checks import known
 from wholebody.base.errors import InputError
 from wholebody.figures.joining import joint_in
 from wholebody.geometry.shapes import HalfSpace
@@ -17,7 +18,7 @@ from wholebody.methods.base import Method
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
-from wholebody.tasks import Hold, Point
+from wholebody.tasks import Hold, Orientation, Point
 from wholebody.tracking.drag import Drag
 from wholebody.tracking.frame import FRAME
 
@@ -74,6 +75,7 @@ class LiveProblem:
         stated = (*problem.stated, *problem.bounds)
         self._fixed: tuple[Any, ...] = tuple(term for term in stated if not _handle_of(term, self.handles))
         self.held: Set[str] = {_handle_of(term, self.handles) for term in problem.constraints} - {""}
+        self._drag: Drag[Any] | None = None
 
     def stated(self, q: Array, goals: object, held: Collection[str]) -> Problem:
         """The problem with the start q (nq,), goals, and holds."""
@@ -91,9 +93,23 @@ class LiveProblem:
             balance=problem.balance,
         )
 
-    def drag(self, q: Array, followed: str, place: Array, held: Collection[str], method: Method) -> Drag[Any]:
-        """What follows a handle from the posture q (nq,), while others are held where they are."""
-        return Drag(self.stated(q, [Point(followed, place), *self.problem.goals], held), method, budget=BUDGET)
+    @property
+    def constraints(self) -> Mapping[str, bool]:
+        """Constraints that can be released, and whether they hold: none, as holds are those of handles."""
+        return {}
+
+    def constrain(self, name: str, holds: bool) -> None:
+        """Let a constraint hold or not; raises UnknownNameError, as there is none."""
+        known(name, self.constraints, "constraint")
+
+    def drag(self, q: Array, followed: str, target: Array, held: Collection[str], method: Method) -> Drag[Any]:
+        """What follows a handle from the posture q (nq,), while others are held where they are.
+
+        The target is a place (3,), or an orientation (4,) as a quaternion.
+        """
+        goal = Point(followed, target) if len(target) == 3 else Orientation(followed, target)
+        self._drag = Drag(self.stated(q, [goal, *self.problem.goals], held), method, budget=BUDGET)
+        return self._drag
 
     def move(self, name: str, at: pin.SE3, over: float | None = None) -> None:
         """Move a thing."""
@@ -102,14 +118,18 @@ class LiveProblem:
     def arrived(self) -> None:
         """Note that what follows has made a frame: nothing."""
 
-    def remembered(self) -> Any:
-        """What `restore` goes back to: the placements of the things."""
-        return {name: self.scene.objects[name].placement for name in things_of(self.scene)}
+    def remembered(self, q: Array) -> Any:
+        """What `restore` goes back to: the placements of the things, and the posture q (nq,)."""
+        return {name: self.scene.objects[name].placement for name in things_of(self.scene)}, q.copy()
 
-    def restore(self, remembered: Any) -> None:
-        """Put the things back."""
-        for name, at in remembered.items():
+    def restore(self, remembered: Any) -> Array:
+        """Put the things back; returns the posture (nq,), from which what follows goes on."""
+        things, q = remembered
+        for name, at in things.items():
             self.scene.move(name, at=at)
+        if self._drag is not None:
+            self._drag.q = q
+        return np.array(q)
 
 
 class LiveAssembly:
@@ -118,7 +138,7 @@ class LiveAssembly:
     def __init__(self, assembly: Assembly) -> None:
         self._still = copy.copy(assembly)  # without holds
         self._dragged: Assembly | None = None
-        self.scene, self.q, self.held = self._still.scene, self._still.q, frozenset[str]()
+        self.q, self.held = self._still.q, frozenset[str]()
         model, self.handles = self.scene.model, dict[str, Handle]()
         figures = self._still.figures
         for name in self._still.bodies:
@@ -130,12 +150,26 @@ class LiveAssembly:
                 joint = joint_in(model, f"{name}/", str(figure.model.names[own.parentJoint]))
                 self.handles[f"{name}/{frame}"] = Handle(joint, own.placement)
 
-    def drag(self, q: Array, followed: str, place: Array, held: Collection[str], method: Method) -> Drag[Any]:
+    @property
+    def scene(self) -> Scene:
+        """The scene of the bodies; another one after a constraint was released or holds again."""
+        return self._still.scene
+
+    @property
+    def constraints(self) -> Mapping[str, bool]:
+        """Joints and constraints, and whether they hold."""
+        return self._still.constraints
+
+    def constrain(self, name: str, holds: bool) -> None:
+        """Let a joint or constraint hold or not; raises UnknownNameError where there is none."""
+        (self._still.hold if holds else self._still.release)(name)
+
+    def drag(self, q: Array, followed: str, target: Array, held: Collection[str], method: Method) -> Drag[Any]:
         """As of a problem; the method is Newton's, whatever is asked."""
         made = self._dragged = copy.copy(self._still)
         for name in held:
             made.fixed("world", name)
-        made.point_goal(followed, place)
+        (made.point_goal if len(target) == 3 else made.orientation_goal)(followed, target)
         return Drag(made, goal=len(made.goals) - 1, budget=BUDGET)
 
     def move(self, name: str, at: pin.SE3, over: float | None = None) -> None:
@@ -149,18 +183,23 @@ class LiveAssembly:
         if self._dragged is not None:
             self._still.place(self._dragged.variables())
 
-    def remembered(self) -> Any:
-        """The placements of the things, and of the bodies."""
+    def remembered(self, q: Array) -> Any:
+        """The placements of the things and of the bodies, and what holds."""
         things = {name: self.scene.objects[name].placement for name in things_of(self.scene)}
-        return things, self._still.variables()
+        return things, self._still.variables(), self.constraints
 
-    def restore(self, remembered: Any) -> None:
-        """Put things and bodies back."""
-        things, variables = remembered
-        self._dragged = None
-        self._still.place(variables)
-        for name, at in things.items():
-            self._still.move(name, at=at)
+    def restore(self, remembered: Any) -> Array:
+        """Put things, bodies and constraints back."""
+        things, variables, constraints = remembered
+        for name, holds in constraints.items():
+            if holds != self.constraints[name]:
+                self.constrain(name, holds)
+        for made in (self._still, self._dragged):
+            if made is not None:
+                made.place(variables)
+                for name, at in things.items():
+                    made.move(name, at=at)
+        return self._still.q
 
     def stated(self, q: Array, goals: object, held: Collection[str]) -> Problem:
         """Raise InputError."""

@@ -18,7 +18,6 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.base.files import checked_target, write
-from wholebody.dynamics.overlaps import Overlap
 from wholebody.geometry.placement import FARTHEST
 from wholebody.problem import Problem
 from wholebody.view import commands
@@ -37,6 +36,7 @@ from wholebody.view.viewed_scene import ViewedScene, checked_scene
 
 if TYPE_CHECKING:
     from wholebody.methods.newton.assembly import Assembly
+    from wholebody.tracking.overlaps import Overlap
 
 SAVED = (".glb", ".htm", ".html", ".png")  # endings of the files that `Viewer.save` writes
 

@@ -36,11 +36,11 @@ class _Part:
         joints = [whole.joints[whole.getJointId(name)] for name in list(small.names)[1:]]
         self.idx_q = _places([(int(joint.idx_q), int(joint.nq)) for joint in joints])
         self.idx_v = _places([(int(joint.idx_v), int(joint.nv)) for joint in joints])
-        self.model, self.start = whole, np.array(start)
+        self.model, self.start = whole, np.array(start, dtype=float)
 
     def embed(self, q: Array) -> Array:
         """Whole posture (nq,) of a small one."""
-        whole = self.start.copy()
+        whole: Array = self.start.copy()
         whole[self.idx_q] = q
         return whole
 
@@ -258,7 +258,7 @@ class _Comparison:
         elif isinstance(term, Measure):
             ask = [lambda: term.gradient(state)[columns], lambda: term.curvature(state)[columns]]
         elif isinstance(term, Bound):
-            ask = [lambda side=side: term.bounds(state, None)[side][columns] for side in (0, 1)]
+            ask = [lambda: np.array(term.bounds(state, None))[:, columns]]
         else:
             ask = [
                 lambda: np.atleast_1d(term.value(state)),

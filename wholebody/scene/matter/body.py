@@ -127,19 +127,12 @@ class Body(Checked):
 
 
 class MassProperties(NamedTuple):
-    """What a rigid body is to dynamics.
+    """What a rigid body is to dynamics."""
 
-    Attributes:
-        mass: kg.
-        centre: (3,) centre of mass in the shape's axes, metres.
-        inertia: (3, 3) about the centre, along the shape's axes, kg m2.
-        note: what was assumed about a shape that is no closed surface; empty if nothing.
-    """
-
-    mass: float
-    centre: Array
-    inertia: Array
-    note: str = ""
+    mass: float  # kg
+    centre: Array  # (3,) centre of mass in the shape's axes, metres
+    inertia: Array  # (3, 3) about the centre, along the shape's axes, kg m2
+    note: str = ""  # what was assumed about a shape that is no closed surface; empty if nothing
 
 
 def mass_properties(shape: Shape, body: Body, name: str = "a body") -> MassProperties:
