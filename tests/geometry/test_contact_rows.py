@@ -356,14 +356,17 @@ def slowly(scene, q, contacts):
                 if drop >= module.BAND:
                     continue
                 lever = lever - (lever @ towards) * towards
-                share = 1.0
+                share, sag = 1.0, 0.0
                 base = placed.oMg[other].actInv(facing + module.INSET * towards)
                 for *outward, offset in planes(piece[other].geometry):
                     rate = np.dot(outward, placed.oMg[other].rotation.T @ lever)
                     if rate > 1e-12:
                         share = min(share, max(offset - np.dot(outward, base), 0.0) / rate)
+                    slope = -np.dot(outward, placed.oMg[other].rotation.T @ towards)
+                    there = offset - np.dot(outward, placed.oMg[other].actInv(facing)) < module.NORMAL_ROOM
+                    sag = max(sag, rate / slope) if there and slope > 0.0 else sag
                 over = over and share >= 1.0
-                corners.append((distance + share * drop, at + share * lever, share * np.linalg.norm(lever)))
+                corners.append((distance + share * drop + min(share * sag, module.INSET), at + share * lever, share * np.linalg.norm(lever)))
             sides.append((corners, over and bool(corners)))
         (first, first_over), (second, second_over) = sides
         kept = first if first_over else second if second_over else first + second
