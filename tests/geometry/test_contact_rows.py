@@ -211,6 +211,22 @@ def test_lever_rows_tell_the_gap_where_they_stand(free_bodies, kind, gap):
     assert levers >= 12
 
 
+def test_what_lies_on_an_edge_tilts_about_it_and_not_into_the_face(free_bodies):
+    """Past the edge the face falls away: at an angle of 0.05 a turn by 0.04 towards it is free, by 0.06 overlaps."""
+    scene = wb.Scene(free_bodies(wb.Box((0.2, 0.2, 0.02))))
+    scene.add(wb.Box((0.4, 0.4, 0.2)), name="table", at=(-0.2, 0.0, -0.1))  # its edge is the world's y axis
+
+    def tilted(angle):
+        turn = pin.exp3(np.array([0.0, angle, 0.0]))
+        return np.concatenate([turn @ (0.0, 0.0, 0.01), pin.Quaternion(turn).coeffs()])
+
+    contacts, rows, jacobian = rows_of(scene, tilted(0.05))
+    assert contacts.distance == pytest.approx([0.0], abs=1e-7)
+    for angle, fits in ((0.01, True), (-0.01, False)):
+        ahead = rows.gap + jacobian @ pin.difference(scene.model, tilted(0.05), tilted(angle))
+        assert (ahead.min() > -1e-6) == fits == (distance_of(scene, tilted(angle))[0] > -1e-6)
+
+
 def places(scene, q):
     """Where the rows stand, (m, 3), in the plane through the origin along the normal."""
     contacts, rows, _ = rows_of(scene, q)
