@@ -166,7 +166,7 @@ def regress(arguments: argparse.Namespace) -> int:
 def loads(arguments: argparse.Namespace) -> None:
     """Measure and report; --quick takes one clip, cut to half a second."""
     from tests.audits import loads
-    from wholebody.bench.measure.clips import EQUIPMENT
+    from wholebody.bench.measure.motion import EQUIPMENT
 
     longest = number(arguments.longest, "--longest", 0.2, 1e4, "s")
     few, longest = (1, 0.5) if arguments.quick else (None, longest)
@@ -203,8 +203,8 @@ def clip_constants(arguments: argparse.Namespace) -> None:
 @measuring(
     "detail",
     "levels of modelling",
-    "Solve problems with the person as spheres, capsules and hulls, with all joints and pairs and with those that a "
-    "task needs, and judge the answers in the finest model.",
+    "Solve problems with the person as spheres, capsules and hulls, with all pairs and with those "
+    "that can touch, and judge the answers in the finest model.",
     count("--count", 8, "cases of each level"),
     seed("of the first case"),
 )

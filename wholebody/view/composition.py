@@ -9,7 +9,6 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
-from wholebody.dynamics.overlaps import Overlap
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.proximity import PENETRATION
@@ -24,6 +23,7 @@ from wholebody.view.viewed_scene import ViewedScene
 
 if TYPE_CHECKING:
     from wholebody.tracking.inner_paths import Timed
+    from wholebody.tracking.overlaps import Overlap
 
 
 class Composition:

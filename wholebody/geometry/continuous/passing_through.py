@@ -66,30 +66,18 @@ def is_free(
 
 
 class Entered(NamedTuple):
-    """A pair that gets deeper during a motion than it may.
+    """A pair that gets deeper during a motion than it may."""
 
-    Attributes:
-        number: place among the collision pairs of the geometry model.
-        depth: at the end, metres, if it overlaps there, otherwise the largest on the way.
-        inside: whether it overlaps at the end.
-    """
-
-    number: int
-    depth: float
-    inside: bool
+    number: int  # place among the collision pairs of the geometry model
+    depth: float  # at the end, metres, if it overlaps there, otherwise the largest on the way
+    inside: bool  # whether it overlaps at the end
 
 
 def entered(sweep: Sweep, depths: SweptDepth, path: Sequence[Array], watched: NDArray[np.bool_]) -> list[Entered]:
     """The pairs that one motion after the other leads through each other, and those that overlap where it ends.
 
     They get deeper on the way than at the beginning by `OVERLAP`, or overlap at the end by `INSIDE`: if they are not
-    watched, by that much more than at the beginning.
-
-    Args:
-        sweep: of the model and geometry.
-        depths: of the same.
-        path: configurations (nq,), at least one.
-        watched: (pairs,) of which pairs an overlap at the end counts too that was there at the beginning.
+    watched (pairs,), by that much more than at the beginning. The path has one configuration (nq,) or more.
     """
     last = _by_pair(depths.start(path[-1]), len(watched))
     if not (last > INSIDE).any() and all(

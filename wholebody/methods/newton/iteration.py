@@ -125,11 +125,8 @@ class Iteration:
     def iterate(self, iterations: int, *, goals: bool, measures: Measures, early_exit: bool = False) -> None:
         """Step until everything holds, nothing moves any more, or the iterations are spent.
 
-        Args:
-            iterations: most iterations.
-            goals: whether goals are pursued.
-            measures: minimised, kept from growing, or ignored.
-            early_exit: end at the first step that gains little, as in a frame whose goal lies inside something.
+        Measures are minimised, kept from growing, or ignored. `early_exit` ends at the first step that gains little,
+        as in a frame whose goal lies inside something.
         """
         self.stationary, active, norms = False, self.active_system, self._norms(self.residual)
         trust = _Trust(self.least_damping, max(STEPS.funnel * norms[1], self.tolerance))
@@ -239,13 +236,9 @@ class Iteration:
     ) -> Array:
         """The step of one iteration; the active set changes until the linear solution agrees with it.
 
-        Args:
-            damping: of the goals; its square applies to constraints.
-            share: of the constraints' errors that the step corrects.
-            goal_share: share of the goals' errors that the step corrects.
-            goals: whether goals are pursued at all.
-            measures: minimised, kept from growing, or ignored.
-            proximity: factor of the least motion, against the measures.
+        The damping is that of the goals, its square that of constraints. `share` and `goal_share` are the parts of the
+        errors of constraints and goals that the step corrects, `proximity` is the factor of the least motion, against
+        the measures.
         """
         asked = self.residual * share
         asked[self.goal_rows] = self.residual[self.goal_rows] * min(goal_share, share)

@@ -148,21 +148,23 @@ def _depends_on(measure: Measure, tangent: Indices, start: Array, state: State) 
 
 
 def refine(
-    active_system: ActiveSystem, x: Array, measure: Callable[[Array], float], *, tolerance: float
+    active_system: ActiveSystem,
+    x: Array,
+    measure: Callable[[Array], float],
+    *,
+    tolerance: float,
+    rounds: int = REFINEMENT.rounds,
 ) -> tuple[Array, int]:
     """Lower the measures, a function of the variables (7 n,), from x, where all equations hold to the tolerance.
 
-    A round that moves nothing by more, metres and radians, is the last.
-
-    Returns:
-        The variables, and the number of iterations.
+    A round that moves nothing by more, m and rad, is the last. Return the variables, and the number of iterations.
     """
     run = Iteration(active_system, x, REFINEMENT.finer * tolerance, REFINEMENT.finer * tolerance, "slack")
     run.iterate(REFINEMENT.back, goals=True, measures="keep")
     if not run.met:
         return x, 0
     descent = _Descent(run, measure, tolerance)
-    for _ in range(REFINEMENT.rounds):
+    for _ in range(rounds):
         if not descent.lower():
             break
     return descent.best, len(run.residuals) - 1
