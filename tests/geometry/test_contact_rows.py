@@ -382,7 +382,8 @@ def slowly(scene, q, contacts):
                     there = offset - np.dot(outward, placed.oMg[other].actInv(facing)) < module.NORMAL_ROOM
                     sag = max(sag, rate / slope) if there and slope > 0.0 else sag
                 over = over and share >= 1.0
-                corners.append((distance + share * drop + min(share * sag, module.INSET), at + share * lever, share * np.linalg.norm(lever)))
+                gap = distance + share * drop + min(share * sag, module.INSET)
+                corners.append((gap, at + share * lever, share * np.linalg.norm(lever)))
             sides.append((corners, over and bool(corners)))
         (first, first_over), (second, second_over) = sides
         kept = first if first_over else second if second_over else first + second

@@ -203,7 +203,7 @@ class Multistart:
         return self._descend(probe.q, "restart", most=max(self._left, 1))
 
     def _to_the_place(self) -> bool:
-        """Descend to the place of contacts that are met, where they do not bend, and from there; whether that is lower."""
+        """Descend to the place of contacts that are met, which does not bend, and from there; whether that is lower."""
         there = at_its_place(self.problem, self.lineariser.state.update(self.best.q))
         if there is None or self.control.over:
             return False
