@@ -271,8 +271,7 @@ class Multistart:
 
     def _ran(self, stage: SQP | Feasibility | Closest, start: Array) -> LocalSolution:
         """The end of a stage from a posture (nq,), whose iterations count."""
-        local = stage.run(start)
-        self.spent += local.iterations
+        self.spent += (local := stage.run(start)).iterations
         return local
 
     def _feasibility(self, lineariser: Lineariser, most: int, note: str) -> Feasibility:
@@ -312,8 +311,7 @@ class Multistart:
             return False
         tolerance, ends = self.budget.tolerance, list[LocalSolution]()
         given = (self.problem, self.lineariser.state, self._start, np.random.default_rng(self.budget.seed))
-        few = self._moving() < SEARCH.few
-        agreeing = SEARCH.agreeing_few if few else SEARCH.agreeing
+        agreeing = SEARCH.agreeing_few if (few := self._moving() < SEARCH.few) else SEARCH.agreeing
         starts = throughout(*given, SEARCH.reach_trials_few - 1) if few else None
         others = starts or restarts(*given, SEARCH.reach_trials - 1, SEARCH.far)
         enough, programs = SEARCH.reached * tolerance, self._at_most(SEARCH.reach_trial_programs)
