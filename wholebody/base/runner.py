@@ -64,19 +64,12 @@ class EndedError(WholebodyError):
 
 
 class Job(NamedTuple):
-    """A job for a child process.
+    """A job for a child process."""
 
-    Attributes:
-        name: any value by which the caller identifies the job; it is not sent to the process.
-        function: called in the process with the arguments.
-        arguments: of the function.
-        seconds: time to the deadline, unless the job moves it; 0 for none.
-    """
-
-    name: Any
-    function: Callable[..., Any]
-    arguments: tuple[Any, ...]
-    seconds: float
+    name: Any  # any value by which the caller identifies the job; it is not sent to the process
+    function: Callable[..., Any]  # called in the process with the arguments
+    arguments: tuple[Any, ...]  # of the function
+    seconds: float  # time to the deadline, unless the job moves it; 0 for none
 
 
 class Outcome(NamedTuple):
@@ -267,11 +260,9 @@ def run_jobs(next_job: Callable[[], Job | None], children: Sequence[Child]) -> I
 
 
 def allow(seconds: float, processor: float = 0.0) -> None:
-    """Move the deadline of the running job to so many seconds from now; does nothing outside a job.
+    """Move the deadline of the running job to so many seconds from now; 0 for none. It does nothing outside a job.
 
-    Args:
-        seconds: by the clock; 0 for no deadline.
-        processor: of the processor's time, which passes slowly where others use it too; 0 for no such deadline.
+    `processor` are seconds of the processor's time, which passes slowly where others use it too.
     """
     if _parent is not None:
         signal.setitimer(signal.ITIMER_REAL, seconds)

@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.base.checks import array, choice, instance, time_step
 from wholebody.base.errors import InputError
 from wholebody.dynamics.actuated import Actuated
@@ -73,6 +73,9 @@ class WorldFrame(NamedTuple):
     seconds: float
     note: str
 
+    def __repr__(self) -> str:
+        return brief(self)
+
 
 class World(NotCopyable):
     """A figure that follows a tracker among things, some of which move by themselves.
@@ -85,6 +88,16 @@ class World(NotCopyable):
         dt: seconds a frame.
         time: seconds since the start.
         engine: the things that move by themselves; None if there are none.
+
+    Raises:
+        InputError: a value of the wrong kind or range, or a figure that penetrates something and cannot leave it.
+
+    Examples:
+        >>> room = wb.Scene(human).add(wb.HalfSpace(), name="floor")
+        >>> _ = room.add(wb.Sphere(0.1), name="ball", at=(0.5, 0.0, 1.0), body=wb.Body(mass=0.5))
+        >>> frame = wb.World(room).step()
+        >>> bool(frame.placements["ball"].translation[2] < 1.0)
+        True
     """
 
     def __init__(

@@ -29,6 +29,13 @@ class Look(Constraint):
         view: the field; by default that of easy eye movement, 15 degrees about a line 15 degrees below the head's axis.
         eyes: the frame between the eyes, such as "anna/gaze" of one of several figures.
         place: that frame and its joint; once resolved.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a frame that the figure does not have.
+
+    Examples:
+        >>> screen = wb.ergonomics.Look((0.6, 0.0, 1.2))
     """
 
     at: inputs.Position

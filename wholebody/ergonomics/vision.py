@@ -33,6 +33,12 @@ class FieldOfView(Checked):
         up: above the normal line of sight, radians.
         down: below it, radians.
         declination: of the normal line of sight below the head's own axis ahead, radians.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> narrow = wb.ergonomics.FieldOfView(horizontal=0.26)
     """
 
     horizontal: Annotated[float, Range(1e-3, pi, "rad")] = radians(35.0)
@@ -85,6 +91,10 @@ class Sight:
         comfortable: whether easy eye movement reaches it.
         distance: from the eyes, metres.
         hidden_by: name of the thing or segment that is in between; "" for none.
+
+    Examples:
+        >>> wb.ergonomics.sight(scene, standing, (2.0, 0.0, 1.5)).comfortable
+        True
     """
 
     off: float
@@ -112,6 +122,10 @@ def sight(scene: Scene, q: Array, point: Array, field: FieldOfView = LARGEST, *,
 
     Raises:
         InputError: a value of the wrong kind, or a figure without eyes.
+
+    Examples:
+        >>> wb.ergonomics.sight(scene, standing, (2.0, 0.0, 1.5)).hidden_by
+        ''
     """
     checks.instance(scene, Scene, "sight: scene", "make one with wb.Scene(figure)")
     q = checks.posture(q, scene.model.nq, "sight: q")

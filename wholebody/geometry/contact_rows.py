@@ -37,33 +37,22 @@ LENGTHS = np.array([LEVER_DISTANCE, BAND, INSET, SHORTEST_LEVER, SAME_NORMAL, NO
 
 
 class ContactRows(NamedTuple):
-    """Rows ``gap + jacobian @ dq >= clearance``: one for each of the k contacts, then more, sorted by contact.
+    """Rows ``gap + jacobian @ dq >= clearance``: one for each of the k contacts, then more, sorted by contact."""
 
-    Attributes:
-        gap: (m,) metres.
-        wrench: (m, 6) [n, x cross n] in the world.
-        contact: (m,) which contact a row belongs to.
-        first: (m,) joint of the first piece.
-        second: (m,) joint of the second piece; the row is for its motion relative to the first.
-    """
-
-    gap: Array
-    wrench: Array
-    contact: Indices
-    first: Indices
-    second: Indices
+    gap: Array  # (m,) metres
+    wrench: Array  # (m, 6) [n, x cross n] in the world
+    contact: Indices  # (m,) which contact a row belongs to
+    first: Indices  # (m,) joint of the first piece
+    second: Indices  # (m,) joint of the second piece; the row is for its motion relative to the first
 
 
 class ContactRowBuilder:
     """Builds contact rows for all near pairs at once. It remembers no posture, so any number of runs may share one."""
 
     def __init__(self, table: PairTable, most_ends: int = MOST_ENDS, same_normal: float = SAME_NORMAL) -> None:
-        """Take the pieces and pairs.
+        """Take the pieces and pairs, and how many rows a contact has at most beside its witness row.
 
-        Args:
-            table: of them.
-            most_ends: rows of one contact beside its witness row.
-            same_normal: cosine of the angle to a face's normal within which coal's may be meant to be it.
+        `same_normal` is the cosine of the angle to a face's normal within which coal's may be meant to be it.
         """
         self.table, self.most_ends = table, most_ends
         self._lengths = LENGTHS.copy()

@@ -216,15 +216,7 @@ def _farthest_first(place: Array, gap: Array, witness: Array, distance: float, s
 
 @compiled()
 def contact_rows(contacts: ContactArrays, clearance: Array, table: TableArrays, most_ends: int, room: RowArrays) -> int:
-    """Write the rows of all contacts, as `ContactRowBuilder.write` does; how many there are.
-
-    Args:
-        contacts: the near pairs.
-        clearance: (k,) distance asked of each, metres.
-        table: of the pieces.
-        most_ends: rows of one contact beside the witness row.
-        room: for the rows.
-    """
+    """Write the rows of all contacts, with clearances (k,), as `ContactRowBuilder.write` does; how many there are."""
     pair, distance, normal, point_a, _, number, _ = contacts
     extended, joint, lengths, points, first_point, faces, first_face, radius, axis = table
     shapes = points, first_point, faces, first_face, radius, axis

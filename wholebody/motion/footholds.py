@@ -22,19 +22,12 @@ WAITED = 0.25  # s: a body that nothing lower bears for longer is borne by what 
 
 
 class RestLimits(NamedTuple):
-    """What counts as rest.
+    """What counts as rest."""
 
-    Attributes:
-        speed: m/s, largest speed; a rest begins where the speed falls below two thirds of it.
-        height: m, largest height above the lowest rest nearby.
-        least: s, shortest rest.
-        slid: m: a point that goes on farther while it is slow has made a step, and rests at two places.
-    """
-
-    speed: float = 0.15
-    height: float = 0.05
-    least: float = 0.1
-    slid: float = 0.08
+    speed: float = 0.15  # m/s, largest speed; a rest begins where the speed falls below two thirds of it
+    height: float = 0.05  # m, largest height above the lowest rest nearby
+    least: float = 0.1  # s, shortest rest
+    slid: float = 0.08  # m: a point that goes on farther while it is slow has made a step, and rests at two places
 
 
 def speeds(places: Array, dt: float) -> Array:
@@ -51,7 +44,7 @@ def resting(places: Array, dt: float, limits: RestLimits, kinds: Sequence[int]) 
     if not slow:
         return found
     marks = np.stack(slow, axis=1)
-    stands = [(k, run, _lowest(places[run.first : run.end, k, 2])) for k, mask in enumerate(slow) for run in runs(mask)]
+    stands = [(k, run, lowest(places[run.first : run.end, k, 2])) for k, mask in enumerate(slow) for run in runs(mask)]
     kind = np.array(kinds, dtype=int)
     lows = _level_of_kinds(stands, kind)
     base = np.array([low - lows[kind[k]] for k, _, low in stands])
@@ -85,7 +78,8 @@ def _slow(places: Array, speed: Array, dt: float, limits: RestLimits) -> Mask:
     return long_runs(kept, max(1, round(limits.least / dt)))
 
 
-def _lowest(heights: Array) -> float:
+def lowest(heights: Array) -> float:
+    """Height [m] above which a point is in four of five frames in which it rests."""
     return float(np.percentile(heights, 20.0))
 
 

@@ -35,23 +35,15 @@ OVER = 0.2  # s: in which a point goes over to where it rests
 
 @dataclass(frozen=True, eq=False)
 class HeldPoint:
-    """A point of a figure that may rest.
-
-    Attributes:
-        role: of the skeleton's joint by which it rests.
-        foot: "left" or "right" for a point of a sole, which comes down to the ground; else "".
-        joint: index of the joint that carries it.
-        place: (3,) in the joint's frame, metres.
-        edge: whether it is on the edge of a sole, so that its height alone counts: soles come down flat.
-    """
+    """A point of a figure that may rest."""
 
     __repr__ = brief
 
-    role: str
-    foot: str
-    joint: int
-    place: Array
-    edge: bool = False
+    role: str  # of the skeleton's joint by which it rests
+    foot: str  # "left" or "right" for a point of a sole, which comes down to the ground; else ""
+    joint: int  # index of the joint that carries it
+    place: Array  # (3,) in the joint's frame, metres
+    edge: bool = False  # whether it is on the edge of a sole, so that its height alone counts: soles come down flat
 
 
 def held_points(figure: Figure, roles: Roles, ground: Ground) -> list[HeldPoint]:
@@ -116,14 +108,10 @@ class Holds:
         dt: float,
         surface: Callable[[Array], float | None] | None,
     ) -> None:
-        """Take the points.
+        """Take the points that rest at some time, the ground that says when, and the seconds of a frame.
 
-        Args:
-            points: those that rest at some time.
-            ground: when they do.
-            scale: metres of the figure for each metre of height of the recording's ground.
-            dt: seconds from frame to frame.
-            surface: height of the highest surface below a place (3,), metres; None for that of the recording.
+        `scale` are metres of the figure for each metre of height of the recording's ground; `surface` is the height of
+        the highest surface below a place (3,), metres, None for that of the recording.
         """
         self.points, self._scale, self._surface = points, scale, surface
         self.over = max(1, round(OVER / dt))
@@ -134,11 +122,8 @@ class Holds:
     def goals(self, frame: int, paths: Array, shift: Array, again: bool = False) -> tuple[Array, Array]:
         """Goals (h, 3) and weights (h, 3) of a frame.
 
-        Args:
-            frame: number of the frame.
-            paths: (n, h, 3) where the points would be in each frame.
-            shift: (3,) by how much the body is beside its free fit, metres.
-            again: whether it is known where points come down.
+        Without holds the points would be on `paths` (n, h, 3); the body is beside its free fit by a shift (3,),
+        metres. `again` says that it is known where points come down.
         """
         if self._down is None:
             self._down = self._facing_down(paths)

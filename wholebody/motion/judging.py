@@ -50,6 +50,11 @@ class AvoidanceReport:
         deviation: largest change of a posture that was free, radians or metres.
         smoothed: windows of frames that were too rough and were made smooth after the method.
         rough: whether jerk, speed or deviation are beyond their bounds, and nothing else is wrong.
+
+    Examples:
+        >>> report = wb.avoid(clip, scene).report
+        >>> report.solved, report.frames_changed
+        (True, 0)
     """
 
     solved: bool
@@ -91,7 +96,13 @@ class AvoidanceReport:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Avoided:
-    """The answer of `avoid`: the clip that the method made, and the report on it."""
+    """The answer of `avoid`: the clip that the method made, and the report on it.
+
+    Examples:
+        >>> answer = wb.avoid(clip, scene)
+        >>> len(answer.clip) == len(clip)
+        True
+    """
 
     clip: Clip
     report: AvoidanceReport
@@ -126,8 +137,8 @@ def judged(
         message = f"nothing collides, in the frames and between them, to 0.1 mm{noted}"
     else:
         message = "; ".join(left or ["something collides between two frames that collide"])
-        if now.free and loads is not None and loads.missed:
-            message += "; less is needed of a slower clip, Trajectory(stretch=2), or where feet slide, hold_feet=False"
+        if now.free and loads is not None and loads.missed and result.times is None and not loads.before.flies:
+            message += "; less is needed of a slower clip, Trajectory(stretch=2)"
     message += "".join(f"; {part}" for part in _added(before, now, terms, result, loads))
     return AvoidanceReport(
         solved=solved,

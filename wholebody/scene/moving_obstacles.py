@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.geometry.continuous.passing_through import OVERLAP, Entered, entered
+from wholebody.geometry.continuous.passing_through import OVERLAP, entered
 from wholebody.geometry.continuous.sweep import FirstContact, Sweep
 from wholebody.geometry.continuous.swept_depth import SweptDepth
 from wholebody.geometry.proximity import Contacts, PairTable
@@ -24,19 +24,12 @@ MOST_SHARES = 128  # of a frame; what is too fast for them comes in deeper, and 
 
 
 class Collision(NamedTuple):
-    """Two that a frame could not keep apart.
+    """Two that a frame could not keep apart."""
 
-    Attributes:
-        first: name of a segment or thing.
-        second: name of the other.
-        depth: how deep they overlap at the end, metres; where they do not, how deep they did at most on the way.
-        inside: whether they overlap at the end; otherwise one went into the other and came out, or through it.
-    """
-
-    first: str
-    second: str
-    depth: float
-    inside: bool
+    first: str  # name of a segment or thing
+    second: str  # name of the other
+    depth: float  # how deep they overlap at the end, metres; where they do not, how deep they did at most on the way
+    inside: bool  # whether they overlap at the end; otherwise one went into the other and came out, or through it
 
     def __str__(self) -> str:
         if self.inside:
@@ -95,11 +88,7 @@ class FrameMotion:
         Nothing is in the way if the straight motion from the first posture to the last is free, or that along the path.
         """
         along = [self._at(q, share) for share, q in path]
-        found: list[Entered] = []
-        for way in ([along[0], along[-1]], along):
-            found = entered(self._both.sweep, self._both.depths, way, self._both.moves)
-            if not found:
-                return ()
+        found = entered(self._both.sweep, self._both.depths, along, self._both.moves)
         owners, pairs = self._scene.owners, self._both.table.pairs
         deepest: dict[tuple[str, str], Collision] = {}
         for one in found:

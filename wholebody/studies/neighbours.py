@@ -23,28 +23,18 @@ Work = Mapping[Any, tuple[Any, ...]]
 
 
 class Family(NamedTuple):
-    """Cases that give each other starts.
+    """Cases that give each other starts."""
 
-    Attributes:
-        order: the cases.
-        done: their records by number.
-        compute: answers of a function of `solving` for work by key: the number of a case, and what goes with it. Those
-            that are None, or whose process ended, are left out.
-        keep: puts a record into its place; whether the caller ends the run.
-    """
-
-    order: Sequence[Case]
-    done: dict[int, SolveRecord]
+    order: Sequence[Case]  # the cases
+    done: dict[int, SolveRecord]  # their records by number
+    # answers of a function of `solving` for work by key: the number of a case, and what goes with it. Those that are
+    # None, or whose process ended, are left out.
     compute: Callable[[Callable[..., Any], Work], dict[Any, Any]]
-    keep: Callable[[int, SolveRecord], bool]
+    keep: Callable[[int, SolveRecord], bool]  # puts a record into its place; whether the caller ends the run
 
 
 def solve_from_neighbours(family: Family) -> bool:
-    """Try the answers of solved cases as starts of their neighbours that are not solved, until nothing new is solved.
-
-    Returns:
-        Whether the caller ended the run.
-    """
+    """Try answers of solved cases as starts of neighbours until nothing new is solved; whether the caller ended it."""
     order, done, compute, keep = family
     tried: dict[int, dict[int, int]] = {k: {} for k, one in done.items() if one.q is not None and not one.solved}
     while True:
@@ -118,11 +108,7 @@ def lower(family: Family) -> bool:
 
 
 def name_changes(family: Family) -> bool:
-    """Write into the later case of each jump that is left which joint turns, how far, and from which case.
-
-    Returns:
-        Whether the caller ended the run.
-    """
+    """Write into the later case of each jump that is left which joint turns, how far, and from where; see `lower`."""
     order, done, compute, keep = family
     work = {(a, b): (b, done[a].q, done[b].q) for a, b in _neighbours(order) if _jumps(done, a, b)}
     largest: dict[int, tuple[float, str]] = {}

@@ -43,6 +43,9 @@ def write_task(problem: Problem | Scene, path: str | PathLike[str], *, title: st
     Raises:
         InputError: a figure that was not loaded or was reduced, or a term, measure or shape that task files do not
             have, or no measures but `Soft`; or the file cannot be written or does not end in .toml.
+
+    Examples:
+        >>> path = wb.taskfile.write_task(problem, folder / "copy.toml", title="A reach")
     """
     target = files.checked_target(path, "write_task: path", "a task", (".toml",))
     if isinstance(problem, Scene):

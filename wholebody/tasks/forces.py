@@ -41,6 +41,13 @@ class Force(Checked):
     Attributes:
         frame: where it acts: the origin of a frame.
         force: (3,) in the world [N].
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a frame that the figure does not have.
+
+    Examples:
+        >>> push = wb.Force("right_palm", (-100.0, 0.0, 0.0))  # the hand pushes forward by 100 N
     """
 
     frame: inputs.Name
@@ -82,13 +89,10 @@ def point_rows(state: State, point: Array, joint: int) -> Array:
 
 
 def pressure(state: State, loads: Loads, mass: range | None, height: float) -> tuple[Array, Array]:
-    """Where level ground at a height presses against the weight of some joints and forces, and its derivative.
+    """The point (2,) where level ground at a height presses against the weight of joints and forces; its derivative.
 
-    About that point the weight and the forces have no moment but about the vertical: without forces it is below the
-    centre of mass.
-
-    Returns:
-        The point (2,), metres, and the derivative (2, nv).
+    About that point [m] the weight and the forces have no moment but about the vertical: without forces it is below
+    the centre of mass.
     """
     model = state.model
     weight = GRAVITY * sum(model.inertias[k].mass for k in (mass or range(1, model.njoints)))
@@ -119,6 +123,13 @@ class LoadedBalance(Constraint):
         feet: segments that carry the figure, as for `Balance`.
         margin: least distance from the edges [m]; None for 0.15 of the polygon's least width.
         keeps: that margin; once resolved.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a frame that the figure does not have.
+
+    Examples:
+        >>> steady = wb.ergonomics.LoadedBalance([wb.Force("right_palm", (-100, 0, 0))])
     """
 
     forces: Forces

@@ -66,6 +66,11 @@ def follow_path(
     Raises:
         InputError: the path is not one, the spacing is not positive, or the goal is not a `Point`.
         UnknownNameError: there is no such method.
+
+    Examples:
+        >>> answers = wb.follow_path(problem, [(0.50, -0.25, 0.95), (0.55, -0.20, 0.95)], "qp")
+        >>> all(answer.solved for answer in answers)
+        True
     """
     places = _spaced(path, spacing)
     if isinstance(problem, Assembly):

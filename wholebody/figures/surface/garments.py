@@ -14,43 +14,31 @@ from wholebody.figures.surface.fields import Field
 
 
 class Bone(NamedTuple):
-    """What moves vertices.
+    """What moves vertices."""
 
-    Attributes:
-        segment: the segment that it moves with; of a half, the segment that it turns half as much as.
-        parent: of a half, the segment against which the turn is halved; None of others.
-        instead: the segment to move with, rigidly, in a figure that lacks `segment`; None where there is always one.
-        bind: (4, 4) placement in the world in the binding posture.
-        rest: (4, 4) placement relative to `instead` in such a figure.
-    """
-
-    segment: str
-    parent: str | None
+    segment: str  # the segment that it moves with; of a half, the segment that it turns half as much as
+    parent: str | None  # of a half, the segment against which the turn is halved; None of others
+    # the segment to move with, rigidly, in a figure that lacks `segment`; None where there is always one
     instead: str | None
-    bind: Array
-    rest: Array
+    bind: Array  # (4, 4) placement in the world in the binding posture
+    rest: Array  # (4, 4) placement relative to `instead` in such a figure
 
 
 class Patch(NamedTuple):
-    """A part of the surface, of which most is moved by the bones of a segment.
+    """A part of the surface, of which most is moved by the bones of a segment."""
 
-    Attributes:
-        name, segment, color: such as "shirt:left_upper_arm", which is unique; its segment; red, green, blue.
-        vertices, normals: (n, 3) metres, in the world of the binding posture, and outward unit vectors.
-        bones, weights: (n, 4) indices of bones, and their influences, which add up to 1.
-        faces: (m, 3) indices of vertices, wound outwards.
-        coarse: (k, 3) the same of fewer and larger triangles, for shadows and small pictures.
-    """
-
+    # name, segment and color: such as "shirt:left_upper_arm", which is unique; its segment; red, green, blue
     name: str
     segment: str
     color: tuple[float, float, float]
+    # vertices and normals: (n, 3) metres, in the world of the binding posture, and outward unit vectors
     vertices: Array
     normals: Array
+    # bones and weights: (n, 4) indices of bones, and their influences, which add up to 1
     bones: NDArray[np.uint8]
     weights: Array
-    faces: NDArray[np.int64]
-    coarse: NDArray[np.int64]
+    faces: NDArray[np.int64]  # (m, 3) indices of vertices, wound outwards
+    coarse: NDArray[np.int64]  # (k, 3) the same of fewer and larger triangles, for shadows and small pictures
 
 
 class Surface(NamedTuple):
@@ -82,39 +70,27 @@ class Surface(NamedTuple):
 
 
 class Claim(NamedTuple):
-    """The region of a bone: its influence on a point is exp(-distance / softness).
+    """The region of a bone: its influence on a point is exp(-distance / softness)."""
 
-    Attributes:
-        bone: name of a segment, or "<segment>/half", which turns by half of what the segment turns.
-        field: distance from the region.
-        softness: metres over which the influence fades by e: a larger value bends joints over a longer stretch.
-    """
-
-    bone: str
-    field: Field
+    bone: str  # name of a segment, or "<segment>/half", which turns by half of what the segment turns
+    field: Field  # distance from the region
+    # metres over which the influence fades by e: a larger value bends joints over a longer stretch
     softness: float = 0.014
 
 
 class Garment(NamedTuple):
-    """A part of one colour, before it is made.
+    """A part of one colour, before it is made."""
 
-    Attributes:
-        name, color: such as "shirt", and red, green, blue.
-        field: its solid in the world of the body's binding posture.
-        low, high: (3,) corners of a box around it.
-        cell: size of the grid's cells, metres.
-        claims: regions of the bones that move it.
-        cuts: half spaces that end it at sharp edges: hem, collar, cuffs.
-    """
-
+    # name and color: such as "shirt", and red, green, blue
     name: str
     color: tuple[float, float, float]
-    field: Field
+    field: Field  # its solid in the world of the body's binding posture
+    # low and high: (3,) corners of a box around it
     low: Array
     high: Array
-    cell: float
-    claims: Sequence[Claim]
-    cuts: Sequence[Field] = ()
+    cell: float  # size of the grid's cells, metres
+    claims: Sequence[Claim]  # regions of the bones that move it
+    cuts: Sequence[Field] = ()  # half spaces that end it at sharp edges: hem, collar, cuffs
 
 
 def bounds(points: Sequence[Array], margin: float) -> tuple[Array, Array]:

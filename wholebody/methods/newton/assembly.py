@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from wholebody.assessment.all_pairs import all_pairs
 from wholebody.base.arrays import Array
-from wholebody.base.checks import choice, flag, known, number, shown, whole
+from wholebody.base.checks import choice, flag, known, number, shown, some, whole
 from wholebody.base.errors import InputError
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
@@ -63,6 +63,12 @@ class Assembly(AssemblyJoints):
     Attributes:
         clearance: least distance of every tested pair, metres.
         metric: what the least motion is measured by.
+
+    Examples:
+        >>> swing = wb.Assembly().body("seat", (0.0, 0.0, -1.0))
+        >>> swing = swing.revolute("world", "seat", at=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0))
+        >>> swing.point_goal("seat", (1.0, 0.0, 0.0)).solve().status
+        'solved'
     """
 
     def __init__(self, *, clearance: float = 0.0, metric: Metric = "rim") -> None:
@@ -92,6 +98,9 @@ class Assembly(AssemblyJoints):
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self._prepared, self._scene, self._alone = None, None, OneAtATime("assembly")
+
+    def __repr__(self) -> str:
+        return f"Assembly of {len(self.bodies)} bodies and {len(self._goals)} goals: {some(self.bodies) or 'none'}"
 
     def __copy__(self) -> Assembly:
         return copy.deepcopy(self)

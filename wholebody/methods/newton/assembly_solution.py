@@ -41,6 +41,11 @@ class AssemblySolution:
         path: (k, nq) the states on the way as postures of the assembly's `scene`, the first as before the solve and the
             last as after it.
         message: one sentence that explains the status and names bodies.
+
+    Examples:
+        >>> answer = wb.Assembly().body("ball", (0.0, 0.0, 1.0)).point_goal("ball", (0.0, 0.0, 2.0)).solve()
+        >>> answer.status, answer.placements["ball"].translation.round(6).tolist()
+        ('solved', [0.0, 0.0, 2.0])
     """
 
     __repr__ = brief

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from wholebody.assessment.posture import assess
 from wholebody.base import checks
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, brief
 from wholebody.figures.description import is_root
 from wholebody.figures.figure import Figure
 from wholebody.figures.self_pairs import random_postures
@@ -36,11 +36,11 @@ class _Part:
         joints = [whole.joints[whole.getJointId(name)] for name in list(small.names)[1:]]
         self.idx_q = _places([(int(joint.idx_q), int(joint.nq)) for joint in joints])
         self.idx_v = _places([(int(joint.idx_v), int(joint.nv)) for joint in joints])
-        self.model, self.start = whole, np.array(start)
+        self.model, self.start = whole, np.array(start, dtype=float)
 
     def embed(self, q: Array) -> Array:
         """Whole posture (nq,) of a small one."""
-        whole = self.start.copy()
+        whole: Array = self.start.copy()
         whole[self.idx_q] = q
         return whole
 
@@ -125,6 +125,8 @@ class Simplified:
     left_out: LeftOut
     _part: _Part = field(repr=False)
 
+    __repr__ = brief
+
     def posture(self, q: Array) -> Array:
         """Posture of the whole figure, (nq,), of one of the smaller figure (small nq,)."""
         return self._part.embed(checks.posture(q, self.problem.scene.model.nq))
@@ -148,6 +150,11 @@ def simplify(problem: Problem) -> Simplified:
 
     Raises:
         InputError: it is no problem, or objects came to or left its scene after it was stated.
+
+    Examples:
+        >>> part = wb.simplify(problem)
+        >>> part.restored(wb.solve(part.problem)).status
+        'solved'
     """
     checks.instance(problem, Problem, "simplify: problem", "state one with wb.Problem(scene, goals=[...])")
     problem.check_fresh()
@@ -251,7 +258,7 @@ class _Comparison:
         elif isinstance(term, Measure):
             ask = [lambda: term.gradient(state)[columns], lambda: term.curvature(state)[columns]]
         elif isinstance(term, Bound):
-            ask = [lambda side=side: term.bounds(state, None)[side][columns] for side in (0, 1)]
+            ask = [lambda: np.array(term.bounds(state, None))[:, columns]]
         else:
             ask = [
                 lambda: np.atleast_1d(term.value(state)),
