@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from typing import Annotated, Any, NamedTuple, TypeAlias
 
@@ -94,6 +95,10 @@ def check_reachable(place: Array, where: str) -> None:
     distance = math.hypot(*place)
     if distance > FARTHEST:
         raise InputError(f"{where} is {distance:.4g} m away; lengths are in metres, so divide millimetres by 1000")
+    if distance > 30.0:  # m: farther is hardly meant
+        warnings.warn(
+            f"{where} is {distance:.3g} m away; lengths are in metres: divide centimetres by 100", stacklevel=3
+        )
 
 
 def direction(value: object, where: str) -> Array:
