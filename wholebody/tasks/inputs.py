@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Annotated, Any, NamedTuple, TypeAlias
+from collections.abc import Callable, Hashable, Sequence
+from typing import Annotated, Any, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,8 @@ from wholebody.base.fields import Range
 from wholebody.figures.state import State
 from wholebody.geometry.placement import PlacementLike, placement, unit_vector
 from wholebody.tasks.base import Surroundings
+
+T = TypeVar("T")
 
 FARTHEST = 100.0  # Distance [m] beyond which a position is refused as a wrong unit: 100 mm are a tenth of a metre
 
@@ -31,6 +33,12 @@ class Place(NamedTuple):
 
 
 WORLD = Place(0, 0)  # The world: Pinocchio's frame and joint 0
+
+
+def once(scene: Surroundings, key: Hashable, make: Callable[[], T]) -> T:
+    """What follows from figure and things, where they are, and a key alone: made once, and read-only."""
+    found: T = scene.built.known((key, scene.built.moves), make)
+    return found
 
 
 def find_place(scene: Surroundings, name: str, where: str) -> Place:
@@ -91,8 +99,8 @@ def point(value: object, where: str) -> Array:
 
 def check_reachable(place: Array, where: str) -> None:
     """Refuse a position that cannot be in metres."""
-    distance = math.hypot(*place)
-    if distance > FARTHEST:
+    if place.dot(place) > FARTHEST**2:
+        distance = math.hypot(*place)
         raise InputError(f"{where} is {distance:.4g} m away; lengths are in metres, so divide millimetres by 1000")
 
 
@@ -147,7 +155,7 @@ def joints_with_mass(scene: Surroundings, where: str, frames: Sequence[str] = ()
         if body is None:
             raise InputError(f"{where}: {', '.join(frames)} are of several figures; state one {where} for each")
         joints = figure.bodies[body]
-    inertias = list(scene.model.inertias)
-    if not any(inertias[k].mass > 0.0 for k in joints or range(1, len(inertias))):
+    masses = once(scene, "masses", lambda: [inertia.mass for inertia in scene.model.inertias])
+    if not any(masses[k] > 0.0 for k in joints or range(1, len(masses))):
         raise InputError(f"{where}: nothing of {figure.name} that moves has mass; leave it out")
     return joints
