@@ -57,32 +57,6 @@ sys.dont_write_bytecode = False
 
 settings.load_profile("ci" if os.environ.get("CI") else "default")
 
-LONG = (
-    *("view/test_page.py", "examples/test_examples.py", "docs/test_pages.py", "motion/test_avoidance.py"),
-    *("base/test_compiled.py", "test_odd_arguments.py", "cli/test_show.py", "motion/bisection/test_method.py"),
-    *("view/test_live_page.py", "motion/test_batch.py", "cli/test_commands.py", "view/test_files.py"),
-    *(
-        "bench/suite/compare/test_run.py",
-        "methods/test_contradictions.py",
-        "base/test_batches.py",
-        "doctor/test_checks.py",
-    ),
-    *("view/test_server.py", "tracking/test_moving_things.py", "tasks/test_rhythm.py", "view/test_legend.py"),
-    *("tracking/test_scenes.py", "dynamics/test_scenes.py", "view/test_timeline.py"),
-    *("tracking/test_dragging.py", "base/test_runner.py", "methods/newton/test_method.py"),
-    *(
-        "figures/surface/test_surface.py",
-        "bench/suite/stability/test_command.py",
-        "bench/measure/test_motion.py",
-        "test_threads.py",
-    ),
-    *("test_copies.py", "bench/test_commands.py"),
-)
-"""Files that take longest by the clock, over six seconds each beside others: they begin first.
-
-So all workers end together. pytest-xdist keeps this order with `--no-loadscope-reorder`; by itself it would begin with
-the files of the most tests."""
-
 COAL = {"formula": (0.0, 1e-12), "iterated": (1e-6, 1e-9), "ellipsoid": (1e-6, 1e-5)}
 """Accuracy of coal's distances: metres, and share of the size of both pieces together.
 
@@ -93,10 +67,14 @@ at 100 m, and 1e-6 m at 1 cm."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the tests of the files that take longest before the others."""
-    places = {ROOT / "tests" / name: place for place, name in enumerate(LONG)}
+    """Put the tests of the files that take longest, over four seconds each, before the others: workers end together.
+
+    pytest-xdist keeps this order with `--no-loadscope-reorder`; by itself it would begin with the files of most tests.
+    """
+    longest = ROOT / "tests" / "longest.txt"
+    places = {ROOT / "tests" / f"{name}.py": place for place, name in enumerate(longest.read_text().split())}
     if missing := [str(path) for path in places if not path.is_file()]:
-        raise pytest.UsageError(f"LONG in tests/conftest.py names {', '.join(missing)}, which is no file")
+        raise pytest.UsageError(f"{longest} names {', '.join(missing)}, which is no file")
     items.sort(key=lambda item: places.get(item.path, len(places)))
 
 

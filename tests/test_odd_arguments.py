@@ -24,7 +24,7 @@ import wholebody as wb
 from wholebody import tracking
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.figures.state import State
-from wholebody.geometry.shapes import Compound
+from wholebody.geometry.compound import Compound
 from wholebody.motion import measures
 from wholebody.motion.sphere_filling import Spheres, fill_with_spheres
 from wholebody.planning.distinct import Solutions
@@ -174,6 +174,16 @@ class Level(wb.methods.AssemblyConstraint):
         return result
 
 
+class Still(wb.Measure):
+    """The same at all placements."""
+
+    def value(self, state: Any) -> float:
+        return 1.0
+
+    def gradient(self, state: Any) -> Any:
+        return np.zeros(state.model.nv)
+
+
 def assembly() -> wb.Assembly:
     made = wb.Assembly()
     made.body("crank", size=0.1).body("rod", (0.06, 0.0, 0.08), size=0.3)
@@ -262,6 +272,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     moves = {"ball": ((1.0, 1.0, 1.0), (1.0, 0.9, 1.0))}
     yield "Scene.sweep", Call(there.sweep, {"q0": q, "q1": q + 0.1, "tolerance": 1e-4, "moves": moves})
     world = {"scene": there, "start": q, "dt": 0.1, "overlap": "qp", "seed": 0, "spring": wb.dynamics.Spring()}
+    world["give_way"] = "both"
     yield "World", Call(wb.World, world, lambda made: made.step(q))
     yield "World.step", Call(wb.World(there, q).step, {"tracked": q})
     body = {"mass": 0.5, "material": "wood", "velocity": (0.1, 0.0, 0.0), "angular_velocity": (0.0, 0.0, 0.1)}
@@ -345,6 +356,8 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Exertion", Call(wb.ergonomics.Exertion, {**strong, "weight": 1.0}, lambda term: term.weight)
     limited = {**strong, "share": 1.0, "compression": 3400.0}
     yield "StrengthLimit", Call(wb.ergonomics.StrengthLimit, limited, on_a_person)
+    look = {"at": (1.0, 0.0, 1.0), "view": wb.ergonomics.FieldOfView(), "eyes": "gaze"}
+    yield "Look", Call(wb.ergonomics.Look, look, on_a_person)
     settings = {"parts": {"seat": wb.Sphere(0.1)}, "slide": (0.0, 0.1), "height": (0.0, 0.1), "tilt": (0.0, 0.1)}
     yield "adjustable", Call(wb.figures.adjustable, settings)
     yield "ReachCones", Call(wb.ReachCones, {"names": ["left_shoulder"]}, on_a_person)
@@ -412,7 +425,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "assess", Call(wb.assess, {"problem": ask, "q": q})
     checked = {"term": wb.Point("link4", at), "scene": ask.scene, "q": q}
     yield "check_derivatives", Call(wb.check_derivatives, checked, str)
-    yield "simplify", Call(wb.simplify, {"problem": ask, "lock": True})
+    yield "simplify", Call(wb.simplify, {"problem": ask})
     part = wb.simplify(ask)
     yield "Simplified.posture", Call(part.posture, {"q": part.problem.start})
     yield "Solution.plot", Call(wb.solve(part.problem).plot, {})
@@ -497,7 +510,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     def solve_parts(made: Any) -> Any:
         return made.solve(iterations=3)
 
-    yield "Assembly", Call(wb.Assembly, {"clearance": 0.01})
+    yield "Assembly", Call(wb.Assembly, {"clearance": 0.01, "metric": "rim"})
     third = {"name": "third", "at": at, "shape": wb.Sphere(0.1), "size": 0.1, "color": (1.0, 0.0, 0.0)}
     yield "Assembly.body", Call(assembly().body, third, solve_parts)
     given = {"name": "arm", "figure": arm, "start": q, "constraints": [], "color": (1.0, 0.0, 0.0)}
@@ -523,6 +536,12 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     placed = assembly()
     yield "Assembly.place", Call(placed.place, {"variables": placed.variables()}, solve_parts)
     yield "Assembly.drop_goals", Call(assembly().drop_goals, {})
+    yield "Assembly.drop_measures", Call(assembly().drop_measures, {})
+    yield "Assembly.minimise", Call(assembly().minimise, {"measure": Still()})
+    joined = assembly().fixed("crank", "rod")
+    yield "Assembly.release", Call(joined.release, {"constraint": "fixed joint of 'crank' and 'rod'"})
+    yield "Assembly.hold", Call(joined.hold, {"constraint": "fixed joint of 'crank' and 'rod'"})
+    yield "Assembly.orientation_goal", Call(assembly().orientation_goal, {"body": "rod", "target": (0, 0, 0, 1)})
     fixed = {"first": "crank", "second": "rod", "placement_second": at}
     yield "Assembly.fixed", Call(assembly().fixed, fixed, solve_parts)
     yield "Assembly.frame_goal", Call(assembly().frame_goal, {"body": "rod", "target": at}, solve_parts)
@@ -565,6 +584,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     }
     yield "follow", Call(tracking.follow, followed)
     loop = {"scene": there, "start": q, "overlap": "qp", "dt": 0.1, "seed": 0, "rigid": False, "touching": ["ball"]}
+    loop["give_way"] = "both"
     yield "FrameLoop", Call(tracking.FrameLoop, loop, lambda made: made.frame(q))
     yield "FrameLoop.frame", Call(tracking.FrameLoop(there, q).frame, {"tracked": q})
     recording = tracking.follow(there, track)

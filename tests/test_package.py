@@ -50,13 +50,18 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
         _ = wholebody.no_such_name  # type: ignore[attr-defined]
 
 
-@pytest.mark.parametrize("package", ["", *(f".{room}" for room in wholebody._ROOMS)])
-def test_names_for_type_checkers_are_the_names_that_load(package: str) -> None:
-    module = import_module(f"wholebody{package}")
-    tree = ast.parse(Path(str(module.__file__)).read_text())
+STUBS = sorted(Path(wholebody.__path__[0]).rglob("__init__.pyi"))
+
+
+@pytest.mark.parametrize("stub", STUBS, ids=lambda stub: stub.parent.name)
+def test_names_for_type_checkers_are_the_names_that_load(stub: Path) -> None:
+    room = stub.parent.relative_to(wholebody.__path__[0]).parts
+    module = import_module(".".join(("wholebody", *room)))
+    tree = ast.parse(stub.read_text())
     imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module != "typing"]
     stated = {alias.name: node.module for node in imports for alias in node.names}
-    for name in set(module.__all__) & stated.keys() - set(wholebody._ROOMS):
+    assert len(STUBS) == 10
+    for name in set(module.__all__) & {name for name, home in stated.items() if home != "wholebody"}:
         value = getattr(module, name)
         assert value is getattr(import_module(str(stated[name])), name)
         assert name == "__version__" or value.__doc__

@@ -14,6 +14,7 @@ import pinocchio as pin
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.charts import listing
 from wholebody.base.errors import InputError, TermError
 from wholebody.base.fields import Range
 from wholebody.base.pool import Loan
@@ -24,24 +25,15 @@ from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace, borrowed
 from wholebody.tasks.answers import in_words, is_own
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
-from wholebody.tasks.checks import check_measure, check_rows
+from wholebody.tasks.checks import KINDS, check_measure, check_rows, checked_terms
 from wholebody.tasks.defaults import balancing, default_constraints, default_measures, stances, standing
 from wholebody.tasks.inputs import once
 from wholebody.terms.linearisation import Lineariser
 from wholebody.terms.plan import TermPlan, Terms, make_plan
 
 CLEARANCE = Range(0.0, 0.5, "m")  # more is refused as a wrong unit
-
 _TermError = TypeVar("_TermError", bound=TermError)
-
 _Planned = tuple[tuple[Constraint, ...], tuple[Bound, ...], tuple[Measure, ...]]
-
-_KINDS: dict[str, tuple[type, ...]] = {
-    "goals": (Goal,), "constraints": (Constraint,), "bounds": (Bound,), "measures": (Measure,)
-}  # fmt: skip
-_ARGUMENTS: dict[str, tuple[type, ...]] = {
-    "goals": (Goal,), "constraints": (Constraint, Bound), "measures": (Measure,)
-}  # fmt: skip
 
 
 class Problem(checks.FixedAttributes):
@@ -72,6 +64,9 @@ class Problem(checks.FixedAttributes):
 
     Threads may solve and assess one problem at the same time; only one thread may change it. It can be pickled; a copy
     shares the scene, a deep copy has its own.
+
+    Examples:
+        >>> reach = wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.55, -0.25, 0.95))], clearance=0.005)
     """
 
     _settable = frozenset({"start", "goals", "constraints", "bounds", "measures", "measures_given", "clearances"})
@@ -111,12 +106,12 @@ class Problem(checks.FixedAttributes):
         self._revision = scene.revision
         self.start = _start(scene, start)
         self.clearance = CLEARANCE(clearance, "clearance")
-        terms = [*_checked(goals, _ARGUMENTS["goals"], "goals")]
-        given = [*_checked(constraints, _ARGUMENTS["constraints"], "constraints")]
+        terms = [*checked_terms(goals, (Goal,), "goals")]
+        given = [*checked_terms(constraints, (Constraint, Bound), "constraints")]
         self.measures_given = measures is not None
         self.range_of_motion = checks.flag(range_of_motion, "range_of_motion")
         self.balance = balance if balance is None else checks.flag(balance, "balance")
-        measured = None if measures is None else _checked(measures, (Measure,), "measures")
+        measured = None if measures is None else checked_terms(measures, (Measure,), "measures")
         self.goals: tuple[Goal, ...] = tuple(goal.resolve(scene, self.start) for goal in terms)
         stated = self._resolved([term for term in given if isinstance(term, Constraint)])
         self._places = tuple(place for place, term in enumerate(given) if isinstance(term, Constraint))
@@ -171,15 +166,20 @@ class Problem(checks.FixedAttributes):
         make = partial(default_constraints, scene, start, known, ranges=ranges, standing=steady, required=required)
         return scene.built.known(key, make)
 
+    def _told(self) -> tuple[str, dict[str, list[str]]]:
+        things, pairs = len(self.scene.objects), len(self.clearances)
+        told = f"{things} things, {pairs} pairs, clearance {1e3 * self.clearance:g} mm"
+        terms = {"goals": self.goals, "constraints": (*self.constraints, *self.bounds), "measures": self.measures}
+        words = {name: [in_words(term) for term in given] for name, given in terms.items()}
+        return f"Problem of {self.scene.figure.name!r} among {told}", words
+
     def __repr__(self) -> str:
-        asked = [*self.goals, *self.constraints, *self.bounds]
-        return (
-            f"Problem of {self.scene.figure.name!r} among {len(self.scene.objects)} things, "
-            f"{len(self.clearances)} pairs, clearance {1e3 * self.clearance:g} mm\n"
-            f"  goals: {checks.some(map(in_words, asked[: len(self.goals)])) or 'none'}\n"
-            f"  constraints: {checks.some(map(in_words, asked[len(self.goals) :])) or 'none'}; "
-            f"measures: {checks.some(map(in_words, self.measures)) or 'none'}"
-        )
+        heading, words = self._told()
+        goals, constraints, measures = (checks.some(each) or "none" for each in words.values())
+        return f"{heading}\n  goals: {goals}\n  constraints: {constraints}; measures: {measures}"
+
+    def _repr_html_(self) -> str:
+        return listing(*self._told())
 
     def _checked_value(self, name: str, value: Any) -> Any:
         """What is set after the problem was stated: a posture, clearances, or terms that are resolved already."""
@@ -189,7 +189,7 @@ class Problem(checks.FixedAttributes):
             return checks.array(value, name, "one number a collision pair, metres").copy()
         if name == "measures_given":
             return checks.flag(value, name)
-        terms = _checked(value, _KINDS[name], name)
+        terms = checked_terms(value, KINDS[name], name)
         for number, term in enumerate(terms):
             if is_dataclass(term) and not all(hasattr(term, field.name) for field in fields(term)):
                 correction = "give it to problem.retarget([...])" if name == "goals" else self._correction
@@ -238,7 +238,7 @@ class Problem(checks.FixedAttributes):
             InputError: not a list of goals, or a goal with a value of the wrong kind, shape or range.
             UnknownNameError: a name that the figure does not have.
         """
-        listed = _checked(goals, (Goal,), "goals")
+        listed = checked_terms(goals, (Goal,), "goals")
         resolved = tuple(goal.resolve(self.scene, self.start) for goal in listed)
         if any(map(is_own, resolved)):
             with self.borrow() as workspace:
@@ -392,17 +392,6 @@ def _start(scene: Scene, start: Array | str | Mapping[str, Array | str] | None) 
     if scene.model.nq > scene.model.nv and not pin.isNormalized(scene.model, q, UNIT_TOLERANCE):
         raise InputError("the start's quaternion is not of unit length; normalise it with pin.normalize(model, q)")
     return np.array(pin.normalize(scene.model, q))
-
-
-def _checked(terms: Any, kinds: tuple[type, ...], what: str) -> Sequence[Any]:
-    listed = checks.listed(terms, what, f"{what}=[...]")
-    for number, term in enumerate(listed):
-        if not isinstance(term, kinds):
-            wanted = " or ".join(kind.__name__ for kind in kinds)
-            home = next((name for name, taken in _ARGUMENTS.items() if isinstance(term, taken)), "")
-            correction = f"give it in {home}=[...]" if home else "see wholebody.tasks"
-            raise InputError(f"{what}[{number}] is {checks.a(type(term))}, not a {wanted}; {correction}")
-    return listed
 
 
 def _owner_pair(scene: Scene, pair: Any) -> tuple[str, str]:

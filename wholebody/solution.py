@@ -50,6 +50,10 @@ class Solution(Shown):
             "active set" is the hot start, "semismooth newton" closed what neither did, and "not exact" are programs
             that none closed. Empty for methods without programs. Iterations of qp whose entry of the trace is called
             "seed" have none: each is a descent by damped least squares.
+
+    Examples:
+        >>> solution.status, solution.q.shape == standing.shape, solution.trace[-1].goal_error < 1e-5
+        ('solved', True, True)
     """
 
     q: Array

@@ -203,8 +203,8 @@ def clip_constants(arguments: argparse.Namespace) -> None:
 @measuring(
     "detail",
     "levels of modelling",
-    "Solve problems with the person as spheres, capsules and hulls, with all joints and pairs and with those that a "
-    "task needs, and judge the answers in the finest model.",
+    "Solve problems with the person as spheres, capsules and hulls, with all pairs and with those "
+    "that can touch, and judge the answers in the finest model.",
     count("--count", 8, "cases of each level"),
     seed("of the first case"),
 )

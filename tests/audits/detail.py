@@ -8,23 +8,17 @@ from typing import Any
 import numpy as np
 
 import wholebody as wb
-from wholebody.base.arrays import Array
 from wholebody.base.errors import WholebodyError
 from wholebody.bench.measure.scaling import TIP, chain, task
 from wholebody.bench.rows import Figure, Row, measured_ms
 from wholebody.bench.suite.problem_sets.registry import SETS
-from wholebody.methods.simplification.simplify import Parts, leave_out
+from wholebody.methods.simplification.simplify import simplify
 from wholebody.problem import Problem
 
 SHOWN = "solved", "pairs", "a solve ms", "judgement ms", "inside", "worst deepest mm", "worst effort above %"
 """Figures of a level of modelling that the report shows."""
 
-LEVELS: dict[str, Parts] = {
-    "all": Parts(joints=False, pairs=False),
-    "active joints": Parts(joints=True, pairs=False),
-    "pairs in reach": Parts(joints=False, pairs=True),
-    "simplified": Parts(joints=True, pairs=True),
-}
+LEVELS = "all", "simplified"
 
 
 def detail_rows(cases: int, seed: int, say: Callable[[str], None]) -> Iterator[Row]:
@@ -61,20 +55,18 @@ def levels(case: str, models: dict[str, Problem]) -> Iterator[Row]:
     """All levels of all models of one case; the first model, whole, is what the others are held against."""
     judge, best = next(iter(models.values())), float("nan")
     for detail, given in models.items():
-        for level, parts in LEVELS.items():
-            prepare, _, part = measured_ms(lambda: leave_out(given, parts))  # noqa: B023
+        for level in LEVELS:
+            prepare, _, part = measured_ms(lambda: simplify(given))  # noqa: B023
             problem = given if level == "all" else part.problem
             wb.solve(problem)  # what a problem makes once is made
             answer, solved, judged = _timed(problem)
-            q: Array = answer.q if level == "all" else part.posture(answer.q)
-            truth = wb.assess(judge, q)
+            truth = wb.assess(judge, answer.q)
             if np.isnan(best) and answer.solved:
                 best = truth.measure
             yield Row(
                 case,
                 f"{detail}, {level}",
                 {
-                    "freedoms": problem.scene.model.nv,
                     "pairs": len(problem.scene.geometry.collisionPairs),
                     "status": answer.status,
                     "a solve ms": max(solved - judged, 0.0),
@@ -103,7 +95,7 @@ def detail_summary(rows: Sequence[Row]) -> list[Row]:
         mine = [row for row in rows if (row.case, row.tool) == (case, model)]
         solved = [row for row in mine if row["status"] == "solved"]
         figures: dict[str, Figure] = {"solved": f"{len(solved)} of {len(mine)}"}
-        for name in ("freedoms", "pairs", "a solve ms", "judgement ms", "leaving out ms"):
+        for name in ("pairs", "a solve ms", "judgement ms", "leaving out ms"):
             figures[name] = float(np.median([row[name] for row in mine]))
         figures["inside"] = sum(row["deepest mm"] > 0.1 for row in solved)
         for name in ("deepest mm", "clearance missed mm", "goal missed mm", "effort above %"):

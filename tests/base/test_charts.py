@@ -21,6 +21,9 @@ def lines_of(shown: Shown, panel: int = 0) -> dict[str, np.ndarray]:
 
 def test_a_solution_draws_its_trace_and_notebooks_show_it() -> None:
     problem = wb.Problem(wb.Scene(wb.load("hand")), goals=[wb.Point("right_index_tip", (0.05, 0.05, 0.1))])
+    told = ElementTree.fromstring(problem._repr_html_())
+    assert [row.findtext("th") for row in told.iter("tr")] == ["goals", "constraints", "measures"]
+    assert next(told.iter("td")).text == "Point(right_index_tip)"
     solution = wb.solve(problem)
     drawn = lines_of(solution)
     assert drawn["goal error [m, rad]"] == pytest.approx([max(entry.goal_error, 1e-9) for entry in solution.trace])

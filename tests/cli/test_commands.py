@@ -277,7 +277,7 @@ def test_help_is_there_and_light() -> None:
 
 
 UNUSED = (
-    *("wholebody.cli.clip", "wholebody.cli.bench", "wholebody.motion", "wholebody.tracking"),
+    *("wholebody.cli.clip", "wholebody.cli.bench", "wholebody.motion.clip", "wholebody.tracking"),
     *("wholebody.methods.newton.assembly", "wholebody.figures.surface.making", "scipy.ndimage", "scipy.spatial"),
     *("asyncio", "jinja2", "matplotlib", "rich.progress", "tornado", "trimesh"),
 )

@@ -8,9 +8,9 @@ import pytest
 
 import wholebody as wb
 from wholebody.dynamics.coupling import contact_impulse
-from wholebody.dynamics.overlaps import overlaps
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.scene.matter.materials import Surface
+from wholebody.tracking.overlaps import overlaps
 
 DT = 1.0 / 60.0
 
@@ -65,9 +65,9 @@ def arm_world(planar_arm, **more: object) -> tuple[wb.World, wb.Scene]:
     return wb.World(scene, np.zeros(3), **more), scene
 
 
-@pytest.mark.parametrize("overlap", ["qp", "ccd"])
-def test_an_arm_pushes_a_ball_and_never_is_in_it(planar_arm, overlap: str) -> None:
-    world, scene = arm_world(planar_arm, overlap=overlap)
+@pytest.mark.parametrize(("overlap", "give_way"), [("qp", "figure"), ("ccd", "figure"), ("qp", "both")])
+def test_an_arm_pushes_a_ball_and_never_is_in_it(planar_arm, overlap: str, give_way: str) -> None:
+    world, scene = arm_world(planar_arm, overlap=overlap, give_way=give_way)
     pushed, ball = 0, []
     for frame in range(90):
         made = world.step(np.array([min(0.6, 0.01 * frame), 0.0, 0.0]))
@@ -129,7 +129,7 @@ def test_overlaps_are_of_objects_and_are_shared_where_both_may_move(planar_arm) 
     scene = wb.Scene(planar_arm((0.5, 0.4, 0.3)))
     scene.add(wb.Box((0.5, 0.2, 0.2)), name="wall", at=(0.5, 0.1, 0.0))
     scene.add(wb.Sphere(0.1), name="ball", at=(1.05, 0.11, 0.0), body=wb.Body())
-    found = {one.second: one for one in overlaps(scene, np.zeros(3))}
+    found = {one.second: one for one in overlaps(scene, np.zeros(3), "both")}
     assert set(found) == {"wall", "ball"}
     assert {one.first for one in found.values()} == {scene.figure.name}
     wall, ball = found["wall"], found["ball"]
@@ -139,6 +139,9 @@ def test_overlaps_are_of_objects_and_are_shared_where_both_may_move(planar_arm) 
     assert wall.moves_second == pytest.approx(np.zeros(3))
     assert ball.moves_first == pytest.approx(0.5 * ball.depth)
     assert ball.moves_second == pytest.approx(-0.5 * ball.depth)
+    alone = next(one for one in overlaps(scene, np.zeros(3)) if one.second == "ball")  # the figure has priority
+    assert alone.moves_first == pytest.approx(ball.depth)
+    assert not alone.moves_second.any()
     pairs = [
         k
         for k, names in enumerate(scene.contacts(np.zeros(3), 0.0).pair)
@@ -257,3 +260,18 @@ def test_things_that_a_joint_holds_together_and_half_spaces_are_no_overlap(plana
     assert made.deepest == 0.0
     assert made.overlaps == made.collisions == ()
     assert scene.penetration(np.zeros(3)) == []
+
+
+def test_a_body_that_is_put_elsewhere_wakes_and_its_weight_was_lifted_by_work() -> None:
+    scene = wb.Scene(wb.load("hand")).add(wb.HalfSpace(), name="floor", at=(0.0, 0.0, -1.0))
+    scene.add(wb.Sphere(0.1), name="ball", at=(1.0, 0.0, -0.8999), body=wb.Body(mass=2.0))
+    engine = RigidBodies(scene)
+    for _ in range(60):
+        frame = engine.advance(1 / 60)
+    assert frame.sleeping == 1
+    before, place = engine.energy(), engine.placement("ball").translation
+    engine.put("ball", pin.SE3(np.eye(3), place + (0.0, 0.0, 0.5)))
+    frame = engine.advance(1 / 60)
+    assert frame.work == pytest.approx(2.0 * 9.81 * 0.5, rel=1e-6)
+    assert engine.energy() - before == pytest.approx(frame.work, rel=1e-6)
+    assert engine.placement("ball").translation[2] == pytest.approx(place[2] + 0.5 - 0.5 * 9.81 / 60**2, abs=1e-4)

@@ -112,7 +112,7 @@ def test_real_recordings_keep_the_directions_of_their_limbs(name: str, human: Fi
 
 
 def test_a_skeleton_of_the_same_directions_is_followed_whatever_its_size(human: Figure) -> None:
-    for tall in (0.6, 1.0, 1.3):
+    for tall in (0.6, 1.3):
         motion = person(tall=tall)
         clip = wb.retarget(motion, human)
         assert within(clip)
@@ -135,20 +135,20 @@ def test_feet_that_stand_stay_where_they_are_at_the_height_of_the_floor(human: F
 
 def test_the_answer_does_not_depend_on_the_frame_it_starts_from(human: Figure, shared_data: Path) -> None:
     """Played backwards, the same postures come out; and so they do, away from the cut, from the middle on."""
-    motion = wb.motion.read_skeleton(shared_data / "mocap" / "cmu_02_07.bvh").part(200, 260)
+    motion = wb.motion.read_skeleton(shared_data / "mocap" / "cmu_02_07.bvh").part(200, 232)
     clip = wb.retarget(motion, human)
     back = wb.retarget(motion.reversed(), human)
-    late = wb.retarget(motion.part(20, 60), human)
+    late = wb.retarget(motion.part(10, 32), human)
     for frame in ("left_wrist", "right_elbow", "head"):  # feet come down where they were led
         own = places(clip, frame)
         assert np.linalg.norm(own - places(back, frame)[::-1], axis=1).max() < 0.03
-        assert np.linalg.norm(own[45:] - places(late, frame)[25:], axis=1).max() < 0.03
+        assert np.linalg.norm(own[24:] - places(late, frame)[14:], axis=1).max() < 0.03
 
 
 def test_a_retargeted_clip_is_smooth_where_the_recording_is(human: Figure) -> None:
     """Arms that pass their singular direction, straight out to the sides, at constant speed."""
-    clip = wb.retarget(person(60), human)
-    assert np.abs(np.diff(clip.q[:, 7:], axis=0)).max() < 0.12
+    clip = wb.retarget(person(30), human)
+    assert np.abs(np.diff(clip.q[:, 7:], axis=0)).max() < 0.24
 
 
 def test_a_robot_follows(human: Figure, tmp_path: Path) -> None:

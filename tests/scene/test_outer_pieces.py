@@ -103,7 +103,7 @@ def test_a_body_meets_itself_and_what_it_carries_with_its_spheres(spheres, hulls
 def test_copies_and_smaller_figures_have_outer_pieces(spheres, hulls):
     problem = shelf(spheres, 3)
     small = wb.simplify(problem)
-    q = small.posture(wb.solve(small.problem).q)
+    q = wb.solve(small.problem).q
     assert deepest(hulls, problem.scene.objects.values(), q) < INSIDE
     count = len(problem.scene.pair_table.pairs)
     for copied in (copy.copy(problem.scene), pickle.loads(pickle.dumps(problem.scene))):

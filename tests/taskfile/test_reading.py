@@ -72,6 +72,16 @@ def test_the_good_file_is_good(write: Callable[[str], Path]) -> None:
         ("target = [0.4, -0.2, 1.0]", "target = [0.4, inf, 1.0]", ["goal 1, key target[1]", "inf"]),
         ("tolerance = 1e-06", "tolerance = 1.0", ["task.toml:39", "method, key tolerance"]),
         ("weight = 2.0", "weight = 0", ["measure 1, key weight"]),
+        (
+            'type = "effort"',
+            'type = "exertion"\nforces = [1]',
+            ["measure 1, key forces[0]", "1 is no force", 'frame = "right_palm"'],
+        ),
+        (
+            'type = "effort"',
+            'type = "exertion"\nforces = [{ frame = "right_palm" }]',
+            ["measure 1, key forces[0]", "key force is missing"],
+        ),
         # a wrong name
         ('name = "human"', 'name = "humna"', ["figure name", "did you mean human"]),
         (

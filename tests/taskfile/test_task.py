@@ -58,6 +58,7 @@ def test_scene_and_start(everything: wb.taskfile.Task) -> None:
 def test_terms_are_those_that_python_makes(everything: wb.taskfile.Task) -> None:
     problem = everything.problem
     turn = pin.Quaternion(np.array(TURNED)).matrix()
+    held = [wb.Force("left_palm", (0.0, 0.0, -49.0))]
     same = wb.Problem(
         problem.scene,
         problem.start,
@@ -83,6 +84,9 @@ def test_terms_are_those_that_python_makes(everything: wb.taskfile.Task) -> None
             wb.RangeOfMotion(["neck", "left_hamstrings"]),
             wb.Stand("ground", feet=["left_foot"], balance=False),
             wb.Grasp("right", "rod", "power"),
+            wb.ergonomics.LoadedBalance(held, margin=0.02),
+            wb.ergonomics.StrengthLimit(held, strength=wb.motion.Strength(25, "female"), standing=False),
+            wb.ergonomics.Look((1.0, 0.5, 0.2)),
         ],
         measures=[
             wb.Effort(),
@@ -92,6 +96,7 @@ def test_terms_are_those_that_python_makes(everything: wb.taskfile.Task) -> None
             wb.Rhythm(2.0),
             wb.RotationEffort(3.0),
             wb.Stance(weight=4.0),
+            wb.ergonomics.Exertion(strength=wb.motion.Strength(sex="female"), weight=5.0),
         ],
     )
     q = pin.integrate(problem.scene.model, problem.start, np.linspace(-0.1, 0.1, 55))

@@ -89,6 +89,20 @@ def test_joints_of_things_go_round(tmp_path: Path) -> None:
         assert again.objects[name].body == scene.objects[name].body
 
 
+def test_forces_and_strength_go_round(tmp_path: Path) -> None:
+    pushed, who = [wb.Force("left_palm", (-90.0, 0.0, 5.0))], wb.motion.Strength(20, "female")
+    problem = wb.Problem(
+        wb.Scene(wb.load("human")),
+        constraints=[wb.ergonomics.LoadedBalance(pushed), wb.ergonomics.StrengthLimit(pushed, strength=who, share=0.8)],
+        measures=[wb.ergonomics.Exertion(pushed, weight=2.0)],
+    )
+    again = wb.read_task(wb.taskfile.write_task(problem, tmp_path / "pushed.toml")).problem
+    state = problem.scene.state(problem.start)
+    for mine, theirs in zip(problem.constraints, again.constraints, strict=True):
+        np.testing.assert_array_equal(mine.value(state), theirs.value(state))
+    assert again.measures[0].weight * again.measures[0].value(state) == 2.0 * problem.measures[0].value(state)
+
+
 def test_a_scene_alone_and_a_result(tmp_path: Path) -> None:
     scene = wb.Scene(wb.load("human", sex="female", stature=1.6)).add(wb.HalfSpace(), name="floor")
     task = wb.read_task(wb.taskfile.write_task(scene, tmp_path / "scene.toml"))

@@ -227,7 +227,7 @@ def test_what_is_told_of_a_term_goes_into_another_process():
 
 def test_fractions_are_numbers(scene):
     figure = scene.figure
-    clip = wb.Clip(figure, np.array([figure.neutral] * 8), 0.02)
+    clip = wb.Clip(figure, np.array([figure.neutral] * 4), 0.02)
     third = wb.motion.torques(clip, friction=Fraction(1, 3))
     assert np.array_equal(third.torque, wb.motion.torques(clip, friction=1 / 3).torque)
     problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (Fraction(2, 5), Fraction(-1, 5), 1))])

@@ -79,7 +79,7 @@ def test_frames_whose_time_is_spent_are_free_and_arrive(
     monkeypatch.setattr(
         control.time, "thread_time", lambda: {"ccd": 0.0001, "placo": 0.0005}.get(method, 0.001) * next(ticks)
     )
-    inside = [drag.to((0.5, -0.25, 0.9)) for _ in range(40)]
+    inside = [drag.to((0.5, -0.25, 0.9)) for _ in range(25)]
     assert min(frame.error for frame in inside) > 0.05
     for frame in inside:
         judged = wb.assess(problem, frame.q)
@@ -87,7 +87,7 @@ def test_frames_whose_time_is_spent_are_free_and_arrive(
         assert judged.constraint_violation < 1e-3
     # to the end, a search of the goal inside takes 7 Newton steps, 60 programs of placo, or 143 sweeps
     assert max(frame.iterations for frame in inside) <= {"ccd": 110, "newton": 4, "placo": 25}.get(method, 11)
-    assert min(drag.to((0.3, -0.25, 1.0)).error for _ in range(60)) < 2e-3
+    assert any(drag.to((0.3, -0.25, 1.0)).error < 2e-3 for _ in range(60))
 
 
 def test_newton_needs_few_iterations_a_frame_and_does_not_drift(scene: wb.Scene) -> None:

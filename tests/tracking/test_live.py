@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wholebody as wb
@@ -132,6 +133,37 @@ def test_an_assembly_is_dragged_by_its_bodies() -> None:
     np.testing.assert_allclose(drag.q, before, atol=1e-12)
     with pytest.raises(wb.InputError, match="no task file"):
         drag.stated()
+
+
+def test_an_assembly_is_opened_closed_and_turned_by_hand() -> None:
+    drag = LiveDrag(jointed())
+    joint = "spherical joint of 'rod' and 'ball'"
+    drag.constrain(joint, False)
+    along(drag, "ball", (0.3, 0.0, 0.0))
+    np.testing.assert_allclose(drag.place("rod"), (0, 0, 0.5), atol=1e-6)  # it no longer follows
+    drag.constrain(joint, True)
+    along(drag, "ball", (0.05, 0.0, -0.15))
+    assert np.linalg.norm(drag.place("rod") - drag.place("ball")) < 0.5 + 1e-3  # closed again: 0.4 and 0.1 m
+    for _ in range(4):
+        assert drag.undo()
+    assert drag.constraints[joint]
+    np.testing.assert_allclose(drag.place("ball"), (0, 0, 1.0), atol=1e-9)
+    drag.take("rod", turn=True)
+    for turn in np.linspace(0.0, 0.5, 30):
+        frame = drag.move((0, np.sin(0.5 * turn), 0, np.cos(0.5 * turn)))
+    assert frame.error < 1e-3
+    assert frame.status == "turning rod, by newton/auto"
+    np.testing.assert_allclose(drag.place("rod"), (0.4 * np.sin(0.5), 0, 0.1 + 0.4 * np.cos(0.5)), atol=1e-3)
+
+
+def test_a_hand_is_turned(drag: LiveDrag) -> None:
+    before = pin.Quaternion(drag.orientation("right_palm"))
+    drag.take("right_palm", turn=True)
+    for turn in np.linspace(0.0, 0.4, 20):
+        wanted = pin.Quaternion(pin.exp3(np.array((turn, 0.0, 0.0)))) * before
+        frame = drag.move(wanted.coeffs())
+    assert frame.error < 5e-3
+    assert np.linalg.norm(drag.place("left_sole") - drag.place_at(drag.problem.start, "left_sole")) < 2e-3
 
 
 def test_a_thing_pushes_an_assembly() -> None:

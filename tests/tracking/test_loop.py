@@ -213,3 +213,29 @@ def test_driven_objects_come_first(hand: wb.Figure, scene: wb.Scene) -> None:
         done.append(loop.count)
     assert order == ["resolve", "sweep"] * 3
     assert done == [1, 2, 3]
+
+
+@pytest.mark.parametrize("stop", [False, True], ids=["free", "a wall behind it"])
+def test_a_ball_takes_half_of_an_overlap_where_both_give_way(planar_arm: Any, stop: bool) -> None:
+    scene, place, angle = wb.Scene(planar_arm((0.5, 0.4))), np.array((0.3, 0.13, 0.0)), 0.1
+    scene.add(wb.Sphere(0.1), name="ball", at=place, body=wb.Body(mass=1.0))
+    if stop:
+        scene.add(wb.Box((0.5, 0.1, 0.5)), name="wall", at=(0.3, 0.2801, 0.0))
+    loop = FrameLoop(scene, np.zeros(2), touching=["ball"], give_way="both")
+    frame = loop.frame(np.array((angle, 0.0)))
+    out = np.array((-np.sin(angle), np.cos(angle), 0.0))
+    depth = 0.1 + 0.02 - float(out @ place)  # of the ball in the first link, whose radius is 2 cm
+    moved = scene.objects["ball"].placement.translation - place
+    if stop:
+        assert abs(moved[1]) < 3e-4
+    else:
+        assert moved == pytest.approx(0.5 * depth * out, abs=1e-6)
+    assert not frame.note
+    assert -scene.contacts(frame.q, 0.0).distance.min(initial=0.0) < 1e-4
+    wanted = float(np.arctan2(*(place + moved)[1::-1])) - float(np.arcsin(0.12 / np.linalg.norm(place + moved)))
+    assert frame.q[0] == pytest.approx(wanted, abs=5e-3)  # the link touches the ball
+
+
+def test_who_gives_way_is_checked(planar_arm: Any) -> None:
+    with pytest.raises(wb.InputError, match="give_way"):
+        FrameLoop(wb.Scene(planar_arm((0.5,))), np.zeros(1), give_way="thing")  # type: ignore[arg-type]

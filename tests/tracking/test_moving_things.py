@@ -80,7 +80,7 @@ def test_nobody_ends_inside_where_the_root_could_have_gone_somewhere_free() -> N
     limits = wb.StepLimit(12.0, root_velocity=4.0, root_turn=6.0)
     aside = [4.0 * DT * sign * axis for axis in np.eye(3) for sign in (-1.0, 1.0)]
     could = 0
-    for seed, kind in enumerate(("board", "plate", "rod", "board")):
+    for seed, kind in enumerate(("board", "plate", "rod")):
         throw = Thrown(seed, kind, 20.0, 3.0)
         problem = problem_of(throw.scene, constraints=[limits])
         tracker, q = wb.QP().tracker(problem, DT), problem.start
@@ -97,7 +97,7 @@ def test_nobody_ends_inside_where_the_root_could_have_gone_somewhere_free() -> N
 
 def test_nobody_ends_inside_where_another_search_finds_a_free_posture() -> None:
     """The root has to turn and go at once, which programs from where it may go alone do not find."""
-    row = throws("board", 20.0, "walks", swift=False, count=3)
+    row = throws("board", 20.0, "walks", swift=False, count=2)
     assert row["named"]
     assert row["silent"] == 0
 

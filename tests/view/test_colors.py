@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import wholebody as wb
-from wholebody.dynamics.overlaps import overlaps
+from wholebody.tracking.overlaps import overlaps
 from wholebody.view.composition import Composition
 from wholebody.view.scene_graph import SceneGraph
 

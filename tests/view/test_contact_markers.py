@@ -9,7 +9,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.base.errors import InputError
-from wholebody.dynamics.overlaps import overlaps
+from wholebody.tracking.overlaps import overlaps
 from wholebody.view import Viewer
 from wholebody.view.composition import Composition
 from wholebody.view.legend import legend
@@ -21,7 +21,7 @@ def test_each_of_two_that_may_move_gets_its_half_of_the_depth(planar_arm: Any) -
     scene.add(wb.Box((0.5, 0.2, 0.2)), name="wall", at=(0.5, 0.1, 0.0))
     scene.add(wb.Sphere(0.1), name="ball", at=(1.05, 0.11, 0.0), body=wb.Body())
     q, viewed = np.zeros(3), Composition(scene, SceneGraph(), -1.0, (), False)
-    found = overlaps(scene, q)
+    found = overlaps(scene, q, "both")
     keyframe = viewed.keyframe(q, None, overlaps=found)
     arrows = {path: matrix for path, (marker, matrix) in keyframe.markers.items() if marker.kind == "arrow"}
     assert len(arrows) == 3  # the arm out of the wall; the arm and the ball out of each other
@@ -35,7 +35,9 @@ def test_each_of_two_that_may_move_gets_its_half_of_the_depth(planar_arm: Any) -
     assert marker.kind == "dashes"
     assert dashes[:3, 3] == pytest.approx(found[ball].point)
     assert dashes[:3, 3] + dashes[:3, 2] == pytest.approx(second[:3, 3])
-    assert any("mm" in marker.text for marker, _ in keyframe.markers.values() if marker.kind == "label")
+    labels = [marker.text for marker, _ in keyframe.markers.values() if marker.kind == "label"]
+    assert any("mm half each" in text for text in labels)
+    assert any(f"mm by {scene.figure.name}" in text for text in labels)
     only_second = [one._replace(moves_first=np.zeros(3)) for one in found if one.second == "ball"]
     assert [meaning for meaning, _ in legend([viewed.keyframe(q, None, overlaps=only_second)])] == [
         "global penetration depth PD_g"

@@ -54,21 +54,6 @@ def test_the_page_tells_what_is_shown(browser: Browser, tmp_path: Path) -> None:
         assert browser.evaluate(_PANEL)["status"].startswith("3 postures, 1.00 s; at most")
 
 
-@pytest.mark.browser
-def test_a_notebook_shows_the_scene_in_a_frame(browser: Browser, tmp_path: Path) -> None:
-    scene = wb.Scene(wb.load("hand"))
-    with wb.Viewer(scene, title="In a notebook") as viewer:
-        assert "nothing is shown yet" in viewer._repr_html_()
-        viewer.show(scene.figure.neutral)
-        (tmp_path / "cell.html").write_text(viewer._repr_html_(), encoding="utf-8")
-    framed = "document.querySelector('iframe').contentWindow"
-    ready = "document.querySelector('iframe')?.contentWindow?.wholebody?.ready === true"
-    browser.open((tmp_path / "cell.html").as_uri(), ready)
-    assert browser.evaluate(f"{framed}.document.querySelector('#panel b').textContent") == "In a notebook"
-    assert browser.evaluate(f"{framed}.viewer.scene_tree.find(['figure', 'body']).object.children.length") > 0
-    assert browser.evaluate(f"{framed}.viewer.capture_image().length") > 10_000
-
-
 def _pixels(path: Path) -> Any:
     return np.asarray(Image.open(path).convert("RGB")).astype(int)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +62,17 @@ def mouse(browser: Browser, kind: str, x: float, y: float, pressed: bool = False
     )
 
 
+def key(browser: Browser, name: str, shift: bool = False) -> None:
+    """Press and release a key."""
+    for kind in ("keyDown", "keyUp"):
+        browser._call("Input.dispatchKeyEvent", type=kind, key=name, code=name, modifiers=8 * shift)
+
+
+def arrived(drag: LiveDrag, place: Any) -> bool:
+    """Whether the right palm is at a place and let go."""
+    return bool(np.allclose(drag.place("right_palm"), place, atol=3e-3)) and not drag.taken
+
+
 def reached(browser: Browser, x: float, y: float) -> bool:
     """Move the mouse to a pixel; whether the page has drawn a handle there, of which its cursor tells."""
     for side in (3, 0):  # a mouse that stays tells nothing
@@ -108,4 +120,19 @@ def test_mouse_drags_holds_undoes_and_saves(
     assert len(saved.constraints) - len(saved.defaults) == 3
     press(browser, "undo")
     until(lambda: np.array_equal(drag.q, start))
+
+    for arrow, shift, wanted in (
+        ("ArrowUp", False, (0.0, 0.0, 0.03)),
+        ("ArrowRight", False, (0.03 * 1.6 / np.hypot(1.6, 2.2), 0.03 * 2.2 / np.hypot(1.6, 2.2), 0.0)),
+        ("ArrowDown", True, (0.03 * 2.2 / np.hypot(1.6, 2.2), -0.03 * 1.6 / np.hypot(1.6, 2.2), 0.0)),
+    ):
+        before = drag.place("right_palm")  # chosen by the last click
+        for _ in range(3):
+            key(browser, arrow, shift)
+        there = before + wanted
+        until(partial(arrived, drag, there))
+        key(browser, "Escape")
+        until(lambda: np.array_equal(drag.q, start))
+    assert np.allclose(client.camera.position, EYE, atol=1e-3)  # arrow keys do not turn the camera
+    assert browser.evaluate("document.body.textContent.includes('arrow keys move the chosen handle')")
     assert not browser.errors

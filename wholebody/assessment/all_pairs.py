@@ -148,21 +148,13 @@ def all_pairs(built: SceneGeometry) -> Pool[AllPairs]:
 
 
 class NearPairs(NamedTuple):
-    """Some pairs of a scene at a posture; arrays have k rows.
+    """Some pairs of a scene at a posture; arrays have k rows."""
 
-    Attributes:
-        built: the scene's geometry; where its pieces are now is not read.
-        number: (k,) places among the geometry model's collision pairs.
-        pair: (k, 2) the two pieces.
-        found: (k, 10) distance, normal from the first piece to the second, nearest points of both.
-        placement: (k, 2, 4, 3) where both pieces were: columns of the rotation, then the translation.
-    """
-
-    built: SceneGeometry
-    number: Indices
-    pair: Indices
-    found: Array
-    placement: Array
+    built: SceneGeometry  # the scene's geometry; where its pieces are now is not read
+    number: Indices  # (k,) places among the geometry model's collision pairs
+    pair: Indices  # (k, 2) the two pieces
+    found: Array  # (k, 10) distance, normal from the first piece to the second, nearest points of both
+    placement: Array  # (k, 2, 4, 3) where both pieces were: columns of the rotation, then the translation
 
     def label(self, row: int) -> Label:
         """What the pair in a row is called."""

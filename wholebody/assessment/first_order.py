@@ -31,21 +31,14 @@ INDEPENDENT = 1e-9  # share of its length that a direction must have of its own 
 
 @dataclass(frozen=True)
 class Blocker:
-    """A limit, constraint or contact that blocks a better posture.
+    """A limit, constraint or contact that blocks a better posture."""
 
-    Attributes:
-        kind: "contact" between two owners, "limit" of a joint, "bound" on a joint (as by `Freeze`), or "constraint".
-        names: the two segments or objects; the joint; or the constraint as in "constraints[0], Hold".
-        share: its part of the gradient, relative to the strongest blocker, from 0 to 1.
-        violated: whether it is violated at the posture.
-        frame: name of the frame of a constraint on one frame.
-    """
-
+    # "contact" between two owners, "limit" of a joint, "bound" on a joint (as by `Freeze`), or "constraint"
     kind: Literal["contact", "limit", "bound", "constraint"]
-    names: tuple[str, ...]
-    share: float
-    violated: bool
-    frame: str | None = None
+    names: tuple[str, ...]  # the two segments or objects; the joint; or the constraint as in "constraints[0], Hold"
+    share: float  # its part of the gradient, relative to the strongest blocker, from 0 to 1
+    violated: bool  # whether it is violated at the posture
+    frame: str | None = None  # name of the frame of a constraint on one frame
 
     def __str__(self) -> str:
         if self.kind == "contact":

@@ -35,23 +35,15 @@ DEPTHS = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
 
 @dataclass(frozen=True, eq=False)
 class MotionAssessment:
-    """How good a motion is.
-
-    Attributes:
-        depth: (n,) deepest overlap of any pair at each posture, metres; 0 if there is none.
-        overlapping: (n,) number of pairs that overlap by more than 0.01 mm.
-        limit_violation: largest violation of a joint limit at any posture, radians or metres.
-        velocity: (n - 1, nv) from posture to posture, radians and metres a second.
-        jerk: (n - 3,) root of the mean square of the third difference of the joint angles over time, rad/s^3.
-    """
+    """How good a motion is."""
 
     __repr__ = brief
 
-    depth: Array
-    overlapping: Counts
-    limit_violation: float
-    velocity: Array
-    jerk: Array
+    depth: Array  # (n,) deepest overlap of any pair at each posture, metres; 0 if there is none
+    overlapping: Counts  # (n,) number of pairs that overlap by more than 0.01 mm
+    limit_violation: float  # largest violation of a joint limit at any posture, radians or metres
+    velocity: Array  # (n - 1, nv) from posture to posture, radians and metres a second
+    jerk: Array  # (n - 3,) root of the mean square of the third difference of the joint angles over time, rad/s^3
 
 
 def assess_motion(

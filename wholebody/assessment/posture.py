@@ -18,7 +18,7 @@ import numpy as np
 from wholebody.assessment.all_pairs import AllPairs, all_pairs
 from wholebody.assessment.first_order import MET, Blocker, FirstOrder
 from wholebody.assessment.motion import limit_violation
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.base.checks import a, number, posture
 from wholebody.base.errors import InputError, TermError
 from wholebody.figures.state import State
@@ -47,6 +47,11 @@ class Assessment:
         goal_errors: (goals,) norm of each goal's error, metres or radians (whichever is larger).
         first_order: optimality and blockers, computed when they are asked for.
         seconds: wall time that the judgement itself took; a method's own time is its solution's less this.
+
+    Examples:
+        >>> judged = wb.assess(problem, solution.q)
+        >>> judged.goal_error < 1e-5, judged.penetration < 1e-5
+        (True, True)
     """
 
     goal_error: float
@@ -60,6 +65,8 @@ class Assessment:
     goal_errors: tuple[float, ...]
     first_order: FirstOrder = field(compare=False, repr=False)
     seconds: float = field(default=0.0, compare=False, repr=False)
+
+    __repr__ = brief
 
     @property
     def optimality(self) -> float:
@@ -119,6 +126,10 @@ def assess(problem: Problem, q: Array) -> Assessment:
     Raises:
         InputError: q has the wrong shape or a value that is not finite.
         TermError: a term of one's own answers what is not finite there, or no numbers of its shape; it is named.
+
+    Examples:
+        >>> wb.assess(problem, solution.q).goal_error < 1e-5
+        True
     """
     began = time.perf_counter()
     if not isinstance(problem, Problem):

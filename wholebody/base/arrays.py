@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
 from typing import Any, TypeAlias, TypeVar, cast
 
 import numpy as np
@@ -15,6 +16,7 @@ Record = TypeVar("Record", bound=tuple[Any, ...])
 
 SHOWN = 8  # numbers of an array that are shown
 LETTERS = 80  # of another value
+LINE = 240  # letters of all
 
 
 def as_dict(record: tuple[Any, ...]) -> dict[str, Any]:
@@ -31,15 +33,24 @@ def with_values(record: Record, **values: Any) -> Record:
 
 
 def brief(self: Any) -> str:
-    """The `__repr__` of a dataclass that has arrays: long ones are shown by their shape."""
-    told = ", ".join(f"{one.name}={_word(getattr(self, one.name))}" for one in fields(self) if one.repr)
-    return f"{type(self).__name__}({told})"
+    """The `__repr__` of a dataclass or named tuple in a line: long arrays by their shape, and no defaults."""
+    named = fields(self) if is_dataclass(self) else ()
+    names = {one.name: one.default for one in named if one.repr} or dict.fromkeys(getattr(self, "_fields", ()), self)
+    values = {name: getattr(self, name) for name in names}
+    told = [f"{name}={_word(value)}" for name, value in values.items() if not _is(value, names[name])]
+    text = f"{type(self).__name__}({', '.join(told)})"
+    return text if len(text) <= LINE else f"{text[: LINE - 4]}...)"
+
+
+def _is(value: object, default: object) -> bool:
+    """Whether a number, text or None is the default."""
+    return isinstance(value, (int, float, str, type(None))) and value == default
 
 
 def _word(value: Any) -> str:
     if isinstance(value, np.ndarray) and value.size > SHOWN:
         return f"<array {value.shape}>"
-    if isinstance(value, (tuple, list)) and len(value) > SHOWN:
-        return f"<{len(value)} {type(value[0]).__name__}>"
-    text = " ".join(repr(value).split())
+    if isinstance(value, (tuple, list, Mapping)) and len(value) > SHOWN:
+        return f"<{len(value)} {type(next(iter(value))).__name__}>"
+    text = f"{value:.4g}" if isinstance(value, float) else " ".join(repr(value).split())
     return text if len(text) <= LETTERS else f"{text[: LETTERS - 3]}..."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from wholebody.base.errors import InputError
@@ -38,6 +38,14 @@ def svg(chart: Any) -> str:
     chart.savefig(stream, format="svg", metadata={"Date": None})
     text = stream.getvalue()
     return text[text.index("<svg") :]
+
+
+def listing(heading: str, rows: Mapping[str, Iterable[str]]) -> str:
+    """A heading, and a table of named lists of words, HTML."""
+    lines = (
+        f"<tr><th>{html.escape(name)}</th><td>{html.escape(', '.join(each))}</td></tr>" for name, each in rows.items()
+    )
+    return f"<table><caption>{html.escape(heading)}</caption>{''.join(lines)}</table>"
 
 
 class Shown:

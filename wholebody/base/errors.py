@@ -47,11 +47,25 @@ def _spellings(name: str) -> tuple[str, str]:
 
 
 class WholebodyError(Exception):
-    """Base of every error that wholebody raises deliberately."""
+    """Base of every error that wholebody raises deliberately.
+
+    Examples:
+        >>> try:
+        ...     wb.solve(problem, method="qpp")
+        ... except wb.WholebodyError as error:
+        ...     print(type(error).__name__)
+        UnknownNameError
+    """
 
 
 class InputError(WholebodyError, ValueError):
-    """A value that cannot be used: wrong type, shape, sign or range, NaN, or an impossible combination."""
+    """A value that cannot be used: wrong type, shape, sign or range, NaN, or an impossible combination.
+
+    Examples:
+        >>> wb.Box((1.0, -1.0, 1.0))
+        Traceback (most recent call last):
+        wholebody.base.errors.InputError: ...
+    """
 
 
 class TermError(InputError):
@@ -87,7 +101,13 @@ class UndefinedTermError(TermError):
 
 
 class UnknownNameError(WholebodyError, KeyError):
-    """An unknown name; the message lists the nearest known names."""
+    """An unknown name; the message lists the nearest known names.
+
+    Examples:
+        >>> wb.load("humann")
+        Traceback (most recent call last):
+        wholebody.base.errors.UnknownNameError: ...human...
+    """
 
     def __init__(self, kind: str, name: str, known: Iterable[str], where: str = "") -> None:
         """Build the sentence of a kind of object and all known names; `where` is a place, such as "goal 2"."""
@@ -104,8 +124,19 @@ class UnknownNameError(WholebodyError, KeyError):
 
 
 class FileFormatError(WholebodyError, ValueError):
-    """A file that cannot be read, with its name and the place in it."""
+    """A file that cannot be read, with its name and the place in it.
+
+    Examples:
+        >>> wb.read_clip("missing.bvh", human)
+        Traceback (most recent call last):
+        wholebody.base.errors.FileFormatError: BVH file missing.bvh: there is no such file...
+    """
 
 
 class MissingPackageError(WholebodyError, ImportError):
-    """An optional package that the call needs, with the command that installs it."""
+    """An optional package that the call needs, with the command that installs it.
+
+    Examples:
+        >>> issubclass(wb.MissingPackageError, wb.WholebodyError)
+        True
+    """

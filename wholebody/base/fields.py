@@ -26,23 +26,14 @@ Check: TypeAlias = Callable[[Any, str], Any]
 
 @dataclass(frozen=True)
 class Range:
-    """The numbers that a value may be, both ends included.
+    """The numbers that a value may be, both ends included."""
 
-    Attributes:
-        low: the least.
-        high: the greatest.
-        unit: of the numbers.
-        whole: whether they are whole.
-        endless: whether infinity is taken too, for no limit.
-        wanted: what the message asks for in place of the range.
-    """
-
-    low: float
-    high: float
-    unit: str = ""
-    whole: bool = False
-    endless: bool = False
-    wanted: str = ""
+    low: float  # the least
+    high: float  # the greatest
+    unit: str = ""  # of the numbers
+    whole: bool = False  # whether they are whole
+    endless: bool = False  # whether infinity is taken too, for no limit
+    wanted: str = ""  # what the message asks for in place of the range
 
     def __call__(self, value: object, what: str) -> float:
         """The number; an InputError if the value is none of these."""

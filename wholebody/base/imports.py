@@ -4,28 +4,27 @@ from __future__ import annotations
 
 import signal
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from importlib import import_module
 
 
-def exported(package: str, modules: Mapping[str, str]) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
-    """Return a package's `__getattr__` and `__dir__`.
-
-    `modules` has the names that it exports, separated by blanks, by the module that has them.
-    """
-    home = {name: module for module, names in modules.items() for name in names.split()}
+def exported(package: str, file: str) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
+    """Return a package's `__getattr__`, `__dir__` and `__all__`: the names that its stub imports."""
+    home, module = dict[str, str](), ""
+    with open(f"{file.removesuffix('.py')}.pyi", encoding="utf-8") as stub:
+        for line in stub:
+            module = line.split()[1] if line.startswith("from ") else module
+            home.update({part.split(",")[0].strip(): module for part in line.split(" as ")[1:]})
 
     def load(name: str) -> object:
         if name not in home:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        value = getattr(import_module(home[name]), name)
+        room = home[name] == package
+        value = import_module(f"{package}.{name}") if room else getattr(import_module(home[name]), name)
         setattr(sys.modules[package], name, value)
         return value
 
-    def listed() -> list[str]:
-        return sorted(home)
-
-    return load, listed
+    return load, lambda: sorted(home), sorted(home)
 
 
 def end_quietly() -> None:

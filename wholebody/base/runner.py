@@ -64,19 +64,12 @@ class EndedError(WholebodyError):
 
 
 class Job(NamedTuple):
-    """A job for a child process.
+    """A job for a child process."""
 
-    Attributes:
-        name: any value by which the caller identifies the job; it is not sent to the process.
-        function: called in the process with the arguments.
-        arguments: of the function.
-        seconds: time to the deadline, unless the job moves it; 0 for none.
-    """
-
-    name: Any
-    function: Callable[..., Any]
-    arguments: tuple[Any, ...]
-    seconds: float
+    name: Any  # any value by which the caller identifies the job; it is not sent to the process
+    function: Callable[..., Any]  # called in the process with the arguments
+    arguments: tuple[Any, ...]  # of the function
+    seconds: float  # time to the deadline, unless the job moves it; 0 for none
 
 
 class Outcome(NamedTuple):

@@ -14,10 +14,10 @@ from datetime import date
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from typing import Any, TypeVar, get_origin, get_type_hints
+from typing import Any, TypeVar, get_type_hints
 
 from wholebody.base.errors import FileFormatError
-from wholebody.base.files import make_folder, read_text, write
+from wholebody.base.files import make_folder, write
 from wholebody.bench.statistics import Interval
 from wholebody.version import __version__
 
@@ -79,8 +79,7 @@ def write_text(path: Path, text: str) -> None:
 def write_rows(path: Path, facts: Mapping[str, str], rows: Sequence[Any]) -> None:
     """Write dataclass instances of one kind, one a line, under their field names; the facts stand above as comments.
 
-    An interval has three columns, of which the ends are called NAME_low and NAME_high; a mapping has a column a key,
-    and is read back with numbers where cells are numbers, without those that are empty.
+    An interval has three columns, of which the ends are called NAME_low and NAME_high; a mapping has a column a key.
     """
     text = io.StringIO()
     for name, value in facts.items():
@@ -104,44 +103,6 @@ def flat(row: Any) -> dict[str, Any]:
             if isinstance(each, Interval):
                 cells |= {name: each.value, f"{name}_low": each.low, f"{name}_high": each.high}
     return cells
-
-
-def read_rows(path: Path, kind: type[_R]) -> tuple[dict[str, str], list[_R]]:
-    """Read back what `write_rows` wrote; FileFormatError for no file, another kind of file, or a value that is none."""
-    facts: dict[str, str] = {}
-    rest = read_text(path, "table")
-    while rest.startswith("# "):
-        line, _, rest = rest.partition("\n")
-        name, _, value = line[2:].removesuffix("\r").partition(": ")
-        facts[name] = value
-    try:
-        given = list(csv.reader(io.StringIO(rest, newline="")))  # cells may have line breaks
-    except csv.Error as error:
-        raise FileFormatError(f"{path}: is not CSV ({error}); measure again") from None
-    types = get_type_hints(kind)
-    parts = {field.name: _parts(field.name, types[field.name]) for field in dataclasses.fields(kind)}  # type: ignore[arg-type]
-    for name in parts:
-        if get_origin(types[name]) is Mapping:  # which has all further columns
-            others = {part for other, each in parts.items() if other != name for part in each}
-            parts[name] = tuple(column for column in (given[0] if given else ()) if column not in others)
-    names = [name for each in parts.values() for name in each]
-    if not given or given[0] != names:
-        found = ", ".join(given[0])[:200] if given else "none"
-        raise FileFormatError(f"{path}: the columns are {found}, not {', '.join(names)}; measure again")
-    rows = []
-    for number, cells in enumerate(given[1:], start=1):
-        try:
-            texts = dict(zip(names, cells, strict=True))
-            values = {
-                name: {part: figure(texts[part]) for part in parts[name] if texts[part]}
-                if get_origin(types[name]) is Mapping
-                else _value(types[name], [texts[each] for each in parts[name]])
-                for name in parts
-            }
-            rows.append(kind(**values))
-        except ValueError as error:
-            raise FileFormatError(f"{path}: row {number} cannot be read ({error}); measure again") from None
-    return facts, rows
 
 
 def of(compute: Callable[..., Any]) -> dict[str, Callable[..., Any]]:
@@ -221,30 +182,3 @@ def _line(cells: Iterable[str]) -> str:
     line = io.StringIO(newline="")
     csv.writer(line, lineterminator="\r\n").writerow(cells)  # it quotes only what its own lines end with
     return line.getvalue().removesuffix("\r\n") + "\n"
-
-
-def _parts(name: str, kind: Any) -> tuple[str, ...]:
-    """The columns of a field."""
-    return (name, f"{name}_low", f"{name}_high") if kind is Interval else (name,)
-
-
-def figure(text: str) -> int | float | str:
-    """What a cell of a figure holds: a whole number, a number, or a text."""
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            pass
-    return text
-
-
-def _value(kind: Any, texts: Sequence[str]) -> Any:
-    if kind is Interval:
-        value, low, high = map(float, texts)
-        return Interval(value, low, high)
-    (text,) = texts
-    if kind is bool:
-        if text not in ("True", "False"):
-            raise ValueError(f"{text!r} is neither True nor False")
-        return text == "True"
-    return kind(text)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from wholebody.base.checks import choice
 from wholebody.base.errors import InputError
 from wholebody.cli.arguments import check_overlaps, scene_names, scene_options
 from wholebody.cli.command import command, flag, option
@@ -14,9 +15,9 @@ from wholebody.cli.command import command, flag, option
 if TYPE_CHECKING:
     from wholebody.base.arrays import Array
     from wholebody.bench.rows import Row
-    from wholebody.dynamics.overlaps import Overlap
     from wholebody.dynamics.world import WorldFrame
     from wholebody.tracking import InteractionScene
+    from wholebody.tracking.overlaps import Overlap
 
 
 @command(
@@ -31,6 +32,9 @@ without a network).""",
         "name of the scene, or all; or a task file whose objects have a density or a mass",
         "qp or ccd (default: qp)",
         "out/world",
+    ),
+    option(
+        "--give-way", default="figure", metavar="WHO", help="figure or both: who takes an overlap (default: figure)"
     ),
     flag("--picture", "draw five moments too, by a headless Chromium"),
     flag("--live", "open a page instead: drag handles and things with the mouse, and throw them (needs viser)"),
@@ -55,11 +59,13 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.tables import machine, write_text
     from wholebody.cli.tables import print_rows
     from wholebody.dynamics.scenes import WORLD_SCENES
+    from wholebody.tracking.overlaps import GIVE_WAY
 
     names = scene_names(arguments, WORLD_SCENES, "world", files=True)
     if not names:
         return 0
     check_overlaps([arguments.overlap])
+    choice(arguments.give_way, GIVE_WAY, "--give-way")
     if arguments.live:
         if len(names) > 1:
             raise InputError("--live shows one scene, not all; name one")
@@ -83,7 +89,7 @@ def _live(scene: InteractionScene, arguments: argparse.Namespace) -> int:
     from wholebody.tracking.receiver import Receiver
     from wholebody.view.live_page import LivePage
 
-    live = LiveWorld(scene.scene, scene.track.q[0])
+    live = LiveWorld(scene.scene, scene.track.q[0], give_way=arguments.give_way)
     receiver = None if arguments.udp is None else Receiver(arguments.udp, live.handles)
     told = {""}
 
@@ -121,8 +127,8 @@ def _run_one(scene: InteractionScene, arguments: argparse.Namespace, facts: dict
     from wholebody.bench.rows import chart
     from wholebody.bench.tables import write_rows
     from wholebody.cli.tables import progress_bar
-    from wholebody.dynamics.overlaps import overlaps
     from wholebody.dynamics.world import World
+    from wholebody.tracking.overlaps import overlaps
 
     name = scene.name
     frames: list[WorldFrame] = []
@@ -130,11 +136,12 @@ def _run_one(scene: InteractionScene, arguments: argparse.Namespace, facts: dict
     with progress_bar() as bar:
         task = bar.add_task(name, total=len(scene.track))
         world = World(
-            scene.scene, scene.track.q[0], dt=scene.track.dt, overlap=arguments.overlap, seed=arguments.seed
+            scene.scene, scene.track.q[0], dt=scene.track.dt, overlap=arguments.overlap, seed=arguments.seed,
+            give_way=arguments.give_way,
         )  # fmt: skip
         for tracked in scene.track.q:
             frames.append(world.step(tracked))
-            pushed.append(overlaps(scene.scene, frames[-1].wanted))
+            pushed.append(overlaps(scene.scene, frames[-1].wanted, arguments.give_way))
             bar.update(task, completed=len(frames))
     drawing = _animation(scene, frames, pushed, arguments.out, arguments.picture)
     inside = [sum(one.pairs for one in each) for each in pushed]

@@ -35,6 +35,10 @@ class Actuated:
     Raises:
         InputError: no figure, or a number that is negative or too large.
         UnknownNameError: a name that is no joint or group of the figure.
+
+    Examples:
+        >>> soft = wb.Actuated(human, stiffness={"right_arm": 40.0})  # the other joints are limp
+        >>> world = wb.World(scene, standing, spring=soft)
     """
 
     figure: Figure

@@ -40,6 +40,9 @@ class Spring(Checked):
 
     Raises:
         InputError: K is not within 1e-9 and 1e12 N/m, R not within 0 and 1e12 N s/m, or m not within 1e-9 and 1e6 kg.
+
+    Examples:
+        >>> world = wb.World(scene, standing, spring=wb.dynamics.Spring(stiffness=500.0, damping=30.0))
     """
 
     stiffness: Annotated[float, Range(1e-9, 1e12, "N/m")] = 1000.0

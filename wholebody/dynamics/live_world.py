@@ -17,7 +17,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import instance, known, numbers
+from wholebody.base.checks import choice, instance, known, numbers
 from wholebody.base.errors import InputError
 from wholebody.dynamics.actuated import Actuated
 from wholebody.dynamics.coupling import Spring
@@ -28,6 +28,7 @@ from wholebody.scene.scene import Scene
 from wholebody.tasks import Hold, Point
 from wholebody.tracking.live import LiveFrame
 from wholebody.tracking.live_subjects import LiveProblem, handle_frames, things_of
+from wholebody.tracking.overlaps import GIVE_WAY
 
 RATE = 12.0  # 1/s: of the spring between the mouse and a body
 STRONGEST = 80.0  # m/s^2: a body is not drawn faster than this
@@ -46,6 +47,7 @@ class LiveWorld:
         things: names of the things that can be dragged: those that move by themselves, and those that stand.
         held: frames that the tracked posture keeps where they are.
         taken: the handle that the mouse holds; "" for none.
+        give_way: who takes an overlap of the figure with a thing that moves by itself, see `World`.
         methods, chosen: of the tracker: "qp" alone.
     """
 
@@ -56,6 +58,7 @@ class LiveWorld:
         *,
         constraints: Sequence[Any] | None = None,
         spring: Spring | Actuated | None = None,
+        give_way: str = "figure",
     ) -> None:
         """Begin at a start (nq,), with constraints of the tracked posture: the soles of people are held by default.
 
@@ -66,6 +69,7 @@ class LiveWorld:
         """
         instance(scene, Scene, "LiveWorld: scene", "make one with wb.Scene(figure)")
         self._given, self._spring = scene, spring
+        self.give_way: str = choice(give_way, GIVE_WAY, "LiveWorld: give_way")
         empty = Scene(scene.figure)
         soles = [Hold(name) for name in handle_frames(scene.figure.frames) if name.endswith("_sole")]
         stated = Problem(empty, start, constraints=soles if constraints is None else constraints, balance=False)
@@ -80,7 +84,7 @@ class LiveWorld:
 
     def _begin(self) -> None:
         self.scene, self.taken = copy.copy(self._given), ""
-        self.world = World(self.scene, self._subject.q, spring=self._spring)
+        self.world = World(self.scene, self._subject.q, spring=self._spring, give_way=self.give_way)
         self._bodies = frozenset(() if self.world.engine is None else self.world.engine.bodies)
         self._state = self.scene.state(self.world.q)
         self._tracked, self._goals, self._renewed = np.array(self.world.q), dict[str, Array](), dict[str, float]()
@@ -128,6 +132,7 @@ class LiveWorld:
                 raise InputError("no handle was taken; take one first")
             self._pull(target)
         self._ease()
+        self.world.give_way = self.give_way
         frame = self.world.step(self._track())
         self._note = frame.note
         error = 0.0 if target is None else float(np.linalg.norm(self.place(self.taken) - target))

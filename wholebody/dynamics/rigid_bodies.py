@@ -158,6 +158,14 @@ class RigidBodies:
         else:  # along the mean of the velocities before and after
             self._pushed += before + 0.5 * float(impulse @ self._velocity(number, lever))
 
+    def put(self, name: str, at: pin.SE3) -> None:
+        """Put a body elsewhere, with its velocity; it wakes, and what lay on it. What that raises is work."""
+        number, before, kept = self._number(name), self.energy(), self.state.copies()
+        self.state.put(number, at)
+        self.state.bodies.moving[self._joints.linked(number)] = True
+        self._sleepers.wake_where_put(self._finder, kept)
+        self._pushed += self.energy() - before
+
     def _inverse_inertia(self, number: int) -> Array:
         rotation = self.state.bodies.rotation[number]
         return np.asarray(rotation @ self.state.bodies.inverse[number] @ rotation.T)

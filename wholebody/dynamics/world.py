@@ -15,14 +15,13 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from wholebody.base.arrays import Array
-from wholebody.base.checks import array, instance, time_step
+from wholebody.base.arrays import Array, brief
+from wholebody.base.checks import array, choice, instance, time_step
 from wholebody.base.errors import InputError
 from wholebody.dynamics.actuated import Actuated
 from wholebody.dynamics.articulated import Articulated, Moved
 from wholebody.dynamics.coupling import Coupling, PushedContacts, Spring
 from wholebody.dynamics.frame import EngineFrame, one_frame
-from wholebody.dynamics.overlaps import Overlap, overlaps
 from wholebody.dynamics.pieces import HUMAN, segment_placements
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.geometry.continuous.passing_through import INSIDE
@@ -34,6 +33,7 @@ from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import NotCopyable
 from wholebody.tracking.frame import FRAME, Frame
 from wholebody.tracking.loop import FrameLoop, invalid_reason
+from wholebody.tracking.overlaps import GIVE_WAY, Overlap, overlaps
 
 Advance = tuple[Array, Frame, Mapping[str, Array], EngineFrame | None]
 """The posture that was wanted, the frame, impulses on things, and what the things did."""
@@ -73,6 +73,9 @@ class WorldFrame(NamedTuple):
     seconds: float
     note: str
 
+    def __repr__(self) -> str:
+        return brief(self)
+
 
 class World(NotCopyable):
     """A figure that follows a tracker among things, some of which move by themselves.
@@ -85,6 +88,16 @@ class World(NotCopyable):
         dt: seconds a frame.
         time: seconds since the start.
         engine: the things that move by themselves; None if there are none.
+
+    Raises:
+        InputError: a value of the wrong kind or range, or a figure that penetrates something and cannot leave it.
+
+    Examples:
+        >>> room = wb.Scene(human).add(wb.HalfSpace(), name="floor")
+        >>> _ = room.add(wb.Sphere(0.1), name="ball", at=(0.5, 0.0, 1.0), body=wb.Body(mass=0.5))
+        >>> frame = wb.World(room).step()
+        >>> bool(frame.placements["ball"].translation[2] < 1.0)
+        True
     """
 
     def __init__(
@@ -96,6 +109,7 @@ class World(NotCopyable):
         overlap: str = "qp",
         seed: int = 0,
         spring: Spring | Actuated | None = None,
+        give_way: str = "figure",
     ) -> None:
         """Begin.
 
@@ -107,6 +121,8 @@ class World(NotCopyable):
             seed: of all random orders; the same seed gives the same motion.
             spring: between tracker and figure, K 1000, R 40 and 0.4 kg by default; or a `wb.Actuated` of the figure,
                 whose joints then yield to what they meet.
+            give_way: who takes an overlap of the figure with a thing that moves by itself, "figure" or "both", half and
+                half; see `FrameLoop`. A `wb.Actuated` figure yields by its springs.
 
         Raises:
             InputError: no posture near the start is free, a thing that moves by itself overlaps another thing at the
@@ -118,7 +134,9 @@ class World(NotCopyable):
         instance(spring, (Spring, Actuated, type(None)), "World: spring", instead)
         self._bodies = tuple(name for name, thing in scene.objects.items() if thing.body is not None)
         first = scene.figure.posture(scene.figure.postures[0]) if start is None else start
-        self._loop = FrameLoop(scene, first, overlap=overlap, dt=self.dt, seed=seed, touching=self._bodies)
+        self._loop = FrameLoop(
+            scene, first, overlap=overlap, dt=self.dt, seed=seed, touching=self._bodies, give_way=give_way
+        )  # fmt: skip
         self.engine = RigidBodies(scene, start=self._loop.shown) if self._bodies else None
         self._articulated = None
         if isinstance(spring, Actuated):
@@ -147,6 +165,15 @@ class World(NotCopyable):
     def q(self) -> Array:
         """(nq,) the posture that is shown."""
         return self._loop.shown if self._articulated is None else self._articulated.q
+
+    @property
+    def give_way(self) -> str:
+        """Who takes an overlap of the figure with a thing that moves by itself; it can be set."""
+        return self._loop.give_way
+
+    @give_way.setter
+    def give_way(self, give_way: str) -> None:
+        self._loop.give_way = choice(give_way, GIVE_WAY, "World: give_way")
 
     @property
     def velocity(self) -> Array:
@@ -190,7 +217,7 @@ class World(NotCopyable):
         self._workspace.refresh()
         near = self.scene.overlapping(frame.q, self._workspace)
         deepest = max(0.0, -float(near.distance.min(initial=0.0)))
-        found = overlaps(self.scene, frame.q) if deepest > INSIDE else ()
+        found = overlaps(self.scene, frame.q, self.give_way) if deepest > INSIDE else ()
         squeezed = self._squeezed(near, {*self._bodies, *moved})
         note = f"{note}; the one before counts" if note else ""
         note = "; ".join(part for part in (note, frame.note, *map(str, squeezed)) if part)
@@ -205,6 +232,9 @@ class World(NotCopyable):
         frame = self._loop.frame(wanted)
         impulses, engine = dict[str, Array](), None
         if self.engine is not None:
+            for name in self._bodies if self.give_way == "both" else ():
+                if self.scene.objects[name].placement != self._placed[name]:
+                    self.engine.put(name, self.scene.objects[name].placement)
             impulses = self._push(frame.q)
             after = self._segments(frame.q)
             given = {name: (self._before[name], place) for name, place in after.items()}

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.joined import one_figure
@@ -65,6 +65,11 @@ class BodyAngles:
         neck_twist: likewise about the axis.
         left_share: share of the weight on the left foot, 0 to 1, from the centre of mass between the ankles.
         center_ahead: of the centre of mass before the middle of the ankles, metres.
+
+    Examples:
+        >>> angles = wb.ergonomics.body_angles(human, standing)
+        >>> abs(angles.trunk_flexion) < 0.1
+        True
     """
 
     left: SideAngles
@@ -77,6 +82,8 @@ class BodyAngles:
     neck_twist: float
     left_share: float
     center_ahead: float
+
+    __repr__ = brief
 
     def side(self, name: str) -> SideAngles:
         """The angles of "left" or "right"."""
@@ -92,6 +99,10 @@ def body_angles(figure: Figure, q: Array) -> BodyAngles:
 
     Raises:
         InputError: a figure without these names, or q has the wrong shape or is not finite.
+
+    Examples:
+        >>> wb.ergonomics.body_angles(human, standing).left.elbow_flexion < 0.3
+        True
     """
     check_person(figure, "body_angles: figure")
     q = checks.posture(q, figure.model.nq, "body_angles: q")

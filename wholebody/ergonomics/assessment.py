@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from math import degrees
 from typing import Any
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.ergonomics.angles import SIDES, BodyAngles, check_person
 from wholebody.ergonomics.owas_score import Owas, owas_code
 from wholebody.ergonomics.posture_torques import StaticTorques, static_torques
@@ -42,6 +42,10 @@ class Ergonomics:
         rula, reba, owas: the scores.
         torques: static torques against strength.
         seat: whether the person was taken to sit, and what told it.
+
+    Examples:
+        >>> wb.ergonomics.ergonomics_of(human, standing).rula.left.score
+        2
     """
 
     angles: BodyAngles
@@ -50,6 +54,8 @@ class Ergonomics:
     owas: Owas
     torques: StaticTorques
     seat: str = ""
+
+    __repr__ = brief
 
     def rows(self) -> list[tuple[str, str, str, str]]:
         """Rows of a table: method, left, right, and what it says of the worse side."""
@@ -115,6 +121,10 @@ def ergonomics_of(
 
     Raises:
         InputError: no person, no posture, no work or no strength.
+
+    Examples:
+        >>> scores = wb.ergonomics.ergonomics_of(human, standing, wb.ergonomics.Work(load=6.0))
+        >>> rows = scores.rows()
     """
     person = seen(figure, q, work, "ergonomics_of")
     angles, told = person.angles, person.work

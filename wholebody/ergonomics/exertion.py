@@ -167,6 +167,13 @@ class Exertion(Measure):
         strength: of the person.
         standing: whether both feet carry the person; False for who sits, whose legs do not count.
         weight: factor on the measure; 10 of it beside `Effort` is as strong as a habit.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a frame that the figure does not have.
+
+    Examples:
+        >>> light = wb.ergonomics.Exertion([wb.Force("right_palm", (0, 0, -50))], weight=10.0)
     """
 
     forces: Forces = ()
@@ -213,6 +220,13 @@ class StrengthLimit(Constraint):
         standing: as for `Exertion`.
         share: of the strength that may be used.
         compression: greatest of the disc L5/S1 [N]; None for no bound.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a frame that the figure does not have.
+
+    Examples:
+        >>> limit = wb.ergonomics.StrengthLimit([wb.Force("right_palm", (0, 0, -50))], share=0.5)
     """
 
     forces: Forces = ()
@@ -255,6 +269,10 @@ def back_compression(figure: Figure, q: Array, forces: Sequence[Force] = ()) -> 
     Raises:
         InputError: no person, no posture, or no forces.
         UnknownNameError: a force on an unknown frame.
+
+    Examples:
+        >>> wb.ergonomics.back_compression(human, standing) < 1000.0
+        True
     """
     person = check_person(figure, "back_compression: figure")
     q = checks.posture(q, person.model.nq, "back_compression: q")

@@ -40,6 +40,14 @@ class Lift(Checked):
         duration: of the lifting, hours, up to 8.
         coupling: "good", "fair" or "poor".
         load: kg; None for a lift of which only the limit is asked.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> lift = wb.ergonomics.Lift(horizontal=0.4, vertical=0.7, travel=0.5, load=10.0)
+        >>> lift.index > 0.5
+        True
     """
 
     horizontal: Annotated[float, Range(0.0, 3.0, "m")]
@@ -107,6 +115,10 @@ def lift_between(
 
     Raises:
         InputError: no person, no posture, or a value out of range.
+
+    Examples:
+        >>> take = human.with_joints(standing, {"left_shoulder_flexion": 1.0, "right_shoulder_flexion": 1.0})
+        >>> origin, destination = wb.ergonomics.lift_between(human, standing, take, load=5.0)
     """
     person = check_person(figure, "lift_between: figure")
     floor = checks.number(floor, "lift_between: floor", -100.0, 100.0, "m")

@@ -26,7 +26,12 @@ BENT_KNEE = radians(30.0)
 
 @dataclass(frozen=True)
 class Owas(Checked):
-    """The digits of an OWAS code; an InputError if one is out of its range."""
+    """The digits of an OWAS code; an InputError if one is out of its range.
+
+    Examples:
+        >>> wb.ergonomics.Owas(back=2, arms=1, legs=2, load=1).category
+        2
+    """
 
     back: Annotated[int, Range(1, 4, whole=True)]
     arms: Annotated[int, Range(1, 3, whole=True)]
@@ -56,7 +61,12 @@ class Owas(Checked):
 
 
 def owas(figure: Figure | Scene, q: Array, work: Work | None = None) -> Owas:
-    """OWAS of a person's posture; arguments and errors as for `rula`. Of `work` counts whether the person walks too."""
+    """OWAS of a person's posture; arguments and errors as for `rula`. Of `work` counts whether the person walks too.
+
+    Examples:
+        >>> wb.ergonomics.owas(human, standing).category
+        1
+    """
     person = seen(figure, q, work, "owas")
     return owas_code(person.angles, person.work)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.ergonomics.angles import SIDES, check_person
 from wholebody.ergonomics.work import LOAD
 from wholebody.figures.figure import Figure
@@ -29,10 +29,17 @@ class StaticTorques:
         torque: joint -> torque, N m; positive towards positive angles.
         share: joint -> share of the strength in its direction, of the joints with published strength; more than 1 is
             more than the person can.
+
+    Examples:
+        >>> held = wb.ergonomics.static_torques(human, standing, load=5.0)
+        >>> max(held.share.values()) < 1.0
+        True
     """
 
     torque: Mapping[str, float]
     share: Mapping[str, float]
+
+    __repr__ = brief
 
     @property
     def worst(self) -> tuple[str, float]:
@@ -63,6 +70,10 @@ def static_torques(
 
     Raises:
         InputError: no person, no posture, or a value out of range.
+
+    Examples:
+        >>> round(wb.ergonomics.static_torques(human, standing, load=10.0).torque["left_elbow_flexion"], 1)
+        4.9
     """
     person = check_person(figure, "static_torques: figure")
     q = checks.posture(q, person.model.nq, "static_torques: q")

@@ -25,7 +25,12 @@ from wholebody.scene.scene import Scene
 
 @dataclass(frozen=True)
 class RebaParts(Checked):
-    """Scores of the parts of the body, which the tables combine; an InputError if one is out of its range."""
+    """Scores of the parts of the body, which the tables combine; an InputError if one is out of its range.
+
+    Examples:
+        >>> wb.ergonomics.RebaParts(neck=1, trunk=2, legs=1, upper_arm=1, lower_arm=1, wrist=1).score
+        1
+    """
 
     neck: Annotated[int, Range(1, 3, whole=True)]
     trunk: Annotated[int, Range(1, 5, whole=True)]
@@ -59,14 +64,25 @@ class RebaParts(Checked):
 
 
 class Reba(BothSides):
-    """REBA of both sides: the parts with the arm and the leg of each side."""
+    """REBA of both sides: the parts with the arm and the leg of each side.
+
+    Examples:
+        >>> reba = wb.ergonomics.reba(human, standing)
+        >>> max(reba.left.score, reba.right.score) == reba.score
+        True
+    """
 
     left: RebaParts
     right: RebaParts
 
 
 def reba(figure: Figure | Scene, q: Array, work: Work | None = None) -> Reba:
-    """REBA of a person's posture; arguments and errors as for `rula`. Of `work` the grip counts too."""
+    """REBA of a person's posture; arguments and errors as for `rula`. Of `work` the grip counts too.
+
+    Examples:
+        >>> wb.ergonomics.reba(human, standing).score
+        1
+    """
     person = seen(figure, q, work, "reba")
     return Reba(*(reba_parts(person.angles, side, person.work) for side in SIDES))
 

@@ -28,7 +28,12 @@ END_OF_TWIST = radians(45.0)  # half of the forearm's usual range to either side
 
 @dataclass(frozen=True)
 class RulaParts(Checked):
-    """Scores of the parts of the body, which the tables combine; an InputError if one is out of its range."""
+    """Scores of the parts of the body, which the tables combine; an InputError if one is out of its range.
+
+    Examples:
+        >>> wb.ergonomics.RulaParts(upper_arm=1, lower_arm=1, wrist=1, wrist_twist=1, neck=1, trunk=1, legs=1).score
+        1
+    """
 
     upper_arm: Annotated[int, Range(1, 6, whole=True)]
     lower_arm: Annotated[int, Range(1, 3, whole=True)]
@@ -64,7 +69,13 @@ class RulaParts(Checked):
 
 
 class Rula(BothSides):
-    """RULA of both sides."""
+    """RULA of both sides.
+
+    Examples:
+        >>> rula = wb.ergonomics.rula(human, standing)
+        >>> max(rula.left.score, rula.right.score) == rula.score
+        True
+    """
 
     left: RulaParts
     right: RulaParts
@@ -80,6 +91,10 @@ def rula(figure: Figure | Scene, q: Array, work: Work | None = None) -> Rula:
 
     Raises:
         InputError: no person, no posture, or no work.
+
+    Examples:
+        >>> wb.ergonomics.rula(human, standing, wb.ergonomics.Work(repeated=True)).score
+        3
     """
     person = seen(figure, q, work, "rula")
     return Rula(*(rula_parts(person.angles, side, person.work) for side in SIDES))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi, radians
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeAlias
 
 import coal
 import numpy as np
@@ -20,6 +20,7 @@ from wholebody.tasks import inputs
 EYES = "gaze"  # frame between the eyes; its x axis points ahead
 RAY = 1e-3  # m: radius of a line of sight
 NEAR = 0.02  # m: at both ends of a line of sight that is not looked at: the thing that is seen hides nothing
+TINY = 1e-12  # m^2, m^3: no direction is straight up or down exactly
 BLURRED = 0.05  # m: nearer points are not seen
 
 
@@ -32,6 +33,12 @@ class FieldOfView(Checked):
         up: above the normal line of sight, radians.
         down: below it, radians.
         declination: of the normal line of sight below the head's own axis ahead, radians.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> narrow = wb.ergonomics.FieldOfView(horizontal=0.26)
     """
 
     horizontal: Annotated[float, Range(1e-3, pi, "rad")] = radians(35.0)
@@ -45,12 +52,27 @@ class FieldOfView(Checked):
         Raises:
             InputError: it is no direction.
         """
-        sine, cosine = np.sin(self.declination), np.cos(self.declination)
-        x, y, z = checks.numbers(direction, (3,), "off: direction").tolist()
-        ahead, above = cosine * x - sine * z, sine * x + cosine * z
-        side, height = np.arctan2(y, ahead), np.arctan2(above, np.hypot(ahead, y))
-        return float(np.hypot(side / self.horizontal, height / (self.up if height > 0.0 else self.down)))
+        return float(np.sqrt(self.squared(checks.numbers(direction, (3,), "off: direction"))[0]))
 
+    def squared(self, direction: Array) -> tuple[float, Array]:
+        """The square of `off` of a direction (3,) in the eyes' axes, and its derivative (3,)."""
+        sine, cosine = np.sin(self.declination), np.cos(self.declination)
+        turned = np.array(((cosine, 0.0, -sine), (0.0, 1.0, 0.0), (sine, 0.0, cosine)))
+        x, y, z = (turned @ direction).tolist()
+        level = float(np.hypot(x, y))
+        side, height = np.arctan2(y, x) / self.horizontal, np.arctan2(z, level)
+        bound = self.up if height > 0.0 else self.down
+        d_side = np.array((-y, x, 0.0)) / max(level**2, TINY) / self.horizontal
+        d_height = np.array((-z * x, -z * y, level**2)) / max(level * (level**2 + z**2), TINY) / bound
+        slope = 2.0 * (side * d_side + height / bound * d_height)
+        return float(side**2 + (height / bound) ** 2), slope @ turned
+
+
+def _field(value: object, where: str) -> FieldOfView:
+    return checks.instance(value, FieldOfView, where, "give one such as wb.ergonomics.FieldOfView()")
+
+
+FieldOfViewGiven: TypeAlias = Annotated[FieldOfView, _field]
 
 COMFORTABLE = FieldOfView(radians(15.0), radians(15.0), radians(15.0))
 """Easy eye movement: 15 degrees to each side, up and down (MIL-STD-1472G, figure of the visual field: optimum eye
@@ -69,6 +91,10 @@ class Sight:
         comfortable: whether easy eye movement reaches it.
         distance: from the eyes, metres.
         hidden_by: name of the thing or segment that is in between; "" for none.
+
+    Examples:
+        >>> wb.ergonomics.sight(scene, standing, (2.0, 0.0, 1.5)).comfortable
+        True
     """
 
     off: float
@@ -96,6 +122,10 @@ def sight(scene: Scene, q: Array, point: Array, field: FieldOfView = LARGEST, *,
 
     Raises:
         InputError: a value of the wrong kind, or a figure without eyes.
+
+    Examples:
+        >>> wb.ergonomics.sight(scene, standing, (2.0, 0.0, 1.5)).hidden_by
+        ''
     """
     checks.instance(scene, Scene, "sight: scene", "make one with wb.Scene(figure)")
     q = checks.posture(q, scene.model.nq, "sight: q")

@@ -43,6 +43,12 @@ class Work(Checked):
         walking: whether the person walks (OWAS).
         seated: None to tell it from the posture: both thighs lie, both knees are bent, no knee is on the ground, and
             the centre of mass is behind the feet.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> work = wb.ergonomics.Work(load=6.0, repeated=True)
     """
 
     load: Annotated[float, LOAD] = 0.0

@@ -52,6 +52,11 @@ def adjustable(
 
     Raises:
         InputError: no parts, no shape, a half-space, no setting, or a range that is empty.
+
+    Examples:
+        >>> seat = wb.figures.adjustable({"cushion": wb.Box((0.5, 0.5, 0.08))}, slide=(-0.1, 0.1))
+        >>> seat.joints
+        ('slide',)
     """
     told = "adjustable: parts"
     checks.instance(parts, Mapping, told, "give {'cushion': (wb.Box((0.45, 0.5, 0.05)), (0.2, 0, 0.4))}")

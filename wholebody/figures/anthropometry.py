@@ -47,23 +47,15 @@ OVERHEAD = "overhead_reach_sitting"
 
 @dataclass(frozen=True)
 class Person:
-    """One person; all other quantities follow from these.
+    """One person; all other quantities follow from these."""
 
-    Attributes:
-        sex: "male" or "female".
-        stature: metres.
-        mass: kilograms.
-        dimensions: name and metres of all others, in the order of `dimension_names`.
-        stated: names of those that were given; the others are likely for them.
-        age: years, for the ranges of motion; None for those of all adults.
-    """
-
-    sex: str
-    stature: float
-    mass: float
+    sex: str  # "male" or "female"
+    stature: float  # metres
+    mass: float  # kilograms
+    # name and metres of all others, in the order of `dimension_names`
     dimensions: tuple[tuple[str, float], ...] = field(repr=False)
-    stated: tuple[str, ...] = ()
-    age: float | None = field(default=None, repr=False)
+    stated: tuple[str, ...] = ()  # names of those that were given; the others are likely for them
+    age: float | None = field(default=None, repr=False)  # years, for the ranges of motion; None for those of all adults
 
     @property
     def column(self) -> str:

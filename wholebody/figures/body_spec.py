@@ -20,20 +20,13 @@ from wholebody.figures.anthropometry import Person
 
 
 class Solid(NamedTuple):
-    """One convex piece on a segment.
+    """One convex piece on a segment."""
 
-    Attributes:
-        name: unique in the figure: "<segment>" or "<segment>:<k>".
-        segment: name of the segment that carries it.
-        geometry: coal's Sphere, Capsule, Box or Convex.
-        placement: of the geometry in the segment's frame.
-        mesh: for a Convex, the file (relative to the URDF) and the scale along x, y, z that give its vertices.
-    """
-
-    name: str
-    segment: str
-    geometry: Any
-    placement: pin.SE3
+    name: str  # unique in the figure: "<segment>" or "<segment>:<k>"
+    segment: str  # name of the segment that carries it
+    geometry: Any  # coal's Sphere, Capsule, Box or Convex
+    placement: pin.SE3  # of the geometry in the segment's frame
+    # for a Convex, the file (relative to the URDF) and the scale along x, y, z that give its vertices
     mesh: tuple[str, tuple[float, float, float]] | None = None
 
 
@@ -68,25 +61,15 @@ class Landmark(NamedTuple):
 
 @dataclass(frozen=True)
 class BodySpec:
-    """The content of a body's URDF.
+    """The content of a body's URDF."""
 
-    Attributes:
-        name: name of the robot in the URDF.
-        title: one line for the head of the file.
-        links: the root link first.
-        joints: in the order of the links they end in.
-        landmarks: frames for goals.
-        solids: collision pieces.
-        person: whose body it is.
-    """
-
-    name: str
-    title: str
-    links: tuple[Link, ...]
-    joints: tuple[Joint, ...]
-    landmarks: tuple[Landmark, ...]
-    solids: tuple[Solid, ...]
-    person: Person | None = None
+    name: str  # name of the robot in the URDF
+    title: str  # one line for the head of the file
+    links: tuple[Link, ...]  # the root link first
+    joints: tuple[Joint, ...]  # in the order of the links they end in
+    landmarks: tuple[Landmark, ...]  # frames for goals
+    solids: tuple[Solid, ...]  # collision pieces
+    person: Person | None = None  # whose body it is
 
 
 def place(x: float = 0.0, y: float = 0.0, z: float = 0.0, rotation: Array | None = None) -> pin.SE3:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures.figure import Figure
 
@@ -34,6 +34,11 @@ class DenavitHartenberg(NamedTuple):
         a: (n,) metres along the common normal.
         alpha: (n,) radians about the common normal.
         tool: placement of the tip in the last DH frame.
+
+    Examples:
+        >>> table = wb.figures.denavit_hartenberg(human, "right_arm")
+        >>> table.d.shape == table.a.shape == (len(table.joints),)
+        True
     """
 
     joints: tuple[str, ...]
@@ -45,6 +50,9 @@ class DenavitHartenberg(NamedTuple):
     a: Array
     alpha: Array
     tool: pin.SE3
+
+    def __repr__(self) -> str:
+        return brief(self)
 
     def forward(self, values: Array) -> pin.SE3:
         """Return the placement of the tip in the reference frame at joint values (n,)."""
@@ -73,6 +81,10 @@ def denavit_hartenberg(figure: Figure, branch: str) -> DenavitHartenberg:
     Raises:
         UnknownNameError: no such chain.
         InputError: the chain has a joint that is not revolute.
+
+    Examples:
+        >>> wb.figures.denavit_hartenberg(human, "right_arm").tip
+        'right_index_tip'
     """
     if branch not in figure.chains:
         raise UnknownNameError("branch", branch, figure.chains)

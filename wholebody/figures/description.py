@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, brief
 from wholebody.figures.anthropometry import Person
 from wholebody.figures.body_spec import Solid
 from wholebody.figures.motion_ranges import MotionRange
@@ -21,10 +21,18 @@ ROOT_JOINT = "root_joint"
 
 
 class Chain(NamedTuple):
-    """Joints from the root outwards, and the frame at the end."""
+    """Joints from the root outwards, and the frame at the end.
+
+    Examples:
+        >>> human.chains["right_arm"].tip
+        'right_index_tip'
+    """
 
     joints: tuple[str, ...]
     tip: str
+
+    def __repr__(self) -> str:
+        return brief(self)
 
 
 class JointCone(NamedTuple):
@@ -35,12 +43,19 @@ class JointCone(NamedTuple):
         reference: frame to which the cone is fixed.
         limb: frame that carries the limb.
         axis: (3,) unit direction of the limb in its own frame.
+
+    Examples:
+        >>> human.cones["left_shoulder"].axis.shape
+        (3,)
     """
 
     cone: ReachCone
     reference: str
     limb: str
     axis: Array
+
+    def __repr__(self) -> str:
+        return brief(self)
 
 
 class ExcludedPair(NamedTuple):
@@ -59,6 +74,10 @@ class Limits(NamedTuple):
         idx_v: (n,) indices in the tangent vector.
         lower: (n,) radians or metres.
         upper: (n,)
+
+    Examples:
+        >>> bool((human.limits.lower <= human.limits.upper).all())
+        True
     """
 
     idx_q: Indices
@@ -66,21 +85,17 @@ class Limits(NamedTuple):
     lower: Array
     upper: Array
 
+    def __repr__(self) -> str:
+        return brief(self)
+
 
 class Follower(NamedTuple):
-    """A joint whose value is that of another times a slope plus an offset (mimic).
+    """A joint whose value is that of another times a slope plus an offset (mimic)."""
 
-    Attributes:
-        joint: name of the followed joint.
-        idx_q: its index in the posture.
-        slope: never zero.
-        offset: radians or metres.
-    """
-
-    joint: str
-    idx_q: int
-    slope: float
-    offset: float
+    joint: str  # name of the followed joint
+    idx_q: int  # its index in the posture
+    slope: float  # never zero
+    offset: float  # radians or metres
 
     def value(self, q: Array) -> float:
         """Value of the joint at a posture."""
@@ -96,55 +111,40 @@ Articulated: TypeAlias = Any
 
 
 class Member(NamedTuple):
-    """A figure among those that were joined.
+    """A figure among those that were joined."""
 
-    Attributes:
-        figure: as it is alone.
-        at: where the world of that figure is in the world: it places a fixed root, and the postures of a free one.
-    """
-
-    figure: Articulated
+    figure: Articulated  # as it is alone
+    # where the world of that figure is in the world: it places a fixed root, and the postures of a free one
     at: pin.SE3
 
 
 class Description(NamedTuple):
-    """The named parts of a figure, in addition to its model and geometry.
+    """The named parts of a figure, in addition to its model and geometry."""
 
-    Attributes:
-        groups: group to joints, without the root.
-        chains: limbs, from the root outwards.
-        frames: names of frames for goals.
-        segments: links with mass or geometry.
-        postures: name to a function that computes the posture of a figure.
-        cones: reach cones of ball joints.
-        collision_groups: segment to the group whose parts are never tested against each other; may be empty.
-        effort: joint to weight of its effort; joints that are not named have 1.
-        excluded: pairs of pieces that are not tested, with the reason.
-        ranges: ranges of motion that more than one joint angle decides; a problem takes them by default.
-        root_effort: weight of the position [rad^2/m^2] and of the rotation of each free root in the effort.
-        notes: sentences on what had to be changed about the geometry of a file, or about stated dimensions.
-        person: sex, stature and mass of the figure or of the hand's owner; None for a figure of a file.
-        members: figures that were joined, by name; empty for one figure.
-        prefixes: what the names of each figure's parts begin with, such as "anna/"; "" for one figure.
-        outer: makes the pieces that meet things in the world, on frames of the model, for a figure whose own are too
-            coarse for it; None if its own do.
-    """
-
-    groups: Mapping[str, tuple[str, ...]]
-    chains: Mapping[str, Chain]
-    frames: tuple[str, ...]
-    segments: tuple[str, ...]
-    postures: Mapping[str, Callable[[Articulated], Array]]
-    cones: Mapping[str, JointCone] = MappingProxyType({})
+    groups: Mapping[str, tuple[str, ...]]  # group to joints, without the root
+    chains: Mapping[str, Chain]  # limbs, from the root outwards
+    frames: tuple[str, ...]  # names of frames for goals
+    segments: tuple[str, ...]  # links with mass or geometry
+    postures: Mapping[str, Callable[[Articulated], Array]]  # name to a function that computes the posture of a figure
+    cones: Mapping[str, JointCone] = MappingProxyType({})  # reach cones of ball joints
+    # segment to the group whose parts are never tested against each other; may be empty
     collision_groups: Mapping[str, str] = MappingProxyType({})
+    # joint to weight of its effort; joints that are not named have 1
     effort: Mapping[str, float] = MappingProxyType({})
-    excluded: tuple[ExcludedPair, ...] = ()
+    excluded: tuple[ExcludedPair, ...] = ()  # pairs of pieces that are not tested, with the reason
+    # ranges of motion that more than one joint angle decides; a problem takes them by default
     ranges: Mapping[str, MotionRange] = MappingProxyType({})
+    # weight of the position [rad^2/m^2] and of the rotation of each free root in the effort
     root_effort: tuple[float, ...] = (0.0, 0.0)
+    # sentences on what had to be changed about the geometry of a file, or about stated dimensions
     notes: tuple[str, ...] = ()
+    # sex, stature and mass of the figure or of the hand's owner; None for a figure of a file
     person: Person | None = None
-    members: Mapping[str, Member] = MappingProxyType({})
+    members: Mapping[str, Member] = MappingProxyType({})  # figures that were joined, by name; empty for one figure
+    # what the names of each figure's parts begin with, such as "anna/"; "" for one figure
     prefixes: tuple[str, ...] = ("",)
+    # makes the pieces that meet things in the world, on frames of the model, for a figure whose own are too coarse for
+    # it; None if its own do
     outer: Callable[[], tuple[Solid, ...]] | None = None
 
 

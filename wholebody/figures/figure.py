@@ -72,6 +72,10 @@ class Figure(checks.FixedAttributes):
         followers: joint to the law by which it follows another (mimic).
         effort_weights: (nv,) weight of each degree of freedom in the effort.
         neutral_weights: (nv,) weight of each degree of freedom in the displacement from neutral: 1, and 0 for the root.
+
+    Examples:
+        >>> human.joint_values(standing)["left_elbow_flexion"] >= 0.0
+        True
     """
 
     _settable = frozenset({"loaded_as"})

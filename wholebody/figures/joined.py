@@ -27,6 +27,11 @@ def join(figures: Mapping[str, Figure | tuple[Figure, Any]]) -> Figure:
     Raises:
         InputError: no figures, no figure, a name with a slash, the name "root", a figure that was joined already or
             that meets things with pieces of their own (detail "spheres"), or a placement that cannot be read.
+
+    Examples:
+        >>> both = wb.figures.join({"anna": human, "ben": (human, (1.0, 0.0, 0.0))})
+        >>> both.model.nv == 2 * human.model.nv
+        True
     """
     if not isinstance(figures, Mapping) or not figures:
         raise InputError(

@@ -26,21 +26,13 @@ Parts: TypeAlias = tuple[pin.Model, pin.GeometryModel, Description, pin.Geometry
 
 
 class _Part(NamedTuple):
-    """A figure in a model of several.
+    """A figure in a model of several."""
 
-    Attributes:
-        figure: as it is alone.
-        joints: index in the model of each of its joints; of its world, the joint that carries that.
-        frames: the same of its frames.
-        world: where its world is in the joint that carries it.
-        prefix: what its names begin with.
-    """
-
-    figure: Articulated
-    joints: tuple[int, ...]
-    frames: tuple[int, ...]
-    world: pin.SE3
-    prefix: str
+    figure: Articulated  # as it is alone
+    joints: tuple[int, ...]  # index in the model of each of its joints; of its world, the joint that carries that
+    frames: tuple[int, ...]  # the same of its frames
+    world: pin.SE3  # where its world is in the joint that carries it
+    prefix: str  # what its names begin with
 
 
 def check_single(figure: Articulated, name: str) -> None:

@@ -32,26 +32,17 @@ Concavity = float | Mapping[str, float] | None
 
 
 class LinkShape(NamedTuple):
-    """One collision shape of a link.
+    """One collision shape of a link."""
 
-    Attributes:
-        link: name of the link.
-        placement: in the link's frame.
-        kind: "box", "sphere", "cylinder", "capsule", "ellipsoid", "mesh" or "triangles".
-        size: box: three edges; sphere: radius; cylinder and capsule: radius, length; ellipsoid: three semi-axes;
-            mesh: scale along x, y, z; triangles: none.
-        file: of a mesh.
-        triangles: vertices (n, 3) and faces (m, 3).
-        name: of the shape in the file; empty without one.
-    """
-
-    link: str
-    placement: pin.SE3
-    kind: str
+    link: str  # name of the link
+    placement: pin.SE3  # in the link's frame
+    kind: str  # "box", "sphere", "cylinder", "capsule", "ellipsoid", "mesh" or "triangles"
+    # box: three edges; sphere: radius; cylinder and capsule: radius, length; ellipsoid: three semi-axes; mesh: scale
+    # along x, y, z; triangles: none
     size: tuple[float, ...]
-    file: Path | None = None
-    triangles: tuple[Array, NDArray[np.int64]] | None = None
-    name: str = ""
+    file: Path | None = None  # of a mesh
+    triangles: tuple[Array, NDArray[np.int64]] | None = None  # vertices (n, 3) and faces (m, 3)
+    name: str = ""  # of the shape in the file; empty without one
 
 
 CONCAVITY = Range(0.01, 1.0)

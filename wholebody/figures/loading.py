@@ -36,6 +36,11 @@ def load(spec: str | PathLike[str], **options: Any) -> Figure:
         UnknownNameError: an unknown name or option.
         InputError: a value that is impossible for a body.
         FileFormatError: a file that cannot be read.
+
+    Examples:
+        >>> woman = wb.load("human", sex="female", stature=1.65)
+        >>> woman.model.nv
+        55
     """
     from wholebody.figures.hand import hand_figure
     from wholebody.figures.human.figure import avatar_figure, human_figure

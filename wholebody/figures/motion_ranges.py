@@ -19,31 +19,19 @@ from wholebody.figures.tables import table
 
 
 class CoupledRange(NamedTuple):
-    """A weighted sum of joint angles is at most a bound: ``sum_i c_i q_i <= b``.
+    """A weighted sum of joint angles is at most a bound: ``sum_i c_i q_i <= b``."""
 
-    Attributes:
-        joints: joint to its factor c.
-        bound: b, radians.
-    """
-
-    joints: Mapping[str, float]
-    bound: float
+    joints: Mapping[str, float]  # joint to its factor c
+    bound: float  # b, radians
 
 
 class EllipseAxis(NamedTuple):
-    """One of the angles of an elliptic range: the sum of some joints.
+    """One of the angles of an elliptic range: the sum of some joints."""
 
-    Attributes:
-        joints: names of the joints.
-        lower: the angle's least value while the others are zero, radians, negative.
-        upper: its greatest value, positive.
-        offset: radians added to the sum: of joints that are locked.
-    """
-
-    joints: tuple[str, ...]
-    lower: float
-    upper: float
-    offset: float = 0.0
+    joints: tuple[str, ...]  # names of the joints
+    lower: float  # the angle's least value while the others are zero, radians, negative
+    upper: float  # its greatest value, positive
+    offset: float = 0.0  # radians added to the sum: of joints that are locked
 
 
 class EllipticRange(NamedTuple):
@@ -64,22 +52,14 @@ class TwistRange(NamedTuple):
     (Grassia 1998, "Practical Parameterization of Rotations Using the Exponential Map", Journal of Graphics Tools 3(3)).
     The twist has no jump but where the limb points away from its central direction, which no limb does.
     ``s twist <= b + w . z`` with z the direction of the limb's z axis in the reference.
-
-    Attributes:
-        reference: frame that carries the range.
-        limb: frame that turns; its z axis is the limb's long axis.
-        center: (3, 3) central rotation of the limb in the reference.
-        sign: s, 1 or -1: the direction of the twist that is limited.
-        bound: b, radians.
-        slope: (3,) w, radians.
     """
 
-    reference: str
-    limb: str
-    center: Array
-    sign: float
-    bound: float
-    slope: Array
+    reference: str  # frame that carries the range
+    limb: str  # frame that turns; its z axis is the limb's long axis
+    center: Array  # (3, 3) central rotation of the limb in the reference
+    sign: float  # s, 1 or -1: the direction of the twist that is limited
+    bound: float  # b, radians
+    slope: Array  # (3,) w, radians
 
 
 MotionRange: TypeAlias = CoupledRange | EllipticRange | TwistRange

@@ -27,6 +27,10 @@ def urdf_path(name: str) -> Path:
 
     Raises:
         UnknownNameError: there is no such file.
+
+    Examples:
+        >>> wb.figures.urdf_path("hand").name
+        'hand.urdf'
     """
     path = urdf_folder() / f"{name}.urdf"
     if not path.is_file():

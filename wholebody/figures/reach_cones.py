@@ -30,6 +30,9 @@ class ReachCone:
         boundaries: (k, 3) boundary normals of the edges.
         planes: (5 k, 3) of the k edges, in this order: their boundary normals, the normals at their first and at their
             last corner, between which a direction is beside the edge, their first corners, and the normals S.
+
+    Examples:
+        >>> cone = human.cones["left_shoulder"].cone
     """
 
     def __init__(self, vertices: Any, visible: Any) -> None:
@@ -58,6 +61,9 @@ class ReachCone:
         across = (np.cross(self.boundaries, self.vertices), np.cross(following, self.boundaries))
         sides = np.cross(self.visible, self.vertices)
         self.planes: Array = np.vstack([self.boundaries, *across, self.vertices, sides])
+
+    def __repr__(self) -> str:
+        return f"ReachCone({len(self.vertices)} corners)"
 
     def contains(self, direction: Any) -> bool:
         """Whether a direction (3,) is inside, on the edge included."""

@@ -30,19 +30,12 @@ UNPARTED = "overlap at zero, and no posture was found that parts them"
 
 
 class RestPosture(NamedTuple):
-    """The default posture of a robot.
+    """The default posture of a robot."""
 
-    Attributes:
-        q: (nq,) posture within the limits without self-contact.
-        zero: (nq,) all joints at zero, or at the nearest value within the limits.
-        excluded: pairs that could not be separated; they are removed from the geometry.
-        parted: pairs of pieces that overlap at `zero` and not at `q`, by name.
-    """
-
-    q: Array
-    zero: Array
-    excluded: tuple[ExcludedPair, ...]
-    parted: tuple[tuple[str, str], ...]
+    q: Array  # (nq,) posture within the limits without self-contact
+    zero: Array  # (nq,) all joints at zero, or at the nearest value within the limits
+    excluded: tuple[ExcludedPair, ...]  # pairs that could not be separated; they are removed from the geometry
+    parted: tuple[tuple[str, str], ...]  # pairs of pieces that overlap at `zero` and not at `q`, by name
 
 
 def rest_posture(model: pin.Model, geometry: pin.GeometryModel, seed: int) -> RestPosture:

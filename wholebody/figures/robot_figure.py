@@ -29,35 +29,21 @@ COLOR = (0.62, 0.66, 0.70, 1.0)
 
 
 class Robot(NamedTuple):
-    """A robot as a file has it.
+    """A robot as a file has it."""
 
-    Attributes:
-        name: of the robot.
-        model: Pinocchio's model.
-        links: names, the root link first.
-        geometry: the pieces; their pairs are chosen.
-        notes: sentences on what was changed or left out.
-        visual: what is drawn; the pieces if None.
-        frames: names of more frames for goals.
-        postures: named postures of the file, (nq,).
-        cones: limits of ball joints.
-        groups: named groups of joints; "all" is added.
-        untested: why two pieces, by their numbers, are never tested by the file; None where it does not say.
-        place: of a free root in the first posture.
-    """
-
-    name: str
-    model: pin.Model
-    links: tuple[str, ...]
-    geometry: pin.GeometryModel
-    notes: tuple[str, ...] = ()
-    visual: pin.GeometryModel | None = None
-    frames: tuple[str, ...] = ()
-    postures: Mapping[str, Array] = MappingProxyType({})
-    cones: Mapping[str, JointCone] = MappingProxyType({})
-    groups: Mapping[str, tuple[str, ...]] = MappingProxyType({})
+    name: str  # of the robot
+    model: pin.Model  # Pinocchio's model
+    links: tuple[str, ...]  # names, the root link first
+    geometry: pin.GeometryModel  # the pieces; their pairs are chosen
+    notes: tuple[str, ...] = ()  # sentences on what was changed or left out
+    visual: pin.GeometryModel | None = None  # what is drawn; the pieces if None
+    frames: tuple[str, ...] = ()  # names of more frames for goals
+    postures: Mapping[str, Array] = MappingProxyType({})  # named postures of the file, (nq,)
+    cones: Mapping[str, JointCone] = MappingProxyType({})  # limits of ball joints
+    groups: Mapping[str, tuple[str, ...]] = MappingProxyType({})  # named groups of joints; "all" is added
+    # why two pieces, by their numbers, are never tested by the file; None where it does not say
     untested: Callable[[int, int], str | None] | None = None
-    place: pin.SE3 | None = None
+    place: pin.SE3 | None = None  # of a free root in the first posture
 
 
 def robot_figure(robot: Robot, samples: int, seed: int) -> Figure:

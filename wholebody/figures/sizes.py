@@ -63,19 +63,12 @@ TRUNK = (
 
 
 class Skeleton(NamedTuple):
-    """What the sizes of the arms depend on, metres.
+    """What the sizes of the arms depend on, metres."""
 
-    Attributes:
-        hip_height: of the hip joint above the sole.
-        hip_y: hip joint beside the middle.
-        girdle: (3,) the clavicle's inner end, from the hip joints' middle.
-        back: the rearmost point of the trunk behind the hip joint.
-    """
-
-    hip_height: float
-    hip_y: float
-    girdle: tuple[float, float, float]
-    back: float
+    hip_height: float  # of the hip joint above the sole
+    hip_y: float  # hip joint beside the middle
+    girdle: tuple[float, float, float]  # (3,) the clavicle's inner end, from the hip joints' middle
+    back: float  # the rearmost point of the trunk behind the hip joint
 
 
 def leg_sizes(of: Mapping[str, float], ankle: float) -> dict[str, float]:

@@ -75,6 +75,9 @@ class State:
         self._companions: dict[object, State] = {}
         self.update(self.q)
 
+    def __repr__(self) -> str:
+        return f"State({self.model.name!r}, {self.model.nq} coordinates)"
+
     def update(self, q: Array) -> State:
         """Move to the posture q, shape (nq,).
 

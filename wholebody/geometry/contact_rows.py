@@ -37,21 +37,13 @@ LENGTHS = np.array([LEVER_DISTANCE, BAND, INSET, SHORTEST_LEVER, SAME_NORMAL, NO
 
 
 class ContactRows(NamedTuple):
-    """Rows ``gap + jacobian @ dq >= clearance``: one for each of the k contacts, then more, sorted by contact.
+    """Rows ``gap + jacobian @ dq >= clearance``: one for each of the k contacts, then more, sorted by contact."""
 
-    Attributes:
-        gap: (m,) metres.
-        wrench: (m, 6) [n, x cross n] in the world.
-        contact: (m,) which contact a row belongs to.
-        first: (m,) joint of the first piece.
-        second: (m,) joint of the second piece; the row is for its motion relative to the first.
-    """
-
-    gap: Array
-    wrench: Array
-    contact: Indices
-    first: Indices
-    second: Indices
+    gap: Array  # (m,) metres
+    wrench: Array  # (m, 6) [n, x cross n] in the world
+    contact: Indices  # (m,) which contact a row belongs to
+    first: Indices  # (m,) joint of the first piece
+    second: Indices  # (m,) joint of the second piece; the row is for its motion relative to the first
 
 
 class ContactRowBuilder:

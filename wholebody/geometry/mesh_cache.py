@@ -43,17 +43,11 @@ _writes = 0
 
 
 class ConvexPieces(NamedTuple):
-    """A mesh as a union of convex pieces.
+    """A mesh as a union of convex pieces."""
 
-    Attributes:
-        pieces: at least one.
-        added_volume: volume of all pieces over that of the closed parts of the mesh, minus one.
-        notes: one sentence for each part that was changed.
-    """
-
-    pieces: tuple[Piece, ...]
-    added_volume: float
-    notes: tuple[str, ...]
+    pieces: tuple[Piece, ...]  # at least one
+    added_volume: float  # volume of all pieces over that of the closed parts of the mesh, minus one
+    notes: tuple[str, ...]  # one sentence for each part that was changed
 
 
 class CacheState(NamedTuple):

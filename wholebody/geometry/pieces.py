@@ -30,18 +30,12 @@ LARGEST = 1e4
 
 
 class Piece(NamedTuple):
-    """One convex piece of a shape.
+    """One convex piece of a shape."""
 
-    Attributes:
-        geometry: coal's Box, Sphere, Capsule, Ellipsoid, Convex or Halfspace; its origin is the centre of
-            its bounding sphere.
-        placement: of the geometry's origin in the shape.
-        volume: cubic metres; infinite for a half-space.
-    """
-
+    # coal's Box, Sphere, Capsule, Ellipsoid, Convex or Halfspace; its origin is the centre of its bounding sphere
     geometry: Any
-    placement: pin.SE3
-    volume: float
+    placement: pin.SE3  # of the geometry's origin in the shape
+    volume: float  # cubic metres; infinite for a half-space
 
 
 def box_corners(geometry: Any) -> Array:
@@ -57,25 +51,15 @@ def box_corners(geometry: Any) -> Array:
 
 
 class SweptPoints(NamedTuple):
-    """One piece as swept points, in the piece's own frame.
+    """One piece as swept points, in the piece's own frame."""
 
-    Attributes:
-        points: (m, 3) swept points; empty if one witness point is sufficient (ellipsoid, half-space).
-        radius: radius around the points, metres.
-        faces: (f, 4) rows [n, b] with n . x <= b inside; for a capsule only the two caps' planes.
-        reach: radius about the piece's origin that contains the piece; inf for a half-space.
-        axis: unit direction of a capsule, zero for everything else.
-        width: least distance between two parallel planes that enclose the piece; inf for a half-space.
-        half: (3,) half the size of a box about the piece's origin, along its axes, that contains it.
-    """
-
-    points: Array
-    radius: float
-    faces: Array
-    reach: float
-    axis: Array
-    width: float
-    half: Array
+    points: Array  # (m, 3) swept points; empty if one witness point is sufficient (ellipsoid, half-space)
+    radius: float  # radius around the points, metres
+    faces: Array  # (f, 4) rows [n, b] with n . x <= b inside; for a capsule only the two caps' planes.
+    reach: float  # radius about the piece's origin that contains the piece; inf for a half-space
+    axis: Array  # unit direction of a capsule, zero for everything else
+    width: float  # least distance between two parallel planes that enclose the piece; inf for a half-space
+    half: Array  # (3,) half the size of a box about the piece's origin, along its axes, that contains it
 
 
 _NONE = np.zeros((0, 3))

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, brief
 from wholebody.base.checks import number
 from wholebody.geometry.large_models import pairs_of
 from wholebody.geometry.memory_views import RESULT_DOUBLES, fields
@@ -47,6 +47,9 @@ class Contacts(NamedTuple):
     point_b: Array
     number: Indices
     placements: Array
+
+    def __repr__(self) -> str:
+        return brief(self)
 
     def nearest_first(self) -> Contacts:
         """The same in the order of their distances."""

@@ -33,17 +33,12 @@ SHORTEST = 2e-4
 
 
 class Separation(NamedTuple):
-    """A translation of A.
+    """A translation of A."""
 
-    Attributes:
-        translation: (3,) metres.
-        separated: whether coal finds no overlap after it.
-        least: whether no shorter one exists, proven. With several overlapping pairs of round pieces, whose sides are
-            sampled and then refined, there is seldom a proof: then the translation is the best of many local searches.
-    """
-
-    translation: Array
-    separated: bool
+    translation: Array  # (3,) metres
+    separated: bool  # whether coal finds no overlap after it
+    # whether no shorter one exists, proven. With several overlapping pairs of round pieces, whose sides are sampled and
+    # then refined, there is seldom a proof: then the translation is the best of many local searches.
     least: bool
 
 

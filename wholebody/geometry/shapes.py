@@ -15,7 +15,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from wholebody.base.arrays import Array, brief
-from wholebody.base.checks import array, listed, path, shown
+from wholebody.base.checks import array, path, shown
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range, Vector
 from wholebody.geometry.convex import CONCAVITY, VERTICES, check_mesh, convex_pieces
@@ -38,7 +38,6 @@ Lengths: TypeAlias = Annotated[tuple[float, float, float], Vector(3, LENGTH)]
 __all__ = [
     "Box",
     "Capsule",
-    "Compound",
     "Cylinder",
     "Ellipsoid",
     "HalfSpace",
@@ -56,6 +55,10 @@ class Shape(Checked, ABC):
 
     Raises:
         InputError: a size that is no number or not within 0.1 mm and 10 km, as every shape raises it when it is made.
+
+    Examples:
+        >>> isinstance(wb.Sphere(0.1), wb.Shape)
+        True
     """
 
     @abstractmethod
@@ -74,6 +77,12 @@ class Box(Shape):
 
     Attributes:
         size: full lengths along x, y and z, metres.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> table = wb.Box((1.2, 0.7, 0.04))
     """
 
     size: Lengths
@@ -89,6 +98,12 @@ class Sphere(Shape):
 
     Attributes:
         radius: metres.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> ball = wb.Sphere(radius=0.1)
     """
 
     radius: Length
@@ -105,6 +120,12 @@ class Capsule(Shape):
     Attributes:
         radius: metres.
         length: of the segment, without the two half balls, metres.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> rail = wb.Capsule(radius=0.02, length=0.8)
     """
 
     radius: Length
@@ -125,6 +146,12 @@ class Cylinder(Shape):
     Attributes:
         radius: metres.
         length: along z, metres.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> post = wb.Cylinder(radius=0.05, length=2.0)
     """
 
     radius: Length
@@ -155,6 +182,9 @@ class Torus(Shape):
 
     Raises:
         InputError: a length out of range, or the tube is not thinner than the ring.
+
+    Examples:
+        >>> wheel = wb.Torus(radius=0.18, tube=0.015)
     """
 
     radius: Length
@@ -194,6 +224,12 @@ class Ellipsoid(Shape):
 
     Attributes:
         semi_axes: half lengths along x, y and z, metres.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> egg = wb.Ellipsoid((0.03, 0.03, 0.04))
     """
 
     semi_axes: Lengths
@@ -214,6 +250,9 @@ class HalfSpace(Shape):
 
     Raises:
         InputError: the normal has no length, or a value is no number or out of range.
+
+    Examples:
+        >>> ground = wb.HalfSpace()
     """
 
     normal: Annotated[tuple[float, float, float], unit_vector] = (0.0, 0.0, 1.0)
@@ -233,6 +272,9 @@ class Hull(Shape):
 
     Raises:
         InputError: not such points, or none that span a solid.
+
+    Examples:
+        >>> wedge = wb.Hull([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)])
     """
 
     __repr__ = brief
@@ -248,40 +290,6 @@ class Hull(Shape):
     def pieces(self) -> tuple[Piece, ...]:
         """One coal Convex."""
         return (hull_piece(self.points, "Hull"),)
-
-
-@dataclass(frozen=True, eq=False)
-class Compound(Shape):
-    """Shapes that are one thing.
-
-    Attributes:
-        parts: each shape, and its placement as a pin.SE3.
-
-    Raises:
-        InputError: other parts, or none.
-    """
-
-    parts: tuple[tuple[Shape, pin.SE3], ...]
-
-    def __post_init__(self) -> None:
-        wanted = "[(wb.Box((0.1, 0.1, 0.1)), pin.SE3.Identity())]"
-        parts = tuple(listed(self.parts, "Compound parts", wanted))
-        for part in parts:
-            pair = isinstance(part, (tuple, list)) and len(part) == 2
-            placed = pair and isinstance(part[0], Shape) and isinstance(part[1], pin.SE3)
-            if not (placed and np.isfinite(part[1].homogeneous).all()):
-                raise InputError(f"Compound: a part is {shown(part)}; give pairs such as {wanted}")
-        if not parts:
-            raise InputError(f"Compound: there are no parts; give pairs such as {wanted}")
-        object.__setattr__(self, "parts", tuple((shape, pin.SE3(at)) for shape, at in parts))
-
-    def pieces(self) -> tuple[Piece, ...]:
-        """The pieces of all shapes."""
-        return tuple(
-            Piece(piece.geometry, at * piece.placement, piece.volume)
-            for shape, at in self.parts
-            for piece in shape.pieces()
-        )
 
 
 @runtime_checkable
@@ -317,6 +325,10 @@ class Mesh(Shape):
         FileFormatError: the file is no mesh that can be read.
         MissingPackageError: trimesh, or for a COLLADA file pycollada, is not installed.
         InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> corners = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+        >>> wedge = wb.Mesh((corners, [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)]))
     """
 
     __repr__ = brief

@@ -36,7 +36,13 @@ class Step(Protocol):
 
 
 class Tracker(Protocol):
-    """Follows the goals of one problem, which may move from call to call. It serves one thread at a time."""
+    """Follows the goals of one problem, which may move from call to call. It serves one thread at a time.
+
+    Examples:
+        >>> tracker = wb.QP().tracker(problem, dt=0.02)
+        >>> tracker.step(problem.start).q.shape == problem.start.shape
+        True
+    """
 
     @property
     def problem(self) -> Problem:
@@ -79,7 +85,13 @@ class Tracker(Protocol):
 
 
 class Method(Protocol):
-    """An algorithm that solves problems."""
+    """An algorithm that solves problems.
+
+    Examples:
+        examples/own_method.py is a whole method in forty lines; an object or "module:Class" names it.
+
+        >>> wb.QP().accepts(problem)
+    """
 
     @property
     def name(self) -> str:

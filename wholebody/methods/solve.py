@@ -104,6 +104,10 @@ def solve(problem: Problem, method: str | Method = "qp", progress: Progress | No
     Raises:
         UnknownNameError: there is no such method.
         InputError: the scene changed after the problem was made, or the method cannot take some of its terms.
+
+    Examples:
+        >>> wb.solve(problem, method="qp").status
+        'solved'
     """
     check_problem(problem, "solve: problem")
     solution = as_method(method).solve(problem, function(progress, "progress"))

@@ -95,6 +95,12 @@ def avoid(
     Raises:
         InputError: the scene's figure has other joints than the clip's, or a constraint does not fit.
         UnknownNameError: there is no such method, or a constraint names what the figure does not have.
+
+    Examples:
+        >>> inside = human.with_joints(standing, {"right_shoulder_abduction": -0.3})
+        >>> freed = wb.avoid(wb.Clip(human, [standing, inside, standing], dt=0.5).resampled(0.1))
+        >>> freed.report.solved
+        True
     """
     instance(clip, Clip, "avoid: clip", "read one with wb.read_clip(path, figure)")
     scene = Scene(clip.figure) if scene is None else scene

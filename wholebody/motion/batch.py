@@ -15,6 +15,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.batches import fingerprint, run_batch
 from wholebody.base.errors import InputError, WholebodyError
 from wholebody.base.files import is_file, read_bytes
+from wholebody.base.progress import reporter
 from wholebody.base.runner import Job
 from wholebody.figures.figure import Figure
 from wholebody.motion.avoidance import as_avoider, avoid
@@ -35,7 +36,11 @@ Source = Clip | str | os.PathLike[str]
 
 
 class BatchProgress(NamedTuple):
-    """Told when a case is done: how many are, those of an earlier run included, of how many, and which was the last."""
+    """Told when a case is done: how many are, those of an earlier run included, of how many, and which was the last.
+
+    Examples:
+        >>> done = wb.motion.BatchProgress(3, 12, None)
+    """
 
     done: int
     total: int
@@ -67,7 +72,7 @@ def avoid_many(
     methods: Iterable[str | Avoider] = ("trajectory",),
     jobs: int = 1,
     cluster: str | None = None,
-    progress: Callable[[BatchProgress], Any] | None = None,
+    progress: Callable[[BatchProgress], Any] | bool | None = None,
     **options: Unpack[AvoidOptions],
 ) -> tuple[AvoidedCase, ...]:
     """Free clips of collisions: each clip, with each equipment, by each method.
@@ -86,7 +91,7 @@ def avoid_many(
         methods: names or settings, see `avoid`.
         jobs: cases at a time.
         cluster: address of a dask scheduler that runs them; None for this machine.
-        progress: called with a `BatchProgress` after each case.
+        progress: called with a `BatchProgress` after each case; True for a line that counts.
         options: `constraints`, `hold_feet` and `keep_ends`, as of `avoid`.
 
     Returns:
@@ -98,6 +103,11 @@ def avoid_many(
         FileFormatError: the folder holds another table.
         MissingPackageError: dask is not installed.
         WholebodyError: the cluster does not answer.
+
+    Examples:
+        >>> rows = wb.motion.avoid_many([clip], folder)
+        >>> rows[0].outcome
+        'free'
     """
     what = "avoid_many"
     if unknown := options.keys() - AvoidOptions.__annotations__.keys():
@@ -117,7 +127,7 @@ def avoid_many(
     jobs = checks.whole(jobs, f"{what}: jobs", 1, 4096)
     if cluster is not None:
         checks.text(cluster, f"{what}: cluster")
-    checks.function(progress, f"{what}: progress")
+    told = reporter(progress, f"{what}: progress")
     owners = [source.figure if isinstance(source, Clip) else figure for source in sources.values()]
     for owner in {id(owner): owner for owner in owners if owner is not None}.values():
         for one in pieces:  # what does not fit is said before anything is computed
@@ -130,7 +140,7 @@ def avoid_many(
         for wears, one in worn.items()
         for way, method in ways.items()
     ]
-    return batch.freed(asked, faults, held, progress)
+    return batch.freed(asked, faults, held, told)
 
 
 class _Batch(NamedTuple):
@@ -258,6 +268,9 @@ def read_many(
     Raises:
         InputError: two files of one name, or no figure.
         WholebodyError: as for `avoid_many`.
+
+    Examples:
+        >>> made = wb.motion.read_many([recording], folder, human)
     """
     what = "read_many"
     check_figure(figure, what)

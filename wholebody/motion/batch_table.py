@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
+from wholebody.base.arrays import brief
 from wholebody.base.errors import FileFormatError
 from wholebody.base.files import make_folder, read_text, write
 from wholebody.motion.clip import Clip
@@ -42,6 +43,10 @@ class AvoidedCase:
         missed: largest miss of a constraint, metres or radians.
         frames_changed, posture_solves, programs: counts.
         asked: fingerprint of clip, figure, equipment, method and constraints; a case with the same is not done again.
+
+    Examples:
+        >>> wb.motion.avoid_many([clip], folder)[0].colliding
+        0
     """
 
     clip: str
@@ -68,6 +73,8 @@ class AvoidedCase:
     posture_solves: int = 0
     programs: int = 0
     asked: str = ""
+
+    __repr__ = brief
 
     @property
     def stem(self) -> str:

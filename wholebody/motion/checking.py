@@ -67,6 +67,11 @@ class ClipCheck(Shown):
         sliding: how far each point of the feet slides while it stands.
         jerk: (n - 3,) root of the mean square of the third difference of the joint angles over time, rad/s^3.
         queries: number of distances that coal was asked for.
+
+    Examples:
+        >>> found = wb.check(clip, scene)
+        >>> found.free, found.depth.shape == (len(clip),)
+        (True, True)
     """
 
     clip: Clip
@@ -197,6 +202,10 @@ def check(
     Raises:
         InputError: no clip, a scene of a figure with other joints, a depth out of range, or a joint whose motion
             between two postures cannot be bounded.
+
+    Examples:
+        >>> wb.check(clip, scene).free
+        True
     """
     instance(clip, Clip, "check: clip", "read one with wb.read_clip(path, figure)")
     scene = (

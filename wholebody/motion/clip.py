@@ -117,6 +117,10 @@ class Clip(Shown):
     Raises:
         InputError: no frame, another number of values than the figure has, a value that is not finite, a quaternion
             that is not of unit length, or a time step that is not positive; the frame is named.
+
+    Examples:
+        >>> wb.Clip(human, [standing, solution.q], dt=0.5, name="reach").resampled(0.1)
+        Clip('reach' of 'human': 6 frames, one each 0.1 s)
     """
 
     figure: Figure

@@ -48,6 +48,11 @@ class Torques:
         lower: (nv,) least torque of each joint, N m: published strength of a person, effort limits of a robot; -inf
             where none is known.
         upper: (nv,) largest torque of each joint, N m; inf where none is known.
+
+    Examples:
+        >>> needed = wb.motion.torques(clip)
+        >>> needed.torque.shape == (len(clip), human.model.nv)
+        True
     """
 
     figure: Figure
@@ -147,6 +152,9 @@ def torques(
     Raises:
         UnknownNameError: the figure has no such foot.
         InputError: something else than a clip, a value out of range, or a figure without mass or feet.
+
+    Examples:
+        >>> needed = wb.motion.torques(clip, strength=wb.motion.Strength(50, "female"))
     """
     clip = checks.instance(clip, Clip, "torques: clip", "read one with wb.read_clip(path, figure)")
     friction = checks.number(friction, "torques: friction", 1e-3, 100.0)
@@ -249,19 +257,13 @@ PLACE = 2e-3
 
 @dataclass(frozen=True, eq=False)
 class LoadChange:
-    """Loads before and after a change.
-
-    Attributes:
-        before: torques of the clip as it was.
-        after: torques of the answer; both are those of `wb.motion.torques`.
-        times: (m,) place of each frame of the answer in the frames before.
-    """
+    """Loads before and after a change."""
 
     __repr__ = brief
 
-    before: Torques
-    after: Torques
-    times: Array
+    before: Torques  # torques of the clip as it was
+    after: Torques  # torques of the answer; both are those of `wb.motion.torques`
+    times: Array  # (m,) place of each frame of the answer in the frames before
 
     @property
     def bounds(self) -> tuple[Array, Array]:

@@ -121,17 +121,11 @@ def depth(workspace: Workspace, q: Array, clearance: float = 0.0) -> float:
 
 
 class Faults(NamedTuple):
-    """What is wrong with postures of a clip.
+    """What is wrong with postures of a clip."""
 
-    Attributes:
-        depths: (n,) of the deepest overlap, or of what is nearer than the clearance, metres.
-        wrong: (n,) frames that overlap, miss a limit or miss what is held.
-        gaps: frames whose motion to the next one dips, where neither is wrong.
-    """
-
-    depths: Array
-    wrong: Mask
-    gaps: list[int]
+    depths: Array  # (n,) of the deepest overlap, or of what is nearer than the clearance, metres
+    wrong: Mask  # (n,) frames that overlap, miss a limit or miss what is held
+    gaps: list[int]  # frames whose motion to the next one dips, where neither is wrong
 
     @property
     def frames(self) -> Mask:

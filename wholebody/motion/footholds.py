@@ -22,19 +22,12 @@ WAITED = 0.25  # s: a body that nothing lower bears for longer is borne by what 
 
 
 class RestLimits(NamedTuple):
-    """What counts as rest.
+    """What counts as rest."""
 
-    Attributes:
-        speed: m/s, largest speed; a rest begins where the speed falls below two thirds of it.
-        height: m, largest height above the lowest rest nearby.
-        least: s, shortest rest.
-        slid: m: a point that goes on farther while it is slow has made a step, and rests at two places.
-    """
-
-    speed: float = 0.15
-    height: float = 0.05
-    least: float = 0.1
-    slid: float = 0.08
+    speed: float = 0.15  # m/s, largest speed; a rest begins where the speed falls below two thirds of it
+    height: float = 0.05  # m, largest height above the lowest rest nearby
+    least: float = 0.1  # s, shortest rest
+    slid: float = 0.08  # m: a point that goes on farther while it is slow has made a step, and rests at two places
 
 
 def speeds(places: Array, dt: float) -> Array:

@@ -52,28 +52,20 @@ class FrameBounds(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class FrameTerms:
-    """What holds in the frames of one clip.
+    """What holds in the frames of one clip."""
 
-    Attributes:
-        scene: figure and things.
-        q: (n, nq) original postures.
-        dt: seconds from frame to frame.
-        given: the terms as they were given, without `StanceFeet` and `MotionBounds`.
-        stands: for each frame, frames of the feet that stand there and are held.
-        shifts: for each frame, by how much each of them is held beside where it was (3,), metres.
-        grips: for the numbers of given terms that hold a frame at another one, in each frame the shift of the grip
-            (n, 3) beside where it was, metres, in the axes of the other one; without those that are not shifted.
-        largest: (n,) largest deviation of each frame, radians and metres; inf for any.
-    """
-
-    scene: Scene
-    q: Array
-    dt: float
+    scene: Scene  # figure and things
+    q: Array  # (n, nq) original postures
+    dt: float  # seconds from frame to frame
+    # the terms as they were given, without `StanceFeet` and `MotionBounds`
     given: tuple[Constraint | Goal | Bound, ...]
-    stands: tuple[tuple[str, ...], ...]
+    stands: tuple[tuple[str, ...], ...]  # for each frame, frames of the feet that stand there and are held
+    # for each frame, by how much each of them is held beside where it was (3,), metres
     shifts: tuple[tuple[Array, ...], ...]
+    # for the numbers of given terms that hold a frame at another one, in each frame the shift of the grip (n, 3) beside
+    # where it was, metres, in the axes of the other one; without those that are not shifted
     grips: Mapping[int, Array] = field(default_factory=dict)
-    largest: Array | None = None
+    largest: Array | None = None  # (n,) largest deviation of each frame, radians and metres; inf for any
     _held: dict[int, tuple[HeldTerm, ...]] = field(default_factory=dict, init=False, repr=False)
     _feet: dict[int, tuple[Hold, ...]] = field(default_factory=dict, init=False, repr=False)
     _bounds: dict[int, FrameBounds] = field(default_factory=dict, init=False, repr=False)

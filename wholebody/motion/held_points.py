@@ -35,23 +35,15 @@ OVER = 0.2  # s: in which a point goes over to where it rests
 
 @dataclass(frozen=True, eq=False)
 class HeldPoint:
-    """A point of a figure that may rest.
-
-    Attributes:
-        role: of the skeleton's joint by which it rests.
-        foot: "left" or "right" for a point of a sole, which comes down to the ground; else "".
-        joint: index of the joint that carries it.
-        place: (3,) in the joint's frame, metres.
-        edge: whether it is on the edge of a sole, so that its height alone counts: soles come down flat.
-    """
+    """A point of a figure that may rest."""
 
     __repr__ = brief
 
-    role: str
-    foot: str
-    joint: int
-    place: Array
-    edge: bool = False
+    role: str  # of the skeleton's joint by which it rests
+    foot: str  # "left" or "right" for a point of a sole, which comes down to the ground; else ""
+    joint: int  # index of the joint that carries it
+    place: Array  # (3,) in the joint's frame, metres
+    edge: bool = False  # whether it is on the edge of a sole, so that its height alone counts: soles come down flat
 
 
 def held_points(figure: Figure, roles: Roles, ground: Ground) -> list[HeldPoint]:

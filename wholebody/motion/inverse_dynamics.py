@@ -68,17 +68,11 @@ def _outermost(points: Array) -> Array:
 
 
 class GroundForces(NamedTuple):
-    """Forces of the ground in one frame.
+    """Forces of the ground in one frame."""
 
-    Attributes:
-        forces: (points, 3) force on each point of the soles, N, in the world.
-        missing: (6,) what the ground cannot give of the wrench: force N, moment N m about the wrench's point.
-        split: (3 points, 6) derivative of the forces with respect to the wrench, while the same edges bear.
-    """
-
-    forces: Array
-    missing: Array
-    split: Array
+    forces: Array  # (points, 3) force on each point of the soles, N, in the world
+    missing: Array  # (6,) what the ground cannot give of the wrench: force N, moment N m about the wrench's point
+    split: Array  # (3 points, 6) derivative of the forces with respect to the wrench, while the same edges bear
 
 
 def ground_forces(wrench: Array, about: Array, points: Array, friction: float) -> GroundForces:
@@ -145,19 +139,12 @@ class Stand(NamedTuple):
 
 
 class Loads(NamedTuple):
-    """Loads of one frame.
+    """Loads of one frame."""
 
-    Attributes:
-        torque: (nv,) of the joints, N m, after the ground's forces; the root's part is what is missing.
-        wrench: (6,) that the ground has to give: force N, and moment about the world's origin N m.
-        ground: what it gives; about the centre of mass.
-        center: (3,) centre of mass, metres.
-    """
-
-    torque: Array
-    wrench: Array
-    ground: GroundForces
-    center: Array
+    torque: Array  # (nv,) of the joints, N m, after the ground's forces; the root's part is what is missing
+    wrench: Array  # (6,) that the ground has to give: force N, and moment about the world's origin N m
+    ground: GroundForces  # what it gives; about the centre of mass
+    center: Array  # (3,) centre of mass, metres
 
 
 class Derivatives(NamedTuple):

@@ -50,6 +50,11 @@ class AvoidanceReport:
         deviation: largest change of a posture that was free, radians or metres.
         smoothed: windows of frames that were too rough and were made smooth after the method.
         rough: whether jerk, speed or deviation are beyond their bounds, and nothing else is wrong.
+
+    Examples:
+        >>> report = wb.avoid(clip, scene).report
+        >>> report.solved, report.frames_changed
+        (True, 0)
     """
 
     solved: bool
@@ -91,7 +96,13 @@ class AvoidanceReport:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Avoided:
-    """The answer of `avoid`: the clip that the method made, and the report on it."""
+    """The answer of `avoid`: the clip that the method made, and the report on it.
+
+    Examples:
+        >>> answer = wb.avoid(clip, scene)
+        >>> len(answer.clip) == len(clip)
+        True
+    """
 
     clip: Clip
     report: AvoidanceReport

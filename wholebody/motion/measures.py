@@ -140,6 +140,9 @@ class MotionBounds(Checked):
 
     Raises:
         InputError: a value out of range.
+
+    Examples:
+        >>> freed = wb.avoid(clip, scene, constraints=[wb.motion.MotionBounds(jerk=1.5)])
     """
 
     jerk: Annotated[float, Range(1.0, 1e6)] | None = 2.0

@@ -22,7 +22,15 @@ from wholebody.motion.windows import Window
 
 @dataclass(frozen=True)
 class PerFrame(Checked):
-    """Every frame by tracking, forward and backward, with a least distance of every pair, metres."""
+    """Every frame by tracking, forward and backward, with a least distance of every pair, metres.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> wb.avoid(clip, scene, method=wb.motion.PerFrame(clearance=0.002)).report.method
+        'frames'
+    """
 
     name: ClassVar[str] = "frames"
     dynamics: ClassVar[None] = None

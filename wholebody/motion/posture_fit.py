@@ -31,23 +31,14 @@ RELAXED = 1e-10  # of the price: less holds contacts more exactly, and costs the
 
 
 class Goals(NamedTuple):
-    """What one frame is to reach.
+    """What one frame is to reach."""
 
-    Attributes:
-        points: (p, 3) where the points are to be, metres, to a common shift but for the anchor's weight.
-        turns: (t, 3, 3) orientations that frames are to have.
-        held: (h, 3) where held points are to be, metres.
-        held_weights: (h, 3) weight of each, along the axes of the world; 0 for none.
-        posture: (nq,) a posture to stay near to.
-        posture_weights: (nv,) weight of each difference from it, metres per radian.
-    """
-
-    points: Array
-    turns: Array
-    held: Array
-    held_weights: Array
-    posture: Array
-    posture_weights: Array
+    points: Array  # (p, 3) where the points are to be, metres, to a common shift but for the anchor's weight
+    turns: Array  # (t, 3, 3) orientations that frames are to have
+    held: Array  # (h, 3) where held points are to be, metres
+    held_weights: Array  # (h, 3) weight of each, along the axes of the world; 0 for none
+    posture: Array  # (nq,) a posture to stay near to
+    posture_weights: Array  # (nv,) weight of each difference from it, metres per radian
 
 
 class Layout(NamedTuple):

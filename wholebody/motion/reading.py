@@ -36,6 +36,11 @@ def read_skeleton(path: str | os.PathLike[str], *, unit: str | None = None, up: 
         FileFormatError: the file cannot be read, is cut off, has wrong counts, two roots, or values that are no finite
             numbers; the line is named.
         InputError: the path is none, or unit or up is another word.
+
+    Examples:
+        >>> motion = wb.motion.read_skeleton(recording)
+        >>> motion.dt == clip.dt
+        True
     """
     path = checked_path(path, "path")
     if unit is not None:
@@ -72,6 +77,10 @@ def read_clip(
             does not fit the figure; the file and, in text files, the line are named.
         UnknownNameError: it has a joint that the figure does not have.
         InputError: the path is none, or the figure is none.
+
+    Examples:
+        >>> wb.read_clip(recording, human).dt == clip.dt
+        True
     """
     path = checked_path(path, "path")
     check_figure(figure, "read_clip")

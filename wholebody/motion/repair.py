@@ -25,21 +25,13 @@ from wholebody.motion.windows import Window
 
 @dataclass(frozen=True)
 class RepairSettings:
-    """Numbers of the repair.
+    """Numbers of the repair."""
 
-    Attributes:
-        margin: seconds before and after a fault in which postures may change; doubled in each round.
-        rounds: of looking at the clip and repairing what is wrong.
-        radius: trust region, radians and metres; postures are nearly free.
-        through: metres, as thick as a forearm; no rows free a deeper dip, of a limb that goes right through.
-        spread: seconds that a push at one frame spreads over.
-    """
-
-    margin: float = 0.1
-    rounds: int = 4
-    radius: float = 0.05
-    through: float = 0.06
-    spread: float = 0.06
+    margin: float = 0.1  # seconds before and after a fault in which postures may change; doubled in each round
+    rounds: int = 4  # of looking at the clip and repairing what is wrong
+    radius: float = 0.05  # trust region, radians and metres; postures are nearly free
+    through: float = 0.06  # metres, as thick as a forearm; no rows free a deeper dip, of a limb that goes right through
+    spread: float = 0.06  # seconds that a push at one frame spreads over
 
 
 SETTINGS = RepairSettings()

@@ -30,19 +30,12 @@ LIMBS = (("hip", "knee", "ankle", "toe"), ("shoulder", "elbow", "wrist", "hand")
 
 
 class Targets(NamedTuple):
-    """Goals of all frames.
+    """Goals of all frames."""
 
-    Attributes:
-        points: role to (n, 3), metres in the figure's world.
-        turns: role to (n, 3, 3): orientations of the figure's frames.
-        root: (n, 3, 3) orientation of the pelvis, from which the descent begins.
-        path: metres of the figure for each metre of the skeleton's way over the ground.
-    """
-
-    points: dict[str, Array]
-    turns: dict[str, Array]
-    root: Array
-    path: float
+    points: dict[str, Array]  # role to (n, 3), metres in the figure's world
+    turns: dict[str, Array]  # role to (n, 3, 3): orientations of the figure's frames
+    root: Array  # (n, 3, 3) orientation of the pelvis, from which the descent begins
+    path: float  # metres of the figure for each metre of the skeleton's way over the ground
 
 
 class _Body:

@@ -60,6 +60,11 @@ def retarget(
         FileFormatError: the TOML file cannot be read.
         InputError: no bones are known to belong to the figure, or two ends of none; the scene is of another figure; the
             ground is none, or of a recording of another length.
+
+    Examples:
+        >>> walk = wb.retarget(skeleton, human)
+        >>> walk.figure.name
+        'human'
     """
     motion = checked_motion(motion, "retarget: motion")
     one_figure(figure, "retarget: figure")
@@ -145,6 +150,9 @@ def bone_errors(
 
     Raises:
         InputError: the clip has another number of frames, or no bones are known to belong to the figure.
+
+    Examples:
+        >>> errors = wb.motion.bone_errors(skeleton, wb.retarget(skeleton, human))
     """
     motion = checked_motion(motion, "bone_errors: motion")
     instance(clip, Clip, "bone_errors: clip", "give that of wb.retarget(motion, figure)")

@@ -23,23 +23,15 @@ ROLES = tuple(row["role"] for row in ROWS)
 
 
 class Roles(NamedTuple):
-    """What has which role.
+    """What has which role."""
 
-    Attributes:
-        joints: role to joint of the skeleton.
-        frames: role to frame of the figure.
-        turns: role to the frame of the figure that has the orientation of the role.
-        table: name of the table that matched the skeleton.
-        missing: roles of the figure that no joint of the skeleton is known to have, if there are others to name.
-        told: roles whose joints are known by the skeleton's structure alone.
-    """
-
-    joints: dict[str, str]
-    frames: dict[str, str]
-    turns: dict[str, str]
-    table: str
+    joints: dict[str, str]  # role to joint of the skeleton
+    frames: dict[str, str]  # role to frame of the figure
+    turns: dict[str, str]  # role to the frame of the figure that has the orientation of the role
+    table: str  # name of the table that matched the skeleton
+    # roles of the figure that no joint of the skeleton is known to have, if there are others to name
     missing: tuple[str, ...] = ()
-    told: tuple[str, ...] = ()
+    told: tuple[str, ...] = ()  # roles whose joints are known by the skeleton's structure alone
 
 
 def matched(

@@ -40,6 +40,10 @@ class SkeletonMotion:
 
     Raises:
         InputError: shapes do not fit, there is not one root, or a value is not finite.
+
+    Examples:
+        >>> skeleton.positions.shape == (len(clip), len(skeleton.names), 3)
+        True
     """
 
     __repr__ = brief

@@ -64,6 +64,9 @@ class StanceFeet:
 
     Raises:
         InputError: a value out of range.
+
+    Examples:
+        >>> freed = wb.avoid(clip, scene, constraints=[wb.motion.StanceFeet(speed=0.2)])
     """
 
     feet: Sequence[str] | None = None

@@ -56,6 +56,9 @@ class Ground:
         tilt: degrees by which the lowest level slopes in the recording; drift of less than 2 degrees is usual.
         uneven: whether heights do not gather in levels; each foothold then has its own.
         dt: seconds from frame to frame.
+
+    Examples:
+        >>> flat = wb.motion.ground(skeleton).tilt
     """
 
     footholds: tuple[Foothold, ...]
@@ -181,6 +184,9 @@ def ground(
 
     Raises:
         UnknownNameError: a name that does not exist.
+
+    Examples:
+        >>> ground = wb.motion.ground(skeleton)
     """
     motion = checked_motion(motion, "ground: motion")
     joints = {role: motion.names.index(name) for role, name in skeleton_roles(motion, names).items()}

@@ -37,6 +37,9 @@ class Strength(Checked):
     Raises:
         InputError: a percentile beyond what was measured.
         UnknownNameError: another sex.
+
+    Examples:
+        >>> weak = wb.motion.Strength(percentile=5, sex="female")
     """
 
     percentile: Annotated[float, Range(PERCENTILES[0], PERCENTILES[-1])] = 50.0

@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.base.checks import choice, color, instance, known, listed, numbers, shown, text
 from wholebody.base.checks import text as checked_text
 from wholebody.base.errors import InputError
@@ -47,6 +47,12 @@ class Equipment:
         rests_on: segments that it is not tested against.
         color: red, green, blue and, if wanted, alpha, each from 0 to 1; a name such as "steelblue", or "#rrggbb".
         filling: the spheres that fill it, once `filled`.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> pack = wb.motion.Equipment("pack", wb.Box((0.15, 0.3, 0.4)), to="thorax", at=(-0.25, 0.0, 0.0))
     """
 
     name: str
@@ -56,6 +62,8 @@ class Equipment:
     rests_on: tuple[str, ...] = ()
     color: tuple[float, float, float, float] | None = None
     filling: SphereFilling | None = field(default=None, init=False)
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -239,6 +247,10 @@ def equipment(name: str, figure: Figure) -> tuple[Equipment, ...]:
     Raises:
         UnknownNameError: there is no such equipment.
         InputError: not a person.
+
+    Examples:
+        >>> [piece.to for piece in wb.motion.equipment("pack", human)]
+        ['thorax']
     """
     known(name, READY, "equipment", "equipment")
     instance(figure, Figure, "equipment: figure", "load one with wb.load('human')")

@@ -33,6 +33,11 @@ class Solutions(Sequence[Solution]):
         descents: how many descents ended in a posture that solves the problem.
         starts: how many were made.
         complete: whether all answers count as found, by the rule of `methods.starts.all_found`: an estimate, no proof.
+
+    Examples:
+        >>> found = wb.solutions(problem, most=2, starts=4)
+        >>> len(found.answers) <= 2
+        True
     """
 
     answers: tuple[Solution, ...] = field(repr=False)
@@ -88,6 +93,9 @@ def solutions(
 
     Raises:
         InputError: a value of the wrong kind or out of range, or the scene changed after the problem was stated.
+
+    Examples:
+        >>> best = wb.solutions(problem, most=2, starts=4).answers[0]
     """
     check_problem(problem, "solutions: problem")
     most = checks.whole(most, "solutions: most", 1, 10_000)

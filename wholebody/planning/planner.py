@@ -52,6 +52,11 @@ class Plan:
         velocity: largest of any joint, in parts of its limit.
         acceleration: the same.
         seconds: of the processor.
+
+    Examples:
+        >>> found = wb.plan(scene, standing, human.with_joints(standing, {"left_elbow_flexion": 1.0}))
+        >>> found.solved, len(found.clip) > 1
+        (True, True)
     """
 
     clip: Clip = field(repr=False)
@@ -96,6 +101,11 @@ def plan(
         InputError: the start or the goal overlaps something, or misses a limit or a constraint, or an argument is not
             of its kind.
         UnknownNameError: a name that the figure does not have.
+
+    Examples:
+        >>> hand = wb.load("hand")
+        >>> wb.plan(wb.Scene(hand), "open", "grip").solved
+        True
     """
     began = processor_time()
     checks.instance(scene, Scene, "plan: scene", "make one with wb.Scene(figure)")

@@ -38,6 +38,9 @@ class Pace(Checked):
 
     Raises:
         InputError: a value out of range.
+
+    Examples:
+        >>> calm = wb.planning.Pace(velocity=1.0, acceleration=4.0)
     """
 
     velocity: Annotated[float, Range(1e-3, 1e3, "rad/s")] | None = None

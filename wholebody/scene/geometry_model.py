@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Indices
+from wholebody.base.arrays import Indices, brief
 from wholebody.base.pool import Pool
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.continuous.moved_pairs import compiled_kernel
@@ -60,6 +60,8 @@ class SceneObject:
     motion: Motion | None = None
     body: Body | None = None
     material: Material = DEFAULT
+
+    __repr__ = brief
 
 
 class SceneGeometry:

@@ -17,7 +17,8 @@ from wholebody.figures.link_pieces import Concavity
 from wholebody.figures.mjcf.compiled import Compiled, is_mjcf, placement
 from wholebody.figures.mjcf.figure import mjcf_figure
 from wholebody.figures.mjcf.geoms import SHAPES, height_field
-from wholebody.geometry.shapes import Box, Capsule, Compound, Cylinder, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
+from wholebody.geometry.compound import Compound
+from wholebody.geometry.shapes import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
 from wholebody.scene.matter.body import Body
 from wholebody.scene.scene import Scene
 
@@ -43,6 +44,9 @@ def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Co
         FileFormatError: a file that cannot be read, with the place and the correction.
         InputError: several robots and a root for all, or a concavity out of range.
         MissingPackageError: MuJoCo is not installed.
+
+    Examples:
+        >>> cell = wb.read_scene("cell.xml")  # doctest: +SKIP
     """
     place = as_path(path, "read_scene: path")
     check_file(place, "scene")

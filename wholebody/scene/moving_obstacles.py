@@ -24,19 +24,12 @@ MOST_SHARES = 128  # of a frame; what is too fast for them comes in deeper, and 
 
 
 class Collision(NamedTuple):
-    """Two that a frame could not keep apart.
+    """Two that a frame could not keep apart."""
 
-    Attributes:
-        first: name of a segment or thing.
-        second: name of the other.
-        depth: how deep they overlap at the end, metres; where they do not, how deep they did at most on the way.
-        inside: whether they overlap at the end; otherwise one went into the other and came out, or through it.
-    """
-
-    first: str
-    second: str
-    depth: float
-    inside: bool
+    first: str  # name of a segment or thing
+    second: str  # name of the other
+    depth: float  # how deep they overlap at the end, metres; where they do not, how deep they did at most on the way
+    inside: bool  # whether they overlap at the end; otherwise one went into the other and came out, or through it
 
     def __str__(self) -> str:
         if self.inside:

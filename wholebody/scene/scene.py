@@ -33,6 +33,14 @@ class Scene(SceneContents):
     things had when it began. A solve during which objects are added or removed ends with an `InputError`.
 
     A scene can be pickled. A copy of it, `copy.copy` or `copy.deepcopy`, has things of its own.
+
+    Raises:
+        InputError: no figure, or figures of one name.
+
+    Examples:
+        >>> kitchen = wb.Scene(human).add(wb.HalfSpace(), name="floor")
+        >>> kitchen.add(wb.Box((0.6, 1.2, 0.04)), name="table", at=(0.6, 0.0, 0.74)).penetration(standing)
+        []
     """
 
     def borrow(self) -> AbstractContextManager[Workspace]:

@@ -34,6 +34,10 @@ class NotCopyable:
             "its problem or scene"
         )
 
+    def __repr__(self) -> str:
+        problem = repr(getattr(self, "problem", "")).partition("\n")[0]
+        return f"{type(self).__name__}({problem.strip(chr(39))})"
+
 
 class Workspace(NotCopyable):
     """Room for one run on a scene; borrowed by `Scene.borrow`, or made by `Scene.workspace` for what lives on.

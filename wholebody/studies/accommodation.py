@@ -48,25 +48,15 @@ class Share(NamedTuple):
 
 
 class Exclusion(NamedTuple):
-    """A dimension that tells who is left out.
+    """A dimension that tells who is left out."""
 
-    Attributes:
-        sex: "male" or "female".
-        verdict: "reach", "fit" or "see": what they do not.
-        dimension: its name, see `wb.people`.
-        side: "over" or "under".
-        value: metres (mass: kilograms) over or under which they are.
-        excluded: how many are left out for it.
-        told: share of these that are on that side, less the share of those that are accommodated.
-    """
-
-    sex: str
-    verdict: str
-    dimension: str
-    side: str
-    value: float
-    excluded: int
-    told: float
+    sex: str  # "male" or "female"
+    verdict: str  # "reach", "fit" or "see": what they do not
+    dimension: str  # its name, see `wb.people`
+    side: str  # "over" or "under"
+    value: float  # metres (mass: kilograms) over or under which they are
+    excluded: int  # how many are left out for it
+    told: float  # share of these that are on that side, less the share of those that are accommodated
 
     def __str__(self) -> str:
         unit = "kg" if self.dimension == "mass" else "m"
@@ -89,6 +79,12 @@ class Accommodation:
             NaN for who was refused. Empty where nobody is joined with an adjustable figure.
 
     Who was refused has no posture, and is neither in shares nor in exclusions; see `tried`.
+
+    Examples:
+        >>> def task(figure, target, layout):
+        ...     return wb.Problem(wb.Scene(figure), goals=[wb.Point("right_index_tip", (0.3, -0.2, 1.2))])
+        >>> wb.accommodation(task, wb.people(1)).fits
+        (True, True)
     """
 
     records: Records
@@ -194,7 +190,7 @@ def accommodation(
     method: str | Method | None = None,
     jobs: int = 1,
     folder: str | os.PathLike[str] | None = None,
-    progress: Callable[[SolveProgress], Any] | None = None,
+    progress: Callable[[SolveProgress], Any] | bool | None = None,
 ) -> Accommodation:
     """Solve a task for many people, and count who reaches, fits and sees.
 
@@ -215,6 +211,12 @@ def accommodation(
         InputError: a value of the wrong kind or range, or everybody is refused.
         UnknownNameError: there is no such task file or method.
         FileFormatError: the task file cannot be read.
+
+    Examples:
+        >>> def task(figure, target, layout):
+        ...     return wb.Problem(wb.Scene(figure), goals=[wb.Point("right_index_tip", (0.3, -0.2, 1.2))])
+        >>> wb.accommodation(task, wb.people(1)).reaches  # a woman and a man
+        (True, True)
     """
     point = None if sees is None else inputs.point(sees, "accommodation: sees")
     given = sampled(100) if people is None else people

@@ -10,7 +10,9 @@ from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
 from wholebody.base import checks
+from wholebody.base.arrays import brief
 from wholebody.base.batches import fingerprint, run_batch, shared
+from wholebody.base.progress import reporter
 from wholebody.base.runner import EndedError, Job
 from wholebody.methods.base import Method
 from wholebody.methods.control import ctrl_c_ends_all
@@ -38,11 +40,17 @@ class SolveProgress(NamedTuple):
         done: problems, those of an earlier run included.
         total: how many there are in all.
         record: the one that was done last; None before the first.
+
+    Examples:
+        >>> records = wb.solve_many([problem], progress=lambda now: now.done >= 100)  # ends after a hundred
     """
 
     done: int
     total: int
     record: SolveRecord | None
+
+    def __repr__(self) -> str:
+        return brief(self)
 
 
 @dataclass(frozen=True)
@@ -70,7 +78,7 @@ class Running:
             checks.whole(jobs, f"{what}: jobs", 1, MOST_JOBS),
             None if cluster is None else checks.text(cluster, f"{what}: cluster"),
             None if seconds is None else checks.number(seconds, f"{what}: seconds", 1e-3, LONGEST, "s"),
-            checks.function(progress, f"{what}: progress"),
+            reporter(progress, f"{what}: progress"),
         )
 
 
@@ -83,7 +91,7 @@ def solve_many(
     warm_start: bool = False,
     seconds: float | None = None,
     folder: str | os.PathLike[str] | None = None,
-    progress: Callable[[SolveProgress], Any] | None = None,
+    progress: Callable[[SolveProgress], Any] | bool | None = None,
 ) -> Records:
     """Solve many problems, several at a time, in processes that keep the scenes which they have seen.
 
@@ -107,8 +115,8 @@ def solve_many(
         seconds: deadline of each problem, by the clock; its record's outcome is then "ended". None for none.
         folder: keeps the records (`records.sqlite`). What it holds already of the same problem and method is not solved
             again: a run that was ended goes on. Made if it does not exist.
-        progress: called with a `SolveProgress` after each problem; if it returns True, the run ends and the problems
-            that are left are "cancelled".
+        progress: called with a `SolveProgress` after each problem; if it returns True, the run ends, and the
+            remaining problems are "cancelled". True in place of a function prints a line that counts.
 
     Returns:
         The records, in the order of the problems.
@@ -119,6 +127,11 @@ def solve_many(
         FileFormatError: the folder holds other records.
         MissingPackageError: dask is not installed.
         WholebodyError: the cluster does not answer.
+
+    Examples:
+        >>> records = wb.solve_many({"first": problem, "second": problem})
+        >>> [record.outcome for record in records]
+        ['solved', 'solved']
     """
     what = "solve_many"
     named = _named(problems, what)

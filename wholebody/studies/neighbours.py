@@ -23,20 +23,14 @@ Work = Mapping[Any, tuple[Any, ...]]
 
 
 class Family(NamedTuple):
-    """Cases that give each other starts.
+    """Cases that give each other starts."""
 
-    Attributes:
-        order: the cases.
-        done: their records by number.
-        compute: answers of a function of `solving` for work by key: the number of a case, and what goes with it. Those
-            that are None, or whose process ended, are left out.
-        keep: puts a record into its place; whether the caller ends the run.
-    """
-
-    order: Sequence[Case]
-    done: dict[int, SolveRecord]
+    order: Sequence[Case]  # the cases
+    done: dict[int, SolveRecord]  # their records by number
+    # answers of a function of `solving` for work by key: the number of a case, and what goes with it. Those that are
+    # None, or whose process ended, are left out.
     compute: Callable[[Callable[..., Any], Work], dict[Any, Any]]
-    keep: Callable[[int, SolveRecord], bool]
+    keep: Callable[[int, SolveRecord], bool]  # puts a record into its place; whether the caller ends the run
 
 
 def solve_from_neighbours(family: Family) -> bool:

@@ -43,6 +43,10 @@ def people(
 
     Raises:
         InputError: a value of the wrong kind or range.
+
+    Examples:
+        >>> sorted(wb.people(2, seed=1))
+        ['female 1', 'female 2', 'male 1', 'male 2']
     """
     sexes = _sexes(sex, "people")
     if percentiles is not None:
@@ -92,6 +96,10 @@ def boundary(
     Raises:
         InputError: a value of the wrong kind or range.
         UnknownNameError: an unknown dimension.
+
+    Examples:
+        >>> list(wb.boundary(0.9, ("stature", "mass"), "female"))[0]
+        'female boundary 0'
     """
     share = checks.number(confidence, "boundary: confidence", 0.5, 0.999)
     names = ("stature", "mass", *dimension_names())

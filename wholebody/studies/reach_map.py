@@ -12,6 +12,7 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.batches import spread
 from wholebody.base.errors import InputError
+from wholebody.base.progress import reporter
 from wholebody.base.runner import packed
 from wholebody.geometry.placement import FARTHEST
 from wholebody.methods.base import Method
@@ -64,7 +65,7 @@ def reach_map(
     method: str | Method | None = None,
     jobs: int = 1,
     cluster: str | None = None,
-    progress: Callable[[int, int], Any] | None = None,
+    progress: Callable[[int, int], Any] | bool | None = None,
 ) -> ReachMap:
     """Find which places of a grid a point of a frame can reach, with everything that a problem asks.
 
@@ -85,14 +86,19 @@ def reach_map(
             neighbour is reached. A method that is given solves all places, so `wb.QP()` minimises the measures too.
         jobs: processes.
         cluster: address of a dask scheduler; None for this machine.
-        progress: called with the numbers of settled and of all places; if it returns True, the search ends, and places
-            that are left are not tried.
+        progress: called with the numbers of settled and of all places; if it returns True, the search ends, and the
+            other places are not tried. True in place of a function prints a line that counts.
 
     Raises:
         InputError: a value of the wrong kind or range, or more than a million places.
         UnknownNameError: no such frame or method.
         MissingPackageError: dask is not installed.
         WholebodyError: the cluster does not answer.
+
+    Examples:
+        >>> found = wb.reach_map(problem, "right_index_tip", (0.3, -0.3, 1.0), (0.5, -0.1, 1.0), 0.2)
+        >>> found.verdict.shape
+        (2, 2, 1)
     """
     what = "reach_map"
     check_problem(problem, f"{what}: problem").check_fresh()
@@ -107,9 +113,9 @@ def reach_map(
     jobs = checks.whole(jobs, f"{what}: jobs", 1, MOST_JOBS)
     if cluster is not None:
         checks.text(cluster, f"{what}: cluster")
-    checks.function(progress, f"{what}: progress")
+    told = reporter(progress, f"{what}: progress")
     asked = Asked(problem, frame, point, whole, quick)
-    search = _Search(asked, grid, jobs, cluster, progress)
+    search = _Search(asked, grid, jobs, cluster, told)
     search.run()
     return search.answer()
 

@@ -39,6 +39,11 @@ class ReachMap(Shown):
 
     Raises:
         InputError: of its files: another ending, or it cannot be written.
+
+    Examples:
+        >>> found = wb.reach_map(problem, "right_index_tip", (0.4, -0.3, 1.0), (0.4, -0.3, 1.0), 0.1)
+        >>> bool(found.left.max() == 0.0)
+        True
     """
 
     problem: Problem = field(repr=False)

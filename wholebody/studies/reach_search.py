@@ -9,10 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.figures.state import State
 from wholebody.methods.base import Method
 from wholebody.methods.contradictions import contradictions
-from wholebody.methods.simplification.reach import Balls, Reach, held_balls
+from wholebody.methods.simplification.reach import Balls, Reach, held_balls, still_dofs
 from wholebody.problem import Problem
 from wholebody.tasks import Point
 
@@ -166,13 +165,8 @@ def reach_balls(problem: Problem, frame: str, offset: Array) -> tuple[Array, Arr
     held = model.frames[figure.frame_id(frame)]
     point = (held.placement.act(offset))[None]
     joint = np.array([held.parentJoint], dtype=np.intp)
-    state = State(model).update(problem.start)
-    stuck = np.zeros(model.nv, dtype=bool)
-    for bound in problem.bounds:
-        low, high = bound.bounds(state, None)
-        stuck |= (low == 0.0) & (high == 0.0)
     resting = Balls(point, np.zeros(1), np.zeros(1, dtype=np.intp))
-    reach = Reach(model, problem.start, resting, joint, np.flatnonzero(stuck).tolist())
+    reach = Reach(model, problem.start, resting, joint, still_dofs(problem))
     found = [reach.seen_from(0), *held_balls(figure, reach, problem.constraints)]
     center = np.concatenate([balls.center for balls in found])
     radius = np.concatenate([balls.radius for balls in found])

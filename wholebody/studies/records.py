@@ -49,6 +49,11 @@ class SolveRecord:
         neighbour: name of the case whose answer was the start that led to the posture; "" where it was its own start.
         change: of strategy, in a warm-started run: the joint that turns by more than 10 degrees from a neighbouring
             case, such as "left_hip_flexion by 60 degrees from 1"; "" where the posture goes on from its neighbours.
+
+    Examples:
+        >>> record = wb.solve_many([problem])[0]
+        >>> record.goal_error < 1e-5
+        True
     """
 
     __repr__ = brief
@@ -111,6 +116,11 @@ class Records(Shown, Sequence[SolveRecord]):
 
     Raises:
         InputError: no list of records; of its files: another ending, or it cannot be written.
+
+    Examples:
+        >>> records = wb.solve_many([problem])
+        >>> records[0].outcome, len(records)
+        ('solved', 1)
     """
 
     def __init__(self, records: Sequence[SolveRecord]) -> None:

@@ -14,15 +14,10 @@ from wholebody.scene.scene import Scene
 
 
 class Sent(NamedTuple):
-    """What is sent to another process.
+    """What is sent to another process."""
 
-    Attributes:
-        value: pickled, with scenes left out.
-        scenes: digest of each of its scenes to that scene, pickled.
-    """
-
-    value: bytes
-    scenes: dict[str, bytes]
+    value: bytes  # pickled, with scenes left out
+    scenes: dict[str, bytes]  # digest of each of its scenes to that scene, pickled
 
     def read(self) -> Any:
         """The value, with the scenes that this process has seen already, or has them now.

@@ -31,19 +31,12 @@ Run = tuple[Any, Sequence[Make]]
 
 @dataclass(frozen=True)
 class Case:
-    """A problem that is made where it is solved.
+    """A problem that is made where it is solved."""
 
-    Attributes:
-        record: its record before it is done: name and factors.
-        make: makes the problem.
-        asked: fingerprint; a case with the same is not done again.
-        place: numbers of its factors; cases are neighbours as far as these are alike.
-    """
-
-    record: SolveRecord
-    make: Make
-    asked: str = ""
-    place: tuple[int, ...] = ()
+    record: SolveRecord  # its record before it is done: name and factors
+    make: Make  # makes the problem
+    asked: str = ""  # fingerprint; a case with the same is not done again
+    place: tuple[int, ...] = ()  # numbers of its factors; cases are neighbours as far as these are alike
 
 
 def solve_runs(runs: Sequence[Run], method: Method) -> list[list[dict[str, Any]]]:

@@ -43,7 +43,7 @@ def study(
     warm_start: bool = False,
     seconds: float | None = None,
     folder: str | os.PathLike[str] | None = None,
-    progress: Callable[[SolveProgress], Any] | None = None,
+    progress: Callable[[SolveProgress], Any] | bool | None = None,
 ) -> Records:
     """Solve one task for every person, with every target, in every layout.
 
@@ -67,7 +67,8 @@ def study(
             person before, see `solve_many`.
         seconds: deadline of each problem, by the clock; None for none.
         folder: keeps the records, so that a run that was ended goes on; see `solve_many`.
-        progress: called with a `SolveProgress` after each case; if it returns True, the run ends.
+        progress: called with a `SolveProgress` after each case; if it returns True, the run ends. True in place of a
+            function prints a line that counts.
 
     Returns:
         One record for each combination, the targets varying fastest. Its columns `person`, `target` and `layout` are
@@ -79,6 +80,13 @@ def study(
         FileFormatError: the task file cannot be read, or the folder holds other records.
         MissingPackageError: dask is not installed.
         WholebodyError: the cluster does not answer.
+
+    Examples:
+        >>> def task(figure, target, layout):
+        ...     return wb.Problem(wb.Scene(figure), goals=[wb.Point("right_index_tip", target)])
+        >>> records = wb.study(task, people=["F5", "M95"], targets=[(0.3, -0.2, 1.2)])
+        >>> [record.outcome for record in records]
+        ['solved', 'solved']
     """
     what = "study"
     make: TaskFile | TaskFunction

@@ -15,7 +15,6 @@ from wholebody.base.fields import Check, Range, Vector, check_of
 from wholebody.figures.anthropometry import DIMENSION
 from wholebody.figures.figure import Figure
 from wholebody.geometry.placement import unit_vector
-from wholebody.scene.matter.body import BallJoint, Hinge
 from wholebody.taskfile.where import Where
 from wholebody.tasks import inputs
 from wholebody.tasks.inputs import FARTHEST
@@ -231,45 +230,41 @@ class ByName(Kind):
                 self.names_of.names(name, figure, where.at(name))
 
 
-class ThingJoints(Kind):
-    """Joints that hold a thing to others or to the world."""
+@dataclass(frozen=True)
+class Part(Kind):
+    """A table in braces, within a value, that makes an object."""
 
-    words = (
-        'list of {type = "hinge" or "ball", at = [x, y, z], axis = [x, y, z], to = "thing"}; at is a point in the '
-        "thing's axes, m; axis is that of a hinge, z if left out; without to the world holds it"
-    )
+    noun: str
+    example: str  # a table as it is written, without its braces
+    forms: dict[str, Form]  # by the values of `chooser`; one of name "" where there is none
+    chooser: str = ""  # key that names the form
+    note: str = ""  # about the keys, for the documentation
 
-    def read(self, value: Any, where: Where) -> tuple[BallJoint, ...]:
-        """Return the joints."""
-        if not isinstance(value, list) or not value:
-            raise where.fault(
-                f'{shown(value)} is no list of joints; write [{{ type = "hinge", at = [0.0, 0.4, 0.0] }}]'
-            )
-        return tuple(self._joint(entry, where.at(f"[{i}]")) for i, entry in enumerate(value))
+    @property
+    def words(self) -> str:
+        """An example, and what its keys mean."""
+        return f"{{ {self.example} }}{self.note}"
 
-    @staticmethod
-    def _joint(entry: Any, where: Where) -> BallJoint:
-        if not isinstance(entry, dict):
-            raise where.fault(f'{shown(entry)} is no joint; write {{ type = "hinge", at = [0.0, 0.4, 0.0] }}')
-        read: dict[str, Kind] = {
-            "at": POSITION,
-            "to": Text(),
-            **({"axis": DIRECTION} if entry.get("type") == "hinge" else {}),
-        }
-        if "type" not in entry:
-            raise where.fault('the joint has no type; write type = "hinge" or type = "ball"')
-        kind = Choice(tuple(JOINTS)).read(entry["type"], where.at("type"))
-        for name in entry:
-            if name != "type" and name not in read:
-                raise UnknownNameError(f"key of a joint of type {kind!r}", name, ("type", *read), str(where))
-        given = {name: read[name].read(one, where.at(name)) for name, one in entry.items() if name != "type"}
+    def read(self, value: Any, where: Where) -> Any:
+        """Return the object."""
+        if not isinstance(value, dict) or self.chooser not in ({"": None} | value):
+            raise where.fault(f"{shown(value)} is no {self.noun}; write {{ {self.example} }}")
+        data = {name: entry for name, entry in value.items() if name != self.chooser}
+        choice = Choice(tuple(self.forms))
+        form = self.forms[choice.read(value[self.chooser], where.at(self.chooser)) if self.chooser else ""]
+        assert form.make is not None
+        read = values_of(data, form.keys, where)
         try:
-            return JOINTS[kind](**given)
+            return form.make(**read)
         except InputError as error:
             raise where.fault(str(error)) from None
 
+    def names(self, value: Any, figure: Figure, where: Where) -> None:
+        """Look up the names in it."""
+        for key in {key.name: key for form in self.forms.values() for key in form.keys}.values():
+            if (found := getattr(value, key.name, None)) is not None:
+                key.kind.names(found, figure, where.at(key.name))
 
-JOINTS: dict[str, type[BallJoint]] = {"hinge": Hinge, "ball": BallJoint}
 
 POSITION = Numbers(Vector(3, Range(-FARTHEST, FARTHEST, "m")), "[x, y, z]")
 DIRECTION = Numbers(Vector(3, Range(-1e6, 1e6)), "[x, y, z], any length")
@@ -340,3 +335,15 @@ class Table:
     implied: tuple[tuple[str, str], ...] = ()  # keys that only one type has and that imply it: (key, type)
     forms: dict[str, Form] | None = None  # types by name
     either: bool = False  # whether it may have one in single brackets, or several in double ones
+
+
+def values_of(data: dict[str, Any], keys: tuple[Key, ...], where: Where) -> dict[str, Any]:
+    """The values of a table, checked and in the form that Python code takes."""
+    known = {key.name: key for key in keys}
+    for name in data:
+        if name not in known:
+            raise UnknownNameError("key", name, known, str(where.at(name)))
+    for key in keys:
+        if key.required and key.name not in data:
+            raise where.fault(f"key {key.name} is missing; write {key.name} = {key.kind.words}")
+    return {name: known[name].kind.read(value, where.at(name)) for name, value in data.items()}

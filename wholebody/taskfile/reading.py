@@ -11,7 +11,7 @@ from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError, UnknownNameError, one_line
 from wholebody.base.files import is_file, parsed_toml, read_text
 from wholebody.figures.figure import Figure
-from wholebody.taskfile.kinds import Form, Key, Table
+from wholebody.taskfile.kinds import Form, Key, Table, values_of
 from wholebody.taskfile.schema import TABLES, TOP
 from wholebody.taskfile.where import Where
 
@@ -75,7 +75,7 @@ def contents_of(path: Path, kind: str, keys: tuple[Key, ...], known: Mapping[str
     for name in plain:
         if name not in names:
             raise UnknownNameError("key or table", name, [*names, *known], str(where))
-    top = Entry(where, None, "", names, _values(plain, keys, where))
+    top = Entry(where, None, "", names, values_of(plain, keys, where))
     return Contents(top, {name: _entries(name, data[name], known[name], where) for name in known if name in data})
 
 
@@ -107,15 +107,4 @@ def _entry(data: dict[str, Any], table: Table, where: Where) -> Entry:
             )  # fmt: skip
         form = table.forms[name]
     keys = (*table.keys, *(form.keys if form else ()))
-    return Entry(where, form, name, {key.name: key for key in keys}, _values(data, keys, where))
-
-
-def _values(data: dict[str, Any], keys: tuple[Key, ...], where: Where) -> dict[str, Any]:
-    known = {key.name: key for key in keys}
-    for name in data:
-        if name not in known:
-            raise UnknownNameError("key", name, known, str(where.at(name)))
-    for key in keys:
-        if key.required and key.name not in data:
-            raise where.fault(f"key {key.name} is missing; write {key.name} = {key.kind.words}")
-    return {name: known[name].kind.read(value, where.at(name)) for name, value in data.items()}
+    return Entry(where, form, name, {key.name: key for key in keys}, values_of(data, keys, where))

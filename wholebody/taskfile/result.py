@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wholebody.base.arrays import Array, as_dict
+from wholebody.base.arrays import Array, as_dict, brief
 from wholebody.base.checks import instance, posture
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, one_line
@@ -95,6 +95,11 @@ class Result(NamedTuple):
         message: the sentence that explains the status.
         method: name of the method.
         joints: joint to its value, radians or metres.
+
+    Examples:
+        >>> result = wb.taskfile.read_result(result_file)
+        >>> result.status, result.q.shape == solution.q.shape
+        ('solved', True)
     """
 
     task: Task
@@ -104,6 +109,9 @@ class Result(NamedTuple):
     method: str
     joints: dict[str, float]
 
+    def __repr__(self) -> str:
+        return brief(self)
+
 
 def read_result(path: str | os.PathLike[str]) -> Result:
     """Read a result.json that `wholebody pose` or `write_result` wrote, and its task.
@@ -112,6 +120,10 @@ def read_result(path: str | os.PathLike[str]) -> Result:
         FileFormatError: it is not a result, or does not fit the present task.
         InputError: the path is none.
         WholebodyError: its task cannot be read.
+
+    Examples:
+        >>> wb.taskfile.read_result(result_file).status
+        'solved'
     """
     file, again = checked_path(path, "read_result: path"), "give a result.json that `wholebody pose` wrote"
     text = read_text(file, "result")
@@ -143,6 +155,10 @@ def write_result(task: Task, solution: Solution, path: str | os.PathLike[str]) -
     Raises:
         InputError: not a task or not a solution of its figure, or the file cannot be written or does not end in
             .json.
+
+    Examples:
+        >>> task = wb.read_task(task_file)
+        >>> path = wb.taskfile.write_result(task, wb.solve(task.problem), folder / "again.json")
     """
     file = checked_target(path, "write_result: path", "a result", (".json",))
     instance(task, Task, "write_result: task", "give one of wb.read_task")

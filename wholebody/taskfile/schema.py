@@ -6,15 +6,16 @@ from collections.abc import Callable
 from dataclasses import MISSING, fields, replace
 from typing import Any
 
-from wholebody import methods, tasks
+from wholebody import ergonomics, methods, tasks
 from wholebody.base.fields import Range, Vector
 from wholebody.figures.anthropometry import AGE, MASS, PERCENTILE, STATURE
 from wholebody.figures.link_pieces import CONCAVITY
 from wholebody.geometry import shapes
 from wholebody.geometry.pieces import SMALLEST
 from wholebody.methods.inputs import BUDGET, CCD_TOLERANCE, DAMPING, ITERATIONS, RESTARTS, SEED, TIME_LIMIT, TOLERANCE
+from wholebody.motion.strength import Strength
 from wholebody.problem import CLEARANCE
-from wholebody.scene.matter.body import Body
+from wholebody.scene.matter.body import BallJoint, Body, Hinge
 from wholebody.taskfile import kinds
 from wholebody.taskfile.kinds import (
     DIRECTION,
@@ -30,11 +31,13 @@ from wholebody.taskfile.kinds import (
     Kind,
     Number,
     Numbers,
+    Part,
     Several,
     Table,
     Text,
     kind_of,
 )
+from wholebody.tasks.forces import MOST_FORCE
 
 _SIZE = Range(SMALLEST, POSITION.vector.each.high, "m")  # of a thing in reach; a larger one is in other units
 _LENGTH, _LENGTHS = Number(_SIZE), Numbers(Vector(3, _SIZE))
@@ -117,6 +120,12 @@ GOALS = {
 SOFT = kind_of(tasks.Soft, "weight")
 """What `soft` of a goal takes: the weight of the measure that the goal becomes."""
 
+_NEWTONS = Numbers(Vector(3, Range(-MOST_FORCE, MOST_FORCE, "N")), "[x, y, z]")
+_FORCE = _form(tasks.Force, "frame force", frame=FRAME, force=_NEWTONS)
+FORCES = Several(Part("force", 'frame = "right_palm", force = [0.0, 0.0, -98.0]', {"": _FORCE}))
+_STRENGTH = _form(Strength, "percentile sex", sex=Choice(("male", "female")))
+STRENGTH = Part("strength", 'percentile = 50, sex = "male"', {"": _STRENGTH})
+
 CONSTRAINTS = {
     "hold": _form(tasks.Hold, "frame at orientation relative_to", frame=FRAME, relative_to=FRAME),
     "plane": _form(tasks.Plane, "frame normal point side", frame=FRAME),
@@ -125,6 +134,11 @@ CONSTRAINTS = {
     "reach_cones": _form(tasks.ReachCones, "names", names=Several(kinds.CONE)),
     "range_of_motion": _form(tasks.RangeOfMotion, "names", names=Several(kinds.RANGE)),
     "stand": _form(tasks.Stand, "on feet balance margin knees", feet=Several(SEGMENT), knees=Several(SEGMENT)),
+    "loaded_balance": _form(ergonomics.LoadedBalance, "forces feet margin", forces=FORCES, feet=Several(SEGMENT)),
+    "strength_limit": _form(
+        ergonomics.StrengthLimit, "forces strength standing share compression", forces=FORCES, strength=STRENGTH
+    ),
+    "look": _form(ergonomics.Look, "at eyes", eyes=FRAME),
     **{name: replace(form, keys=form.keys[:-1]) for name, form in CONTACTS.items()},  # a constraint has no weight
 }
 
@@ -135,6 +149,7 @@ MEASURES = {
     "displacement": _form(tasks.Displacement, "weight"),
     "rhythm": _form(tasks.Rhythm, "weight"),
     "stance": _form(tasks.Stance, "feet weight", feet=Several(SEGMENT)),
+    "exertion": _form(ergonomics.Exertion, "forces strength standing weight", forces=FORCES, strength=STRENGTH),
     "potential_energy": _form(tasks.PotentialEnergy, "weight"),
 }
 
@@ -170,13 +185,23 @@ METHODS = {
 
 
 _THING = _keys(at=PLACEMENT, color=kinds.Color())
+JOINT_OF_A_THING = Part(
+    "joint",
+    'type = "hinge" or "ball", at = [x, y, z], axis = [x, y, z], to = "thing"',
+    {
+        "hinge": Form(_keys(at=POSITION, axis=DIRECTION, to=Text()), Hinge),
+        "ball": Form(_keys(at=POSITION, to=Text()), BallJoint),
+    },
+    "type",
+    "; at is a point in the thing's axes, m; axis is that of a hinge, z if left out; without to the world holds it",
+)
 _BODY = _keys(
     density=kind_of(Body, "density"),
     mass=kind_of(Body, "mass"),
     material=Choice(("wood", "human", "metal")),
     velocity=kind_of(Body, "velocity"),
     angular_velocity=kind_of(Body, "angular_velocity"),
-    joints=kinds.ThingJoints(),
+    joints=Several(JOINT_OF_A_THING),
 )
 
 TOP = _keys(

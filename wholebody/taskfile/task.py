@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import with_values
+from wholebody.base.arrays import brief, with_values
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import UnknownNameError
 from wholebody.base.files import is_file, is_folder, title_of
@@ -52,6 +52,11 @@ class Task:
         method: the method that it names, with its settings.
         goal_names: the name of each goal in tables: its type and its frame.
         view: the camera of a picture.
+
+    Examples:
+        >>> task = wb.read_task(task_file)
+        >>> task.problem.goals[0].frame
+        'right_index_tip'
     """
 
     path: Path
@@ -60,6 +65,8 @@ class Task:
     method: Method
     goal_names: tuple[str, ...]
     view: View
+
+    __repr__ = brief
 
 
 def read_task(path: str | PathLike[str]) -> Task:
@@ -73,6 +80,11 @@ def read_task(path: str | PathLike[str]) -> Task:
             are named.
         UnknownNameError: an unknown key, type, joint, frame or posture, or a missing file, with the nearest names.
         InputError: values that contradict each other.
+
+    Examples:
+        >>> path = wb.taskfile.write_task(problem, folder / "reach.toml")
+        >>> wb.solve(wb.read_task(path).problem).status
+        'solved'
     """
     file = checked_path(path, "path")
     return task_from(read_contents(file), file)

@@ -20,10 +20,9 @@ from wholebody.figures.figure import Figure
 from wholebody.geometry.shapes import Mesh
 from wholebody.problem import Problem
 from wholebody.scene.geometry_model import SceneObject
-from wholebody.scene.matter.body import BallJoint
 from wholebody.scene.scene import Scene
-from wholebody.taskfile.kinds import JOINTS
-from wholebody.taskfile.schema import CONSTRAINTS, FIGURES, GOALS, MEASURES, SHAPES
+from wholebody.taskfile.kinds import Kind, Part, Several
+from wholebody.taskfile.schema import CONSTRAINTS, FIGURES, GOALS, JOINT_OF_A_THING, MEASURES, SHAPES
 from wholebody.tasks.frame import PlacementTerm
 
 
@@ -44,6 +43,9 @@ def write_task(problem: Problem | Scene, path: str | PathLike[str], *, title: st
     Raises:
         InputError: a figure that was not loaded or was reduced, or a term, measure or shape that task files do not
             have, or no measures but `Soft`; or the file cannot be written or does not end in .toml.
+
+    Examples:
+        >>> path = wb.taskfile.write_task(problem, folder / "copy.toml", title="A reach")
     """
     target = files.checked_target(path, "write_task: path", "a task", (".toml",))
     if isinstance(problem, Scene):
@@ -152,14 +154,8 @@ def _thing(thing: SceneObject, target: Path, beside: dict[Path, str]) -> dict[st
             if any(getattr(thing.body, name)):
                 found[name] = _plain(getattr(thing.body, name))
         if thing.body.joints:
-            found["joints"] = [_joint(joint) for joint in thing.body.joints]
+            found["joints"] = [_part(joint, JOINT_OF_A_THING) for joint in thing.body.joints]
     return found
-
-
-def _joint(joint: BallJoint) -> dict[str, Any]:
-    kind = next(name for name, made in JOINTS.items() if made is type(joint))
-    found = {"type": kind, "at": list(joint.at), "to": joint.to, "axis": list(getattr(joint, "axis", ())) or None}
-    return {name: value for name, value in found.items() if value is not None}
 
 
 def _mesh(shape: Mesh, name: str, target: Path, beside: dict[Path, str], found: dict[str, Any]) -> str:
@@ -185,7 +181,7 @@ def _term(term: Any, forms: dict[str, Any], what: str, number: int) -> dict[str,
     for key in forms[kind].keys:
         value = getattr(term, key.name, None)
         if value is not None and not (isinstance(value, tuple) and not value):
-            found[key.name] = _plain(value)
+            found[key.name] = _plain(value, key.kind)
     if isinstance(term, PlacementTerm):
         written = next(name for name in ("at", "placement", "target") if hasattr(term, name))
         found[written] = _seven(term.residual.placement)[0 if term.residual.position else 3 :]
@@ -200,10 +196,21 @@ def _seven(placement: Any) -> list[float]:
     return [float(value) for value in pin.SE3ToXYZQUAT(placement)]
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: Any, kind: Kind | None = None) -> Any:
+    if isinstance(kind, Several):
+        return [_plain(entry, kind.kind) for entry in value]
+    if isinstance(kind, Part):
+        return _part(value, kind)
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
     return [_plain(entry) for entry in value] if isinstance(value, (tuple, list)) else value
+
+
+def _part(made: Any, kind: Part) -> dict[str, Any]:
+    """The table in braces of an object."""
+    name, form = next((name, form) for name, form in kind.forms.items() if form.make is type(made))
+    values = {key.name: _plain(getattr(made, key.name), key.kind) for key in form.keys}
+    return ({kind.chooser: name} if kind.chooser else {}) | {key: one for key, one in values.items() if one is not None}
 
 
 def _beside(file: str, target: Path) -> str:
@@ -221,7 +228,8 @@ def _lines(values: dict[str, Any]) -> str:
 
 def _toml(value: Any) -> str:
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{json.dumps(name)} = {_toml(entry)}" for name, entry in value.items()) + " }"
+        keys = [name if name.isascii() and name.isidentifier() else json.dumps(name) for name in value]
+        return f"{{ {', '.join(f'{key} = {_toml(one)}' for key, one in zip(keys, value.values(), strict=True))} }}"
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(map(_toml, value)) + "]"
     if isinstance(value, bool):

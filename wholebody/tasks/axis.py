@@ -50,6 +50,13 @@ class Axis(Goal):
         toward: (3,) the point in the world to which it should point from the frame's origin [m].
         weight: factor on the squared error [1/rad^2].
         basis: (3, 3) rows in the frame: two directions perpendicular to the axis, and the axis, each of length 1.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range. Neither or both of `direction` and `toward`.
+        UnknownNameError: in a problem, a frame that the figure does not have.
+
+    Examples:
+        >>> look = wb.Axis("gaze", (1, 0, 0), toward=(0.55, -0.25, 0.95))
     """
 
     frame: str

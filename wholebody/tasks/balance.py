@@ -156,6 +156,13 @@ class Balance(Constraint):
         feet: names of the segments that carry the figure, including their child segments, such as toes.
         margin: least distance from the edges [m].
         joints: of the figure that stands, among several; None where there is one.
+
+    Raises:
+        InputError: a margin out of range, or feet that do not stand on anything at the start.
+        UnknownNameError: in a problem, a segment that the figure does not have.
+
+    Examples:
+        >>> steady = wb.Balance(margin=0.02)
     """
 
     feet: Feet = ("left_foot", "right_foot")

@@ -119,7 +119,17 @@ class Term(Checked):
 
 
 class Goal(Term, ABC):
-    """An equality that is met if possible: ``error(state) = 0``."""
+    """An equality that is met if possible: ``error(state) = 0``.
+
+    Examples:
+        >>> class Height(wb.Goal):
+        ...     def error(self, state):
+        ...         return state.center_of_mass()[2:] - 0.9
+        ...     def jacobian(self, state):
+        ...         return state.center_of_mass_jacobian()[2:]
+        >>> wb.solve(wb.Problem(scene, goals=[Height()])).status
+        'solved'
+    """
 
     _answered: ClassVar[Mapping[str, answers.Check]] = {
         "error": answers.values,
@@ -156,7 +166,17 @@ class Goal(Term, ABC):
 
 
 class Constraint(Term, ABC):
-    """An equality or inequality that always holds: ``lower <= value(state) <= upper``."""
+    """An equality or inequality that always holds: ``lower <= value(state) <= upper``.
+
+    Examples:
+        >>> class Low(wb.Constraint):  # keeps the centre of mass below 1.2 m
+        ...     def value(self, state):
+        ...         return 1.2 - state.center_of_mass()[2:]
+        ...     def jacobian(self, state):
+        ...         return -state.center_of_mass_jacobian()[2:]
+        >>> bool(wb.check_derivatives(Low(), scene))
+        True
+    """
 
     _answered: ClassVar[Mapping[str, answers.Check]] = {
         "value": answers.values,
@@ -195,7 +215,15 @@ class Constraint(Term, ABC):
 
 
 class Bound(Term, ABC):
-    """Least and greatest displacement of every degree of freedom."""
+    """Least and greatest displacement of every degree of freedom.
+
+    Examples:
+        docs/extending.md describes own terms.
+
+        >>> class Slow(wb.Bound):
+        ...     def bounds(self, state, dt):
+        ...         return np.full(state.model.nv, -0.1), np.full(state.model.nv, 0.1)
+    """
 
     _answered: ClassVar[Mapping[str, answers.Check]] = {"bounds": answers.sides}
 
@@ -213,7 +241,18 @@ class Bound(Term, ABC):
 
 
 class Measure(Term, ABC):
-    """A cost to minimise. Value, gradient and curvature are without the weight; the problem multiplies them by it."""
+    """A cost to minimise. Value, gradient and curvature are without the weight; the problem multiplies them by it.
+
+    Examples:
+        >>> class Low(wb.Measure):
+        ...     weight = 1.0
+        ...     def value(self, state):
+        ...         return float(state.center_of_mass()[2])
+        ...     def gradient(self, state):
+        ...         return state.center_of_mass_jacobian()[2]
+        >>> bool(wb.check_derivatives(Low(), scene))
+        True
+    """
 
     _answered: ClassVar[Mapping[str, answers.Check]] = {
         "value": answers.one,

@@ -2,20 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
+from wholebody.base import checks
 from wholebody.base.arrays import Array
-from wholebody.base.errors import TermError, UndefinedTermError
+from wholebody.base.errors import InputError, TermError, UndefinedTermError
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks import answers
-from wholebody.tasks.base import Constraint, Goal, Measure, Term
+from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
 
 _ASKED = (("error", 1), ("value", 1), ("jacobian", 1), ("gradient", 1), ("curvature", 1), ("squares", 1), ("bounds", 2))
 """What terms are asked at a state, and of how many arguments."""
+
+KINDS: dict[str, type] = {"goals": Goal, "constraints": Constraint, "bounds": Bound, "measures": Measure}
+
+
+def checked_terms(terms: Any, kinds: type | tuple[type, ...], what: str) -> Sequence[Any]:
+    """Terms of some kinds, given as the argument `what` of a problem; InputError for anything else."""
+    listed = checks.listed(terms, what, f"{what}=[...]")
+    for number, term in enumerate(listed):
+        if not isinstance(term, kinds):
+            wanted = " or ".join(kind.__name__ for kind in (kinds if isinstance(kinds, tuple) else (kinds,)))
+            home = next((name for name, taken in KINDS.items() if isinstance(term, taken)), "")
+            home = "constraints" if home == "bounds" else home
+            correction = f"give it in {home}=[...]" if home else "see wholebody.tasks"
+            raise InputError(f"{what}[{number}] is {checks.a(type(term))}, not a {wanted}; {correction}")
+    return listed
 
 
 @contextmanager

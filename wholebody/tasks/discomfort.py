@@ -46,6 +46,12 @@ class Discomfort(Measure):
 
     Attributes:
         weight: factor on the measure.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> relaxed = wb.Discomfort(weight=0.1)
     """
 
     weight: inputs.Weight = 1.0

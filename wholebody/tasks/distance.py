@@ -86,6 +86,12 @@ class Effort(DistanceMeasure):
 
     Attributes:
         weight: factor on the measure [1/rad^2].
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> least = wb.Effort(weight=1.0)
     """
 
     weight: inputs.Weight = 1.0
@@ -105,6 +111,12 @@ class Displacement(DistanceMeasure):
 
     Attributes:
         weight: factor on the measure [1/rad^2].
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> upright = wb.Displacement(weight=0.1)
     """
 
     weight: inputs.Weight = 1.0
@@ -171,6 +183,12 @@ class RotationEffort(Measure):
     Attributes:
         weight: factor on the measure [1/rad^2].
         others: the start, and the weights of all other degrees of freedom; once resolved.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> least = wb.RotationEffort()
     """
 
     weight: inputs.Weight = 1.0

@@ -21,14 +21,14 @@ from wholebody.tasks.base import Constraint, Surroundings, filled
 GRAVITY = 9.81
 """m/s^2, as in Pinocchio's models."""
 
-MOST = 1e5  # N: a greater force is a mistake of units
+MOST_FORCE = 1e5  # N: a greater force is a mistake of units
 
 
 def _force(value: object, where: str) -> Array:
     """Force (3,), N."""
     found = checks.numbers(value, (3,), where)
-    if np.linalg.norm(found) > MOST:
-        raise InputError(f"{where} is {np.linalg.norm(found):.4g} N; forces are in newtons, at most {MOST:g}")
+    if np.linalg.norm(found) > MOST_FORCE:
+        raise InputError(f"{where} is {np.linalg.norm(found):.4g} N; forces are in newtons, at most {MOST_FORCE:g}")
     return found
 
 
@@ -41,6 +41,13 @@ class Force(Checked):
     Attributes:
         frame: where it acts: the origin of a frame.
         force: (3,) in the world [N].
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a frame that the figure does not have.
+
+    Examples:
+        >>> push = wb.Force("right_palm", (-100.0, 0.0, 0.0))  # the hand pushes forward by 100 N
     """
 
     frame: inputs.Name
@@ -119,6 +126,13 @@ class LoadedBalance(Constraint):
         feet: segments that carry the figure, as for `Balance`.
         margin: least distance from the edges [m]; None for 0.15 of the polygon's least width.
         keeps: that margin; once resolved.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a frame that the figure does not have.
+
+    Examples:
+        >>> steady = wb.ergonomics.LoadedBalance([wb.Force("right_palm", (-100, 0, 0))])
     """
 
     forces: Forces

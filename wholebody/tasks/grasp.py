@@ -64,6 +64,13 @@ class Grasp(ContactTerm):
         approach: "overhand", the palm looks down, "underhand", it looks up, or "side", it looks to the side, within 45
             degrees each; any if left out.
         weight: factor on the squared error, as a goal [1/m^2 and 1/rad^2].
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range. In a problem, a thing that the hand cannot take so.
+        UnknownNameError: in a problem, a name that the scene does not have.
+
+    Examples:
+        >>> grip = wb.Grasp("right", "handle", kind="power")
     """
 
     hand: inputs.Name

@@ -36,6 +36,12 @@ class PotentialEnergy(Measure):
 
     Attributes:
         weight: factor on the measure [1/J^2].
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> lazy = wb.PotentialEnergy(weight=1e-3)
     """
 
     weight: inputs.Weight = 1.0

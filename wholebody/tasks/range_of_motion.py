@@ -39,6 +39,13 @@ class ReachCones(Constraint):
 
     Attributes:
         names: names of the figure's cones; None for all of them.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a cone that the figure does not have.
+
+    Examples:
+        >>> shoulder = wb.ReachCones(["left_shoulder"])
     """
 
     names: Annotated[Sequence[str], Names("['left_shoulder']", least=0)] | None = None
@@ -206,6 +213,13 @@ class RangeOfMotion(Constraint):
 
     Attributes:
         names: names of the figure's ranges; None for all of them.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a range that the figure does not have.
+
+    Examples:
+        >>> neck = wb.RangeOfMotion(["neck"])
     """
 
     names: Annotated[Sequence[str], Names("['neck']", least=0)] | None = None

@@ -83,6 +83,12 @@ class Rhythm(Measure):
         girdles: clavicles with their arms, once resolved; those of each of several figures.
         knees: knees with their hips; they count where there is a lumbar spine.
         lumbar: the lumbar spine of each figure with a free root.
+
+    Raises:
+        InputError: a weight out of range, or in a problem a figure that is no person.
+
+    Examples:
+        >>> natural = wb.Rhythm(weight=1.0)
     """
 
     weight: inputs.Weight = 1.0

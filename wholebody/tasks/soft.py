@@ -26,6 +26,12 @@ class Soft(Measure):
         goal: any goal, such as `wb.Point("left_palm", place)`. Its weight is a factor too.
         weight: factor on the squared error. `Effort` of a person who reaches is about 1: with a weight of 100, 0.1 m
             cost as much.
+
+    Raises:
+        InputError: no goal, or a weight out of range.
+
+    Examples:
+        >>> rather = wb.Soft(wb.Point("left_palm", (0.3, 0.3, 1.0)), weight=10.0)
     """
 
     goal: Goal

@@ -43,6 +43,13 @@ class Stand(TermOfParts):
             ``Stand("floor", feet=shanks, knees=shanks)`` kneels, and with "left_foot" and "right_shank" on one knee.
         parts: of each foot the distance, two angles, and two rows over the face, which are zero; then, with balance,
             the distances of the centre of mass inside the edges [m]; once resolved.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a name that the scene does not have.
+
+    Examples:
+        >>> upright = wb.Stand("floor")
     """
 
     on: inputs.Name
@@ -122,6 +129,13 @@ class Stance(Measure):
         weight: factor on the measure.
         places: of the two, once resolved.
         rest: (3,) f, w and t in the posture.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a segment that the figure does not have.
+
+    Examples:
+        >>> side_by_side = wb.Stance()
     """
 
     feet: Feet = ("left_foot", "right_foot")

@@ -37,6 +37,13 @@ class Touch(ContactTerm):
             without pieces what is drawn of it touches, else, if it has mass or a joint, what moves with it.
         thing: name of a thing or of one of its pieces, such as "chair:2", or of another segment.
         weight: factor on the squared distance, as a goal [1/m^2].
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a name that the scene does not have.
+
+    Examples:
+        >>> palm_on_table = wb.Touch("right_palm", "table")
     """
 
     part: inputs.Name
@@ -79,6 +86,13 @@ class Lean(ContactTerm):
         part: the segment that leans on it.
         side: (3,) direction in the part's axes that looks at the thing; backwards if left out.
         weight: factor on the squared error, as a goal [1/m^2 and 1/rad^2].
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a name that the scene does not have.
+
+    Examples:
+        >>> back = wb.Lean("wall", part="thorax")
     """
 
     on: inputs.Name

@@ -74,6 +74,10 @@ def check_derivatives(term: Goal | Constraint | Measure, scene: Scene, q: ArrayL
 
     Raises:
         InputError: not a term or not a scene, a value or derivative that is not finite, or one of the wrong shape.
+
+    Examples:
+        >>> bool(wb.check_derivatives(wb.Point("right_index_tip", (0.5, -0.2, 1.0)), scene))
+        True
     """
     checks.instance(term, (Goal, Constraint, Measure), "check_derivatives: term", "give a goal, constraint or measure")
     checks.instance(scene, Scene, "check_derivatives: scene", "make one with wb.Scene(figure)")

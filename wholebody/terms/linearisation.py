@@ -31,23 +31,14 @@ from wholebody.terms.plan import OtherTerm, TermPlan, Terms, checked_rows, make_
 
 
 class TermPlanes(NamedTuple):
-    """Supporting planes of all terms; see `Goal.supporting_planes`.
+    """Supporting planes of all terms; see `Goal.supporting_planes`."""
 
-    Attributes:
-        value: (p,) not positive where the terms are met.
-        jacobian: (p, nv).
-        row: (p,) the first row of the term that a plane is of, goals' before constraints'.
-        key: (p,) names a plane from one posture to the next.
-        bend: (b, nv) rows b with the second derivatives of the terms' rows as sums of b' b.
-        bend_row: (b,) the row that a bend is of, goals' before constraints'.
-    """
-
-    value: Array
-    jacobian: Array
-    row: Indices
-    key: Indices
-    bend: Array
-    bend_row: Indices
+    value: Array  # (p,) not positive where the terms are met
+    jacobian: Array  # (p, nv)
+    row: Indices  # (p,) the first row of the term that a plane is of, goals' before constraints'
+    key: Indices  # (p,) names a plane from one posture to the next
+    bend: Array  # (b, nv) rows b with the second derivatives of the terms' rows as sums of b' b
+    bend_row: Indices  # (b,) the row that a bend is of, goals' before constraints'
 
 
 def term_planes(terms: Sequence[Goal | Constraint], counts: Sequence[int], state: State) -> TermPlanes | None:

@@ -44,33 +44,19 @@ class OtherTerm(NamedTuple):
 
 
 class TermPlan(NamedTuple):
-    """The terms of a problem as arrays.
+    """The terms of a problem as arrays."""
 
-    Attributes:
-        floats: all tables of floats, one after the other.
-        integers: all tables of integers.
-        layout: (tables, 6) where each table of floats begins, its rows and columns, and the same of integers.
-        support: (njoints, n) 1 where a column of the joint Jacobian moves a joint.
-        goal_rows: rows of all goals.
-        value_rows: rows of all constraints.
-        others: goals and constraints of other classes.
-        other_bounds: bounds of other classes.
-        other_measures: measures of other classes.
-        goals: entries of each goal; None for one of another class.
-        constraints: the same of each constraint.
-    """
-
-    floats: Array
-    integers: Integers
-    layout: Integers
-    support: NDArray[np.int8]
-    goal_rows: int
-    value_rows: int
-    others: tuple[OtherTerm, ...]
-    other_bounds: tuple[Bound, ...]
-    other_measures: tuple[Measure, ...]
-    goals: tuple[list[Entry] | None, ...]
-    constraints: tuple[list[Entry] | None, ...]
+    floats: Array  # all tables of floats, one after the other
+    integers: Integers  # all tables of integers
+    layout: Integers  # (tables, 6) where each table of floats begins, its rows and columns, and the same of integers
+    support: NDArray[np.int8]  # (njoints, n) 1 where a column of the joint Jacobian moves a joint
+    goal_rows: int  # rows of all goals
+    value_rows: int  # rows of all constraints
+    others: tuple[OtherTerm, ...]  # goals and constraints of other classes
+    other_bounds: tuple[Bound, ...]  # bounds of other classes
+    other_measures: tuple[Measure, ...]  # measures of other classes
+    goals: tuple[list[Entry] | None, ...]  # entries of each goal; None for one of another class
+    constraints: tuple[list[Entry] | None, ...]  # the same of each constraint
 
     @property
     def squares(self) -> int:

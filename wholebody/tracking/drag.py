@@ -33,23 +33,16 @@ Answer = TypeVar("Answer", Solution, AssemblySolution)
 
 
 class DragFrame(NamedTuple):
-    """Answer of one frame of a drag.
+    """Answer of one frame of a drag."""
 
-    Attributes:
-        q: (nq,) the posture, of an assembly that of its `scene`.
-        error: largest remaining goal error, metres or radians.
-        iterations: iterations of the method.
-        seconds: wall time.
-        collisions: what things that move (`Scene.move` with `over`) passed through, or are inside of.
-        path: shares of the frame, from 0 to 1, and the postures (nq,) there, if things moved; otherwise empty. Straight
-            from one to the next nothing was passed but the collisions.
-    """
-
-    q: Array
-    error: float
-    iterations: int
-    seconds: float
+    q: Array  # (nq,) the posture, of an assembly that of its `scene`
+    error: float  # largest remaining goal error, metres or radians
+    iterations: int  # iterations of the method
+    seconds: float  # wall time
+    # what things that move (`Scene.move` with `over`) passed through, or are inside of
     collisions: tuple[Collision, ...] = ()
+    # shares of the frame, from 0 to 1, and the postures (nq,) there, if things moved; otherwise empty. Straight from
+    # one to the next nothing was passed but the collisions.
     path: tuple[tuple[float, Array], ...] = ()
 
     def __repr__(self) -> str:
@@ -213,7 +206,7 @@ class AssemblyDrag:
         return self.assembly.q
 
     def to(self, target: Any) -> DragFrame:
-        """Make one frame towards a position, or a placement; raises InputError where the target is neither."""
+        """Make one frame towards a position, placement or orientation; raises InputError where the target is none."""
         began, spent, collisions = time.perf_counter(), 0, tuple[Collision, ...]()
         path: tuple[tuple[float, Array], ...] = ()
         made, goal = self.assembly, self._goal
@@ -254,6 +247,15 @@ class Drag(NotCopyable, Generic[Answer]):
 
     With a budget a frame ends with what it has found by then, and the next goes on from there. Where it was not enough
     to get half as far as the goal went, the goal goes half as far next, down to 2 mm; otherwise it goes twice as far.
+
+    Raises:
+        InputError: a problem that the method cannot take, a goal that cannot be moved, or a value out of range.
+        UnknownNameError: there is no such method.
+
+    Examples:
+        >>> drag = wb.Drag(problem.with_start(solution.q))
+        >>> drag.to((0.55, -0.25, 0.96)).error < 0.01
+        True
     """
 
     @overload
@@ -280,7 +282,7 @@ class Drag(NotCopyable, Generic[Answer]):
         """Begin a drag at the problem's start, or where the assembly's bodies are.
 
         Args:
-            problem: with the goal that will move, a `Point` or a `Frame`; or an assembly with a goal.
+            problem: with the goal that will move, a `Point`, a `Frame` or an `Orientation`; or an assembly with a goal.
             method: "qp", "ccd", "newton" or another by name, with a tolerance of 1e-5 at the end and no restarts; or a
                 configured method, which is used as it is. An assembly has one method only.
             goal: index of the goal that moves.
@@ -331,9 +333,9 @@ class Drag(NotCopyable, Generic[Answer]):
         return self._run.tracker if isinstance(self._run, ProblemDrag) else None
 
     def to(self, target: Any) -> DragFrame:
-        """Move the goal to a position (or a placement, for a `Frame`), and make one frame towards it.
+        """Move the goal to a position, placement or orientation, as its kind has it, and make one frame towards it.
 
-        Raises InputError where the target is neither.
+        Raises InputError where the target is none.
         """
         return self._run.to(target)
 

@@ -4,21 +4,16 @@ from __future__ import annotations
 
 from typing import NamedTuple, Protocol
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.scene.moving_obstacles import Collision
 
 FRAME = 1.0 / 60.0  # s: of a display, from frame to frame
 
 
 class Resolution(NamedTuple):
-    """Result of the overlap removal of one frame; the other attributes are those of `Frame`.
+    """Result of the overlap removal of one frame; the other attributes are those of `Frame`."""
 
-    Attributes:
-        candidates: postures (nq,) to show, the best one first; the next is taken if the motion to one is not free.
-        swept: whether the motion to the first of them was swept and is free, where nothing moves by itself.
-        path: where things moved, shares of the frame and postures (nq,) on the way to the first of them.
-    """
-
+    # postures (nq,) to show, the best one first; the next is taken if the motion to one is not free
     candidates: tuple[Array, ...]
     contact_seconds: float
     solve_seconds: float
@@ -26,7 +21,8 @@ class Resolution(NamedTuple):
     joints: int
     pairs: int
     note: str
-    swept: bool = False
+    swept: bool = False  # whether the motion to the first of them was swept and is free, where nothing moves by itself
+    # where things moved, shares of the frame and postures (nq,) on the way to the first of them
     path: tuple[tuple[float, Array], ...] = ()
 
 
@@ -70,3 +66,6 @@ class Frame(NamedTuple):
     note: str
     collisions: tuple[Collision, ...] = ()
     path: tuple[tuple[float, Array], ...] = ()
+
+    def __repr__(self) -> str:
+        return brief(self)

@@ -6,6 +6,7 @@ The page that shows it is elsewhere; this is what happens when a handle is taken
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from wholebody.methods.base import Method
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.solve import method_for_motions
 from wholebody.problem import Problem
+from wholebody.scene.scene import Scene
 from wholebody.tracking.drag import Drag
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.live_subjects import LiveSubject, live_subject, things_of
@@ -31,7 +33,7 @@ class LiveFrame(NamedTuple):
 
     Attributes:
         q: (nq,) the posture.
-        error: how far the handle that is held by the mouse is from it, metres; 0 without one.
+        error: how far the handle that was taken is from where it is drawn, metres or radians; 0 without one.
         contacts: number of pairs that touch.
         overlap: deepest overlap, metres.
         seconds: that the frame took.
@@ -57,7 +59,6 @@ class LiveDrag:
 
     Attributes:
         problem: what was given.
-        scene: a copy of its scene; its things are moved.
         q: (nq,) the present posture.
         handles: names of the frames, or bodies, that can be dragged.
         things: names of the things that can be dragged.
@@ -77,7 +78,7 @@ class LiveDrag:
         """
         self._subject: LiveSubject = live_subject(problem)
         self.problem = problem
-        self.scene, self.q = self._subject.scene, self._subject.q
+        self.q = self._subject.q
         self.handles = tuple(self._subject.handles)
         self.things = things_of(self.scene)
         self.held = set(self._subject.held)
@@ -86,7 +87,7 @@ class LiveDrag:
             self.methods = {"newton": "newton"}
             method = "newton" if method == "qp" else method
         self._undo: list[tuple[Array, Any]] = []
-        self.taken = ""
+        self.taken, self._turns = "", False
         self._drag: Drag[Any] | None = None
         self._trouble = ""
         self._state = self.scene.state(self.q)
@@ -94,27 +95,30 @@ class LiveDrag:
 
     # ---- what the mouse and the buttons do
 
-    def take(self, name: str) -> None:
-        """Take the handle of a frame or a thing; raises UnknownNameError where there is none."""
-        known(name, {*self.handles, *self.things}, "handle")
-        self._undo.append((self.q.copy(), self._subject.remembered()))
-        del self._undo[:-100]  # postures that are remembered
-        self.taken = name
+    def take(self, name: str, *, turn: bool = False) -> None:
+        """Take the handle of a frame or a thing, to move it or, a frame's, to `turn` it.
+
+        Raises UnknownNameError where there is none.
+        """
+        known(name, self.handles if turn else {*self.handles, *self.things}, "handle")
+        self._remember()
+        self.taken, self._turns = name, turn
         self._restart()
 
     def let_go(self) -> None:
         """Let the handle go; the figure stays."""
-        self.taken, self._drag, self._trouble = "", None, ""
+        self.taken, self._turns, self._drag, self._trouble = "", False, None, ""
 
     def move(self, place: Array) -> LiveFrame:
-        """Move the handle that was taken to a place (3,), and make one frame; raises InputError where none was taken.
+        """Move the handle that was taken to a place (3,), or an orientation (4,) if it is turned, and make one frame.
 
-        A frame has a budget of the processor's time, see `Drag`; moved to the same place again, the figure goes on. A
-        figure that cannot follow keeps its posture, and the status says why.
+        An orientation is a quaternion (x, y, z, w). A frame has a budget of the processor's time, see `Drag`; moved to
+        the same target again, the figure goes on. A figure that cannot follow keeps its posture, and the status says
+        why. Raises InputError where no handle was taken.
         """
         if not self.taken:
             raise InputError("no handle was taken; take one first")
-        place = numbers(place, (3,), "the place of a handle")
+        place = numbers(place, (4,) if self._turns else (3,), "the target of a handle")
         began, error, path = time.perf_counter(), 0.0, tuple[tuple[float, Array], ...]()
         if self._drag is not None:
             try:
@@ -123,12 +127,28 @@ class LiveDrag:
                     frame = self._drag.to(self.place(next(iter(self.handles))))
                 else:
                     frame = self._drag.to(place)
-                    error = float(np.linalg.norm(self.place_at(frame.q, self.taken) - place))
+                    error = self._away(frame.q, place)
                 self.q, path = np.array(frame.q), frame.path
                 self._subject.arrived()
             except WholebodyError as trouble:
                 self._trouble = str(trouble)
         return with_values(self._report(error, time.perf_counter() - began), path=path)
+
+    @property
+    def constraints(self) -> Mapping[str, bool]:
+        """Joints and constraints of an assembly, and whether they hold; of a problem none."""
+        return self._subject.constraints
+
+    def constrain(self, name: str, holds: bool) -> None:
+        """Let one of `constraints` hold, or release it; the next frames close it. `undo` takes it back.
+
+        Raises UnknownNameError where there is none.
+        """
+        known(name, self.constraints, "constraint")
+        self._remember()
+        self._subject.constrain(name, holds)
+        if self.taken:
+            self._restart()
 
     def toggle(self, name: str) -> bool:
         """Hold a frame where it is, or release it; whether it is held now. Raises UnknownNameError for other names."""
@@ -163,6 +183,15 @@ class LiveDrag:
 
     # ---- what is seen
 
+    @property
+    def scene(self) -> Scene:
+        """A copy of the scene; its things are moved."""
+        return self._subject.scene
+
+    def orientation(self, name: str) -> Array:
+        """How (4,) the handle of a frame is turned, a quaternion (x, y, z, w)."""
+        return np.array(pin.SE3ToXYZQUAT(self._placement(self.q, name))[3:])
+
     def place(self, name: str) -> Array:
         """Where (3,) the handle of a frame or a thing is."""
         return self.place_at(self.q, name)
@@ -171,8 +200,7 @@ class LiveDrag:
         """The same at a posture (nq,)."""
         if name in self.things:
             return np.array(self.scene.objects[name].placement.translation)
-        handle = self._subject.handles[name]
-        return np.array(self._state.update(q).data.oMi[handle.joint].act(handle.local.translation))
+        return np.array(self._placement(q, name).translation)
 
     def report(self) -> LiveFrame:
         """What there is to say without a frame."""
@@ -182,13 +210,31 @@ class LiveDrag:
         """The problem with the present posture as its start, and the holds; raises InputError for an assembly."""
         return self._subject.stated(self.q, goals, self.held - {self.taken})
 
+    def _placement(self, q: Array, name: str) -> pin.SE3:
+        """Placement of the handle of a frame at a posture (nq,)."""
+        handle = self._subject.handles[name]
+        return self._state.update(q).data.oMi[handle.joint] * handle.local
+
+    def _away(self, q: Array, target: Array) -> float:
+        """How far the handle that was taken is at a posture (nq,) from its target, metres or radians."""
+        if self._turns:
+            wanted = pin.Quaternion(target).normalized().toRotationMatrix()
+            return float(np.linalg.norm(pin.log3(wanted @ self._placement(q, self.taken).rotation.T)))
+        return float(np.linalg.norm(self.place_at(q, self.taken) - target))
+
+    def _remember(self) -> None:
+        """Note what `undo` goes back to."""
+        self._undo.append((self.q.copy(), self._subject.remembered()))
+        del self._undo[:-100]  # postures that are remembered
+
     def _restart(self) -> None:
         """Begin to follow anew: holds, handle or method are others."""
         self._trouble = ""
         followed = self.taken if self.taken in self.handles else next(iter(self.handles))
         held = self.held - {self.taken}
+        target = self.orientation(followed) if self._turns else self.place(followed)
         try:
-            self._drag = self._subject.drag(self.q, followed, self.place(followed), held, self.method)
+            self._drag = self._subject.drag(self.q, followed, target, held, self.method)
             workspace = self._drag.workspace
             if workspace is not None:  # what later frames need is made now
                 workspace.sweep.first_contact(self.q, self.q, None, FARTHEST_STEP)
@@ -230,7 +276,8 @@ class LiveDrag:
         # m: pairs nearer than this are counted as contacts
         contacts = self.scene.contacts(self.q, within=0.002)
         overlap = float(-contacts.distance.min(initial=0.0))
-        doing = f"dragging {self.taken}" if self.taken else "take a handle and drag it; click one to hold it"
+        verb = "turning" if self._turns else "dragging"
+        doing = f"{verb} {self.taken}" if self.taken else "take a handle and drag it; click one to hold it"
         status = f"{doing}, by {self.method.name}"
         if self._trouble:
             status = f"{status}: {self._trouble}"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Collection, Set
+from collections.abc import Collection, Mapping, Set
 from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
+from wholebody.base.checks import known
 from wholebody.base.errors import InputError
 from wholebody.figures.joining import joint_in
 from wholebody.geometry.shapes import HalfSpace
@@ -17,7 +18,7 @@ from wholebody.methods.base import Method
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
-from wholebody.tasks import Hold, Point
+from wholebody.tasks import Hold, Orientation, Point
 from wholebody.tracking.drag import Drag
 from wholebody.tracking.frame import FRAME
 
@@ -91,9 +92,22 @@ class LiveProblem:
             balance=problem.balance,
         )
 
-    def drag(self, q: Array, followed: str, place: Array, held: Collection[str], method: Method) -> Drag[Any]:
-        """What follows a handle from the posture q (nq,), while others are held where they are."""
-        return Drag(self.stated(q, [Point(followed, place), *self.problem.goals], held), method, budget=BUDGET)
+    @property
+    def constraints(self) -> Mapping[str, bool]:
+        """Constraints that can be released, and whether they hold: none, as holds are those of handles."""
+        return {}
+
+    def constrain(self, name: str, holds: bool) -> None:
+        """Let a constraint hold or not; raises UnknownNameError, as there is none."""
+        known(name, self.constraints, "constraint")
+
+    def drag(self, q: Array, followed: str, target: Array, held: Collection[str], method: Method) -> Drag[Any]:
+        """What follows a handle from the posture q (nq,), while others are held where they are.
+
+        The target is a place (3,), or an orientation (4,) as a quaternion.
+        """
+        goal = Point(followed, target) if len(target) == 3 else Orientation(followed, target)
+        return Drag(self.stated(q, [goal, *self.problem.goals], held), method, budget=BUDGET)
 
     def move(self, name: str, at: pin.SE3, over: float | None = None) -> None:
         """Move a thing."""
@@ -118,7 +132,7 @@ class LiveAssembly:
     def __init__(self, assembly: Assembly) -> None:
         self._still = copy.copy(assembly)  # without holds
         self._dragged: Assembly | None = None
-        self.scene, self.q, self.held = self._still.scene, self._still.q, frozenset[str]()
+        self.q, self.held = self._still.q, frozenset[str]()
         model, self.handles = self.scene.model, dict[str, Handle]()
         figures = self._still.figures
         for name in self._still.bodies:
@@ -130,12 +144,26 @@ class LiveAssembly:
                 joint = joint_in(model, f"{name}/", str(figure.model.names[own.parentJoint]))
                 self.handles[f"{name}/{frame}"] = Handle(joint, own.placement)
 
-    def drag(self, q: Array, followed: str, place: Array, held: Collection[str], method: Method) -> Drag[Any]:
+    @property
+    def scene(self) -> Scene:
+        """The scene of the bodies; another one after a constraint was released or holds again."""
+        return self._still.scene
+
+    @property
+    def constraints(self) -> Mapping[str, bool]:
+        """Joints and constraints, and whether they hold."""
+        return self._still.constraints
+
+    def constrain(self, name: str, holds: bool) -> None:
+        """Let a joint or constraint hold or not; raises UnknownNameError where there is none."""
+        (self._still.hold if holds else self._still.release)(name)
+
+    def drag(self, q: Array, followed: str, target: Array, held: Collection[str], method: Method) -> Drag[Any]:
         """As of a problem; the method is Newton's, whatever is asked."""
         made = self._dragged = copy.copy(self._still)
         for name in held:
             made.fixed("world", name)
-        made.point_goal(followed, place)
+        (made.point_goal if len(target) == 3 else made.orientation_goal)(followed, target)
         return Drag(made, goal=len(made.goals) - 1, budget=BUDGET)
 
     def move(self, name: str, at: pin.SE3, over: float | None = None) -> None:
@@ -150,13 +178,16 @@ class LiveAssembly:
             self._still.place(self._dragged.variables())
 
     def remembered(self) -> Any:
-        """The placements of the things, and of the bodies."""
+        """The placements of the things and of the bodies, and what holds."""
         things = {name: self.scene.objects[name].placement for name in things_of(self.scene)}
-        return things, self._still.variables()
+        return things, self._still.variables(), self.constraints
 
     def restore(self, remembered: Any) -> None:
-        """Put things and bodies back."""
-        things, variables = remembered
+        """Put things, bodies and constraints back."""
+        things, variables, constraints = remembered
+        for name, holds in constraints.items():
+            if holds != self.constraints[name]:
+                self.constrain(name, holds)
         self._dragged = None
         self._still.place(variables)
         for name, at in things.items():

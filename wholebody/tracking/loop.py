@@ -17,7 +17,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array, with_values
-from wholebody.base.checks import array, flag, function, instance, known, listed, time_step
+from wholebody.base.checks import array, choice, flag, function, instance, known, listed, time_step
 from wholebody.base.errors import InputError
 from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.geometry.placement import PlacementLike, placement
@@ -31,6 +31,7 @@ from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import NotCopyable
 from wholebody.tasks import ReachCones
 from wholebody.tracking.frame import FRAME, Frame, OverlapStrategy, Resolution
+from wholebody.tracking.overlaps import GIVE_WAY, make_room
 from wholebody.tracking.qp_strategy import CLEARANCE, Attraction, QPStrategy, weights
 from wholebody.tracking.recording import Recording
 from wholebody.tracking.tracks import Track
@@ -52,6 +53,7 @@ class FrameLoop(NotCopyable):
         scene: the figure among things.
         shown: (nq,) the posture that is shown at present.
         overlap: name of the overlap strategy.
+        give_way: who takes an overlap of the figure with a thing that has a `wb.Body`.
         count: number of frames so far.
     """
 
@@ -65,6 +67,7 @@ class FrameLoop(NotCopyable):
         seed: int = 0,
         rigid: bool = False,
         touching: Sequence[str] = (),
+        give_way: str = "figure",
     ) -> None:
         """Prepare the first frame.
 
@@ -77,6 +80,8 @@ class FrameLoop(NotCopyable):
             seed: of all random orders.
             rigid: whether the figure is displaced as a whole, such as a hand, while its joints follow the tracker.
             touching: names of things that the figure may touch; with "qp" it keeps a millimetre from all others.
+            give_way: "figure": where it would overlap a thing that has a `wb.Body`, the figure takes all of it. "both":
+                the thing is first moved by half of PD_g, as far as nothing else is in its way (Schmidl and Lin).
 
         Raises:
             UnknownNameError: another overlap, or no such thing.
@@ -84,6 +89,7 @@ class FrameLoop(NotCopyable):
         """
         instance(scene, Scene, "FrameLoop: scene", "make one with wb.Scene(figure)")
         known(overlap, OVERLAPS, "way to remove overlap", "overlap")
+        self.give_way: str = choice(give_way, GIVE_WAY, "FrameLoop: give_way")
         dt = time_step(dt, "dt")
         SEED(seed, "seed")
         rigid = flag(rigid, "rigid")
@@ -109,6 +115,8 @@ class FrameLoop(NotCopyable):
         began = _clocks()
         goal = array(tracked, "tracked", f"{self.scene.model.nq} numbers")
         reason = invalid_reason(self.scene, goal)
+        if self.give_way == "both" and not reason:
+            make_room(self.scene, self.scene.figure.clamp(pin.normalize(self.scene.model, goal)))
         self._workspace.refresh()
         motion = self._workspace.next_frame(self.shown)
         if reason:

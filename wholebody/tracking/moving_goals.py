@@ -18,7 +18,7 @@ from wholebody.methods.base import Tracker
 from wholebody.methods.inputs import check_problem
 from wholebody.problem import Problem
 from wholebody.solution import Solution
-from wholebody.tasks import Frame, Point
+from wholebody.tasks import Frame, Orientation, Point
 from wholebody.tasks.base import Goal
 
 PASSING = 1e-3  # m: if the motion to a solution gets deeper, a nearer solution is tried
@@ -34,29 +34,33 @@ def copied(problem: Problem) -> Problem:
     return copy.copy(problem)
 
 
-def moving_goal(problem: Problem, number: int) -> Point | Frame:
-    """The goal of this index; raises InputError where there is none, or it is no `Point` and no `Frame`."""
+def moving_goal(problem: Problem, number: int) -> Point | Frame | Orientation:
+    """The goal of this index; raises InputError where there is none, or it is of another kind than these."""
     if not problem.goals:
         raise InputError("the problem has no goals; give it a Point or a Frame")
     number = whole(number, "the number of the goal", 0, len(problem.goals) - 1)
     goal = problem.goals[number]
-    if not isinstance(goal, (Point, Frame)):
-        raise InputError(f"goals[{number}] is a {type(goal).__name__}; only a Point or a Frame can be moved")
+    if not isinstance(goal, (Point, Frame, Orientation)):
+        raise InputError(
+            f"goals[{number}] is a {type(goal).__name__}; only a Point, a Frame or an Orientation can be moved"
+        )
     return goal
 
 
 def retarget(problem: Problem, number: int, target: Any) -> None:
-    """Move a problem's goal, a `Point` or `Frame`, to another target; raises InputError where one of them is none."""
+    """Move a goal of `moving_goal` to another target; raises InputError where one of them is none."""
     goals: list[Goal] = list(problem.goals)
     goals[number] = replace(moving_goal(problem, number), target=target)
     problem.retarget(goals)
 
 
-def interpolated_target(goal: Point | Frame, error: Array, share: float) -> Any:
+def interpolated_target(goal: Point | Frame | Orientation, error: Array, share: float) -> Any:
     """A target between the frame, which has this error, and the goal: at a share of the distance."""
     if isinstance(goal, Point):
         return goal.resolved_target + (1.0 - share) * error
     target = goal.resolved_target
+    if isinstance(goal, Orientation):
+        return pin.exp3((1.0 - share) * error) @ target.rotation
     here = pin.SE3(pin.exp3(error[3:]) @ target.rotation, target.translation + error[:3])
     turned = here.rotation @ pin.exp3(share * pin.log3(here.rotation.T @ target.rotation))
     return pin.SE3(turned, here.translation + share * (target.translation - here.translation))

@@ -66,6 +66,11 @@ def follow_path(
     Raises:
         InputError: the path is not one, the spacing is not positive, or the goal is not a `Point`.
         UnknownNameError: there is no such method.
+
+    Examples:
+        >>> answers = wb.follow_path(problem, [(0.50, -0.25, 0.95), (0.55, -0.20, 0.95)], "qp")
+        >>> all(answer.solved for answer in answers)
+        True
     """
     places = _spaced(path, spacing)
     if isinstance(problem, Assembly):
@@ -87,8 +92,9 @@ def follow_path(
 
 def _pulled(assembly: Assembly, places: Sequence[Array], goal: int) -> tuple[AssemblySolution, ...]:
     """The same for an assembly: pull to goal, as Choi and Cremer call it."""
-    if assembly.goals[assembly.goal_index(goal)].whole:
-        raise InputError(f"follow_path moves the goal of a point, and goal {goal} is that of a frame; use Drag")
+    kind = assembly.goals[assembly.goal_index(goal)].kind
+    if kind != "point":
+        raise InputError(f"follow_path moves the goal of a point, and goal {goal} is of the kind {kind!r}; use Drag")
     found: list[AssemblySolution] = []
     for place in places:
         found.append(assembly.retarget(goal, place).solve())

@@ -82,21 +82,13 @@ class Body:
 
 
 class DrawnFigure(NamedTuple):
-    """A figure of which a surface, or the visuals of its file, are drawn in place of pieces.
+    """A figure of which a surface, or the visuals of its file, are drawn in place of pieces."""
 
-    Attributes:
-        prefix: of its segments among the owners of pieces, and of its joints in the model.
-        root: node of the surface, below the figure's or a ghost's.
-        visual: the surface or the visuals.
-        nodes: node of each joint that carries them.
-        color: of all of it; each patch's own if None.
-    """
-
-    prefix: str
-    root: str
-    visual: Skin | LinkVisuals
-    nodes: Mapping[str, str]
-    color: Color | None
+    prefix: str  # of its segments among the owners of pieces, and of its joints in the model
+    root: str  # node of the surface, below the figure's or a ghost's
+    visual: Skin | LinkVisuals  # the surface or the visuals
+    nodes: Mapping[str, str]  # node of each joint that carries them
+    color: Color | None  # of all of it; each patch's own if None
 
     def build(self, graph: SceneGraph, root: str = "", color: Color | None = None) -> list[Skinned]:
         """Put it in the scene graph, below the node `root`; in a colour if there is one."""

@@ -9,10 +9,10 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
-from wholebody.dynamics.overlaps import Overlap
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.proximity import PENETRATION
+from wholebody.tracking.overlaps import Overlap
 from wholebody.view import commands, drawing
 from wholebody.view.bodies import Bodies
 from wholebody.view.contact_markers import color_contacts, mark_blockers, mark_contacts, mark_overlaps

@@ -9,9 +9,9 @@ import numpy as np
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array
-from wholebody.dynamics.overlaps import Overlap
 from wholebody.figures.state import State
 from wholebody.geometry.proximity import PENETRATION
+from wholebody.tracking.overlaps import Overlap
 from wholebody.view import drawing
 from wholebody.view.bodies import Bodies
 from wholebody.view.scene_graph import Keyframe, Marker
@@ -69,8 +69,8 @@ def checked_overlaps(given: object, what: str) -> list[Overlap]:
 def mark_overlaps(keyframe: Keyframe, bodies: Bodies, data: Any, overlaps: Sequence[Overlap]) -> None:
     """Draw PD_g of every two objects, and its length in words.
 
-    An arrow for each of the two that may move begins where its piece ends; dashes lead there from where the two overlap
-    most. Where both may move, each arrow has half of PD_g, but at least `LOOK.shortest_depth`. A ball is drawn where
+    An arrow for each that gives way begins where its piece ends; dashes lead there from where the two overlap
+    most. Where both give way, each arrow has half of PD_g, but at least `LOOK.shortest_depth`. A ball is drawn where
     PD_g is much shorter than the deepest overlap, since the normals of several pairs cancel. `data` is Pinocchio's, at
     the posture.
     """
@@ -89,7 +89,9 @@ def mark_overlaps(keyframe: Keyframe, bodies: Bodies, data: Any, overlaps: Seque
             line = drawing.rod_placement(one.point, start, LOOK.line_radius)
             if line is not None:
                 keyframe.markers[f"{root}/{name} inside"] = (Marker("dashes", LOOK.global_depth), line)
-        text = f"PD_g of {one.first} and {one.second}: {1e3 * depth:.1f} mm"
+        free = [name for name, move in zip((one.first, one.second), moves, strict=True) if np.any(move)]
+        taken = "half each" if len(free) > 1 else "".join(f"by {name}" for name in free)
+        text = f"PD_g of {one.first} and {one.second}: {1e3 * depth:.1f} mm {taken}".rstrip()
         if cancelled:
             ball = Marker("ball", LOOK.global_depth, LOOK.blocker_radius)
             keyframe.markers[f"{root}/cancelled"] = (ball, drawing.point_placement(one.point))

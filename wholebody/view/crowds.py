@@ -18,17 +18,11 @@ MANY = 1000  # opaque pieces of things in the world, from which on those of one 
 
 
 class Instances(NamedTuple):
-    """Pieces of one form, where they are and in which colours.
+    """Pieces of one form, where they are and in which colours."""
 
-    Attributes:
-        form: a coal shape that all of them are, each with a scale of its own.
-        places: (k, 4, 4) placements with scales.
-        colors: (k, 3) red, green, blue.
-    """
-
-    form: Any
-    places: Array
-    colors: Array
+    form: Any  # a coal shape that all of them are, each with a scale of its own
+    places: Array  # (k, 4, 4) placements with scales
+    colors: Array  # (k, 3) red, green, blue
 
     def painted(self, number: int, color: Color) -> Instances:
         """The same with another colour of one of them."""

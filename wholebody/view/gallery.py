@@ -19,27 +19,16 @@ LONGEST = 600.0  # s: of one script
 
 
 class Exhibit(NamedTuple):
-    """What one script made.
+    """What one script made."""
 
-    Attributes:
-        name: of the script.
-        story: its docstring.
-        code: its text, without the docstring.
-        numbers: what it printed, without the paths of its files.
-        seconds: that it ran.
-        pictures: PNG files, base64.
-        scene: the page with the first scene, HTML; "" where it made none.
-        failed: whether it ended with an error, which `numbers` ends with.
-    """
-
-    name: str
-    story: str
-    code: str
-    numbers: str
-    seconds: float
-    pictures: tuple[str, ...]
-    scene: str
-    failed: bool
+    name: str  # of the script
+    story: str  # its docstring
+    code: str  # its text, without the docstring
+    numbers: str  # what it printed, without the paths of its files
+    seconds: float  # that it ran
+    pictures: tuple[str, ...]  # PNG files, base64
+    scene: str  # the page with the first scene, HTML; "" where it made none
+    failed: bool  # whether it ended with an error, which `numbers` ends with
 
 
 def exhibit(script: Path) -> Exhibit:

@@ -18,10 +18,18 @@ from wholebody.dynamics.live_world import LiveWorld
 from wholebody.motion.files.gltf import triangles
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.live import LiveDrag, LiveFrame
+from wholebody.tracking.overlaps import GIVE_WAY
 from wholebody.view.style import LOOK
 from wholebody.view.viser_server import viser_server
 
+SETTLING = 90  # frames after the mouse or a key lets go in which the figure still follows to where that was
 STILL = 1e-5  # m, rad: what moves less is not sent
+PRESS = 0.01  # m that a handle moves at a press of an arrow key; a key that stays down repeats some 30 times a second
+
+KEYS = """arrow keys move the chosen handle, shift with up and down moves it away and back, Escape: {escape}
+<img src="data:," hidden onerror="document.documentElement.addEventListener('keydown', event =>
+event.key.startsWith('Arrow') && event.stopPropagation())">"""
+"""The legend of keys. Its script keeps arrow keys from viser, which would turn the camera by them too."""
 
 
 class LivePage:
@@ -55,6 +63,8 @@ class LivePage:
         self._reached: Any = None
         self._settling = 0  # frames that are left after the mouse let go
         self._sent: dict[int, Any] = {}
+        self._constraints: dict[str, Any] = {}
+        self._rings: Any = None
         self._stopped = threading.Event()
         self.server = viser_server(port, "wholebody drag")
         self.url = f"http://127.0.0.1:{self.server.get_port()}"
@@ -134,6 +144,7 @@ class LivePage:
                 if event.phase == "start":
                     self._settling = 0
                     self.drag.take(name)
+                    self._choice.value = name
                 if self.drag.taken != name:
                     return  # undone meanwhile
                 if event.phase == "start":
@@ -143,11 +154,10 @@ class LivePage:
                     self.drag.let_go()  # what was thrown flies on
                     self._target = None
                 elif event.phase == "end":
-                    # frames after the mouse lets go in which the figure still follows to where it
-                    # let go
-                    self._settling = 90
+                    self._settling = SETTLING
 
         async def clicked(_: Any) -> None:
+            self._choice.value = name
             if name in self.drag.handles:
                 self.toggle(name)
 
@@ -167,14 +177,90 @@ class LivePage:
         self._status, self._numbers = gui.add_markdown(""), gui.add_markdown("")
         self._method = gui.add_dropdown("method", tuple(self.drag.methods), initial_value=self.drag.chosen)
         self._method.on_update(self._choose)
+        names = (*self.drag.handles, *self.drag.things)
+        self._choice = gui.add_dropdown("handle", names, initial_value=names[0])
+        self._choice.on_update(self._chosen)
         self._boxes: dict[str, Any] = {}
         for name in self.drag.handles:
             self._boxes[name] = gui.add_checkbox(f"hold {name}", name in self.drag.held)
             self._boxes[name].on_update(partial(self._ticked, name))
-        again = "start again" if isinstance(self.drag, LiveWorld) else "undo"
+        again = "start again"
+        if isinstance(self.drag, LiveWorld):
+            self._give_way = gui.add_dropdown("gives way", GIVE_WAY, initial_value=self.drag.give_way)
+            self._give_way.on_update(partial(self._shared, self.drag))
+        if isinstance(self.drag, LiveDrag):
+            again = "undo"
+            self._add_rings(self.drag)
+            for name, holds in self.drag.constraints.items():
+                self._constraints[name] = gui.add_checkbox(name, holds)
+                self._constraints[name].on_update(partial(self._constrained, self.drag, name))
         gui.add_button(again).on_click(self._undo)
+        gui.add_html(KEYS.format(escape=again))
+        gui.add_command(again, hotkey="escape").on_trigger(self._undo)
+        for label, key, shift, way in (
+            ("left", "arrowleft", None, (-1, 0, 0)), ("right", "arrowright", None, (1, 0, 0)),
+            ("up", "arrowup", None, (0, 0, 1)), ("down", "arrowdown", None, (0, 0, -1)),
+            ("away", "arrowup", "shift", (0, 1, 0)), ("back", "arrowdown", "shift", (0, -1, 0)),
+        ):  # fmt: skip
+            command = gui.add_command(f"move the chosen handle {label}", hotkey=key, modifier=shift)
+            command.on_trigger(partial(self._pressed, np.array(way)))
         if self._save is not None:
             gui.add_button(f"save as {self._save_to.name}").on_click(self._write)
+
+    def _add_rings(self, drag: LiveDrag) -> None:
+        """Rings that turn the chosen handle of a frame."""
+        self._rings = self.server.scene.add_transform_controls("/turn", 0.2, disable_axes=True, disable_sliders=True)
+
+        async def turned(event: Any) -> None:
+            with self._lock:
+                name = self._choice.value
+                if event.phase == "start":
+                    self._settling = 0
+                    drag.take(name, turn=True)
+                if drag.taken == name:
+                    self._target = np.roll(event.target.wxyz, -1)
+                    self._settling = SETTLING if event.phase == "end" else 0
+
+        self._rings.on_update(turned)
+
+    def _chosen(self, _: Any) -> None:
+        with self._lock:
+            self._show_rings()
+
+    def _show_rings(self) -> None:
+        """Put the rings around the chosen handle, unless the mouse has them."""
+        name = self._choice.value
+        if self._rings is None or not isinstance(self.drag, LiveDrag):
+            return
+        self._rings.visible = name in self.drag.handles
+        if name in self.drag.handles:
+            self._rings.position = self.drag.place(name)
+            if self.drag.taken != name:
+                self._rings.wxyz = np.roll(self.drag.orientation(name), 1)
+
+    def _pressed(self, way: Array, event: Any) -> None:
+        """Move the chosen handle to the right, away or up, as this browser sees it."""
+        with self._lock:
+            name = self._choice.value
+            if self.drag.taken != name or self._target is None or len(self._target) != 3:
+                self.drag.take(name)
+                self._target = self.drag.place(name)
+            camera = event.client.camera
+            away = np.array(camera.look_at - camera.position)
+            away[2] = 0.0
+            away /= max(float(np.linalg.norm(away)), 1e-9)
+            right = np.array((away[1], -away[0], 0.0))
+            self._target = self._target + PRESS * (np.array((right, away, (0.0, 0.0, 1.0))).T @ way)
+            self._settling = SETTLING
+
+    def _constrained(self, drag: LiveDrag, name: str, _: Any) -> None:
+        with self._lock:
+            if self._constraints[name].value != drag.constraints[name]:
+                drag.constrain(name, self._constraints[name].value)
+
+    def _shared(self, world: LiveWorld, _: Any) -> None:
+        with self._lock:
+            world.give_way = self._give_way.value
 
     def _choose(self, _: Any) -> None:
         with self._lock:
@@ -188,6 +274,9 @@ class LivePage:
         with self._lock:
             self.drag.undo()
             self._target, self._settling = None, 0
+            if isinstance(self.drag, LiveDrag):
+                for name, holds in self.drag.constraints.items():
+                    self._constraints[name].value = holds
             self._show(self.drag.report())
 
     def _write(self, _: Any) -> None:
@@ -217,6 +306,11 @@ class LivePage:
             world.follow(self._places())
         frame = world.move(self._target)
         self.frames += 1
+        if self._settling:
+            self._settling -= 1
+            if not self._settling:
+                world.let_go()
+                self._target = None
         self._show(frame)
 
     def follow(self, target: Any) -> LiveFrame:
@@ -248,6 +342,7 @@ class LivePage:
         self._place(frame.q, {})
         for name, ball in self._handles.items():
             ball.position = self.drag.place(name)
+        self._show_rings()
         self._status.content = f"**{frame.status}**"
         self._numbers.content = (
             f"{frame.contacts} contacts, deepest overlap {1e3 * frame.overlap:.2f} mm  \n"

@@ -6,8 +6,10 @@ import base64
 import gzip
 import html
 import importlib.util
+import sys
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 from wholebody.base.errors import MissingPackageError
 from wholebody.view.server import Command, bundle
@@ -46,12 +48,24 @@ body {{ margin: 0; background: #dfe3e7; }}
 
 _UNPACK = """
 (async function () {
-  async function unpacked(id) {
-    const packed = Uint8Array.from(atob(document.getElementById(id).textContent), c => c.charCodeAt(0));
+  async function unpacked(packed) {
+    packed = Uint8Array.from(atob(packed), c => c.charCodeAt(0));
     return new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
   }
-  window.picture = new Uint8Array(await unpacked("picture"));
-  for (const text of new TextDecoder().decode(await unpacked("player")).split("\\0")) {
+  const text = id => document.getElementById(id)?.textContent;
+  const around = (() => { try { parent.document; return parent; } catch { return window; } })();
+  async function player() { // of this page, or of the first scene in the notebook around it
+    const wait = document.createElement("p");
+    for (let tries = 0; !text("player") && !around.wholebodyPlayer; tries++) {
+      wait.textContent = "The player is in the first scene of this notebook: scroll to it, or run its cell again.";
+      if (tries === 10) document.body.prepend(wait);
+      await new Promise(done => setTimeout(done, 200));
+    }
+    wait.remove();
+    return around.wholebodyPlayer = text("player") || around.wholebodyPlayer;
+  }
+  window.picture = new Uint8Array(await unpacked(text("picture")));
+  for (const text of new TextDecoder().decode(await unpacked(await player())).split("\\0")) {
     const script = document.createElement("script");
     script.textContent = text;
     document.body.append(script);
@@ -72,6 +86,33 @@ def static_page(commands: list[Command], title: str = "wholebody") -> str:
     """
     scene = _data("picture", bundle([command.payload for command in commands]))
     return _page(title, scene + player() + _script(_UNPACK))
+
+
+_carrier = ("", "")  # the cell of a notebook whose output has the player, and the run of it that put it there
+
+
+def notebook_frame(commands: list[Command], title: str = "wholebody") -> str:
+    """HTML of a frame with the page of a scene, for the output of a notebook's cell.
+
+    The first cell that shows a scene has the player, whenever it is run; the frames of the others take it from there.
+    """
+    global _carrier
+    cell = _cell()
+    shared = cell is not None and _carrier[0] != "" and (cell[0] != _carrier[0] or cell == _carrier)
+    if cell is not None and not shared:
+        _carrier = cell
+    page = static_page(commands, title)
+    page = html.escape(page.replace(player(), "") if shared else page, quote=True)
+    return f'<iframe srcdoc="{page}" style="width: 100%; height: 480px; border: 0"></iframe>'
+
+
+def _cell() -> tuple[str, str] | None:
+    """The present cell of a notebook and its run, None where no kernel runs it. A cell without a name is its code."""
+    shell: Any = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    if not hasattr(shell, "get_parent"):
+        return None
+    message, code = shell.get_parent(), shell.user_ns.get("In", [""])[-1]
+    return message.get("metadata", {}).get("cellId", code), message.get("header", {}).get("msg_id", code)
 
 
 @lru_cache(maxsize=1)

@@ -19,19 +19,12 @@ from wholebody.view.style import LOOK, Color
 
 @dataclass(frozen=True)
 class Marker:
-    """A small object drawn on top of the picture. It is made once and then only moved.
+    """A small object drawn on top of the picture. It is made once and then only moved."""
 
-    Attributes:
-        kind: "arrow", "rod", "dashes", "ball" or "label".
-        color: red, green, blue; of a label, its CSS colour.
-        size: of an arrow its width relative to the usual, of a ball its radius, of a label its height.
-        text: of a label.
-    """
-
-    kind: str
-    color: Any
-    size: float = 1.0
-    text: str = ""
+    kind: str  # "arrow", "rod", "dashes", "ball" or "label"
+    color: Any  # red, green, blue; of a label, its CSS colour
+    size: float = 1.0  # of an arrow its width relative to the usual, of a ball its radius, of a label its height
+    text: str = ""  # of a label
 
 
 @dataclass

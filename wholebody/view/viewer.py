@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import math
 import os
 import sys
@@ -19,16 +18,16 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.base.files import checked_target, write
-from wholebody.dynamics.overlaps import Overlap
 from wholebody.geometry.placement import FARTHEST
 from wholebody.problem import Problem
+from wholebody.tracking.overlaps import Overlap
 from wholebody.view import commands
 from wholebody.view.bodies import scene_glb
 from wholebody.view.composition import Composition
 from wholebody.view.contact_markers import checked_overlaps
 from wholebody.view.legend import panel
 from wholebody.view.movie import check_movie, counted, frame_times, movie
-from wholebody.view.page import live_page, static_page
+from wholebody.view.page import live_page, notebook_frame, static_page
 from wholebody.view.scene_graph import SceneGraph
 from wholebody.view.screenshot import Screenshots
 from wholebody.view.sender import Sender, seconds
@@ -312,11 +311,13 @@ class Viewer:
         return f"Viewer({self.title!r}), which shows {len(self._seen)} postures"
 
     def _repr_html_(self) -> str:
-        """The scene in a notebook: a frame with the page that `save` writes; a sentence if nothing is shown yet."""
+        """The scene in a notebook: a frame with the page that `save` writes; a sentence if nothing is shown yet.
+
+        The player is in the first one of a notebook.
+        """
         if not self._seen:
             return "<p>nothing is shown yet; call show(q) or play(motion) first</p>"
-        page = html.escape(static_page(self._commands(), self.title), quote=True)
-        return f'<iframe srcdoc="{page}" style="width: 100%; height: 480px; border: 0"></iframe>'
+        return notebook_frame(self._commands(), self.title)
 
     def picture(self, path: str | os.PathLike[str], size: tuple[int, int] = (960, 720), *, legend: bool = True) -> Path:
         """Write the scene as a PNG, drawn by a headless Chromium. A motion is shown at its beginning.

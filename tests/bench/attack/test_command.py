@@ -11,8 +11,7 @@ import pytest
 
 from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
 from wholebody.bench.attack.case import Case, Verdict
-from wholebody.bench.rows import Row
-from wholebody.bench.tables import read_rows
+from wholebody.bench.rows import read_rows
 from wholebody.cli.bench import run as group
 
 
@@ -29,7 +28,7 @@ def test_counts_failures_and_page_are_written(tmp_path: Path) -> None:
     (docs / "where-methods-fail.md").write_text("<!-- bench:attack -->\nold\n<!-- /bench:attack -->\n")
     words = ("--cases", "12", "--kinds", "file", "argument", "--seed", "2", "--seconds", "900", "--out", str(out))
     code = bench(*words, "--update-docs", str(docs))
-    _, rows = read_rows(out / "attack.csv", Row)
+    _, rows = read_rows(out / "attack.csv")
     wrong = [row for row in rows if row["outcome"] == "wrong"]
     assert len(rows) == 12
     assert {row.tool for row in rows} == {"file", "argument"}
@@ -45,7 +44,7 @@ def test_other_runs_are_counted_too(tmp_path: Path) -> None:
     words = ("--cases", "2", "--kinds", "argument")
     bench(*words, "--seed", "3", "--out", str(tmp_path / "a"))
     bench(*words, "--seed", "1", "--out", str(tmp_path / "b"), "--also", str(tmp_path / "a" / "attack.csv"))
-    _, rows = read_rows(tmp_path / "b" / "attack.csv", Row)
+    _, rows = read_rows(tmp_path / "b" / "attack.csv")
     assert [row["seed"] for row in rows] == [1, 1, 3, 3]
     assert "Seed 1, 3." in (tmp_path / "b" / "attack.md").read_text()
     (tmp_path / "none.csv").write_text("a,b\n1,2\n")
@@ -61,7 +60,7 @@ def test_ctrl_c_leaves_what_ended_before_it(tmp_path: Path, monkeypatch: pytest.
 
     monkeypatch.setattr("wholebody.bench.attack.running.attack", two)
     assert bench("--out", str(tmp_path)) == 130
-    _, rows = read_rows(tmp_path / "attack.csv", Row)
+    _, rows = read_rows(tmp_path / "attack.csv")
     assert [row["number"] for row in rows] == [0, 1]
 
 

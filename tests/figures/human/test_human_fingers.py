@@ -101,14 +101,6 @@ def test_a_ball_is_taken_by_two_or_by_all_fingertips(figure, radius, kind, finge
         assert abs(at_ball[f"right_{finger}_distal"]) < 2e-5
 
 
-def test_a_flat_hand_closes_around_a_rod_beside_the_body(figure):
-    scene = wb.Scene(figure).add(wb.Capsule(0.007, 0.3), name="bar", at=(0.35, -0.35, 1.0))
-    bent = {"right_elbow_flexion": np.radians(10.0), **wb.figures.finger_angles("flat", "right")}
-    start = figure.with_joints(figure.posture("standing"), bent)
-    grasp = wb.Grasp("right", "bar", "power")
-    assert wb.solve(wb.Problem(scene, start=start, goals=[grasp], constraints=FEET)).status == "solved"
-
-
 def test_a_pencil_is_taken_by_a_pinch(figure):
     scene = wb.Scene(figure).add(wb.Capsule(0.004, 0.15), name="pencil", at=(0.45, -0.25, 1.2))
     assert wb.solve(wb.Problem(scene, goals=[wb.Grasp("right", "pencil", "pinch")], constraints=FEET)).solved

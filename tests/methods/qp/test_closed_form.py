@@ -139,7 +139,7 @@ def test_goals_that_a_posture_reaches_are_never_proven_out_of_reach():
         figure = known_arm(name)[0]
         lower, upper = figure.limits.lower, figure.limits.upper
         chain, scene = PlainChain(figure.model, figure.limits, tuple(range(1, 7))), wb.Scene(figure)
-        for number in range(120):
+        for number in range(60):
             q = rng.uniform(lower, upper)
             at = rng.integers(6)
             q[at] = (q[at], lower[at], upper[at], np.clip(0.0, lower[at], upper[at]))[number % 4]
@@ -153,7 +153,7 @@ def test_goals_that_a_posture_reaches_are_never_proven_out_of_reach():
                 place.translation = 4.0 * place.translation / np.linalg.norm(place.translation)
                 solution = wb.solve(wb.Problem(scene, goals=[wb.Frame("tool", place)]))
                 proven += solution.status == "unreachable" and solution.iterations < 60
-    assert proven == 20
+    assert proven == 10
 
 
 @pytest.mark.parametrize("name", [name for name, (axes, _) in ARMS.items() if len(axes) == 6])

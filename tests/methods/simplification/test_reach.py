@@ -12,7 +12,7 @@ import wholebody as wb
 from wholebody.figures.figure import Figure
 from wholebody.figures.self_pairs import random_postures
 from wholebody.methods.simplification.reach import Balls, Reach
-from wholebody.methods.simplification.simplify import Parts, leave_out
+from wholebody.methods.simplification.simplify import simplify
 
 POSTURES = 4_000
 
@@ -101,7 +101,7 @@ def least_distances(scene: wb.Scene, numbers: np.ndarray, all_of_them: np.ndarra
 
 def left_out(problem: wb.Problem) -> np.ndarray:
     """Numbers of the pairs that are left out because they cannot come near."""
-    small = leave_out(problem, Parts(joints=False)).problem.scene
+    small = simplify(problem).problem.scene
     names, kept = problem.scene.piece_names, set()
     for a, b in small.pair_table.pairs:
         kept.add((small.piece_names[a], small.piece_names[b]))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wholebody.base.errors import InputError, UnknownNameError
-from wholebody.bench.tables import machine, read_rows
+from wholebody.bench.tables import machine
 from wholebody.cli.bench.command import Chart, folders, listed, measuring, publish, seed
 from wholebody.cli.command import command, count, option
 
@@ -109,10 +109,10 @@ or no end within a minute. What ended before Ctrl-C is written.""",
 def attack(arguments: argparse.Namespace) -> int:
     """Attack; 1 where something was wrong."""
     from wholebody.bench.attack import report, running
-    from wholebody.bench.rows import Row
+    from wholebody.bench.rows import Row, read_rows
 
     _check(arguments)
-    earlier = [one for path in arguments.also for one in read_rows(path, Row)[1]]
+    earlier = [one for path in arguments.also for one in read_rows(path)[1]]
     rows: list[Row] = []
     interrupted = False
     try:

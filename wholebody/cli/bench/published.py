@@ -59,14 +59,14 @@ def answer(arguments: argparse.Namespace) -> None:
     from wholebody.base.files import checked_target
     from wholebody.bench.suite.adapters.registry import adapters
     from wholebody.bench.suite.published.answering import Answering, chosen_problems
-    from wholebody.bench.suite.published.rebuilt import dumped
+    from wholebody.bench.suite.published.rebuilt import dumped, files_of
     from wholebody.cli.tables import progress_bar
 
     found = adapters([arguments.method], starts=True)
     if len(found) > 1:
         raise InputError(f"--method {arguments.method} is {', '.join(one.name for one in found)}; name one of them")
     out = arguments.out or Path(f"{found[0].name.replace('/', '-').replace(':', '-')}.answers.json")
-    checked_target(out, "--out", "a file of answers", (".json",))
+    checked_target(out, "--out", "a file of answers", (".json",), files_of(arguments.folder))
     problems, answering = chosen_problems(arguments.folder, arguments.sets), Answering(arguments.folder, found[0])
     with progress_bar() as bar:
         work = bar.add_task("solving", total=len(problems))
@@ -105,10 +105,10 @@ def judge(arguments: argparse.Namespace) -> None:
     from wholebody.base.files import checked_target
     from wholebody.bench.suite.published.answers import read_answers
     from wholebody.bench.suite.published.judging import COLUMNS, as_json, cells, judge, left_out
-    from wholebody.bench.suite.published.rebuilt import dumped
+    from wholebody.bench.suite.published.rebuilt import dumped, files_of
 
     out = arguments.out or arguments.answers.with_suffix(".verdict.json")
-    checked_target(out, "--out", "a verdict", (".json",), [arguments.answers])
+    checked_target(out, "--out", "a verdict", (".json",), [arguments.answers, *files_of(arguments.problems)])
     verdict = judge(read_answers(arguments.answers, arguments.problems), arguments.problems)
     write_text(out, dumped(as_json(verdict)))
     console = Console()

@@ -62,6 +62,10 @@ def finger_angles(shape: str, side: str | None = None) -> dict[str, float]:
     Raises:
         UnknownNameError: another shape.
         InputError: another side.
+
+    Examples:
+        >>> dexterous = wb.load("human", hands="fingers")
+        >>> fist = dexterous.with_joints(dexterous.neutral, wb.figures.finger_angles("fist", "right"))
     """
     shapes = named_angles("fingers")
     degrees = shapes[known(shape, shapes, "shape of a hand", "finger_angles")]

@@ -28,23 +28,14 @@ class Law(NamedTuple):
 
 
 class RobotModel(NamedTuple):
-    """A robot in an MJCF file.
+    """A robot in an MJCF file."""
 
-    Attributes:
-        model: Pinocchio's.
-        bodies: numbers of its bodies in MuJoCo, parents first.
-        joints: number of a joint in MuJoCo -> its index in Pinocchio.
-        sites: names of the frames of its sites.
-        cones: limits of ball joints, by joint.
-        notes: sentences on what Pinocchio's model does not have.
-    """
-
-    model: pin.Model
-    bodies: tuple[int, ...]
-    joints: dict[int, int]
-    sites: tuple[str, ...]
-    cones: dict[str, JointCone]
-    notes: tuple[str, ...]
+    model: pin.Model  # Pinocchio's
+    bodies: tuple[int, ...]  # numbers of its bodies in MuJoCo, parents first
+    joints: dict[int, int]  # number of a joint in MuJoCo -> its index in Pinocchio
+    sites: tuple[str, ...]  # names of the frames of its sites
+    cones: dict[str, JointCone]  # limits of ball joints, by joint
+    notes: tuple[str, ...]  # sentences on what Pinocchio's model does not have
 
     def posture(self, compiled: Compiled, qpos: Array) -> Array:
         """(nq,) posture of MuJoCo's (nq,) configuration."""

@@ -14,21 +14,14 @@ from wholebody.figures.surface.fields import Field
 
 
 class Bone(NamedTuple):
-    """What moves vertices.
+    """What moves vertices."""
 
-    Attributes:
-        segment: the segment that it moves with; of a half, the segment that it turns half as much as.
-        parent: of a half, the segment against which the turn is halved; None of others.
-        instead: the segment to move with, rigidly, in a figure that lacks `segment`; None where there is always one.
-        bind: (4, 4) placement in the world in the binding posture.
-        rest: (4, 4) placement relative to `instead` in such a figure.
-    """
-
-    segment: str
-    parent: str | None
+    segment: str  # the segment that it moves with; of a half, the segment that it turns half as much as
+    parent: str | None  # of a half, the segment against which the turn is halved; None of others
+    # the segment to move with, rigidly, in a figure that lacks `segment`; None where there is always one
     instead: str | None
-    bind: Array
-    rest: Array
+    bind: Array  # (4, 4) placement in the world in the binding posture
+    rest: Array  # (4, 4) placement relative to `instead` in such a figure
 
 
 class Patch(NamedTuple):
@@ -82,16 +75,11 @@ class Surface(NamedTuple):
 
 
 class Claim(NamedTuple):
-    """The region of a bone: its influence on a point is exp(-distance / softness).
+    """The region of a bone: its influence on a point is exp(-distance / softness)."""
 
-    Attributes:
-        bone: name of a segment, or "<segment>/half", which turns by half of what the segment turns.
-        field: distance from the region.
-        softness: metres over which the influence fades by e: a larger value bends joints over a longer stretch.
-    """
-
-    bone: str
-    field: Field
+    bone: str  # name of a segment, or "<segment>/half", which turns by half of what the segment turns
+    field: Field  # distance from the region
+    # metres over which the influence fades by e: a larger value bends joints over a longer stretch
     softness: float = 0.014
 
 

@@ -17,21 +17,13 @@ from wholebody.figures.surface.garments import Claim
 
 
 class HandShape(NamedTuple):
-    """A hand in its own frame.
+    """A hand in its own frame."""
 
-    Attributes:
-        field: the solid in the binding posture.
-        claims: regions of the bones "<side>_hand", "<side>_forearm" and of every finger's segments.
-        corners: points that its box contains.
-        bind: placement (4, 4) of each of its segments in the binding posture.
-        rest: the same with the fingers as a person holds them whose hand is one segment.
-    """
-
-    field: Field
-    claims: tuple[Claim, ...]
-    corners: tuple[Array, ...]
-    bind: dict[str, Array]
-    rest: dict[str, Array]
+    field: Field  # the solid in the binding posture
+    claims: tuple[Claim, ...]  # regions of the bones "<side>_hand", "<side>_forearm" and of every finger's segments
+    corners: tuple[Array, ...]  # points that its box contains
+    bind: dict[str, Array]  # placement (4, 4) of each of its segments in the binding posture
+    rest: dict[str, Array]  # the same with the fingers as a person holds them whose hand is one segment
 
 
 def hand_shape(person: Person, side: str) -> HandShape:

@@ -66,17 +66,11 @@ def is_free(
 
 
 class Entered(NamedTuple):
-    """A pair that gets deeper during a motion than it may.
+    """A pair that gets deeper during a motion than it may."""
 
-    Attributes:
-        number: place among the collision pairs of the geometry model.
-        depth: at the end, metres, if it overlaps there, otherwise the largest on the way.
-        inside: whether it overlaps at the end.
-    """
-
-    number: int
-    depth: float
-    inside: bool
+    number: int  # place among the collision pairs of the geometry model
+    depth: float  # at the end, metres, if it overlaps there, otherwise the largest on the way
+    inside: bool  # whether it overlaps at the end
 
 
 def entered(sweep: Sweep, depths: SweptDepth, path: Sequence[Array], watched: NDArray[np.bool_]) -> list[Entered]:

@@ -36,15 +36,10 @@ ACCURACY = 2.0 * COAL_ACCURACY
 
 
 class Depths(NamedTuple):
-    """Pairs that overlap, and how deep.
+    """Pairs that overlap, and how deep."""
 
-    Attributes:
-        number: (k,) places among the collision pairs of the geometry model, ascending.
-        depth: (k,) metres, positive.
-    """
-
-    number: Indices
-    depth: Array
+    number: Indices  # (k,) places among the collision pairs of the geometry model, ascending
+    depth: Array  # (k,) metres, positive
 
 
 class SweptDepth:

@@ -45,29 +45,17 @@ def screen(
 
 
 class Shapes(NamedTuple):
-    """The n pieces and p pairs of a geometry model.
+    """The n pieces and p pairs of a geometry model."""
 
-    Attributes:
-        pairs: (p, 2) the pieces of each pair.
-        joint: (n,) joint of each piece.
-        reach: (n,) radius of each piece about its origin; infinite for a half-space.
-        points: (m, 3) swept points of all pieces, those of piece i from `first_point[i]`.
-        first_point: (n + 1,)
-        radius: (n,) about these points.
-        radii: (n, 3) of ellipsoids; 0 for other pieces.
-        faces: (f, 4) outward planes of all pieces, those of piece i from `first_face[i]`.
-        first_face: (n + 1,)
-    """
-
-    pairs: Indices
-    joint: Indices
-    reach: Array
-    points: Array
-    first_point: Indices
-    radius: Array
-    radii: Array
-    faces: Array
-    first_face: Indices
+    pairs: Indices  # (p, 2) the pieces of each pair
+    joint: Indices  # (n,) joint of each piece
+    reach: Array  # (n,) radius of each piece about its origin; infinite for a half-space
+    points: Array  # (m, 3) swept points of all pieces, those of piece i from `first_point[i]`
+    first_point: Indices  # (n + 1,)
+    radius: Array  # (n,) about these points
+    radii: Array  # (n, 3) of ellipsoids; 0 for other pieces
+    faces: Array  # (f, 4) outward planes of all pieces, those of piece i from `first_face[i]`
+    first_face: Indices  # (n + 1,)
 
 
 class Speeds(NamedTuple):
@@ -79,25 +67,15 @@ class Speeds(NamedTuple):
 
 
 class Parts(NamedTuple):
-    """Pairs, each during a part of a motion.
+    """Pairs, each during a part of a motion."""
 
-    Attributes:
-        number: (k,) places of the pairs.
-        first: (k,) the time, of `places`, at which the part begins.
-        last: (k,) the time at which it ends.
-        rows0: (k, 4) distance and normal, from the first piece to the second, at the beginning.
-        rows1: (k, 4) the same at the end.
-        speed: (k,) by how much a pair can come nearer during the whole motion.
-        wanted: (k,) a bound that is sufficient.
-    """
-
-    number: Indices
-    first: Indices
-    last: Indices
-    rows0: Array
-    rows1: Array
-    speed: Array
-    wanted: Array
+    number: Indices  # (k,) places of the pairs
+    first: Indices  # (k,) the time, of `places`, at which the part begins
+    last: Indices  # (k,) the time at which it ends
+    rows0: Array  # (k, 4) distance and normal, from the first piece to the second, at the beginning
+    rows1: Array  # (k, 4) the same at the end
+    speed: Array  # (k,) by how much a pair can come nearer during the whole motion
+    wanted: Array  # (k,) a bound that is sufficient
 
 
 @compiled()

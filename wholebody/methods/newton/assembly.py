@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -12,17 +11,15 @@ from numpy.typing import ArrayLike
 
 from wholebody.assessment.all_pairs import all_pairs
 from wholebody.base.arrays import Array
-from wholebody.base.checks import choice, flag, known, number, shown, whole
+from wholebody.base.checks import choice, flag, known, number, shown, some, whole
 from wholebody.base.errors import InputError
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
-from wholebody.geometry.memory_views import placement_view
 from wholebody.geometry.placement import PlacementLike
 from wholebody.methods.control import budget_for_sweep
 from wholebody.methods.inputs import ITERATIONS, TOLERANCE
-from wholebody.methods.newton import quaternions as quat
-from wholebody.methods.newton.assembly_geometry import AssemblyFigure
 from wholebody.methods.newton.assembly_joints import AssemblyJoints
+from wholebody.methods.newton.assembly_objective import AssemblyObjective, checked
 from wholebody.methods.newton.assembly_solution import (
     AssemblyGoal,
     AssemblySolution,
@@ -30,71 +27,24 @@ from wholebody.methods.newton.assembly_solution import (
     explained,
     to_target,
 )
+from wholebody.methods.newton.assembly_system import AssemblySystem
 from wholebody.methods.newton.batches import Batch, EquationSet, Unit
-from wholebody.methods.newton.feasibility import Projection, kkt_algebra, project, satisfy
+from wholebody.methods.newton.feasibility import satisfy
 from wholebody.methods.newton.inequalities import KINDS, Kind
-from wholebody.methods.newton.linear_algebra import NAMES, QuasiDefinite
+from wholebody.methods.newton.linear_algebra import NAMES
 from wholebody.methods.newton.settings import CONTACTS, FRAMES
-from wholebody.methods.newton.system import ActiveSystem, System, unit
+from wholebody.methods.newton.system import System, unit
 from wholebody.scene.moving_obstacles import FrameMotion
-from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace
+from wholebody.tasks.base import Measure
 from wholebody.tasks.inputs import point
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
 
-class AssemblySystem(ActiveSystem):
-    """An assembly's equations, renewed from state to state."""
-
-    def __init__(
-        self,
-        held: Sequence[Batch],
-        weight: Array,
-        algebra: str,
-        figures: Sequence[AssemblyFigure],
-        to_scene: Callable[[Array], Array],
-        revision: int,
-    ) -> None:
-        """Take constraints and weights (7 n,); `to_scene` gives the scene's posture (nq,) at variables (7 n,)."""
-        super().__init__(held, weight, algebra, figures)
-        self._to_scene, self.revision = to_scene, revision
-        self._nearest: tuple[System, QuasiDefinite] | None = None
-
-    def among(self, scene: Scene, clearance: float) -> None:
-        """Let the pairs of a scene of the bodies touch, at a distance of at least `clearance` metres."""
-        if len(scene.pair_table.pairs):
-            self.workspace = scene.workspace()
-            data = pin.Data()  # without the tensors of a model's data, which grow with the cube of its freedoms
-            data.oMi.extend([pin.SE3.Identity()] * self.workspace.model.njoints)
-            self._find_contacts(np.full(len(scene.pair_table.pairs), clearance), self.workspace, data)
-
-    def nearest(self, x: Array, anchor: Array, tolerance: float, iterations: int) -> Projection:
-        """The place nearest to the anchor from x (both (7 n,)); analysed once while the pattern stays."""
-        if self._nearest is None or self._nearest[0] is not self.system:
-            self._nearest = self.system, kkt_algebra(self.system)
-        return project(self.system, self._nearest[1], x, anchor, tolerance=tolerance, iterations=iterations)
-
-    def _projected(self, x: Array) -> Array:
-        x = unit(x)
-        for figure in self._figures:
-            figure.retract(x)
-        if self.contacts is not None:
-            self.q = self._to_scene(x)
-            self._place(x)
-        return x
-
-    def _place(self, x: Array) -> None:
-        """Write the placements of the bodies at x (7 n,) into the data."""
-        bodies, joints = x.reshape(-1, 7), placement_view(self._data.oMi)
-        if joints is None:
-            for number, body in enumerate(bodies):
-                self._data.oMi[number + 1] = pin.XYZQUATToSE3(body)
-            return
-        joints[1:, 3] = bodies[:, :3]
-        for axis, unit_vector in enumerate(np.eye(3)):
-            joints[1:, axis] = quat.rotate(bodies[:, 3:], np.broadcast_to(unit_vector, (len(bodies), 3)))
+Metric = Literal["rim", "variables"]
+METRICS: tuple[Metric, ...] = ("rim", "variables")
 
 
 class Assembly(AssemblyJoints):
@@ -112,12 +62,27 @@ class Assembly(AssemblyJoints):
 
     Attributes:
         clearance: least distance of every tested pair, metres.
+        metric: what the least motion is measured by.
+
+    Examples:
+        >>> swing = wb.Assembly().body("seat", (0.0, 0.0, -1.0))
+        >>> swing = swing.revolute("world", "seat", at=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0))
+        >>> swing.point_goal("seat", (1.0, 0.0, 0.0)).solve().status
+        'solved'
     """
 
-    def __init__(self, *, clearance: float = 0.0) -> None:
-        """Make an assembly with the world alone, and a least distance of shapes, metres."""
+    def __init__(self, *, clearance: float = 0.0, metric: Metric = "rim") -> None:
+        """Make an assembly with the world alone.
+
+        Args:
+            clearance: least distance of shapes, metres.
+            metric: of the least motion: "rim" counts a rotation of a body as the motion of its rim, "variables" is eq.
+                1 itself, the sum of the squared changes of all seven variables of each body.
+        """
         super().__init__(clearance)
+        self.metric = choice(metric, METRICS, "Assembly: metric")
         self._goals: list[AssemblyGoal] = []
+        self._measures: list[Measure] = []
         self._prepared: AssemblySystem | None = None
         self._alone = OneAtATime("assembly")
         self._analysed = 0
@@ -134,6 +99,9 @@ class Assembly(AssemblyJoints):
         self.__dict__.update(state)
         self._prepared, self._scene, self._alone = None, None, OneAtATime("assembly")
 
+    def __repr__(self) -> str:
+        return f"Assembly of {len(self.bodies)} bodies and {len(self._goals)} goals: {some(self.bodies) or 'none'}"
+
     def __copy__(self) -> Assembly:
         return copy.deepcopy(self)
 
@@ -144,14 +112,22 @@ class Assembly(AssemblyJoints):
         what = f"the goal of {shown(body)}"
         index, local = self._moved(body, what)
         offset = local * pin.SE3(np.eye(3), point(place, f"{what}: place"))
-        self._goals.append(AssemblyGoal(what, index, offset, to_target(target, False, what), whole=False))
+        self._goals.append(AssemblyGoal(what, index, offset, to_target(target, "point", what), "point"))
         return self
 
     def frame_goal(self, body: str, target: PlacementLike) -> Self:
         """Move a body to a placement in the world, if possible."""
         what = f"the goal of {shown(body)}"
         index, local = self._moved(body, what)
-        self._goals.append(AssemblyGoal(what, index, local, to_target(target, True, what), whole=True))
+        self._goals.append(AssemblyGoal(what, index, local, to_target(target, "frame", what), "frame"))
+        return self
+
+    def orientation_goal(self, body: str, target: ArrayLike) -> Self:
+        """Turn a body to an orientation, a quaternion (x, y, z, w) or a matrix (3, 3), if possible; it may move."""
+        what = f"the goal of {shown(body)}"
+        index, local = self._moved(body, what)
+        goal = AssemblyGoal(what, index, local, to_target(target, "orientation", what), "orientation")
+        self._goals.append(goal)
         return self
 
     @property
@@ -160,7 +136,7 @@ class Assembly(AssemblyJoints):
         return tuple(self._goals)
 
     def retarget(self, goal: int, target: Any) -> Self:
-        """Move a goal, by its index, to another position, or placement; nothing is analysed anew."""
+        """Move a goal, by its index, to another position, placement or orientation; nothing is analysed anew."""
         index = self.goal_index(goal)
         self._goals[index] = self._goals[index].moved(target)
         return self
@@ -188,6 +164,22 @@ class Assembly(AssemblyJoints):
         self._goals = []
         return self
 
+    # ---- measures
+
+    def minimise(self, measure: Measure) -> Self:
+        """Lower a measure of a class of your own, in solves and frames, as far as joints, goals and contacts let it.
+
+        It is asked at states of the assembly's `scene`, where joint ``scene.model.getJointId("rod")`` carries the body
+        "rod". Its gradient is compared with a finite difference.
+        """
+        self._measures.append(checked(measure, self.scene, self.q))
+        return self._changed()
+
+    def drop_measures(self) -> Self:
+        """Minimise none of the measures any more."""
+        self._measures = []
+        return self._changed()
+
     # ---- solving
 
     @property
@@ -197,7 +189,7 @@ class Assembly(AssemblyJoints):
 
     def system(self) -> System:
         """The equations as they stand, without contacts."""
-        return System([*self._held(), *self._goal_batches()], np.concatenate(self._sizes))
+        return System([*self._held(), *self._goal_batches()], self._weight())
 
     def solve(
         self,
@@ -210,6 +202,8 @@ class Assembly(AssemblyJoints):
     ) -> AssemblySolution:
         """Move the bodies until joints and goals hold; each step is the least motion. They keep their new placements.
 
+        Where they hold, the measures that `minimise` names are lowered.
+
         No step jumps over a shape, and none of the states on the way is deeper in a shape than a centimetre; a shape
         that a body is inside of at the start is left. The solution's `penetration` is judged by all pairs.
 
@@ -219,7 +213,7 @@ class Assembly(AssemblyJoints):
             algebra: "auto", "normal", "kkt" or "schur".
             inequalities: "slack" or "barrier".
             nearest: find the placements nearest to those before (eq. 1), which many least steps miss by a
-                little; without inequalities, shapes and figures only.
+                little; without inequalities, shapes, figures and measures only.
         """
         tolerance = _tolerance(tolerance)
         iterations = int(ITERATIONS(iterations, "iterations"))
@@ -229,8 +223,10 @@ class Assembly(AssemblyJoints):
         with self._alone:
             active = self._ready(algebra)
             start = active.begin(self.variables(), self._goal_batches())
-            if nearest and (active.contacts is not None or active.system.inequality.any()):
-                raise InputError("nearest is for assemblies without limits, one-sided planes and shapes; leave it out")
+            if nearest and (active.contacts is not None or active.system.inequality.any() or self._measures):
+                raise InputError(
+                    "nearest is for assemblies without limits, one-sided planes, shapes and measures; leave it out"
+                )
             found = satisfy(
                 active, start, tolerance=tolerance, iterations=iterations, kind=inequalities, thorough=True,
             )  # fmt: skip
@@ -238,6 +234,8 @@ class Assembly(AssemblyJoints):
             if nearest and found.met:  # redundant equations leave an error of the KKT system of 1e-10
                 settled = active.nearest(x, start, max(tolerance, 1e-9), iterations)
                 x, nearness = (unit(settled.x) if settled.met else x), settled.errors
+            elif found.met:
+                x = active.lowered(x, tolerance)
             self._places = list(x.reshape(-1, 7))
             status, message = explained(active.system, x, found, tolerance)
             joint_error, goal_error = active.system.largest_errors(active.system.residual(x))
@@ -294,11 +292,12 @@ class Assembly(AssemblyJoints):
         )  # fmt: skip
         holds = found.hard <= max(10.0 * FRAMES.hard_tolerance, before)
         taken = holds
+        x = active.lowered(found.x, FRAMES.hard_tolerance, rounds=1) if found.met else found.x
         if holds and active.contacts is not None:
-            ends = self._to_scene(start), self._to_scene(found.x)
+            ends = self._to_scene(start), self._to_scene(x)
             taken = is_free(active.workspace, *ends, SHORT, budget_for_sweep())
         if taken:
-            self._places = list(found.x.reshape(-1, 7))
+            self._places = list(x.reshape(-1, 7))
         return AssemblyStep(found.goal, found.hard, found.iterations, found.systems, taken)
 
     def _among_moving(
@@ -329,13 +328,23 @@ class Assembly(AssemblyJoints):
         found = self._prepared
         name = algebra or (found.algebra_name if found is not None else "auto")
         if found is None or (found.algebra_name, found.revision) != (name, self.revision):
-            figures, weight = list(self._figures.values()), np.concatenate(self._sizes or [np.zeros(0)])
-            self._analysed = self.structures
-            found = AssemblySystem(self._held(), weight, name, figures, self._to_scene, self.revision)
+            figures = list(self._figures.values())
+            self._analysed, objective = self.structures, None
+            if self._measures:
+                loose = [self._names[name] for name in self._parts if name not in self._figures]
+                objective = AssemblyObjective(self._measures, self.scene, self.q, loose, figures)
+            found = AssemblySystem(
+                self._held(), self._weight(), name, figures, self._to_scene, self.revision, objective
+            )
             if self.has_shapes:
                 found.among(self.scene, self.clearance)
             self._prepared = found
         return found
+
+    def _weight(self) -> Array:
+        """(7 n,) weight of each variable in the least motion."""
+        weight = np.concatenate([np.zeros(0), *self._sizes])
+        return np.ones_like(weight) if self.metric == "variables" else weight
 
     def _least_distance(self) -> float:
         """Of the tested pairs, metres; inf without shapes."""
@@ -355,7 +364,7 @@ class Assembly(AssemblyJoints):
         """What must hold, in batches."""
         if not self._places:
             raise InputError("the assembly has no bodies; add some with body(...)")
-        held = [Unit(list(self._names)), *self._holding.batches()]
+        held = [Unit(list(self._names)), *self._equations().batches()]
         return held + [batch for figure in self._figures.values() for batch in figure.batches]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import pinocchio as pin
@@ -137,7 +137,7 @@ class LooseBodies:
 
     def __init__(
         self,
-        parts: Iterable[str | tuple[str, Figure]],
+        parts: Sequence[str | tuple[str, Figure]],
         owners: Iterable[Owner],
         tested: Callable[[Owner, Owner], bool],
         pairs: Iterable[tuple[str, str]],
@@ -163,6 +163,9 @@ class LooseBodies:
             for first, other in enumerate(owner_of[:second]):
                 if other.body != one.body and tested(other, one):
                     self.geometry.addCollisionPair(pin.CollisionPair(first, second))
+        for part in parts:
+            if isinstance(part, str) and part not in self.segments:
+                self.model.addJointFrame(self.model.getJointId(part))
         index_of = {piece.name: index for index, piece in enumerate(pieces)}
         for pair in pairs:
             self.geometry.addCollisionPair(pin.CollisionPair(*sorted(index_of[name] for name in pair)))
@@ -181,5 +184,6 @@ class LooseBodies:
             self.model.addJoint(carrier, own.joints[joint], own.jointPlacements[joint], f"{name}/{own.names[joint]}")
 
     def frame_id(self, name: str) -> int:
-        """Index of the frame of a body or segment with pieces."""
-        return int(self.model.getFrameId(checks.known(name, self.segments, "body with a shape")))
+        """Index of the frame of a body, or of a segment of a figure with pieces."""
+        known = [frame.name for frame in self.model.frames][1:]
+        return int(self.model.getFrameId(checks.known(name, known, "body")))

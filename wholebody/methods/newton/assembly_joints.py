@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,26 +25,31 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 
-class JointRegister:
-    """Joints by kind and pair of bodies, with their positions in both, so that a joint given twice is refused."""
+@dataclass(frozen=True)
+class Held:
+    """A joint or a constraint: its name and equations, and what a joint connects.
 
-    def __init__(self) -> None:
-        """Make an empty register."""
-        self._known: dict[tuple[str, frozenset[str]], list[dict[str, Array]]] = {}
+    Attributes:
+        name: of the kind and the bodies, as messages give it.
+        kind, ends: kind of a joint and its positions (3,) by the names of its two bodies; empty for other constraints.
+        joint: the two bodies of a joint, whose shapes are not tested against each other; empty for other constraints.
+        fixed: whether it makes two bodies one.
+        holds: whether it holds now.
+        equations: what it asks.
+    """
 
-    def add(self, kind: str, first: str, second: str, places: tuple[Array, Array] | None = None) -> None:
-        """Add a joint of a kind between two bodies, with its positions (3,) in either; None if it has none.
+    name: str
+    kind: str = ""
+    ends: Mapping[str, Array] = field(default_factory=dict)
+    joint: tuple[int, ...] = ()
+    fixed: bool = False
+    holds: bool = True
+    equations: EquationSet = field(default_factory=EquationSet)
 
-        Joints at different positions are different, such as two hinges; one that exists already is refused.
-        """
-        listed = self._known.setdefault((kind, frozenset((first, second))), [])
-        at = (np.zeros(3), np.zeros(3)) if places is None else places
-        here = {first: at[0], second: at[1]}
-        for other in listed:
-            if all(np.abs(other[name] - place).max() <= 1e-9 for name, place in here.items()):  # m: the same place
-                where = "" if places is None else " there"
-                raise InputError(f"{kind}: {first!r} and {second!r} have one already{where}; leave the second out")
-        listed.append(here)
+    def repeats(self, other: Held) -> bool:
+        """Whether another is a joint of the same kind at the same place; two hinges at different places are two."""
+        alike = other.holds and other.kind == self.kind != "" and other.ends.keys() == self.ends.keys()
+        return alike and all(np.abs(other.ends[name] - end).max() <= 1e-9 for name, end in self.ends.items())
 
 
 class AssemblyJoints(AssemblyBodies):
@@ -51,15 +57,28 @@ class AssemblyJoints(AssemblyBodies):
 
     def __init__(self, clearance: float = 0.0) -> None:
         super().__init__(clearance)
-        self._joints = JointRegister()
-        self._holding = EquationSet()
+        self._constraints: dict[str, Held] = {}
+
+    @property
+    def constraints(self) -> Mapping[str, bool]:
+        """Names of the joints and constraints, and whether each holds now."""
+        return {name: held.holds for name, held in self._constraints.items()}
+
+    def release(self, constraint: str) -> Self:
+        """Let a joint or constraint hold no more, by its name in `constraints`; the shapes that it joined may touch."""
+        return self._set(constraint, holds=False)
+
+    def hold(self, constraint: str) -> Self:
+        """Let a joint or constraint that was released hold again; the next solve or frames close it."""
+        return self._set(constraint, holds=True)
 
     def spherical(self, first: str, second: str, **where: Any) -> Self:
         """A point of one body stays at a point of the other. Takes `at`, or `at_first` and `at_second`."""
         a, b = self._pair(first, second, "spherical joint")
-        ends = self._ends(a, b, "spherical joint", (first, second), **where)
-        self._holding.coincide(a[0], b[0], f"the spherical joint of {first!r} and {second!r}", *ends)
-        return self._connected(a[0], b[0])
+        held = self._joint(a, b, "spherical joint", (first, second), **where)
+        end, other_end = held.ends.values()
+        held.equations.coincide(a[0], b[0], f"the {held.name}", end, other_end)
+        return self._keep(held)
 
     def revolute(
         self,
@@ -93,30 +112,31 @@ class AssemblyJoints(AssemblyBodies):
         low, high = (-np.inf, np.inf) if limits is None else numbers(limits, (2,), f"{what}: limits").tolist()
         if low >= high:
             raise InputError(f"{what}: limits {low:g} and {high:g} leave no room; give the lower one first")
-        ends = self._ends((a, in_a), (b, in_b), "revolute joint", (first, second), **where)
+        held = self._joint((a, in_a), (b, in_b), "revolute joint", (first, second), **where)
         basis_a = axes_along(ours)
         # the second body's axes agree with the first's at the present placements, so that the angle is zero now
         basis_b = (turn_b.inverse() * turn_a * basis_a) if axis_second is None else axes_along(theirs)
-        self._holding.coincide(a, b, what, *ends)
-        self._holding.turn(a, b, what, basis_a, basis_b, 2)
+        end, other_end = held.ends.values()
+        held.equations.coincide(a, b, what, end, other_end)
+        held.equations.turn(a, b, what, basis_a, basis_b, 2)
         if limits is not None:
-            self._holding.limit(a, b, f"the limit of {what[4:]}", basis_a, basis_b, low, high)
-        return self._connected(a, b)
+            held.equations.limit(a, b, f"the limit of {held.name}", basis_a, basis_b, low, high)
+        return self._keep(held)
 
     def prismatic(self, first: str, second: str, *, axis: ArrayLike) -> Self:
         """Two bodies translate along one direction (3,) in the world, without rotation."""
         what = f"the prismatic joint of {shown(first)} and {shown(second)}"
         (a, _), (b, _) = self._pair(first, second, "prismatic joint")
         along = direction(axis, f"{what}: axis")
-        self._joints.add("prismatic joint", first, second)
+        held = self._placed_joint((a, b), "prismatic joint", (first, second))
         here_a, here_b = self._placed(a), self._placed(b)
         turn_a, turn_b = pin.Quaternion(here_a.rotation), pin.Quaternion(here_b.rotation)
         basis = axes_along(turn_a.inverse() * along)
-        self._holding.turn(a, b, what, basis, turn_b.inverse() * turn_a * basis, 3)
+        held.equations.turn(a, b, what, basis, turn_b.inverse() * turn_a * basis, 3)
         way = turn_a.inverse() * (here_b.translation - here_a.translation)
         sides = basis.toRotationMatrix().T[:2]
-        self._holding.slide(a, b, what, sides, np.zeros(3), sides @ way)
-        return self._connected(a, b)
+        held.equations.slide(a, b, what, sides, np.zeros(3), sides @ way)
+        return self._keep(held)
 
     def fixed(self, first: str, second: str, *, placement_second: PlacementLike | None = None) -> Self:
         """Two bodies keep their relative placement: the present one, or the second's given one in the first's frame."""
@@ -126,11 +146,10 @@ class AssemblyJoints(AssemblyBodies):
             wanted = self._placed(a).actInv(self._placed(b))
         else:
             wanted = in_a * target_placement(placement_second, what) * in_b.inverse()
-        self._joints.add("fixed joint", first, second)
-        self._holding.coincide(a, b, what, np.array(wanted.translation), np.zeros(3))
-        self._holding.turn(a, b, what, pin.Quaternion(wanted.rotation), pin.Quaternion.Identity(), 3)
-        self._fixed_pairs.append((a, b))
-        return self._connected(a, b)
+        held = self._placed_joint((a, b), "fixed joint", (first, second), fixed=True)
+        held.equations.coincide(a, b, what, np.array(wanted.translation), np.zeros(3))
+        held.equations.turn(a, b, what, pin.Quaternion(wanted.rotation), pin.Quaternion.Identity(), 3)
+        return self._keep(held)
 
     def on_plane(
         self, body: str, place: ArrayLike, *, normal: ArrayLike, through: ArrayLike, of: str = WORLD, side: str = "on"
@@ -153,8 +172,9 @@ class AssemblyJoints(AssemblyBodies):
         unit = in_a.rotation @ direction(normal, f"{what}: normal")
         height = float(unit @ in_a.act(point(through, f"{what}: through")))
         local = np.array(in_b.act(point(place, f"{what}: place")))
-        self._holding.slide(a, b, what, unit, local, height, ONE_SIDED if side == "above" else HARD)
-        return self._changed()
+        held = Held(what[4:])
+        held.equations.slide(a, b, what, unit, local, height, ONE_SIDED if side == "above" else HARD)
+        return self._keep(held)
 
     def on_surface(self, body: str, place: ArrayLike, *, of: str) -> Self:
         """A point of a body, (3,) in its frame, stays on the surface of another body's, or a thing's, shape.
@@ -178,8 +198,9 @@ class AssemblyJoints(AssemblyBodies):
         (shape, at), local = listed[0], in_b.act(point(place, f"{what}: place"))
         half, radius = surface(shape, what)
         numbers_of = (at.rotation[None], at.translation[None], half[None], np.array([radius]), local[None])
-        self._holding.add(OnSurface(np.array([[a, b]]), [what], *numbers_of), HARD)
-        return self._changed()
+        held = Held(what[4:])
+        held.equations.add(OnSurface(np.array([[a, b]]), [what], *numbers_of), HARD)
+        return self._keep(held)
 
     def constrain(self, term: AssemblyConstraint) -> Self:
         """Add a constraint of a class of your own; its derivative is compared with finite differences."""
@@ -190,16 +211,40 @@ class AssemblyJoints(AssemblyBodies):
         bodies = [self._names[known(name, self._names, "body", label)] for name in names_of(term, label)]
         one_sided = flag(term.one_sided, f"{label}: one_sided")
         size = checked(term, np.array([self._places[index] for index in bodies]), label)
-        self._holding.add(OwnRows(np.array([bodies]), label, term, size), ONE_SIDED if one_sided else HARD)
-        return self._changed()
+        held = Held(label)
+        held.equations.add(OwnRows(np.array([bodies]), label, term, size), ONE_SIDED if one_sided else HARD)
+        return self._keep(held)
 
     # ---- internals
 
-    def _connected(self, a: int, b: int) -> Self:
-        """Note a joint between two bodies, whose shapes are not tested against each other any more."""
-        if min(a, b) >= 0:
-            self._joined.add(frozenset((a, b)))
+    def _keep(self, held: Held) -> Self:
+        """Let a new joint or constraint hold; one of the same name that was released makes room for it."""
+        name, number = held.name, 1
+        while name in self._constraints and self._constraints[name].holds:
+            number += 1
+            name = f"{held.name} ({number})"
+        self._constraints[name] = held
+        return self._noted()
+
+    def _set(self, name: str, *, holds: bool) -> Self:
+        known(name, self._constraints, "joint or constraint")
+        self._constraints[name] = replace(self._constraints[name], holds=holds)
+        return self._noted()
+
+    def _noted(self) -> Self:
+        """Note which bodies joints connect now, and which of them are as one."""
+        joints = [held for held in self._constraints.values() if held.joint and held.holds]
+        self._joined = {frozenset(held.joint) for held in joints if min(held.joint) >= 0}
+        self._fixed_pairs = [(held.joint[0], held.joint[1]) for held in joints if held.fixed]
         return self._changed()
+
+    def _equations(self) -> EquationSet:
+        """The equations of all that holds."""
+        found = EquationSet()
+        for held in self._constraints.values():
+            if held.holds:
+                found.extend(held.equations)
+        return found
 
     def _pair(self, first: str, second: str, kind: str) -> tuple[tuple[int, Any], tuple[int, Any]]:
         a, b = self._frame(first, kind), self._frame(second, kind)
@@ -207,7 +252,7 @@ class AssemblyJoints(AssemblyBodies):
             raise InputError(f"{kind}: {first!r} cannot be joined to itself; name two bodies")
         return a, b
 
-    def _ends(
+    def _joint(
         self,
         a: tuple[int, Any],
         b: tuple[int, Any],
@@ -216,8 +261,8 @@ class AssemblyJoints(AssemblyBodies):
         at: Any = None,
         at_first: Any = None,
         at_second: Any = None,
-    ) -> tuple[Array, Array]:
-        """The joint's position in either body; the joint is registered."""
+    ) -> Held:
+        """A joint without its equations yet, with its position in either body."""
         where = f"{kind} of {names[0]!r} and {names[1]!r}"
         if (at is None) == (at_first is None) or (at_first is None) != (at_second is None):
             raise InputError(f"{where}: give its place as at=(x, y, z) in the world, or as at_first and at_second")
@@ -225,7 +270,22 @@ class AssemblyJoints(AssemblyBodies):
             ends = a[1].act(point(at_first, f"{where}: at_first")), b[1].act(point(at_second, f"{where}: at_second"))
         else:
             place = point(at, f"{where}: at")
-            sides = [self._placed(index).actInv(place) for index in (a[0], b[0])]
-            ends = np.array(sides[0]), np.array(sides[1])
-        self._joints.add(kind, *names, ends)
-        return ends
+            ends = (np.array(self._placed(a[0]).actInv(place)), np.array(self._placed(b[0]).actInv(place)))
+        return self._placed_joint((a[0], b[0]), kind, names, ends)
+
+    def _placed_joint(
+        self,
+        bodies: tuple[int, int],
+        kind: str,
+        names: tuple[str, str],
+        ends: tuple[Array, Array] | None = None,
+        *,
+        fixed: bool = False,
+    ) -> Held:
+        """The same with its positions (3,) in either body, None if it has none; refused if it exists already."""
+        by_name = dict(zip(names, ends or (np.zeros(3), np.zeros(3)), strict=True))
+        held = Held(f"{kind} of {names[0]!r} and {names[1]!r}", kind, by_name, bodies, fixed)
+        if any(map(held.repeats, self._constraints.values())):
+            where = "" if ends is None else " there"
+            raise InputError(f"{kind}: {names[0]!r} and {names[1]!r} have one already{where}; leave the second out")
+        return held

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -14,7 +14,10 @@ from wholebody.methods.newton.feasibility import FeasibilityResult
 from wholebody.methods.newton.system import System
 from wholebody.scene.moving_obstacles import Collision
 from wholebody.solution import Status
-from wholebody.tasks.inputs import point, target_placement
+from wholebody.tasks.inputs import point, target_placement, target_rotation
+
+Kind = Literal["point", "frame", "orientation"]
+"""What a goal places."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,11 @@ class AssemblySolution:
         path: (k, nq) the states on the way as postures of the assembly's `scene`, the first as before the solve and the
             last as after it.
         message: one sentence that explains the status and names bodies.
+
+    Examples:
+        >>> answer = wb.Assembly().body("ball", (0.0, 0.0, 1.0)).point_goal("ball", (0.0, 0.0, 2.0)).solve()
+        >>> answer.status, answer.placements["ball"].translation.round(6).tolist()
+        ('solved', [0.0, 0.0, 2.0])
     """
 
     __repr__ = brief
@@ -96,26 +104,27 @@ def explained(system: System, x: Array, found: FeasibilityResult, tolerance: flo
 
 @dataclass(frozen=True)
 class AssemblyGoal:
-    """A point or a frame of a body (`local` in the body `index`), and where in the world it is to be (pin.SE3).
+    """A frame of a body (`local` in the body `index`), and where in the world it is to be (pin.SE3).
 
-    Of a point, which is not `whole`, only the translation counts.
+    Of the kind "point" only the translation counts, of an "orientation" only the rotation.
     """
 
     label: str
     index: int
     local: Any
     target: Any
-    whole: bool
+    kind: Kind
 
     def moved(self, target: Any) -> AssemblyGoal:
-        """The same goal at another position, or placement."""
-        return replace(self, target=to_target(target, self.whole, self.label))
+        """The same goal at another position, placement or orientation."""
+        return replace(self, target=to_target(target, self.kind, self.label))
 
     def error(self, body: Any) -> Array:
         """(6,) metres and radians in the world, from where it is to the target; `body` is the body's placement."""
         here = body * self.local
-        turn = pin.log3(self.target.rotation @ here.rotation.T) if self.whole else np.zeros(3)
-        return np.concatenate([self.target.translation - here.translation, turn])
+        way = np.zeros(3) if self.kind == "orientation" else self.target.translation - here.translation
+        turn = np.zeros(3) if self.kind == "point" else pin.log3(self.target.rotation @ here.rotation.T)
+        return np.concatenate([way, turn])
 
     def between(self, body: Any, share: float) -> AssemblyGoal:
         """The goal at a share of the way from where it is now to the target."""
@@ -127,12 +136,15 @@ class AssemblyGoal:
         """Add the goal's equations."""
         local, target = self.local, self.target
         ends = np.array(local.translation), np.array(target.translation)
-        equations.coincide(self.index, -1, self.label, *ends, Role(weight=1.0))
-        if self.whole:
+        if self.kind != "orientation":
+            equations.coincide(self.index, -1, self.label, *ends, Role(weight=1.0))
+        if self.kind != "point":
             turns = pin.Quaternion(local.rotation), pin.Quaternion(target.rotation)
             equations.turn(self.index, -1, self.label, *turns, 3, Role(weight=1.0))
 
 
-def to_target(target: Any, whole: bool, where: str) -> Any:
-    """A target as pin.SE3: a position, or a placement if the goal is a whole frame."""
-    return target_placement(target, where) if whole else pin.SE3(np.eye(3), point(target, f"{where}: target"))
+def to_target(target: Any, kind: Kind, where: str) -> Any:
+    """A target as pin.SE3: a position, a placement, or an orientation."""
+    if kind == "orientation":
+        return target_rotation(target, where)
+    return target_placement(target, where) if kind == "frame" else pin.SE3(np.eye(3), point(target, f"{where}: target"))

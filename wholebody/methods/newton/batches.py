@@ -129,8 +129,7 @@ class Coincide(Batch):
     ) -> None:
         """Take points (k, 3) in each body, directions (k, size, 3) in the world and heights (k, size)."""
         super().__init__(bodies, labels)
-        self.size = directions.shape[1]
-        self.directions, self.height = directions, height
+        self.size, self.directions, self.height = directions.shape[1], directions, height
         self.pattern = np.ones((self.size, 14), dtype=bool)
         if self.size == 3 and bool((directions == np.eye(3)).all()):
             self.pattern[:, PLACE] = self.pattern[:, OTHER_PLACE] = np.eye(3, dtype=bool)
@@ -260,10 +259,8 @@ class Slide(Batch):
         result[:, OTHER_PLACE, TURN] = change
         result[:, PLACE, TURN] = -change
         result[:, OTHER_TURN, TURN] = other.transpose(0, 2, 1) @ change
-        upper = result[:, TURN, :].copy()
         for block in (PLACE, OTHER_PLACE, OTHER_TURN):
-            upper[:, :, block] = result[:, block, TURN].transpose(0, 2, 1)
-        result[:, TURN, :] = upper
+            result[:, TURN, block] = result[:, block, TURN].transpose(0, 2, 1)
         return result
 
 
@@ -343,6 +340,12 @@ class EquationSet:
         batch.role = role
         self._made.append(batch)
 
+    def extend(self, other: EquationSet) -> None:
+        """Add all equations of another set."""
+        for key, rows in other._rows.items():
+            self._rows.setdefault(key, []).extend(rows)
+        self._made += other._made
+
     def coincide(self, a: int, b: int, label: str, first: Array, second: Array, role: Role = HARD) -> None:
         """A point (3,) of one body coincides with a point of the other."""
         self._add("coincide", role, a, b, label, first, second)
@@ -373,11 +376,9 @@ class EquationSet:
 
     def batches(self) -> list[Batch]:
         """The groups in batches."""
-        listed = []
-        for (kind, role), rows in self._rows.items():
-            batch = _batch(kind, rows)
+        listed = [_batch(kind, rows) for (kind, _), rows in self._rows.items()]
+        for batch, (_, role) in zip(listed, self._rows, strict=True):
             batch.role = role
-            listed.append(batch)
         return [*listed, *self._made]
 
     def _add(self, kind: str, role: Role, a: int, b: int, label: str, *numbers: Any) -> None:

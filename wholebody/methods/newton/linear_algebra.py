@@ -140,20 +140,13 @@ class Products(NamedTuple):
     """Pairs of entries of J that share a column, one row of the Jacobian after the other.
 
     An entry (row, column) is paired with the entries of its column from itself on, by row.
-
-    Attributes:
-        by_row: (nnz,) the entries, row after row and in each row by column.
-        row_start: (height + 1,) where those of each row begin.
-        by_column: (nnz,) the entries, column after column and in each column by row.
-        place: (nnz,) where each entry is in `by_column`.
-        column_end: (nnz,) where the column of each entry ends there.
     """
 
-    by_row: Places
-    row_start: Places
-    by_column: Places
-    place: Places
-    column_end: Places
+    by_row: Places  # (nnz,) the entries, row after row and in each row by column
+    row_start: Places  # (height + 1,) where those of each row begin
+    by_column: Places  # (nnz,) the entries, column after column and in each column by row
+    place: Places  # (nnz,) where each entry is in `by_column`
+    column_end: Places  # (nnz,) where the column of each entry ends there
 
 
 class Gram:

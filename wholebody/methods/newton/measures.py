@@ -148,11 +148,16 @@ def _depends_on(measure: Measure, tangent: Indices, start: Array, state: State) 
 
 
 def refine(
-    active_system: ActiveSystem, x: Array, measure: Callable[[Array], float], *, tolerance: float
+    active_system: ActiveSystem,
+    x: Array,
+    measure: Callable[[Array], float],
+    *,
+    tolerance: float,
+    rounds: int = REFINEMENT.rounds,
 ) -> tuple[Array, int]:
     """Lower the measures, a function of the variables (7 n,), from x, where all equations hold to the tolerance.
 
-    A round that moves nothing by more, metres and radians, is the last.
+    A round that moves nothing by more, metres and radians, is the last, and there are at most `rounds`.
 
     Returns:
         The variables, and the number of iterations.
@@ -162,7 +167,7 @@ def refine(
     if not run.met:
         return x, 0
     descent = _Descent(run, measure, tolerance)
-    for _ in range(REFINEMENT.rounds):
+    for _ in range(rounds):
         if not descent.lower():
             break
     return descent.best, len(run.residuals) - 1

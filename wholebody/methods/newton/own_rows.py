@@ -152,6 +152,17 @@ class AssemblyConstraint(ABC):
     Attributes:
         bodies: names of the bodies.
         one_sided: False for residual = 0, True for residual >= 0.
+
+    Examples:
+        >>> class Level(wb.methods.AssemblyConstraint):
+        ...     bodies = ("ball",)
+        ...     def residual(self, x):
+        ...         return x[:, 2] - 1.0
+        ...     def jacobian(self, x):
+        ...         return np.eye(1, 7, 2)[None]
+        >>> answer = wb.Assembly().body("ball").constrain(Level()).solve()
+        >>> answer.placements["ball"].translation.round(6).tolist()
+        [0.0, 0.0, 1.0]
     """
 
     bodies: tuple[str, ...]

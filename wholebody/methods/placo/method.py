@@ -45,6 +45,14 @@ class Placo(Checked, Descends):
             ends after four seconds of processor time.
         holds: "hard", or "soft" for holds of weight 100 against goals of weight 1: programs then have a solution where
             hard tasks contradict each other or what keeps pairs apart.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        MissingPackageError: placo is not installed.
+
+    Examples:
+        >>> "placo" not in wb.methods.installed_methods() or wb.solve(problem, wb.methods.Placo()).method == "placo"
+        True
     """
 
     # m, rad: tolerance of the goals in frames of a motion before its end

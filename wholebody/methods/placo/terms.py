@@ -43,12 +43,9 @@ REASONS = {
 
 @dataclass
 class Tasks:
-    """The tasks whose weight changes while the solver runs.
+    """The tasks whose weight changes while the solver runs."""
 
-    Attributes:
-        measures: the tasks of the measures, with the share of the weight of each.
-    """
-
+    # the tasks of the measures, with the share of the weight of each
     measures: list[tuple[Any, float]] = field(default_factory=list)
 
     def weigh(self, weight: float) -> None:

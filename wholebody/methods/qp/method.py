@@ -52,6 +52,14 @@ class QP(Checked):
             with everything held, which is there in a fifth to nine tenths of the time. This is for `solve`.
         time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None,
             the numbers of programs end it, and at last ten seconds of processor time.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: there is no such QP solver.
+
+    Examples:
+        >>> wb.solve(problem, wb.QP(tolerance=1e-8, seed=1)).status
+        'solved'
     """
 
     solver: str = "osqp"

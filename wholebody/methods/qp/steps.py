@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.scene.moving_obstacles import Collision
 
 
@@ -29,6 +29,9 @@ class QPStep(NamedTuple):
     path: tuple[tuple[float, Array], ...] = ()
     # which term of one's own is not finite where the step would have ended, so that it was cut; else empty
     note: str = ""
+
+    def __repr__(self) -> str:
+        return brief(self)
 
 
 class FrameStep(NamedTuple):

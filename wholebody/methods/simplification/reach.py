@@ -17,8 +17,9 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices, Mask, with_values
 from wholebody.figures.figure import Figure
+from wholebody.figures.state import State
 from wholebody.geometry.pieces import COAL_ACCURACY
-from wholebody.geometry.proximity import PairTable
+from wholebody.problem import Problem
 from wholebody.tasks.base import Constraint
 from wholebody.tasks.frame import Hold
 
@@ -137,34 +138,38 @@ class Reach:
         return Range(turn if turn.any() else slide, bool(turn.any()), low, high)
 
 
-def reachable_pairs(
-    figure: Figure,
-    reach: Reach,
-    geometry: pin.GeometryModel,
-    table: PairTable,
-    numbers: Indices,
-    clearances: Array,
-    constraints: Iterable[Constraint],
-) -> Mask:
-    """The pairs (k,) that can come as near as their clearance, for all that is proven; the others never do.
+def still_dofs(problem: Problem) -> list[int]:
+    """Degrees of freedom (tangent indices) that the bounds of a problem keep as at the start."""
+    state = State(problem.scene.model).update(problem.start)
+    still = np.zeros(problem.scene.model.nv, dtype=bool)
+    for bound in problem.bounds:
+        low, high = bound.bounds(state, None)
+        still |= (low == 0.0) & (high == 0.0)
+    return [int(dof) for dof in np.flatnonzero(still)]
+
+
+def reachable_pairs(problem: Problem, still: Iterable[int], numbers: Indices) -> Mask:
+    """Which pairs (k,) of a problem's scene are not proven to stay farther apart than their clearance.
+
+    Frames that are held in the world bound the positions of all pieces.
 
     Args:
-        figure: the figure.
-        reach: of all pieces, on its joints.
-        geometry: the pieces, on its joints.
-        table: pieces and pairs, whose pieces may be on other joints.
-        numbers: (k,) of the pairs in the table.
-        clearances: (k,) of each pair, metres.
-        constraints: resolved ones; frames held in the world bound the positions of all pieces.
+        problem: the problem.
+        still: degrees of freedom (tangent indices) that stay as at the start.
+        numbers: (k,) of the pairs in the scene's pair table.
     """
-    pieces, pairs = geometry.geometryObjects, table.pairs[numbers]
-    joint: Indices = np.array([piece.parentJoint for piece in pieces], dtype=np.intp)
+    scene = problem.scene
+    pieces, table, clearances = scene.geometry.geometryObjects, scene.pair_table, problem.clearances[numbers]
+    joint, pairs = table.joint, table.pairs[numbers]
     turn = np.array([piece.placement.rotation for piece in pieces]).reshape(-1, 3, 3)
     center = np.array([piece.placement.translation for piece in pieces]).reshape(-1, 3)
+    reach = Reach(scene.model, problem.start, Balls(center, table.reach, np.arange(len(pieces))), joint, still)
     seats, seat = np.unique(joint, return_inverse=True)
     views = [(seat, [reach.seen_from(int(one)) for one in seats], 0.0)]
     # m: largest displacement of a piece by errors of holds; an accepted answer has less
-    views += [(np.where(joint == 0, 0, -1), [balls], 1e-3) for balls in held_balls(figure, reach, constraints)]
+    views += [
+        (np.where(joint == 0, 0, -1), [balls], 1e-3) for balls in held_balls(scene.figure, reach, problem.constraints)
+    ]
     open_ = np.ones(len(pairs), dtype=bool)
     for row_of, seen, slack in views:
         place, radius = np.zeros((len(seen) + 1, len(pieces), 3)), np.full((len(seen) + 1, len(pieces)), np.inf)

@@ -1,85 +1,112 @@
-"""Makes a smaller problem from a problem, and takes its answers back to the whole figure."""
+"""Makes a problem without the joints, pairs and things that cannot matter."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.assessment.posture import assess
 from wholebody.base import checks
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, brief
 from wholebody.figures.description import is_root
 from wholebody.figures.figure import Figure
+from wholebody.figures.self_pairs import random_postures
+from wholebody.figures.state import State
 from wholebody.geometry.large_models import geometry_model
-from wholebody.methods.simplification.active_joints import ActiveJoints, active_joints
-from wholebody.methods.simplification.embedding import Embedding, SmallerScene, restated
-from wholebody.methods.simplification.reach import Balls, Reach, reachable_pairs
+from wholebody.methods.simplification.reach import reachable_pairs, still_dofs
 from wholebody.problem import Problem
 from wholebody.scene.geometry_model import SceneGeometry, SceneObject
 from wholebody.scene.scene import Scene
 from wholebody.solution import Solution
+from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
 from wholebody.tasks.bounds import Freeze
 
+SAME = 1e-7  # largest difference in the values and derivatives of one function, relative to their size
 
-@dataclass(frozen=True)
-class Parts:
-    """The kinds of parts to leave out, separately, so that their effects can be measured."""
 
-    joints: bool = True  # leave out joints that the problem freezes
-    lock: bool = True  # also lock joints that are not active
-    pairs: bool = True  # drop pairs that cannot come near, and things without a remaining pair
+class _Part:
+    """The postures of a figure without some joints, among those of the whole one."""
+
+    def __init__(self, whole: pin.Model, small: pin.Model, start: Array) -> None:
+        """Match the joints by name; the others stay as in `start`, (nq,)."""
+        joints = [whole.joints[whole.getJointId(name)] for name in list(small.names)[1:]]
+        self.idx_q = _places([(int(joint.idx_q), int(joint.nq)) for joint in joints])
+        self.idx_v = _places([(int(joint.idx_v), int(joint.nv)) for joint in joints])
+        self.model, self.start = whole, np.array(start, dtype=float)
+
+    def embed(self, q: Array) -> Array:
+        """Whole posture (nq,) of a small one."""
+        whole: Array = self.start.copy()
+        whole[self.idx_q] = q
+        return whole
+
+    def whole(self, state: State) -> State:
+        """The state of the whole figure at the posture of the small one; it belongs to the owner of the small state."""
+        q, whole = self.embed(state.q), state.companion(self, self.model)
+        return whole if np.array_equal(q, whole.q) else whole.update(q)
+
+
+class EmbeddedMeasure(Measure):
+    """A measure of the whole figure; the share of the other joints is part of its value."""
+
+    def __init__(self, term: Measure, part: _Part) -> None:
+        self.term, self.part = term, part
+
+    @property
+    def weight(self) -> float:
+        """As the measure's."""
+        return self.term.weight
+
+    def value(self, state: State) -> float:
+        """As the measure's."""
+        return self.term.value(self.part.whole(state))
+
+    def gradient(self, state: State) -> Array:
+        """(small nv,)."""
+        return np.asarray(self.term.gradient(self.part.whole(state))[self.part.idx_v])
+
+    def curvature(self, state: State) -> Array:
+        """(small nv,)."""
+        return np.asarray(self.term.curvature(self.part.whole(state))[self.part.idx_v])
+
+    def squares(self, state: State) -> tuple[Array, Array] | None:
+        """(k,) and (k, small nv)."""
+        found = self.term.squares(self.part.whole(state))
+        return None if found is None else (found[0], np.asarray(found[1][:, self.part.idx_v]))
+
+
+def _places(spans: Sequence[tuple[int, int]]) -> Indices:
+    return np.array([place for first, size in spans for place in range(first, first + size)], dtype=np.intp)
 
 
 @dataclass(frozen=True)
 class LeftOut:
-    """The parts that a simplified problem omits, with bounds on the effect.
+    """The parts that a simplified problem omits.
 
     Attributes:
-        locked: joints that stay as at the start although no bound freezes them.
-        frozen: joints that a bound keeps in place; leaving them out changes nothing.
-        helpers: inequalities for which a locked joint could have helped. An answer in which none of them is at its
-            bound loses at most `excess` by the locking.
-        excess: the measures of the locked joints alone minus their least value. An answer's measure is at most this
-            much higher if no helper and no pair of a locked joint is at its bound.
-        pairs: number of pairs left out. None can come nearer than its clearance in any posture within the limits (and
-            with the frames held that the problem holds); exact.
-        rigid: number of pairs left out because no joint between the two is active.
-        things: names of things without a remaining pair; they are not in the smaller scene.
-        counts: kind of part -> (number in the whole problem, number in the simplified one), for the report.
+        joints: names of the joints that the problem freezes.
+        pairs: number of pairs that cannot come nearer than their clearance.
+        rigid: number of pairs that do not move relative to each other, because joints are frozen.
+        things: names of the things of which no pair is left.
+        counts: degrees of freedom, pairs and pieces before and after.
     """
 
-    locked: tuple[str, ...]
-    frozen: tuple[str, ...]
-    helpers: tuple[str, ...]
-    excess: float
+    joints: tuple[str, ...]
     pairs: int
     rigid: int
     things: tuple[str, ...]
     counts: dict[str, tuple[int, int]]
 
-    @property
-    def exact(self) -> bool:
-        """Whether the answers are unchanged: no joint is locked but those that the problem freezes."""
-        return not self.locked
-
     def __str__(self) -> str:
-        """One line for each kind of part left out, with its bound."""
+        """One line for each kind of part left out."""
         lines = [f"{name}: {after} of {before}" for name, (before, after) in self.counts.items()]
-        lines.append(
-            f"{self.pairs} pairs cannot come nearer than their clearance, {self.rigid} do not move to each other: exact"
-        )
-        if self.things:
-            lines.append(f"{len(self.things)} things cannot be reached: exact")
-        if self.frozen:
-            lines.append(f"{len(self.frozen)} joints are frozen by the problem: exact")
-        if self.locked:
-            helped = f"; could have helped {', '.join(self.helpers)}" if self.helpers else ""
-            lines.append(
-                f"{len(self.locked)} joints stay as they start, and move no goal: measure at most {self.excess:.3g} "
-                f"higher by their own share{helped}"
-            )
+        lines.append(f"{self.pairs} pairs cannot come within their clearance, {self.rigid} do not move to each other")
+        lines += [f"{len(self.things)} things cannot be reached"] if self.things else []
+        lines += [f"{len(self.joints)} joints are frozen"] if self.joints else []
         return "\n".join(lines)
 
 
@@ -88,23 +115,24 @@ class Simplified:
     """A smaller problem whose answers are answers of the whole one.
 
     Attributes:
-        problem: the smaller problem. It has the placements that things had when it was made: simplify anew when they
-            move.
-        whole: the original problem.
-        left_out: the parts that were left out, with bounds.
+        problem: the smaller problem.
+        whole: the problem that it was made from.
+        left_out: the omitted parts.
     """
 
     problem: Problem
     whole: Problem
     left_out: LeftOut
-    _embedding: Embedding = field(repr=False)
+    _part: _Part = field(repr=False)
+
+    __repr__ = brief
 
     def posture(self, q: Array) -> Array:
         """Posture of the whole figure, (nq,), of one of the smaller figure (small nq,)."""
-        return self._embedding.embed(checks.posture(q, self.problem.scene.model.nq))
+        return self._part.embed(checks.posture(q, self.problem.scene.model.nq))
 
     def restored(self, solution: Solution) -> Solution:
-        """A method's answer to `problem` for the whole problem: its posture, with that one's assessment."""
+        """A method's answer to `problem`, assessed in the whole one: "infeasible" where a thing was moved since."""
         checks.instance(solution, Solution, "restored: solution", "give what wb.solve(part.problem) returns")
         q = self.posture(solution.q)
         judged = assess(self.whole, q)
@@ -114,76 +142,152 @@ class Simplified:
         return replace(solution, q=q, status=status, assessment=judged, message=message)
 
 
-def simplify(problem: Problem, *, lock: bool = True) -> Simplified:
-    """A smaller problem whose answers are answers of this one, with fewer joints and pairs.
+def simplify(problem: Problem) -> Simplified:
+    """A problem without frozen joints, without pairs that cannot touch in any allowed posture, and the same answers.
 
-    Args:
-        problem: any problem; it is not changed.
-        lock: whether joints that are not active stay as they start; False keeps all that are not frozen.
-
-    Returns:
-        The smaller problem, the conversion to the whole figure, and the parts that were left out with bounds.
+    Things without a remaining pair are left out too, but for those of contact terms. The statement holds for the
+    present placements of things. Frozen joints stay where a term cannot be stated on the smaller figure.
 
     Raises:
-        InputError: it is no problem, or objects were added to or removed from its scene after it was made.
+        InputError: it is no problem, or objects came to or left its scene after it was stated.
+
+    Examples:
+        >>> part = wb.simplify(problem)
+        >>> part.restored(wb.solve(part.problem)).status
+        'solved'
     """
     checks.instance(problem, Problem, "simplify: problem", "state one with wb.Problem(scene, goals=[...])")
-    return leave_out(problem, Parts(lock=checks.flag(lock, "lock")))
-
-
-def leave_out(problem: Problem, parts: Parts) -> Simplified:
-    """Leave some kinds of parts out of a problem."""
     problem.check_fresh()
-    whole = problem.scene
-    part = active_joints(problem, parts.lock) if parts.joints else None
-    figure, geometry = _smaller_figure(problem, part)
-    embedding = Embedding(whole.model, figure.model, problem.start)
-    start = problem.start[embedding.idx_q]
-    table = whole.pair_table
-    joint = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
-    moves = joint[table.pairs[:, 0]] != joint[table.pairs[:, 1]]
+    whole, still = problem.scene, set(still_dofs(problem))
+    model, table = whole.model, whole.pair_table
+    frozen = [j for j in range(1, model.njoints) if still.issuperset(_dofs(model, j))]
+    body = np.arange(model.njoints)
+    for joint in frozen:
+        body[joint] = body[model.parents[joint]]
+    moves = body[table.joint[table.pairs[:, 0]]] != body[table.joint[table.pairs[:, 1]]]
     numbers = np.flatnonzero(moves)
-    small = SmallerScene(figure, geometry, whole.piece_owner, start)
-    constraints = restated(problem.constraints, small, embedding, holds=True)
-    bounds = [bound for bound in problem.bounds if embedding.trivial or not isinstance(bound, Freeze)]  # those lock
-    kept = list(range(geometry.ngeoms))
-    if parts.pairs:
-        center = np.array([piece.placement.translation for piece in geometry.geometryObjects]).reshape(-1, 3)
-        frozen = np.flatnonzero(part.frozen).tolist() if part is not None else []
-        still = [dof for j in frozen for dof in _dofs(figure, whole.model.names[j])]
-        reach = Reach(figure.model, start, Balls(center, table.reach, np.arange(len(kept))), joint, still)
-        near = reachable_pairs(figure, reach, geometry, table, numbers, problem.clearances[numbers], constraints)
-        numbers = numbers[near]
-        used = {whole.piece_owner[index] for index in np.unique(table.pairs[numbers]).tolist()}
-        kept = [k for k, owner in enumerate(whole.piece_owner) if owner in used or owner not in whole.objects]
+    numbers = numbers[reachable_pairs(problem, still, numbers)]
+    made = _without(problem, frozen, numbers) if frozen else None
+    if made is None:
+        frozen, figure = [], whole.figure
+        part = _Part(model, model, problem.start)
+        made = _stated(problem, problem.constraints, part, _scene(problem, figure, whole.geometry, numbers)), part
+    small, part = made
+    counts = {
+        "degrees of freedom": (model.nv, small.scene.model.nv),
+        "pairs": (len(table.pairs), len(numbers)),
+        "pieces": (whole.geometry.ngeoms, small.scene.geometry.ngeoms),
+    }
+    things = tuple(name for name in whole.objects if name not in small.scene.objects)
+    left_out = LeftOut(
+        tuple(model.names[j] for j in frozen), int(moves.sum()) - len(numbers), int((~moves).sum()), things, counts
+    )
+    return Simplified(small, problem, left_out, part)
+
+
+def _dofs(model: pin.Model, joint: int) -> range:
+    return range(model.idx_vs[joint], model.idx_vs[joint] + model.nvs[joint])
+
+
+def _without(problem: Problem, frozen: list[int], numbers: Indices) -> tuple[Problem, _Part] | None:
+    """The problem without some joints, with these pairs; None where a term is another one on the smaller figure."""
+    scene, model = problem.scene, problem.scene.model
+    names = [model.names[j] for j in range(1, model.njoints) if j not in frozen]
+    figure = scene.figure.reduced(
+        [name.removesuffix("_joint") if is_root(name) else name for name in names], problem.start
+    )
+    _, geometries = pin.buildReducedModel(model, [scene.geometry], frozen, problem.start)
+    part = _Part(model, figure.model, problem.start)
+    judge = _Comparison(problem, part, figure.model)
+    constraints = [term for term in problem.constraints if judge.matters(term)]
+    try:
+        small = _stated(problem, constraints, part, _scene(problem, figure, geometries[0], numbers))
+    except Exception:  # a term of one's own may raise any error on another figure
+        return None
+    bounds = [bound for bound in problem.bounds if not isinstance(bound, Freeze)]
+    before, after = (*problem.goals, *constraints, *bounds), (*small.goals, *small.constraints, *small.bounds)
+    small.measures = tuple(
+        anew if judge.alike(term, anew) else EmbeddedMeasure(term, part)
+        for term, anew in zip(problem.measures, small.measures, strict=True)
+    )
+    return (small, part) if all(map(judge.alike, before, after)) else None
+
+
+def _stated(problem: Problem, constraints: Sequence[Constraint], part: _Part, scene: tuple[Scene, Indices]) -> Problem:
+    """The problem on a scene that has some of its pairs."""
+    bounds = [bound for bound in problem.bounds if not isinstance(bound, Freeze) or len(part.idx_q) == len(part.start)]
     made = Problem(
-        _scene(whole, figure, geometry, kept, numbers), start, goals=restated(problem.goals, small, embedding),
-        constraints=[*constraints, *restated(bounds, small, embedding)],
-        measures=restated(problem.measures, small, embedding),
-        clearance=problem.clearance, range_of_motion=False, balance=False,
+        scene[0], part.start[part.idx_q], goals=problem.goals, constraints=[*constraints, *bounds],
+        measures=problem.measures, clearance=problem.clearance, range_of_motion=False, balance=False,
     )  # fmt: skip
-    made.clearances = problem.clearances[numbers]
+    made.clearances = problem.clearances[scene[1]]
     made.measures_given = problem.measures_given
-    return Simplified(made, problem, _left_out(problem, made, part, int((~moves).sum())), embedding)
+    return made
 
 
-def _smaller_figure(problem: Problem, part: ActiveJoints | None) -> tuple[Figure, pin.GeometryModel]:
-    """The figure without the joints that are not active, and the scene's geometry on its joints."""
-    scene = problem.scene
-    if part is None or part.moving[1:].all():
-        return scene.figure, scene.geometry
-    names = scene.model.names
-    keep = [
-        names[j].removesuffix("_joint") if is_root(names[j]) else names[j] for j in np.flatnonzero(part.moving).tolist()
-    ]
-    figure = scene.figure.reduced(keep, problem.start)
-    locked = [j for j in range(1, scene.model.njoints) if not part.moving[j]]
-    _, geometries = pin.buildReducedModel(scene.model, [scene.geometry], locked, problem.start)
-    return figure, geometries[0]
+class _Comparison:
+    """Compares terms of a figure with those of a smaller one, at the start and at another posture."""
+
+    def __init__(self, problem: Problem, part: _Part, small: pin.Model) -> None:
+        self._part, self._whole, self._small = part, State(problem.scene.model), State(small)
+        self._postures = [part.start[part.idx_q], *random_postures(small, 1, seed=1)]
+
+    def matters(self, term: Constraint) -> bool:
+        """Whether a constraint of the whole figure has a row that does not hold, or that a joint moves."""
+        return bool(len(_moving_rows(self._values(term, self._whole))[0]))
+
+    def alike(self, term: Term, other: Term) -> bool:
+        """Whether a term of the whole figure and one of the smaller figure are the same function."""
+        try:
+            values, others = self._values(term, self._whole), self._values(other, self._small)
+        except Exception:  # of one's own, at a posture that was tried
+            return False
+        if isinstance(term, Constraint):
+            values, others = _moving_rows(values), _moving_rows(others)
+        return all(
+            a.shape == b.shape and np.abs(a - b).max(initial=0.0) <= SAME * (1.0 + np.abs(b).max(initial=0.0))
+            for a, b in zip(values, others, strict=True)
+        )
+
+    def _values(self, term: Any, state: State) -> list[Array]:
+        """Values of a term at the postures: all that a method reads, except the constant part of a measure."""
+        columns = self._part.idx_v if state is self._whole else np.arange(state.model.nv)
+        ask: list[Callable[[], Any]]
+        if isinstance(term, Goal):
+            ask = [lambda: term.error(state), lambda: state.dense_jacobian(term.jacobian(state))[:, columns]]
+        elif isinstance(term, Measure):
+            ask = [lambda: term.gradient(state)[columns], lambda: term.curvature(state)[columns]]
+        elif isinstance(term, Bound):
+            ask = [lambda: np.array(term.bounds(state, None))[:, columns]]
+        else:
+            ask = [
+                lambda: np.atleast_1d(term.value(state)),
+                lambda: state.dense_jacobian(term.jacobian(state))[:, columns],
+                lambda: np.broadcast_to(term.lower, np.atleast_1d(term.value(state)).shape),
+                lambda: np.broadcast_to(term.upper, np.atleast_1d(term.value(state)).shape),
+            ]
+        values = []
+        for q in self._postures:
+            state.update(self._part.embed(q) if state is self._whole else q)
+            values += [np.nan_to_num(np.array(one(), dtype=float), posinf=1e300, neginf=-1e300) for one in ask]
+        return values
 
 
-def _scene(whole: Scene, figure: Figure, geometry: pin.GeometryModel, kept: list[int], numbers: Indices) -> Scene:
-    """A scene of these pieces and pairs, in their original order."""
+def _moving_rows(values: list[Array]) -> list[Array]:
+    """Values of a constraint without the rows that hold and that no joint moves."""
+    value, lower, upper = values[0], values[2], values[3]
+    moves = np.any([np.abs(jacobian).max(axis=1, initial=0.0) > SAME for jacobian in values[1::4]], axis=0)
+    keep = moves | (value < lower - SAME) | (value > upper + SAME)
+    return [part[keep] for part in values]
+
+
+def _scene(problem: Problem, figure: Figure, geometry: pin.GeometryModel, numbers: Indices) -> tuple[Scene, Indices]:
+    """A scene of a figure, the things of these pairs and of contact terms, and these pairs, in their original order."""
+    whole = problem.scene
+    terms = (*problem.goals, *problem.constraints, *problem.measures)
+    used = {whole.piece_owner[index] for index in np.unique(whole.pair_table.pairs[numbers]).tolist()}
+    used |= {name for term in terms for pair in term.touching for name in pair}
+    kept = [k for k, owner in enumerate(whole.piece_owner) if owner in used or owner not in whole.objects]
     place = np.full(geometry.ngeoms, -1, dtype=np.intp)
     place[kept] = np.arange(len(kept))
     pairs: Indices = place[whole.pair_table.pairs[numbers]]
@@ -192,32 +296,4 @@ def _scene(whole: Scene, figure: Figure, geometry: pin.GeometryModel, kept: list
     objects: list[SceneObject] = [thing for name, thing in whole.objects.items() if name in set(owners)]
     known = whole.built.pieces_of
     places = {thing.name: [(int(place[old]), local) for old, local in known[thing.name]] for thing in objects}
-    return Scene.of_parts(figure, objects, SceneGeometry(figure.model, made, owners, places, pairs))
-
-
-def _dofs(figure: Figure, joint: str) -> list[int]:
-    """Degrees of freedom of a joint, none if it is not in this figure."""
-    names = list(figure.model.names)
-    if joint not in names[1:]:
-        return []
-    made = figure.model.joints[names.index(joint)]
-    return list(range(made.idx_v, made.idx_v + made.nv))
-
-
-def _left_out(whole: Problem, small: Problem, part: ActiveJoints | None, rigid: int) -> LeftOut:
-    names = list(whole.scene.model.names)
-    before, after = (len(problem.scene.pair_table.pairs) for problem in (whole, small))
-    return LeftOut(
-        locked=tuple(names[j] for j in range(1, len(names)) if not (part.moving[j] or part.frozen[j])) if part else (),
-        frozen=tuple(names[j] for j in np.flatnonzero(part.frozen & ~part.moving)) if part else (),
-        helpers=part.helpers if part else (),
-        excess=part.excess if part else 0.0,
-        pairs=before - rigid - after,
-        rigid=rigid,
-        things=tuple(name for name in whole.scene.objects if name not in small.scene.objects),
-        counts={
-            "degrees of freedom": (whole.scene.model.nv, small.scene.model.nv),
-            "pairs": (before, after),
-            "pieces": (whole.scene.geometry.ngeoms, small.scene.geometry.ngeoms),
-        },
-    )
+    return Scene.of_parts(figure, objects, SceneGeometry(figure.model, made, owners, places, pairs)), numbers

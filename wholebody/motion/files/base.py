@@ -18,17 +18,11 @@ Motion: TypeAlias = Any
 
 
 class Frames(NamedTuple):
-    """What is read.
+    """What is read."""
 
-    Attributes:
-        q: (n, nq) one posture for each frame.
-        dt: seconds from frame to frame.
-        name: name of the clip.
-    """
-
-    q: Array
-    dt: float
-    name: str
+    q: Array  # (n, nq) one posture for each frame
+    dt: float  # seconds from frame to frame
+    name: str  # name of the clip
 
 
 LARGEST_FILE = 500_000_000  # bytes of a text file of motion: an hour of 75 joints at 120 frames a second

@@ -15,38 +15,24 @@ MOST_JOINTS = 1000
 
 @dataclass
 class BvhJoint:
-    """A joint, or the end of a limb, which has no channels.
+    """A joint, or the end of a limb, which has no channels."""
 
-    Attributes:
-        name: such as "LeftUpLeg".
-        parent: index, -1 for the root.
-        offset: in the parent's axes, units of the file.
-        channels: (axis, "position" or "rotation") in the order of the file.
-        line: where it begins.
-    """
-
-    name: str
-    parent: int
-    line: int
-    offset: tuple[float, ...] = ()
+    name: str  # such as "LeftUpLeg"
+    parent: int  # index, -1 for the root
+    line: int  # where it begins
+    offset: tuple[float, ...] = ()  # in the parent's axes, units of the file
+    # (axis, "position" or "rotation") in the order of the file
     channels: list[tuple[str, str]] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
 class BvhText:
-    """What the text says.
+    """What the text says."""
 
-    Attributes:
-        joints: parents before children.
-        table: (frames, channels) numbers of the motion.
-        dt: seconds.
-        notes: sentences on what was changed.
-    """
-
-    joints: list[BvhJoint]
-    table: Array
-    dt: float
-    notes: tuple[str, ...] = ()
+    joints: list[BvhJoint]  # parents before children
+    table: Array  # (frames, channels) numbers of the motion
+    dt: float  # seconds
+    notes: tuple[str, ...] = ()  # sentences on what was changed
 
 
 def parsed(text: str, name: str) -> BvhText:

@@ -53,23 +53,15 @@ OFF = 1e-4
 
 @dataclass(frozen=True)
 class Node:
-    """A part that rotates about one place.
+    """A part that rotates about one place."""
 
-    Attributes:
-        name: of the segment.
-        parent: index of a node; -1 for the root.
-        offset: (3,) from the parent's place to this one's where the posture is zero, metres.
-        joints: indices of Pinocchio's joints, from the trunk outwards; none for the base of a fixed figure.
-        axes: (k, 3) their axes where the posture is zero.
-        tip: (3,) from its place to its end, or None where other nodes follow.
-    """
-
-    name: str
-    parent: int
-    offset: Array
+    name: str  # of the segment
+    parent: int  # index of a node; -1 for the root
+    offset: Array  # (3,) from the parent's place to this one's where the posture is zero, metres
+    # indices of Pinocchio's joints, from the trunk outwards; none for the base of a fixed figure
     joints: tuple[int, ...]
-    axes: Array
-    tip: Array | None
+    axes: Array  # (k, 3) their axes where the posture is zero
+    tip: Array | None  # (3,) from its place to its end, or None where other nodes follow
 
 
 def nodes_of(figure: Figure) -> list[Node]:

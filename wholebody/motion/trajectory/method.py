@@ -50,6 +50,10 @@ class Trajectory(Checked):
 
     Raises:
         InputError: a value out of range.
+
+    Examples:
+        >>> wb.avoid(clip, scene, method=wb.motion.Trajectory(clearance=0.005)).report.solved
+        True
     """
 
     name: ClassVar[str] = "trajectory"

@@ -10,15 +10,15 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.base.checks import settle
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range, Vector
+from wholebody.geometry.compound import Compound
 from wholebody.geometry.placement import FARTHEST, unit_vector
 from wholebody.geometry.shapes import (
     Box,
     Capsule,
-    Compound,
     Cylinder,
     Ellipsoid,
     HalfSpace,
@@ -42,6 +42,12 @@ class BallJoint(Checked):
     Attributes:
         at: (3,) the point in the thing's axes, metres; where it is at the start is where it stays.
         to: name of the thing that holds it; None for the world. The two do not collide with each other.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> lamp = wb.Body(mass=1.0, joints=[wb.dynamics.BallJoint(at=(0.0, 0.0, 0.5))])
     """
 
     at: Annotated[Three, Vector(3, Range(-FARTHEST, FARTHEST, "m"))] = (0.0, 0.0, 0.0)
@@ -54,6 +60,12 @@ class Hinge(BallJoint):
 
     Attributes:
         axis: (3,) direction of the axis in the thing's axes.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
+    Examples:
+        >>> door = wb.Body(mass=20.0, joints=[wb.dynamics.Hinge(at=(0.0, -0.45, 0.0), axis=(0.0, 0.0, 1.0))])
     """
 
     axis: Annotated[Three, unit_vector] = (0.0, 0.0, 1.0)
@@ -86,6 +98,10 @@ class Body(Checked):
     Raises:
         InputError: both a density and a mass, or a value that is not finite or out of range.
         UnknownNameError: there is no such material.
+
+    Examples:
+        >>> ball = wb.Sphere(0.05), wb.Body(mass=0.2, velocity=(1.0, 0.0, 0.0))
+        >>> play = wb.Scene(wb.load("hand")).add(ball[0], name="ball", at=(0.4, 0.0, 0.0), body=ball[1])
     """
 
     density: Annotated[float, Range(1e-3, 1e6, "kg/m3")] | None = None  # osmium has 2.3e4
@@ -94,6 +110,8 @@ class Body(Checked):
     velocity: Annotated[Three, Vector(3, Range(-1e3, 1e3, "m/s"))] = (0.0, 0.0, 0.0)
     angular_velocity: Annotated[Three, Vector(3, Range(-1e3, 1e3, "rad/s"))] = (0.0, 0.0, 0.0)
     joints: Annotated[Sequence[BallJoint], joints] = ()
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         if self.density is not None and self.mass is not None:
@@ -109,19 +127,12 @@ class Body(Checked):
 
 
 class MassProperties(NamedTuple):
-    """What a rigid body is to dynamics.
+    """What a rigid body is to dynamics."""
 
-    Attributes:
-        mass: kg.
-        centre: (3,) centre of mass in the shape's axes, metres.
-        inertia: (3, 3) about the centre, along the shape's axes, kg m2.
-        note: what was assumed about a shape that is no closed surface; empty if nothing.
-    """
-
-    mass: float
-    centre: Array
-    inertia: Array
-    note: str = ""
+    mass: float  # kg
+    centre: Array  # (3,) centre of mass in the shape's axes, metres
+    inertia: Array  # (3, 3) about the centre, along the shape's axes, kg m2
+    note: str = ""  # what was assumed about a shape that is no closed surface; empty if nothing
 
 
 def mass_properties(shape: Shape, body: Body, name: str = "a body") -> MassProperties:

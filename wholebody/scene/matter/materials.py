@@ -33,6 +33,9 @@ class Material:
 
     Raises:
         InputError: a name that is no text, a restitution out of 0 to 1, or a friction out of 0 to 10.
+
+    Examples:
+        >>> rubber = wb.dynamics.Material("rubber", others=(0.6, 0.9))  # restitution, friction
     """
 
     name: str

@@ -31,7 +31,7 @@ def test_the_tool_has_a_part_of_the_time_and_our_own_methods_have_no_tool(name: 
     figure = wb.load(root / "tests/data/arm/arm.urdf")
     problem = wb.Problem(wb.Scene(figure), goals=[wb.Point(figure.model.names[-1], (0.2, 0.2, 0.5))])
     (adapter,) = adapters([name])
-    record = solve(adapter, DEFAULT, Ready(Case("free", 0, problem, np.zeros(figure.model.nq)), 1.0))
+    record, _ = solve(adapter, DEFAULT, Ready(Case("free", 0, problem, np.zeros(figure.model.nq)), 1.0))
     assert record.answered, record.said
     if name == "qp":
         assert record.tool_seconds == 0.0

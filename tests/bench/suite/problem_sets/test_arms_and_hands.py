@@ -11,7 +11,7 @@ from wholebody.bench.suite.problem_sets import robots
 from wholebody.bench.suite.problem_sets.registry import problem_set
 
 
-@pytest.mark.parametrize("number", [0, 9, 18, 27, 36, 45, 54, 63, 7, 12])
+@pytest.mark.parametrize("number", [0, 9, 18, 27, 36, 45, 54, 63])
 def test_the_witness_of_an_arm_is_clear_and_there(number: int) -> None:
     """All eight arms, all four surroundings, with an orientation and without."""
     case = problem_set("arms_among_things").make(number, 1)
@@ -49,7 +49,7 @@ def test_arms_have_the_lengths_that_their_makers_give() -> None:
         assert figure.placement(zero, "tool").translation == pytest.approx(place, abs=1e-3), name
 
 
-@pytest.mark.parametrize("number", [1, 2, 6])
+@pytest.mark.parametrize("number", [2, 6])
 def test_the_witness_of_a_hand_has_taken_the_thing(number: int) -> None:
     case = problem_set("hands").make(number, 0)
     judged = wb.assess(case.problem, case.witness)

@@ -29,10 +29,9 @@ def test_controls_change_with_the_number() -> None:
     assert sum(isinstance(goal, Touch) for goal in last.goals) == 3
 
 
-@pytest.mark.parametrize("number", [0, 50])
-def test_drivers_are_solved(number: int) -> None:
+def test_a_driver_is_solved() -> None:
     """Where a witness sits, a solve finds a posture, by what it does by default."""
-    case = problem_set("drivers").make(number, 1)
+    case = problem_set("drivers").make(50, 1)
     solution = wb.solve(case.problem)
     judged = wb.assess(case.problem, solution.q)
     assert solution.solved, solution

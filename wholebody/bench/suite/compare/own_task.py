@@ -60,11 +60,11 @@ def _solved(path: Path, adapter: Adapter, cap: float) -> tuple[dict[str, Figure]
     made = _ready(read_task(path).problem)
     allow_processor(cap)
     began = time.perf_counter()
-    records = [solve(adapter, DEFAULT, made)]
+    records = [solve(adapter, DEFAULT, made)[0]]
     first: dict[str, Figure] = {"cold ms": 1e3 * (time.perf_counter() - began)}
     for _ in range(REPEATS if records[0].outcome == ANSWERED else 0):
         allow_processor(cap)
-        records.append(solve(adapter, DEFAULT, made))
+        records.append(solve(adapter, DEFAULT, made)[0])
     status = Path("/proc/self/status")
     if status.is_file():  # Linux
         peak = next(line for line in status.read_text().splitlines() if line.startswith("VmHWM"))

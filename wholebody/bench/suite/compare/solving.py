@@ -91,7 +91,7 @@ def solved(which: Which, adapter: Adapter, level: Budget, cap: float) -> Record:
     made = case_of(which)
     frames = len(made.case.frames)
     allow_processor(frame_cap(cap, frames) * frames if frames else cap)
-    return solve(adapter, level, made)
+    return solve(adapter, level, made)[0]
 
 
 def case_of(which: Which) -> Ready:
@@ -115,8 +115,8 @@ def ready(family: ProblemSet, number: int, seed: int) -> Ready:
     return Ready(case, assess(case.problem, case.witness).measure)
 
 
-def solve(adapter: Adapter, level: Budget, made: Ready) -> Record:
-    """Solve a case with a fresh method. Whatever the method does, this returns what came of it."""
+def solve(adapter: Adapter, level: Budget, made: Ready) -> tuple[Record, list[Array]]:
+    """Solve a case with a fresh method: what came of it, whatever the method does, and a posture (nq,) a frame."""
     empty = blank(adapter, level, made.case.set, made.case.number)
     try:
         method = adapter.make(*level)
@@ -130,9 +130,9 @@ def solve(adapter: Adapter, level: Budget, made: Ready) -> Record:
             return _followed(method, problem, made.case, empty)
         return _once(method, problem, empty)
     except WholebodyError as error:
-        return replace(empty, outcome=REFUSED, said=sentence(error))
+        return replace(empty, outcome=REFUSED, said=sentence(error)), []
     except Exception as error:  # a peer may raise anything; what it was is the result
-        return replace(empty, outcome=FAILED, said=f"{type(error).__name__}: {sentence(error)}")
+        return replace(empty, outcome=FAILED, said=f"{type(error).__name__}: {sentence(error)}"), []
     finally:
         gc.enable()
 
@@ -148,14 +148,14 @@ def sentence(error: BaseException) -> str:
     return " ".join(str(error).split())[:300]
 
 
-def _once(method: Any, problem: Problem, empty: Record) -> Record:
+def _once(method: Any, problem: Problem, empty: Record) -> tuple[Record, list[Array]]:
     of_tool, worked, began = TOOL.seconds, processor_time(), time.perf_counter()
     solution = method.solve(problem)
     spent = time.perf_counter() - began - solution.assessment.seconds
     worked = processor_time() - worked
     q = np.asarray(solution.q, dtype=float)
     if not np.isfinite(q).all():
-        return replace(empty, said="the answer is not finite", seconds=spent, status=solution.status)
+        return replace(empty, said="the answer is not finite", seconds=spent, status=solution.status), []
     judging = processor_time()
     judgement = assess(problem, q)
     worked -= min(processor_time() - judging, solution.assessment.seconds)  # the one within the call took as much
@@ -170,7 +170,7 @@ def _once(method: Any, problem: Problem, empty: Record) -> Record:
         iterations=float(solution.iterations),
         programs=programs_text(solution.programs),
     )
-    return judged(filled, judgement)
+    return judged(filled, judgement), [q]
 
 
 def judged(record: Record, judgement: Assessment) -> Record:
@@ -186,7 +186,7 @@ class _Frame(NamedTuple):
     judgement: Assessment
 
 
-def _followed(method: Any, problem: Problem, case: Case, empty: Record) -> Record:
+def _followed(method: Any, problem: Problem, case: Case, empty: Record) -> tuple[Record, list[Array]]:
     """Follow the goals of a case frame by frame; `problem` is a copy of its problem, that may be changed."""
     q = problem.scene.figure.clamp(problem.start)
     frames: list[_Frame] = []
@@ -200,12 +200,12 @@ def _followed(method: Any, problem: Problem, case: Case, empty: Record) -> Recor
         seconds = time.perf_counter() - began - judging
         worked = processor_time() - worked
         if not np.isfinite(q).all():
-            return replace(empty, said=f"frame {len(frames)}: the posture is not finite")
+            return replace(empty, said=f"frame {len(frames)}: the posture is not finite"), []
         again = processor_time()
         judgement = assess(problem, q)
         worked -= min(processor_time() - again, judging)  # the judgement within the call, if any, took as much
         frames.append(_Frame(q, max(seconds, LEAST), max(worked, LEAST), iterations, judgement))
-    return _summary(frames, case, empty)
+    return _summary(frames, case, empty), [frame.q for frame in frames]
 
 
 def _summary(frames: list[_Frame], case: Case, empty: Record) -> Record:

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import copy
 import json
-import statistics
-import time
 from collections.abc import Sequence
+from dataclasses import replace
+from math import inf
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.base.errors import FileFormatError, InputError, UnknownNameError, WholebodyError
+from wholebody.base.errors import FileFormatError, UnknownNameError
 from wholebody.bench.suite.adapters.base import Adapter
 from wholebody.bench.suite.compare.jobs import kernel_seconds
 from wholebody.bench.suite.compare.results import DEFAULT
-from wholebody.bench.suite.compare.solving import ready, sentence
+from wholebody.bench.suite.compare.solving import Ready, ready, solve
 from wholebody.bench.suite.problem_sets.case import Case
 from wholebody.bench.suite.problem_sets.registry import problem_set
 from wholebody.bench.suite.published.answers import SEEDS
@@ -27,7 +27,6 @@ from wholebody.bench.suite.published.rebuilt import VERSION, Rebuilt, dumped, re
 from wholebody.bench.tables import machine
 from wholebody.bench.tables import sentence as machine_sentence
 from wholebody.figures.figure import Figure
-from wholebody.problem import Problem
 
 
 def chosen_problems(folder: Path, sets: Sequence[str] | None = None) -> list[tuple[str, int]]:
@@ -85,36 +84,12 @@ class Answering:
 
     def _answered(self, case: Case, body: BodyFiles, start: Array) -> dict[str, Any]:
         """Postures and seconds, or why the method refuses the problem or fails."""
-        problem = copy.copy(case.problem).with_start(start)
-        try:
-            method = self._adapter.make(*DEFAULT)
-            self._adapter.prepare(method, problem)
-            if case.frames:
-                return _followed(method, problem, case, body)
-            began = time.perf_counter()
-            solution = method.solve(problem)
-            seconds = time.perf_counter() - began - solution.assessment.seconds
-            return {"posture": body.posture(_finite(solution.q)), "seconds": seconds}
-        except WholebodyError as error:
-            return {"refused": sentence(error)}
-
-
-def _followed(method: Any, problem: Problem, case: Case, body: BodyFiles) -> dict[str, Any]:
-    q, postures, seconds = problem.start, [], []
-    tracker = method.tracker(problem, case.dt)
-    for goals in case.frames:
-        problem.retarget(goals)
-        began = time.perf_counter()
-        q = _finite(tracker.frame(q, method.tolerance).q)
-        seconds.append(time.perf_counter() - began)
-        postures.append(body.posture(q))
-    return {"postures": postures, "seconds": statistics.median(seconds)}
-
-
-def _finite(q: Array) -> Array:
-    if not np.isfinite(q).all():
-        raise InputError("the method's posture is not finite")
-    return q
+        asked = replace(case, problem=copy.copy(case.problem).with_start(start))
+        record, found = solve(self._adapter, DEFAULT, Ready(asked, inf))
+        if not found:
+            return {"refused": record.said}
+        postures = [body.posture(q) for q in found]
+        return ({"postures": postures} if case.frames else {"posture": postures[0]}) | {"seconds": record.seconds}
 
 
 def _in_figure(body: BodyFiles, values: Array) -> Array:

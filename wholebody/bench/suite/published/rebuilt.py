@@ -77,6 +77,16 @@ def read_index(folder: Path) -> dict[str, Any]:
     return read_json(folder / INDEX, "index")
 
 
+def files_of(folder: Path) -> list[Path]:
+    """The files of an export, which no answer or verdict is written over."""
+    parts = ("problems", "bodies", "meshes", "witnesses", "difficulty", "clients")
+    return [
+        *folder.glob("*.schema.json"),
+        folder / INDEX,
+        *(path for part in parts for path in (folder / part).rglob("*")),
+    ]
+
+
 SOLVED = 1e-3  # m, rad: worst of goals and of all that must hold, up to which a problem counts as solved
 EXACT = 1e-6  # m, rad: what a witness meets, and an answer whose effort counts as the best known
 

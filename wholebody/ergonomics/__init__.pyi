@@ -1,0 +1,16 @@
+from wholebody.ergonomics.angles import BodyAngles as BodyAngles, body_angles as body_angles
+from wholebody.ergonomics.assessment import Ergonomics as Ergonomics, ergonomics_of as ergonomics_of
+from wholebody.ergonomics.exertion import (
+    Exertion as Exertion,
+    StrengthLimit as StrengthLimit,
+    back_compression as back_compression,
+)
+from wholebody.ergonomics.lifting import Lift as Lift, lift_between as lift_between
+from wholebody.ergonomics.looking import Look as Look
+from wholebody.ergonomics.owas_score import Owas as Owas, owas as owas
+from wholebody.ergonomics.posture_torques import StaticTorques as StaticTorques, static_torques as static_torques
+from wholebody.ergonomics.reba_score import Reba as Reba, RebaParts as RebaParts, reba as reba
+from wholebody.ergonomics.rula_score import Rula as Rula, RulaParts as RulaParts, rula as rula
+from wholebody.ergonomics.vision import FieldOfView as FieldOfView, Sight as Sight, sight as sight
+from wholebody.ergonomics.work import Work as Work
+from wholebody.tasks.forces import LoadedBalance as LoadedBalance

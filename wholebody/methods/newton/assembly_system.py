@@ -1,0 +1,96 @@
+"""An assembly's equations during an iteration, with its contacts and the measures that it minimises."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array
+from wholebody.geometry.memory_views import placement_view
+from wholebody.methods.newton import quaternions as quat
+from wholebody.methods.newton.assembly_geometry import AssemblyFigure
+from wholebody.methods.newton.assembly_objective import AssemblyObjective
+from wholebody.methods.newton.batches import Batch
+from wholebody.methods.newton.feasibility import Projection, kkt_algebra, project
+from wholebody.methods.newton.linear_algebra import QuasiDefinite
+from wholebody.methods.newton.measures import refine
+from wholebody.methods.newton.settings import REFINEMENT
+from wholebody.methods.newton.system import ActiveSystem, System, unit
+from wholebody.scene.scene import Scene
+
+
+class AssemblySystem(ActiveSystem):
+    """An assembly's equations, renewed from state to state."""
+
+    def __init__(
+        self,
+        held: Sequence[Batch],
+        weight: Array,
+        algebra: str,
+        figures: Sequence[AssemblyFigure],
+        to_scene: Callable[[Array], Array],
+        revision: int,
+        objective: AssemblyObjective | None = None,
+    ) -> None:
+        """Take constraints and weights (7 n,); `to_scene` gives the scene's posture (nq,) at variables (7 n,)."""
+        super().__init__([*held, *(() if objective is None else objective.batches())], weight, algebra, figures)
+        self._to_scene, self.revision, self.objective = to_scene, revision, objective
+        self.own_terms = objective is not None
+        self._nearest: tuple[System, QuasiDefinite] | None = None
+
+    def among(self, scene: Scene, clearance: float) -> None:
+        """Let the pairs of a scene of the bodies touch, at a distance of at least `clearance` metres."""
+        if len(scene.pair_table.pairs):
+            self.workspace = scene.workspace()
+            data = pin.Data()  # without the tensors of a model's data, which grow with the cube of its freedoms
+            data.oMi.extend([pin.SE3.Identity()] * self.workspace.model.njoints)
+            self._find_contacts(np.full(len(scene.pair_table.pairs), clearance), self.workspace, data)
+
+    def arrive(self, x: Array) -> bool:
+        """Renew the contacts and the model of the measures at x; returns whether the pattern changed."""
+        x = self.retract(x)
+        if self.objective is None:
+            return super().arrive(x)
+        self.objective.renew(self._to_scene(x))
+        changed = super().arrive(x)
+        self.objective.enter(self.system)
+        return changed
+
+    def lowered(self, x: Array, tolerance: float, rounds: int = REFINEMENT.rounds) -> Array:
+        """The variables (7 n,) after rounds that lower the measures along the equations, which hold at x."""
+        objective = self.objective
+        if objective is None:
+            return x
+
+        def value(here: Array) -> float:
+            return objective.value(self._to_scene(here))
+
+        return refine(self, x, value, tolerance=tolerance, rounds=rounds)[0]
+
+    def nearest(self, x: Array, anchor: Array, tolerance: float, iterations: int) -> Projection:
+        """The place nearest to the anchor from x (both (7 n,)); analysed once while the pattern stays."""
+        if self._nearest is None or self._nearest[0] is not self.system:
+            self._nearest = self.system, kkt_algebra(self.system)
+        return project(self.system, self._nearest[1], x, anchor, tolerance=tolerance, iterations=iterations)
+
+    def _projected(self, x: Array) -> Array:
+        x = unit(x)
+        for figure in self._figures:
+            figure.retract(x)
+        if self.contacts is not None:
+            self.q = self._to_scene(x)
+            self._place(x)
+        return x
+
+    def _place(self, x: Array) -> None:
+        """Write the placements of the bodies at x (7 n,) into the data."""
+        bodies, joints = x.reshape(-1, 7), placement_view(self._data.oMi)
+        if joints is None:
+            for number, body in enumerate(bodies):
+                self._data.oMi[number + 1] = pin.XYZQUATToSE3(body)
+            return
+        joints[1:, 3] = bodies[:, :3]
+        for axis, unit_vector in enumerate(np.eye(3)):
+            joints[1:, axis] = quat.rotate(bodies[:, 3:], np.broadcast_to(unit_vector, (len(bodies), 3)))

@@ -1,0 +1,1 @@
+from wholebody.view.viewer import Viewer as Viewer
