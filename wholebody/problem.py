@@ -138,17 +138,13 @@ class Problem(checks.FixedAttributes):
 
     def _resolved(self, terms: Sequence[Constraint]) -> tuple[Constraint, ...]:
         """Constraints that were stated, resolved; the same ones in the same scene at the same start are known."""
-        scene, start = self.scene, self.start
-
-        def make() -> tuple[Constraint, ...]:
-            return tuple(term.resolve(scene, start) for term in terms)
-
-        key = tuple((type(term), *vars(term).values()) for term in terms)
+        found = (term.resolve(self.scene, self.start) for term in terms)
+        key = self.start.tobytes(), *((type(term), *vars(term).values()) for term in terms)
         try:
             hash(key)
         except TypeError:  # arrays and placements
-            return make()
-        return make() if any(map(is_own, terms)) else once(scene, (key, start.tobytes()), make)
+            return tuple(found)
+        return tuple(found) if any(map(is_own, terms)) else once(self.scene, key, partial(tuple, found))
 
     def _usual_measures(self, stated: Sequence[Constraint]) -> tuple[Measure, ...]:
         scene, start, ranges = self.scene, self.start, self.range_of_motion

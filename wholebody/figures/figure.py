@@ -205,7 +205,7 @@ class Figure(checks.FixedAttributes):
         """Return the index of a frame, a segment or a joint in `model.frames`."""
         if not isinstance(name, str) or name not in self._frame_ids:
             checks.known(name, self._frame_ids, "frame", offered={*self.frames, *self.segments})
-        return self._frame_ids[name]
+        return int(self._frame_ids[name])
 
     def placement(self, q: Array, name: str) -> pin.SE3:
         """Return the placement in the world, at the posture q (nq,), of a frame, a segment or a joint."""

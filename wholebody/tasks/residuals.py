@@ -28,7 +28,7 @@ def point_rows(point: Array) -> Array:
 
     Written out because numpy's cross product costs twenty times as much on three rows.
     """
-    rows = _FORCES.copy()
+    rows: Array = _FORCES.copy()
     fill_point_rows(rows, point)
     return rows
 

@@ -55,7 +55,7 @@ def _table(plan: Plan, table: int) -> tuple[Array, Integers]:
 @compiled(error_model="numpy")
 def linearise(
     state: tuple[Array, Array, Array, Array], plan: Plan, asked: tuple[Array, Indices, Indices, Array, Array, float],
-    clearances: Array, table: TableArrays, near: NearArrays, known: int,
+    clearances: Array, pieces: TableArrays, near: NearArrays, known: int,
     room: tuple[Array, Array, Array, Array, Array, Array],
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Values and Jacobian rows of all terms of a plan, then contacts and their Jacobian rows; bounds and measures.
@@ -67,7 +67,7 @@ def linearise(
         asked: what `gather` takes: results of coal, the pairs (k,) that were asked; pairs, `travelled` and `bound`;
             metres within which pairs are near.
         clearances: (2, pairs) clearance of each pair, and metres in place of `within` where they are less.
-        table: of the pieces.
+        pieces: their arrays.
         near: room for distances (k,), normals and points (3, k, 3), numbers (k,) and pieces (k, 2) of the contacts, and
             for the distance asked of each (k,); for wrench, gap, contact and joints of their rows, and for the
             clearance of each.
@@ -96,7 +96,7 @@ def linearise(
         pair[:known], distance[:known], vectors[0][:known], vectors[1][:known], vectors[2][:known], number[:known],
         placement,
     )  # fmt: skip
-    gaps = contact_rows(contacts, least, table, (gap_wrench, gap, gap_contact, gap_joints))
+    gaps = contact_rows(contacts, least, pieces, (gap_wrench, gap, gap_contact, gap_joints))
     for r in range(gaps):
         gap_clearance[r] = least[gap_contact[r]]
     wrench, value, jacobian, box, measure, squares = room
