@@ -300,6 +300,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     point = {"name": "ball", "point": (1.0, 1.0, 1.0)}
     for name in ("velocity_at", "mobility"):
         yield f"RigidBodies.{name}", Call(getattr(engine, name), point)
+    yield "RigidBodies.put", Call(engine.put, {"name": "ball", "at": pin.SE3.Identity()})
     yield "RigidBodies.push", Call(engine.push, {**point, "impulse": (0.0, 0.1, 0.0)}, lambda _: engine.energy())
     spring = {"stiffness": 1000.0, "damping": 40.0, "mass": 0.4}
     yield "Spring", Call(wb.dynamics.Spring, spring, lambda made: made.transition(0.1))
@@ -899,6 +900,7 @@ DERIVATIVES = (
     "placed",
     "bounded",
     "warn_of_angles",
+    "squared",
 )
 """What problems and methods, not people, ask of terms and states; at every posture, which is too often for checks."""
 

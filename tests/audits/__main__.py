@@ -166,7 +166,7 @@ def regress(arguments: argparse.Namespace) -> int:
 def loads(arguments: argparse.Namespace) -> None:
     """Measure and report; --quick takes one clip, cut to half a second."""
     from tests.audits import loads
-    from wholebody.bench.measure.clips import EQUIPMENT
+    from wholebody.bench.measure.motion import EQUIPMENT
 
     longest = number(arguments.longest, "--longest", 0.2, 1e4, "s")
     few, longest = (1, 0.5) if arguments.quick else (None, longest)

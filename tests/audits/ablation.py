@@ -25,8 +25,7 @@ from wholebody.base.arrays import Array, as_dict, with_values
 from wholebody.bench.rows import Row
 from wholebody.bench.rows import report as tables_of
 from wholebody.bench.suite.problem_sets.registry import NAMED, SETS
-from wholebody.bench.suite.stability.case import Posed
-from wholebody.bench.suite.stability.catalogue import cases
+from wholebody.bench.suite.stability.catalogue import Posed, cases
 from wholebody.methods.solve import method_named
 from wholebody.problem import Problem
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from tests.audits.ablation import FACTORS, Constant, changed, constants_in, replaced
 from wholebody.base.arrays import Array
-from wholebody.bench.measure.clips import synthetic
+from wholebody.bench.measure.motion import synthetic
 from wholebody.bench.rows import Row, measured_ms
 
 Case = tuple[str, str, str, int]

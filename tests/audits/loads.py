@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests.audits.templates import TEMPLATES
-from wholebody.bench.measure.clips import recorded, synthetic
+from wholebody.bench.measure.motion import recorded, synthetic
 from wholebody.bench.report import render
 from wholebody.figures import load
 from wholebody.motion.avoidance import avoid

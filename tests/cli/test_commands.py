@@ -18,7 +18,7 @@ import wholebody as wb
 from tests.needs import each
 from tests.task_text import figure, point, table
 from wholebody.cli import main
-from wholebody.cli.demo import packaged_tasks
+from wholebody.figures.packaged_urdf import task_paths
 from wholebody.methods import solve as solving
 from wholebody.view import browser, screenshot
 
@@ -257,7 +257,7 @@ def test_figure_describes_and_writes_what_can_be_loaded_again(
 def test_demo_tasks_can_all_be_read(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["demo", "--list"]) == 0
     listed = capsys.readouterr().out
-    for name, path in packaged_tasks().items():
+    for name, path in task_paths().items():
         assert name in listed
         assert wb.read_task(path).problem.goals
 
@@ -277,14 +277,14 @@ def test_help_is_there_and_light() -> None:
 
 
 UNUSED = (
-    *("wholebody.cli.clip", "wholebody.cli.bench", "wholebody.motion.clip", "wholebody.tracking"),
+    *("wholebody.cli.clip", "wholebody.cli.bench", "wholebody.motion.clip", "wholebody.tracking.drag"),
     *("wholebody.methods.newton.assembly", "wholebody.figures.surface.making", "scipy.ndimage", "scipy.spatial"),
     *("asyncio", "jinja2", "matplotlib", "rich.progress", "tornado", "trimesh"),
 )
 
 
 def test_a_command_loads_nothing_that_it_does_not_use(tmp_path: Path) -> None:
-    task = packaged_tasks()["shelf"]
+    task = task_paths()["shelf"]
     problem = wb.read_task(task).problem
     with wb.Viewer(problem.scene) as viewer:
         viewer.show(problem.start)  # makes the body's surface, which is kept

@@ -83,7 +83,7 @@ def test_a_file_that_leads_into_the_wall_ends_there(
         (["--path", "spiral"], "--path: there is no file spiral; give line, circle or a file of places"),
         (["--path", "line", "--method", "jacobi"], "no method is called 'jacobi'"),
         (["--path", "line", "--goal", "5"], "the number of the goal is 5; give a whole number between 0 and 1"),
-        (["--path", "line", "--goal", "1"], "goals[1] is a Orientation"),
+        (["--path", "line", "--goal", "1"], "goals[1] is an Orientation"),
         (["--path", "line", "--frames", "0"], "frames is 0; give a whole number between 1"),
         (["--path", "circle", "--size", "-1"], "radius is -1.0; give a number"),
         (["--path", "line", "--to", "nan", "0", "0"], "--to"),

@@ -110,7 +110,7 @@ def test_a_person_catches_a_ball_and_bears_its_weight() -> None:
     scene.add(wb.Sphere(0.22), name="ball", at=(0.4, 0.0, 1.6), body=wb.Body(mass=0.5, material="human"))
     world = wb.World(scene, start, spring=wb.Actuated(figure))
     given = []
-    for _ in range(60):
+    for _ in range(45):
         frame = world.step(start)
         assert frame.deepest < 1e-3
         given.append(frame.impulses.get("ball", np.zeros(3)))

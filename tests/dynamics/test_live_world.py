@@ -69,7 +69,7 @@ def test_a_lost_tracker_holds_then_eases_back_and_a_jump_is_followed_at_a_bounde
     for _ in range(12):  # 0.2 s without a word
         live.move()
     assert live.place("left_palm") == pytest.approx(places[-1], abs=0.01)
-    for _ in range(120):
+    for _ in range(80):
         live.move()
     assert live.place("left_palm") == pytest.approx(began, abs=0.02)
     with pytest.raises(wb.UnknownNameError, match="left_palm"):

@@ -53,7 +53,7 @@ def test_assemblies_are_told_where_they_are_taken() -> None:
         with pytest.raises(InputError, match=r"the assembly has no goals; .*point_goal"):
             call()
     assembly.frame_goal("rod", (0, 0, 0))
-    with pytest.raises(InputError, match="that of a frame; use Drag"):
+    with pytest.raises(InputError, match="goal 0 is of the kind 'frame'; use Drag"):
         wb.follow_path(assembly, [(0, 0, 0)])
     with pytest.raises(InputError, match="not by 'ccd'; leave method out"):
         wb.Drag(assembly, "ccd")  # type: ignore[call-overload]

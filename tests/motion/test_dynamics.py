@@ -196,3 +196,18 @@ def test_a_foot_stands_between_two_frames_in_which_it_stands() -> None:
     places = np.array([0.0, 0.6, 1.1, 1.9, 2.0, 2.1, 2.9, 4.2, 4.9, 5.0, 5.4, 5.6])
     found = standing_frames(places, feet)
     np.testing.assert_array_equal(found, [0, 1, 2, 2, 2, 3, 3, 4, 4, 5, 5, 6])
+
+
+def test_a_clip_that_loses_its_ground_is_said() -> None:
+    """Who stands and is then lifted by as much in every frame of half a second lacks the whole weight in each."""
+    human = wb.load("human")
+    q = np.repeat(human.posture("standing")[None], 31, axis=0)
+    lifted = q.copy()
+    lifted[:, 2] += 0.3 * np.minimum(np.arange(31) / 30.0, 1.0)  # 0.3 m/s: faster than what stands
+    change = LoadChange(*(wb.motion.torques(wb.Clip(human, each, 1.0 / 30.0)) for each in (q, lifted)), np.arange(31.0))
+    assert not change.farther.any()
+    assert change.unsupported == pytest.approx(np.ones(31), abs=0.02)
+    (said,) = change.missed
+    assert "the ground lacks 100% of the weight more than before" in said
+    assert "in 31 frames" in said
+    assert not LoadChange(change.before, change.before, change.times).missed

@@ -10,7 +10,7 @@ import pytest
 
 import wholebody as wb
 from tests.freeing import begun
-from wholebody.bench.measure.clips import synthetic
+from wholebody.bench.measure.motion import synthetic
 from wholebody.figures.figure import Figure
 from wholebody.motion.avoidance import METHODS
 from wholebody.motion.avoider import MethodResult, Run

@@ -143,7 +143,7 @@ def test_the_frame_loop_names_what_it_cannot_avoid(overlap: str) -> None:
         q = throw.scene.figure.posture("standing")
         loop = FrameLoop(throw.scene, q, overlap=overlap)
         named = parts = 0
-        for _ in range(min(throw.frames, 20)):
+        for _ in range(min(throw.frames, 15)):
             before, way = loop.shown, throw.next()
             q = q.copy()
             q[0] += walks * DT

@@ -104,12 +104,12 @@ def chromium() -> str:
     return found
 
 
-_RARELY = "window.requestAnimationFrame = draw => setTimeout(() => draw(performance.now()), 200)"
+_RARELY = "window.requestAnimationFrame = draw => setTimeout(() => draw(performance.now()), 100)"
 
 
 @pytest.fixture(scope="session")
 def draw_rarely() -> Callable[[Browser], None]:
-    """Return a function: pages that a browser opens from now on draw five times a second.
+    """Return a function: pages that a browser opens from now on draw ten times a second.
 
     Without a GPU sixty times keep a core busy, and no test asks for them.
     """

@@ -14,7 +14,7 @@ from scipy.spatial import ConvexHull
 
 from wholebody.base.errors import InputError
 from wholebody.view import drawing
-from wholebody.view.scene_graph import quaternions
+from wholebody.view.scene_graph import continuous_quaternions
 from wholebody.view.style import LOOK
 
 directions = st.tuples(*[st.floats(-1, 1)] * 3).map(np.array).filter(lambda d: np.linalg.norm(d) > 1e-3)
@@ -93,11 +93,13 @@ def test_quaternions_are_those_of_pinocchio_without_jumps() -> None:
     axis = rng.normal(size=3)
     axis /= np.linalg.norm(axis)
     rotations = np.array([pin.exp3(angle * axis) for angle in angles])
-    found = quaternions(rotations)
+    found = continuous_quaternions(rotations)
     for rotation, q in zip(rotations, found, strict=True):
         np.testing.assert_allclose(pin.Quaternion(q).matrix(), rotation, atol=1e-12)
     assert np.abs(np.diff(found, axis=0)).max() < 0.1
     for axis in np.eye(3):
         np.testing.assert_allclose(
-            pin.Quaternion(quaternions(pin.exp3(np.pi * axis)[None])[0]).matrix(), pin.exp3(np.pi * axis), atol=1e-9
+            pin.Quaternion(continuous_quaternions(pin.exp3(np.pi * axis)[None])[0]).matrix(),
+            pin.exp3(np.pi * axis),
+            atol=1e-9,
         )

@@ -162,11 +162,7 @@ class NearPairs(NamedTuple):
         return "contact", (self.built.owners[first], self.built.owners[second])
 
     def gradients(self, state: State) -> tuple[Array, list[int]]:
-        """Derivatives (n, nv) of the gaps at the corners of the patches, and the row of the pair of each (n,).
-
-        Args:
-            state: at the posture where the pairs are.
-        """
+        """Derivatives (n, nv) of the gaps at the corners of the patches, and the row of the pair of each (n,)."""
         corners = [(row, *corner) for row in range(len(self.number)) for corner in self._patch(row)]
         rows = np.zeros((len(corners), state.model.nv))
         numbers = [corner[0] for corner in corners]

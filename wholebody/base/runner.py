@@ -260,11 +260,9 @@ def run_jobs(next_job: Callable[[], Job | None], children: Sequence[Child]) -> I
 
 
 def allow(seconds: float, processor: float = 0.0) -> None:
-    """Move the deadline of the running job to so many seconds from now; does nothing outside a job.
+    """Move the deadline of the running job to so many seconds from now; 0 for none. It does nothing outside a job.
 
-    Args:
-        seconds: by the clock; 0 for no deadline.
-        processor: of the processor's time, which passes slowly where others use it too; 0 for no such deadline.
+    `processor` are seconds of the processor's time, which passes slowly where others use it too.
     """
     if _parent is not None:
         signal.setitimer(signal.ITIMER_REAL, seconds)

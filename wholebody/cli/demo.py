@@ -22,8 +22,9 @@ def run(arguments: argparse.Namespace) -> int:
     """List the tasks, or pose one."""
     from wholebody.base.errors import UnknownNameError
     from wholebody.cli.pose import pose
+    from wholebody.figures.packaged_urdf import task_paths
 
-    tasks = packaged_tasks()
+    tasks = task_paths()
     if arguments.list:
         for name, path in tasks.items():
             print(f"{name:24} {path}")
@@ -33,10 +34,3 @@ def run(arguments: argparse.Namespace) -> int:
     code = pose(tasks[arguments.name], None, arguments.out)
     print(f"the task is {tasks[arguments.name]}; to turn the scene about, open {arguments.out / 'scene.html'}")
     return code
-
-
-def packaged_tasks() -> dict[str, Path]:
-    """Task files by name: inside an installed package, or among the examples of a checkout."""
-    from wholebody.figures.packaged_urdf import task_paths
-
-    return task_paths()

@@ -143,14 +143,15 @@ def followed(problem: Problem, places: Any, method: str, goal: int, label: str) 
 
 def _goal(problem: Problem, number: int | None) -> int:
     from wholebody.base.errors import InputError
-    from wholebody.tasks import Frame, Point
+    from wholebody.tasks import Frame, Orientation, Point
     from wholebody.tracking.moving_goals import moving_goal
 
     if number is None:
         number = next((k for k, goal in enumerate(problem.goals) if isinstance(goal, (Point, Frame))), None)
         if number is None:
             raise InputError("the task has no point or frame goal that could be dragged; give it one")
-    moving_goal(problem, number)
+    if isinstance(moving_goal(problem, number), Orientation):
+        raise InputError(f"--goal: goals[{number}] is an Orientation, which has no place; name a point or a frame")
     return number
 
 

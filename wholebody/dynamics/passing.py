@@ -66,16 +66,10 @@ class Way(NamedTuple):
 def check_passing(
     state: BodiesState, before: StepStart, after: Contacts, margin: Array, travel: Array, time: float, gravity: float
 ) -> PassingCheck:
-    """Whether pieces can have been deeper than `PASSING` in each other on the way, and where.
+    """Whether pieces can have been deeper than `PASSING` in each other on the way of a step, and where.
 
-    Args:
-        state: where the bodies are after the step.
-        before: the start.
-        after: near pairs after it, within margins (n,) of both bodies.
-        margin: (n,) metres.
-        travel: (n,) most that a point of each body has moved, metres.
-        time: of the step, seconds.
-        gravity: m/s2.
+    The step took `time` seconds. Pairs `after` it are within margins (n,) of both bodies, metres; no point of a body
+    has moved farther than its travel (n,).
     """
     before.widen(travel)
     pieces, near = state.pieces, before.near

@@ -157,25 +157,16 @@ class Pieces:
         return found
 
     def _add_swept_points(self) -> None:
-        """Write the swept points, and their distances from centres of mass."""
-        swept = self.table.swept
-        points = np.vstack([one.points for one in swept] or [np.zeros((0, 3))])
-        count: Indices = np.array([len(one.points) for one in swept], dtype=np.intp)
-        start: Indices = (np.cumsum(count) - count).astype(np.intp)
-        radius = np.array([one.radius for one in swept], dtype=float)
-        axes, plane = np.zeros((len(swept), 3)), np.zeros((len(swept), 4))
-        centres = self.centre[self.body]
-        lever = np.linalg.norm(self.local[:, 3] - centres, axis=1)
-        for k, (one, piece) in enumerate(zip(swept, self.table.geometry.geometryObjects, strict=True)):
-            if len(one.points):
-                placed = one.points @ self.local[k, :3] + self.local[k, 3] - centres[k]
-                lever[k] = float(np.linalg.norm(placed, axis=1).max())
-            elif np.isinf(one.reach):
-                plane[k], lever[k] = one.faces[0], 0.0
-            else:
-                axes[k] = piece.geometry.radii
-                lever[k] += one.reach
-        self.swept = SweptPoints(points, start, count, radius, axes, plane)
+        """Take the swept points of the table, and their greatest distances from centres of mass."""
+        table, centres, number = self.table, self.centre[self.body], np.diff(self.table.first_point)
+        endless, plane = np.isinf(table.reach), np.zeros((len(number), 4))
+        plane[endless] = table.faces[table.first_face[:-1][endless]]
+        axes = np.where((~endless & (number == 0))[:, None], table.half, 0.0)
+        self.swept = SweptPoints(table.points, table.first_point[:-1], number, table.radius, axes, plane)
+        lever = np.where(endless, 0.0, np.linalg.norm(self.local[:, 3] - centres, axis=1) + table.reach)
+        for k in np.flatnonzero(number).tolist():
+            placed = table.swept[k].points @ self.local[k, :3] + self.local[k, 3] - centres[k]
+            lever[k] = float(np.linalg.norm(placed, axis=1).max())
         self.lever = np.zeros(len(self.names))
         np.maximum.at(self.lever, self.body, lever)
 

@@ -28,7 +28,7 @@ from wholebody.dynamics.passing import StepStart, check_passing
 from wholebody.dynamics.pieces import ContactFinder, Pieces
 from wholebody.dynamics.sleeping import Sleepers
 from wholebody.dynamics.step_program import SKIN, Impulses, StepProgram, compiled_kernel
-from wholebody.geometry.placement import FARTHEST
+from wholebody.geometry.placement import FARTHEST, PlacementLike, placement
 from wholebody.geometry.proximity import Contacts
 from wholebody.scene.scene import Scene
 
@@ -158,10 +158,10 @@ class RigidBodies:
         else:  # along the mean of the velocities before and after
             self._pushed += before + 0.5 * float(impulse @ self._velocity(number, lever))
 
-    def put(self, name: str, at: pin.SE3) -> None:
+    def put(self, name: str, at: PlacementLike) -> None:
         """Put a body elsewhere, with its velocity; it wakes, and what lay on it. What that raises is work."""
         number, before, kept = self._number(name), self.energy(), self.state.copies()
-        self.state.put(number, at)
+        self.state.put(number, placement(at, "put: at"))
         self.state.bodies.moving[self._joints.linked(number)] = True
         self._sleepers.wake_where_put(self._finder, kept)
         self._pushed += self.energy() - before

@@ -68,9 +68,8 @@ def _push(c: int, one: float, two: float, three: float, rows: Rows, twist: Array
 def _visit(c: int, rows: Rows, laws: Laws, twist: Array, impulse: Array) -> tuple[float, float, bool]:
     """Solve the program for one point alone.
 
-    Returns:
-        The change of u, that of a joint times `JOINT_PRECISION`; the square of that of the impulse; and whether the
-        point bears or nearly bears something.
+    Return the change of u, that of a joint times `JOINT_PRECISION`; the square of that of the impulse; and whether the
+    point bears or nearly bears something.
     """
     if rows.mobility[c, 0] <= 0.0:
         return 0.0, 0.0, False

@@ -32,20 +32,15 @@ those that were stated."""
 
 
 class TrunkPart(NamedTuple):
-    """A slice of the trunk.
+    """A slice of the trunk."""
 
-    Attributes:
-        segment: that carries it.
-        depth, breadth: names of its dimensions.
-        share: of the depth that it has.
-        behind: (2,) its rear behind the joints of the spine: share of its depth, and of the stature. Who is heavy
-            has most of the depth in front (estimate).
-    """
-
-    segment: str
+    segment: str  # that carries it
+    # depth and breadth: names of its dimensions
     depth: str
     breadth: str
-    share: float
+    share: float  # of the depth that it has
+    # (2,) its rear behind the joints of the spine: share of its depth, and of the stature. Who is heavy has most of the
+    # depth in front (estimate).
     behind: tuple[float, float]
 
     def back(self, of: Mapping[str, float]) -> float:
@@ -97,13 +92,9 @@ joint beside the middle and before the clavicle's inner end, and by how much it 
 def arm_sizes(
     sex: str, of: Mapping[str, float], stated: Collection[str], frame: Skeleton
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the sizes of the arms, and those dimensions of the body that follow from them, metres.
+    """Return the sizes of the arms that hang on a frame, and the dimensions that follow from them, metres.
 
-    Args:
-        sex: "male" or "female".
-        of: all dimensions.
-        stated: names of those that are met before others.
-        frame: what the arms hang on.
+    Of all dimensions the stated ones, by name, are met before others.
     """
     rows = keyed("arm_sizes", "name")
     usual = np.array([float(rows[name][sex]) for name in ARM]) * of["stature"]

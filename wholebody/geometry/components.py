@@ -95,7 +95,9 @@ def _with_cavities(parts: list[Component]) -> list[Component]:
         around = [
             k
             for k, part in enumerate(solid)
-            if part.closed and part.volume > -hollow.volume and _winds_around(part, hollow.vertices[0])
+            if part.closed
+            and part.volume > -hollow.volume
+            and winds_around(part.vertices[part.faces], hollow.vertices[0])
         ]
         if around:
             k = min(around, key=lambda i: solid[i].volume)
@@ -111,9 +113,9 @@ def _with_cavities(parts: list[Component]) -> list[Component]:
     return solid
 
 
-def _winds_around(part: Component, point: Array) -> bool:
-    """Whether a point is inside a closed part: solid angles (Van Oosterom and Strackee 1983) sum to 4 pi."""
-    a, b, c = (part.vertices[part.faces[:, k]] - point for k in range(3))
+def winds_around(corners: Array, point: Array) -> bool:
+    """Whether a point is inside closed triangles (m, 3, 3): solid angles sum to 4 pi (Van Oosterom, Strackee 1983)."""
+    a, b, c = (corners[:, k] - point for k in range(3))
     la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
     above = np.einsum("ij,ij->i", a, np.cross(b, c))
     below = la * lb * lc + (a * b).sum(axis=1) * lc + (b * c).sum(axis=1) * la + (c * a).sum(axis=1) * lb

@@ -54,12 +54,9 @@ class ContactRowBuilder:
     """
 
     def __init__(self, table: PairTable, most_ends: int = MOST_ENDS, same_normal: float = SAME_NORMAL) -> None:
-        """Take the pieces and pairs.
+        """Take the pieces and pairs, and how many rows a contact has at most beside its witness row.
 
-        Args:
-            table: of them.
-            most_ends: rows of one contact beside its witness row.
-            same_normal: cosine of the angle to a face's normal within which coal's may be meant to be it.
+        `same_normal` is the cosine of the angle to a face's normal within which coal's may be meant to be it.
         """
         self.table, self.most_ends = table, most_ends
         lengths = LENGTHS.copy()

@@ -72,11 +72,8 @@ def cache_folder() -> Path:
 def cached(content: tuple[bytes, ...], settings: str, what: str, make: Callable[[], ConvexPieces]) -> ConvexPieces:
     """Return pieces from the cache, or make and cache them.
 
-    Args:
-        content: the data that the pieces are made from.
-        settings: the settings, with the versions of the libraries.
-        what: name of the mesh, with which all notes begin; the cache does not depend on it.
-        make: makes the pieces.
+    They depend on the content that they are made from, and on settings, with the versions of the libraries. `what`,
+    with which all notes begin, is no part of that.
     """
     digest = hashlib.sha256("\0".join(("1", __version__, settings)).encode())
     for part in content:

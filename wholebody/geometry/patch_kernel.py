@@ -217,14 +217,7 @@ def _farthest_first(place: Array, gap: Array, witness: Array, distance: float, s
 
 @compiled()
 def contact_rows(contacts: ContactArrays, clearance: Array, table: TableArrays, room: RowArrays) -> int:
-    """Write the rows of all contacts; how many there are.
-
-    Args:
-        contacts: the near pairs.
-        clearance: (k,) distance asked of each, metres.
-        table: of the pieces.
-        room: for the rows.
-    """
+    """Write the rows of all contacts, of which distances (k,) are asked, metres; how many there are."""
     pair, distance, normal, point_a, _, number, _ = contacts
     extended, joint, lengths, points, first_point, faces, first_face, radius, axis = table
     shapes = points, first_point, faces, first_face, radius, axis

@@ -72,13 +72,8 @@ def object_penetration(
 ) -> ObjectPenetration | None:
     """Both measures of the overlap of two objects, named `a` and `b`; None if no pair overlaps.
 
-    Args:
-        a: name of the first object.
-        b: name of the second.
-        pieces_a: its n pieces, each a coal geometry and its placement in the world.
-        pieces_b: the m of the second.
-        allowed: (n, m) the pairs of pieces that count; all by default.
-        tolerance: depth up to which a pair only touches, metres: coal's own accuracy by default.
+    Each piece is a coal geometry with its placement in the world. Of the pairs those count that are allowed (n, m),
+    all by default. Up to the tolerance, metres, a pair only touches.
     """
     overlap, depths, normals = ObjectPair(pieces_a, pieces_b, allowed).overlapping(np.zeros(3), tolerance)
     if not overlap:

@@ -83,6 +83,25 @@ def unit_vector(value: object, what: str) -> tuple[float, float, float]:
     return x / length, y / length, z / length
 
 
+def quaternions(rotations: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit quaternions (n, 4) as x, y, z, w of rotations (n, 3, 3).
+
+    Each is a row of the matrix 4 q q^T, which is linear in the rotation; the row with the largest diagonal is well
+    conditioned (Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1(3), 1978).
+    """
+    r, n = rotations, np.arange(len(rotations))
+    xx, yy, zz = r[:, 0, 0], r[:, 1, 1], r[:, 2, 2]
+    outer = np.empty((len(r), 4, 4))
+    outer[:, 0, 0], outer[:, 1, 1] = 1 + xx - yy - zz, 1 - xx + yy - zz
+    outer[:, 2, 2], outer[:, 3, 3] = 1 - xx - yy + zz, 1 + xx + yy + zz
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        outer[:, i, j] = outer[:, j, i] = r[:, j, i] + r[:, i, j]
+        outer[:, 3, k] = outer[:, k, 3] = r[:, j, i] - r[:, i, j]
+    row = outer[n, np.argmax(outer[:, range(4), range(4)], axis=1)]
+    found: NDArray[np.float64] = row / np.sqrt((row * row).sum(axis=1, keepdims=True))
+    return found
+
+
 def _rigid(rotation: NDArray[np.float64], translation: NDArray[np.float64], what: str) -> pin.SE3:
     """Check both parts, and round the rotation to the nearest orthonormal matrix (polar decomposition)."""
     _check_values(translation, what)

@@ -80,13 +80,7 @@ class Control:
     def __init__(
         self, time_limit: float | None = None, progress: Progress | None = None, longest: float = LONGEST
     ) -> None:
-        """Start the clock.
-
-        Args:
-            time_limit: seconds on the clock; None for `longest`, infinity for no limit.
-            progress: see `Progress`.
-            longest: seconds of processor time.
-        """
+        """Start the clock: seconds on it, None for `longest` of the processor's time, infinity for no limit."""
         if progress is not None and not callable(progress):
             raise InputError(f"progress is {a(type(progress))}; give a function of one trace entry")
         self.reason = ""

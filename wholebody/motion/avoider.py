@@ -194,23 +194,14 @@ class Run:
 
 
 class MethodResult(NamedTuple):
-    """What a method makes of a clip.
+    """What a method makes of a clip."""
 
-    Attributes:
-        q: (n, nq) postures.
-        repair: whether the shared repair corrects what is left.
-        frozen: joints and groups that the repair keeps as they are in the original postures.
-        message: what did not succeed, one sentence; empty where all did, or where the judge sees it by itself.
-        times: (n,) seconds of the clip as it was at which each frame is; None where the timing stays.
-        stretch: factor by which the clip was slowed most, anywhere.
-    """
-
-    q: Array
-    repair: bool = False
-    frozen: tuple[str, ...] = ()
-    message: str = ""
-    times: Array | None = None
-    stretch: float = 1.0
+    q: Array  # (n, nq) postures
+    repair: bool = False  # whether the shared repair corrects what is left
+    frozen: tuple[str, ...] = ()  # joints and groups that the repair keeps as they are in the original postures
+    message: str = ""  # what did not succeed, one sentence; empty where all did, or where the judge sees it by itself
+    times: Array | None = None  # (n,) seconds of the clip as it was at which each frame is; None where the timing stays
+    stretch: float = 1.0  # factor by which the clip was slowed most, anywhere
 
 
 class Avoider(Protocol):

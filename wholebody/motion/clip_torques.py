@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.lib.stride_tricks import sliding_window_view
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Mask, brief
@@ -73,6 +74,11 @@ class Torques:
     def supported(self) -> Mask:
         """(n,) whether a foot stands in the frame."""
         return np.asarray(self.stands.any(axis=1))
+
+    @property
+    def flies(self) -> bool:
+        """Whether there is a frame in which no foot of a figure with feet stands."""
+        return bool(self.feet) and not self.supported.all()
 
     @property
     def share(self) -> Array:
@@ -254,6 +260,9 @@ TORQUE = 0.02
 PLACE = 2e-3
 """Metres by which the zero moment point may be farther outside, for the same reason."""
 
+FORCE = 0.05
+"""Share of the weight by which the ground may lack more force."""
+
 
 @dataclass(frozen=True, eq=False)
 class LoadChange:
@@ -295,11 +304,33 @@ class LoadChange:
         return found
 
     @property
+    def unsupported(self) -> Array:
+        """(m,) share of the weight by which the ground lacks more of the force that the motion needs than before.
+
+        It is compared with the largest lack before within 0.1 s, as feet may leave the ground so much earlier or later.
+        Feet that no longer stand give nothing, and a flight that is slowed needs a force.
+        """
+        old, new = (np.linalg.norm(loads.missing[:, :3], axis=1) for loads in (self.before, self.after))
+        reach, figure = max(1, round(0.1 / self.after.dt)), self.after.figure
+        near = sliding_window_view(np.pad(old, reach), 2 * reach + 1).max(axis=1)
+        places = np.clip(np.rint(self.times).astype(int), 0, len(old) - 1)
+        weight = pin.computeTotalMass(figure.model) * float(np.linalg.norm(figure.model.gravity.linear))
+        found: Array = np.maximum(new - near[places], 0.0) / max(weight, np.finfo(float).tiny)
+        return found
+
+    @property
     def missed(self) -> list[str]:
         """Sentences on loads beyond their bounds: which, by how much, where, what is allowed, and what was before."""
         said, joint, frame = list[str](), int(np.argmax(self.beyond)), int(np.argmax(self.farther))
         if self.beyond[joint] > TORQUE:
             said.append(self._torque_missed(joint))
+        unsupported, floating = self.unsupported, int(np.argmax(self.unsupported))
+        if unsupported[floating] > FORCE:
+            said.append(
+                f"the ground lacks {unsupported[floating]:.0%} of the weight more than before at "
+                f"{floating * self.after.dt:.2f} s, where {FORCE:.0%} are allowed, and too much in "
+                f"{int((unsupported > FORCE).sum())} frames: feet have left the ground, or a flight is another one"
+            )
         if self.farther[frame] > PLACE:
             said.append(
                 f"the zero moment point is {1e3 * self.farther[frame]:.3g} mm farther outside of the feet than before "

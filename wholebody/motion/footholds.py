@@ -44,7 +44,7 @@ def resting(places: Array, dt: float, limits: RestLimits, kinds: Sequence[int]) 
     if not slow:
         return found
     marks = np.stack(slow, axis=1)
-    stands = [(k, run, _lowest(places[run.first : run.end, k, 2])) for k, mask in enumerate(slow) for run in runs(mask)]
+    stands = [(k, run, lowest(places[run.first : run.end, k, 2])) for k, mask in enumerate(slow) for run in runs(mask)]
     kind = np.array(kinds, dtype=int)
     lows = _level_of_kinds(stands, kind)
     base = np.array([low - lows[kind[k]] for k, _, low in stands])
@@ -78,7 +78,8 @@ def _slow(places: Array, speed: Array, dt: float, limits: RestLimits) -> Mask:
     return long_runs(kept, max(1, round(limits.least / dt)))
 
 
-def _lowest(heights: Array) -> float:
+def lowest(heights: Array) -> float:
+    """Height [m] above which a point is in four of five frames in which it rests."""
     return float(np.percentile(heights, 20.0))
 
 

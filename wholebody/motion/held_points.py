@@ -108,14 +108,10 @@ class Holds:
         dt: float,
         surface: Callable[[Array], float | None] | None,
     ) -> None:
-        """Take the points.
+        """Take the points that rest at some time, the ground that says when, and the seconds of a frame.
 
-        Args:
-            points: those that rest at some time.
-            ground: when they do.
-            scale: metres of the figure for each metre of height of the recording's ground.
-            dt: seconds from frame to frame.
-            surface: height of the highest surface below a place (3,), metres; None for that of the recording.
+        `scale` are metres of the figure for each metre of height of the recording's ground; `surface` is the height of
+        the highest surface below a place (3,), metres, None for that of the recording.
         """
         self.points, self._scale, self._surface = points, scale, surface
         self.over = max(1, round(OVER / dt))
@@ -126,11 +122,8 @@ class Holds:
     def goals(self, frame: int, paths: Array, shift: Array, again: bool = False) -> tuple[Array, Array]:
         """Goals (h, 3) and weights (h, 3) of a frame.
 
-        Args:
-            frame: number of the frame.
-            paths: (n, h, 3) where the points would be in each frame.
-            shift: (3,) by how much the body is beside its free fit, metres.
-            again: whether it is known where points come down.
+        Without holds the points would be on `paths` (n, h, 3); the body is beside its free fit by a shift (3,),
+        metres. `again` says that it is known where points come down.
         """
         if self._down is None:
             self._down = self._facing_down(paths)

@@ -137,8 +137,8 @@ def judged(
         message = f"nothing collides, in the frames and between them, to 0.1 mm{noted}"
     else:
         message = "; ".join(left or ["something collides between two frames that collide"])
-        if now.free and loads is not None and loads.missed:
-            message += "; less is needed of a slower clip, Trajectory(stretch=2), or where feet slide, hold_feet=False"
+        if now.free and loads is not None and loads.missed and result.times is None and not loads.before.flies:
+            message += "; less is needed of a slower clip, Trajectory(stretch=2)"
     message += "".join(f"; {part}" for part in _added(before, now, terms, result, loads))
     return AvoidanceReport(
         solved=solved,

@@ -16,14 +16,8 @@ def soled(
 ) -> dict[str, Array]:
     """Places (n, 3) of a skeleton's toes as if its feet had the two joints as high above their soles as the figure's.
 
-    The way between the two may differ by 20 degrees and more. While both stand the sole is flat, which says in the
-    ankle's axes where the toes of the figure would be.
-
-    Args:
-        motion: of the skeleton.
-        roles: of its joints.
-        stands: role to (n,) whether it stands.
-        places: role to (3,) where it is in the figure's neutral posture.
+    The way between the two may differ by 20 degrees and more. While both stand (n,) the sole is flat, which says in
+    the ankle's axes where the toes of the figure would be: `places` (3,) are those in its neutral posture, by role.
     """
     found = {}
     for side in ("left", "right"):

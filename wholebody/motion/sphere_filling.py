@@ -20,6 +20,7 @@ from scipy.spatial import cKDTree
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.checks import array, flag, whole
 from wholebody.base.errors import InputError
+from wholebody.geometry.components import enclosed_volume, winds_around
 from wholebody.geometry.pieces import Piece
 from wholebody.geometry.shapes import Box, Hull, Mesh, Shape, Sphere
 
@@ -109,7 +110,7 @@ def fill_with_spheres(shape: Shape, count: int, *, envelope: bool = False) -> Sp
     vertices, faces = triangles_of(shape)
     if flag(envelope, "fill_with_spheres: envelope"):
         vertices, faces = _envelope(vertices)
-    elif not _closed(vertices, faces):
+    elif enclosed_volume(vertices, faces) is None:
         raise InputError(
             "fill_with_spheres: the mesh is not closed, so it has no inside; close it, or fill its envelope=True"
         )
@@ -263,20 +264,8 @@ def _signed_depth(points: Array, vertices: Array, faces: Faces) -> Array:
     for k, point in enumerate(points):
         nearest = trimesh.triangles.closest_point(corners, np.broadcast_to(point, (len(corners), 3)))
         away = float(np.linalg.norm(nearest - point, axis=1).min())
-        depth[k] = away if _wound(corners, point + 1e-9 * np.array([1.0, np.pi, 0.0])) > 0.5 else -away
+        depth[k] = away if winds_around(corners, point) else -away
     return depth
-
-
-def _wound(corners: Array, point: Array) -> float:
-    """`_winding` of one point."""
-    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = (corners[:, k].T for k in range(3))
-    x, y, z = point
-    area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-    safe = np.where(area == 0.0, 1.0, area)
-    u = ((x - ax) * (cy - ay) - (y - ay) * (cx - ax)) / safe
-    v = ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / safe
-    above = az + u * (bz - az) + v * (cz - az) > z
-    return float(np.sign(area[(u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & above]).sum())
 
 
 def _envelope(points: Array) -> tuple[Array, Faces]:
@@ -285,14 +274,3 @@ def _envelope(points: Array) -> tuple[Array, Faces]:
 
     hull = trimesh.convex.convex_hull(points)
     return np.array(hull.vertices, dtype=float), np.array(hull.faces, dtype=np.int64)
-
-
-def _closed(vertices: Array, faces: Faces) -> bool:
-    """Whether every edge is passed as often in one direction as in the other."""
-    _, same = np.unique(np.round(vertices, 9), axis=0, return_inverse=True)
-    corner = same.reshape(-1)[faces]
-    corner = corner[(corner != np.roll(corner, 1, axis=1)).all(axis=1)]
-    edges = np.vstack([corner[:, [0, 1]], corner[:, [1, 2]], corner[:, [2, 0]]])
-    size = int(corner.max(initial=0)) + 1
-    ahead, back = edges[:, 0] * size + edges[:, 1], edges[:, 1] * size + edges[:, 0]
-    return bool(len(edges)) and bool(np.array_equal(np.sort(ahead), np.sort(back)))

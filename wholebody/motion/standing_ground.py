@@ -13,7 +13,7 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array, Indices, Mask, with_values
 from wholebody.base.errors import InputError
 from wholebody.base.files import checked_target
-from wholebody.motion.footholds import RestLimits, resting, speeds
+from wholebody.motion.footholds import RestLimits, lowest, resting, speeds
 from wholebody.motion.roles import ROLES, skeleton_roles
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
 from wholebody.motion.windows import long_runs, runs
@@ -26,20 +26,14 @@ NEAR_GROUND = 0.12  # m: highest place of a knee's or wrist's joint above the gr
 
 
 class Foothold(NamedTuple):
-    """A point that rests at one place.
+    """A point that rests at one place."""
 
-    Attributes:
-        role: part of the body, such as "left_toe".
-        first, end: frames, without the last.
-        place: (3,) mean place of the joint, metres, in the recording's world.
-        height: of the ground there above the lowest level, metres.
-    """
-
-    role: str
+    role: str  # part of the body, such as "left_toe"
+    # first and end: frames, without the last
     first: int
     end: int
-    place: Array
-    height: float
+    place: Array  # (3,) mean place of the joint, metres, in the recording's world
+    height: float  # of the ground there above the lowest level, metres
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,8 +189,12 @@ def ground(
     places = motion.positions[:, [joints[role] for role in feet]]
     marks = resting(places, motion.dt, limits, kinds)
     rests = {role: marks[:, k] for k, role in enumerate(feet)}
-    lows = {role: _low(motion.positions[rests[role], joints[role], 2]) for role in feet if rests[role].any()}
-    parts = {part: min(low for role, low in lows.items() if role.endswith(part)) for part in FEET if _any(lows, part)}
+    lows = {role: lowest(motion.positions[rests[role], joints[role], 2]) for role in feet if rests[role].any()}
+    parts = {
+        part: min(low for role, low in lows.items() if role.endswith(part))
+        for part in FEET
+        if any(role.endswith(part) for role in lows)
+    }
     above = {role: parts[role.split("_")[1]] for role in feet if role.split("_")[1] in parts}
     raw = [
         Foothold(role, *run, motion.positions[run.first : run.end, joints[role]].mean(axis=0), 0.0)
@@ -204,7 +202,7 @@ def ground(
         for run in runs(rests[role])
     ]
     heights = np.array(
-        [_low(motion.positions[each.first : each.end, joints[each.role], 2]) - above[each.role] for each in raw]
+        [lowest(motion.positions[each.first : each.end, joints[each.role], 2]) - above[each.role] for each in raw]
     )
     settled, levels, uneven = _levelled(heights, np.array([each.end - each.first for each in raw]))
     low = float(settled.min()) if len(settled) else 0.0
@@ -217,14 +215,6 @@ def ground(
                 mask, more = _others(motion, joints[role], role, holds, above)
                 rests[role], holds = mask, [*holds, *more]
     return Ground(tuple(sorted(holds, key=lambda each: each.first)), rests, above, levels, tilt, uneven, motion.dt)
-
-
-def _any(lows: Mapping[str, float], part: str) -> bool:
-    return any(role.endswith(part) for role in lows)
-
-
-def _low(heights: Array) -> float:
-    return float(np.percentile(heights, 20.0))
 
 
 def _levelled(heights: Array, counts: Indices) -> tuple[Array, tuple[float, ...], bool]:

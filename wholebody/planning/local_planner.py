@@ -31,13 +31,9 @@ GAIN = 5e-3  # rad, m: by which a step comes nearer at least; smaller = longer m
 
 
 class LocalPlanner(Protocol):
-    """Makes the edges of trees.
+    """Makes the edges of trees."""
 
-    Attributes:
-        searches: how many paths are looked for, of which the shortest counts; more = shorter, later.
-    """
-
-    searches: ClassVar[int]
+    searches: ClassVar[int]  # how many paths are looked for, of which the shortest counts; more = shorter, later
 
     def admit(self, q: Array) -> None:
         """Let motions be as near to things as the posture q (nq,) is, which is an end of the whole motion."""

@@ -152,13 +152,7 @@ def runs_of(cases: Sequence[Case], length: int) -> list[list[Case]]:
 
 @ctrl_c_ends_all()
 def run_cases(runs: Sequence[Sequence[Case]], running: Running, store: RecordStore | None = None) -> Records:
-    """Solve cases; see `solve_many`.
-
-    Args:
-        runs: the cases; those of one run warm-start one from the other.
-        running: how.
-        store: what was done before, and keeps what is done now.
-    """
+    """Solve cases; those of one run warm-start one from the other. The store has what was done before."""
     order = [case for run in runs for case in run]
     before = {} if store is None else store.read()
     done = {k: replace(before[case.asked], name=case.record.name, factors=case.record.factors)
@@ -260,11 +254,7 @@ def _done(
 ) -> Generator[tuple[T, Any, EndedError | None], None, None]:  # fmt: skip
     """Do work, in this process too where nobody else's code in its cases can end it or go on for ever.
 
-    Args:
-        work: its parts.
-        cases: of all of it.
-        running: how.
-        ways: how a part is done here, and the job that does parts elsewhere; see `shared`.
+    `ways` are how a part is done here, and the job that does parts elsewhere; see `shared`.
     """
     here, there = ways
     if _is_quick(cases, running):

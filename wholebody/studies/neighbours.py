@@ -34,11 +34,7 @@ class Family(NamedTuple):
 
 
 def solve_from_neighbours(family: Family) -> bool:
-    """Try the answers of solved cases as starts of their neighbours that are not solved, until nothing new is solved.
-
-    Returns:
-        Whether the caller ended the run.
-    """
+    """Try answers of solved cases as starts of neighbours until nothing new is solved; whether the caller ended it."""
     order, done, compute, keep = family
     tried: dict[int, dict[int, int]] = {k: {} for k, one in done.items() if one.q is not None and not one.solved}
     while True:
@@ -112,11 +108,7 @@ def lower(family: Family) -> bool:
 
 
 def name_changes(family: Family) -> bool:
-    """Write into the later case of each jump that is left which joint turns, how far, and from which case.
-
-    Returns:
-        Whether the caller ended the run.
-    """
+    """Write into the later case of each jump that is left which joint turns, how far, and from where; see `lower`."""
     order, done, compute, keep = family
     work = {(a, b): (b, done[a].q, done[b].q) for a, b in _neighbours(order) if _jumps(done, a, b)}
     largest: dict[int, tuple[float, str]] = {}

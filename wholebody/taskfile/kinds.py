@@ -193,7 +193,8 @@ class Several(Kind):
     def read(self, value: Any, where: Where) -> list[Any]:
         """Return the list."""
         if not isinstance(value, list) or len(value) < self.least:
-            raise where.fault(f"{shown(value)} is not a {self.words}; write {self.least} or more in brackets")
+            what = f"list of {self.kind.noun}s" if isinstance(self.kind, Part) else self.words
+            raise where.fault(f"{shown(value)} is no {what}; write {self.least} or more in brackets")
         return [self.kind.read(entry, where.at(f"[{i}]")) for i, entry in enumerate(value)]
 
     def names(self, value: Any, figure: Figure, where: Where) -> None:
@@ -247,8 +248,11 @@ class Part(Kind):
 
     def read(self, value: Any, where: Where) -> Any:
         """Return the object."""
-        if not isinstance(value, dict) or self.chooser not in ({"": None} | value):
+        if not isinstance(value, dict):
             raise where.fault(f"{shown(value)} is no {self.noun}; write {{ {self.example} }}")
+        if self.chooser and self.chooser not in value:
+            choices = " or ".join(f'{self.chooser} = "{name}"' for name in self.forms)
+            raise where.fault(f"the {self.noun} has no {self.chooser}; write {choices}")
         data = {name: entry for name, entry in value.items() if name != self.chooser}
         choice = Choice(tuple(self.forms))
         form = self.forms[choice.read(value[self.chooser], where.at(self.chooser)) if self.chooser else ""]

@@ -89,13 +89,10 @@ def point_rows(state: State, point: Array, joint: int) -> Array:
 
 
 def pressure(state: State, loads: Loads, mass: range | None, height: float) -> tuple[Array, Array]:
-    """Where level ground at a height presses against the weight of some joints and forces, and its derivative.
+    """The point (2,) where level ground at a height presses against the weight of joints and forces; its derivative.
 
-    About that point the weight and the forces have no moment but about the vertical: without forces it is below the
-    centre of mass.
-
-    Returns:
-        The point (2,), metres, and the derivative (2, nv).
+    About that point [m] the weight and the forces have no moment but about the vertical: without forces it is below
+    the centre of mass.
     """
     model = state.model
     weight = GRAVITY * sum(model.inertias[k].mass for k in (mass or range(1, model.njoints)))

@@ -55,47 +55,29 @@ def term_planes(terms: Sequence[Goal | Constraint], counts: Sequence[int], state
 
 
 class Linearisation(NamedTuple):
-    """A problem at one posture, to first order in the tangent displacement dq of shape (nv,).
+    """A problem at one posture, to first order in the tangent displacement dq of shape (nv,)."""
 
-    Attributes:
-        q: (nq,) the posture.
-        goal_error: (g,) errors of the goals, metres and radians; ``goal_error + goal_jacobian @ dq`` should vanish.
-        goal_jacobian: (g, nv).
-        value: (c,) values of the constraints, to stay between the problem's lower and upper.
-        value_jacobian: (c, nv).
-        contacts: the pairs near enough to count.
-        gap: (r,) gaps of the contact rows, metres; the first k are the distances of the k contacts.
-        gap_jacobian: (r, nv); ``gap + gap_jacobian @ dq`` is to be at least `clearance`.
-        gap_contact: (r,) the contact a row belongs to.
-        clearance: (r,) least gap asked of each row.
-        measure: weighted sum of the measures.
-        gradient: (nv,) its derivative.
-        curvature: (nv,) its positive diagonal.
-        lower, upper: (nv,) bounds on dq.
-        squares: (s, nv) rows S of measures that are sums of squares (`Measure.squares`), with the second derivative
-            S' S.
-        squared: (nv,) their part of the curvature, which stands for S' S where rows are not taken; zero without rows.
-        planes: supporting planes of the terms; None where no term has any.
-    """
-
-    q: Array
-    goal_error: Array
-    goal_jacobian: Array
-    value: Array
-    value_jacobian: Array
-    contacts: Contacts
-    gap: Array
-    gap_jacobian: Array
-    gap_contact: Indices
-    clearance: Array
-    measure: float
-    gradient: Array
-    curvature: Array
+    q: Array  # (nq,) the posture
+    goal_error: Array  # (g,) errors of the goals, metres and radians; ``goal_error + goal_jacobian @ dq`` should vanish
+    goal_jacobian: Array  # (g, nv)
+    value: Array  # (c,) values of the constraints, to stay between the problem's lower and upper
+    value_jacobian: Array  # (c, nv)
+    contacts: Contacts  # the pairs near enough to count
+    gap: Array  # (r,) gaps of the contact rows, metres; the first k are the distances of the k contacts
+    gap_jacobian: Array  # (r, nv); ``gap + gap_jacobian @ dq`` is to be at least `clearance`
+    gap_contact: Indices  # (r,) the contact a row belongs to
+    clearance: Array  # (r,) least gap asked of each row
+    measure: float  # weighted sum of the measures
+    gradient: Array  # (nv,) its derivative
+    curvature: Array  # (nv,) its positive diagonal
+    # lower and upper: (nv,) bounds on dq
     lower: Array
     upper: Array
+    # (s, nv) rows S of measures that are sums of squares (`Measure.squares`), with the second derivative S' S
     squares: Array = np.zeros((0, 0))
+    # (nv,) their part of the curvature, which stands for S' S where rows are not taken; zero without rows
     squared: Array = np.zeros(0)
-    planes: TermPlanes | None = None
+    planes: TermPlanes | None = None  # supporting planes of the terms; None where no term has any
 
 
 NO_LIMITS = Limits(*np.zeros((2, 0), dtype=np.intp), *np.zeros((2, 0)))
@@ -151,15 +133,10 @@ class Lineariser:
         dt: float | None = None,
         plan: TermPlan | None = None,
     ) -> None:
-        """Take the resolved terms of a problem.
+        """Take the resolved terms of a problem, and a workspace of this run alone.
 
-        Args:
-            workspace: of this run alone.
-            limits: of the figure's joints; see `Figure.limits`.
-            terms: all resolved.
-            clearances: (pairs,) least distance asked of every collision pair, metres.
-            dt: step in seconds for bounds that need one.
-            plan: of the same constraints, bounds, measures and step, and of any goals; None to make it here.
+        Clearances (pairs,) are asked of every collision pair, metres; `dt` is the step in seconds for bounds that need
+        one. The plan is of the same constraints, bounds, measures and step, and of any goals; None to make it here.
         """
         self.workspace, self.state, self._limits = workspace, workspace.state, limits
         self.goals, self.constraints, self.bounds, self.measures = terms

@@ -106,11 +106,8 @@ class TermPlan(NamedTuple):
 def make_plan(limits: Limits, terms: Terms, dt: float | None, state: State) -> TermPlan:
     """The plan of resolved terms.
 
-    Args:
-        limits: of the figure's joints; see `Figure.limits`.
-        terms: all resolved.
-        dt: seconds of a step, for bounds that need them; None for a whole solve.
-        state: tells how many rows terms of other classes have; stays where it is.
+    `dt` are the seconds of a step, for bounds that need them; None for a whole solve. The state tells how many rows
+    terms of other classes have, and stays where it is.
     """
     model, (goals, constraints, bounds, measures) = state.model, terms
     parts: dict[int, list[Row]] = {table: [] for table in range(kinds.EDGE + 1)}

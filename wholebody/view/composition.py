@@ -12,7 +12,6 @@ from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.proximity import PENETRATION
-from wholebody.tracking.overlaps import Overlap
 from wholebody.view import commands, drawing
 from wholebody.view.bodies import Bodies
 from wholebody.view.contact_markers import color_contacts, mark_blockers, mark_contacts, mark_overlaps
@@ -24,6 +23,7 @@ from wholebody.view.viewed_scene import ViewedScene
 
 if TYPE_CHECKING:
     from wholebody.tracking.inner_paths import Timed
+    from wholebody.tracking.overlaps import Overlap
 
 
 class Composition:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,12 +11,14 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.figures.state import State
 from wholebody.geometry.proximity import PENETRATION
-from wholebody.tracking.overlaps import Overlap
 from wholebody.view import drawing
 from wholebody.view.bodies import Bodies
 from wholebody.view.scene_graph import Keyframe, Marker
 from wholebody.view.style import LOOK
 from wholebody.view.viewed_scene import ViewedScene
+
+if TYPE_CHECKING:
+    from wholebody.tracking.overlaps import Overlap
 
 _DEPTH, _GLOBAL = Marker("arrow", LOOK.depth, 1.3), Marker("arrow", LOOK.global_depth, 1.3)
 _CANCELLED = 0.1  # of the deepest overlap: a shorter PD_g has no use as a direction
@@ -63,6 +65,10 @@ def mark_contacts(keyframe: Keyframe, bodies: Bodies, contacts: Any) -> None:
 def checked_overlaps(given: object, what: str) -> list[Overlap]:
     """Overlaps of an argument of this name; raises InputError where they are none."""
     found = checks.listed(given, what, "frame.overlaps")
+    if not found:  # most pictures have none, and need nothing of a world
+        return []
+    from wholebody.tracking.overlaps import Overlap
+
     return [checks.instance(one, Overlap, what, "give those of a WorldFrame") for one in found]
 
 

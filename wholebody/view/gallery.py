@@ -68,12 +68,8 @@ def write_gallery(
 ) -> list[Exhibit]:
     """Run scripts one after the other, and write one page that opens in any browser without a network.
 
-    The player of the scenes is in it once.
-
-    Args:
-        scripts: files, each with a docstring and an option --out.
-        path: of the page.
-        say: is called with what each script made.
+    Each script has a docstring and an option --out; `say` is called with what it made. The player of the scenes is in
+    the page once.
     """
     made = []
     for script in scripts:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from wholebody.base.arrays import Array
+from wholebody.geometry.placement import quaternions
 from wholebody.view import commands, drawing
 from wholebody.view.commands import Track
 from wholebody.view.crowds import Instances
@@ -29,26 +30,19 @@ class Marker:
 
 @dataclass
 class Keyframe:
-    """Everything that can change from one posture to the next.
+    """Everything that can change from one posture to the next."""
 
-    Attributes:
-        transforms: placement (4, 4) by node, relative to the node above.
-        colors: by node.
-        crowds: pieces that are drawn together, by node; a motion shows those of its first keyframe.
-        markers: marker and placement (4, 4) by node. Markers of earlier keyframes that are not named are hidden.
-        contacts_shown: whether all pairs that overlap are shown.
-        touching, overlapping: numbers of pairs that are shown as touching, and that overlap.
-        overlap: depth of the deepest overlap, metres.
-    """
-
-    transforms: dict[str, Array] = field(default_factory=dict)
-    colors: dict[str, Color] = field(default_factory=dict)
+    transforms: dict[str, Array] = field(default_factory=dict)  # placement (4, 4) by node, relative to the node above
+    colors: dict[str, Color] = field(default_factory=dict)  # by node
+    # pieces that are drawn together, by node; a motion shows those of its first keyframe
     crowds: dict[str, Instances] = field(default_factory=dict)
+    # marker and placement (4, 4) by node. Markers of earlier keyframes that are not named are hidden.
     markers: dict[str, tuple[Marker, Array]] = field(default_factory=dict)
-    contacts_shown: bool = True
+    contacts_shown: bool = True  # whether all pairs that overlap are shown
+    # touching and overlapping: numbers of pairs that are shown as touching, and that overlap
     touching: int = 0
     overlapping: int = 0
-    overlap: float = 0.0
+    overlap: float = 0.0  # depth of the deepest overlap, metres
 
 
 class SceneGraph:
@@ -197,35 +191,18 @@ def _motion(path: str, matrices: Array, *, steps: bool = False) -> list[Track]:
     scales = np.linalg.norm(matrices[:, :3, :3], axis=1)
     tracks = [
         Track(path, "position", "vector3", matrices[:, :3, 3], steps),
-        Track(path, "quaternion", "quaternion", quaternions(matrices[:, :3, :3] / scales[:, None, :]), steps),
+        Track(
+            path, "quaternion", "quaternion", continuous_quaternions(matrices[:, :3, :3] / scales[:, None, :]), steps
+        ),
     ]
     if (np.ptp(scales, axis=0) > 1e-9).any():
         tracks.append(Track(path, "scale", "vector3", scales, steps))
     return tracks
 
 
-def quaternions(rotations: Array) -> Array:
-    """Unit quaternions (n, 4) as x, y, z, w of rotations (n, 3, 3), neighbours on the same half of the sphere.
-
-    Each is a row of the matrix 4 q q^T, which is linear in the rotation; the row with the largest diagonal is well
-    conditioned (Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1(3), 1978).
-    """
-    r = rotations
-    xx, yy, zz = r[:, 0, 0], r[:, 1, 1], r[:, 2, 2]
-    outer = np.empty((len(r), 4, 4))
-    outer[:, 0, 0] = 1 + xx - yy - zz
-    outer[:, 1, 1] = 1 - xx + yy - zz
-    outer[:, 2, 2] = 1 - xx - yy + zz
-    outer[:, 3, 3] = 1 + xx + yy + zz
-    outer[:, 0, 1] = outer[:, 1, 0] = r[:, 1, 0] + r[:, 0, 1]
-    outer[:, 0, 2] = outer[:, 2, 0] = r[:, 0, 2] + r[:, 2, 0]
-    outer[:, 1, 2] = outer[:, 2, 1] = r[:, 2, 1] + r[:, 1, 2]
-    outer[:, 0, 3] = outer[:, 3, 0] = r[:, 2, 1] - r[:, 1, 2]
-    outer[:, 1, 3] = outer[:, 3, 1] = r[:, 0, 2] - r[:, 2, 0]
-    outer[:, 2, 3] = outer[:, 3, 2] = r[:, 1, 0] - r[:, 0, 1]
-    best = np.argmax(np.einsum("nii->ni", outer), axis=1)
-    q = outer[np.arange(len(r)), best]
-    q /= np.linalg.norm(q, axis=1, keepdims=True)
+def continuous_quaternions(rotations: Array) -> Array:
+    """Unit quaternions (n, 4) of rotations (n, 3, 3), neighbours on the same half of the sphere."""
+    q = quaternions(rotations)
     flips = np.sign(np.einsum("ni,ni->n", q[1:], q[:-1]))
     q[1:] *= np.cumprod(np.where(flips == 0, 1.0, flips))[:, None]
-    return np.asarray(q)
+    return q

@@ -20,7 +20,6 @@ from wholebody.base.errors import InputError
 from wholebody.base.files import checked_target, write
 from wholebody.geometry.placement import FARTHEST
 from wholebody.problem import Problem
-from wholebody.tracking.overlaps import Overlap
 from wholebody.view import commands
 from wholebody.view.bodies import scene_glb
 from wholebody.view.composition import Composition
@@ -37,6 +36,7 @@ from wholebody.view.viewed_scene import ViewedScene, checked_scene
 
 if TYPE_CHECKING:
     from wholebody.methods.newton.assembly import Assembly
+    from wholebody.tracking.overlaps import Overlap
 
 SAVED = (".glb", ".htm", ".html", ".png")  # endings of the files that `Viewer.save` writes
 

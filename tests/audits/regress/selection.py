@@ -20,8 +20,7 @@ from wholebody.bench.measure.scaling import assembly_chain
 from wholebody.bench.measure.track import track
 from wholebody.bench.suite.adapters.own import OwnTool
 from wholebody.bench.suite.problem_sets.registry import problem_set
-from wholebody.bench.suite.stability.case import Posed
-from wholebody.bench.suite.stability.catalogue import cases
+from wholebody.bench.suite.stability.catalogue import Posed, cases
 from wholebody.methods.base import Method
 from wholebody.methods.qp.solvers.base import ACTIVE_SET
 from wholebody.problem import Problem

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.bench.measure import clips, motion
+from wholebody.bench.measure import motion
 from wholebody.bench.rows import chart
 from wholebody.cli import main
 from wholebody.motion.batch_table import AvoidedCase
 from wholebody.motion.worn_equipment import dressed
 
 
-@pytest.mark.parametrize("name", clips.SYNTHETIC)
+@pytest.mark.parametrize("name", motion.SYNTHETIC)
 def test_synthetic_clips_collide_are_smooth_and_within_limits(name: str) -> None:
     figure = wb.load("human")
-    clip = clips.synthetic(name, figure)
+    clip = motion.synthetic(name, figure)
     assert clip.dt == pytest.approx(1 / 30)
     assert all(figure.within_limits(q, 1e-6) for q in clip.q)
     assert np.abs(clip.velocities()[[0, -1]]).max() < 0.5
@@ -28,7 +28,7 @@ def test_synthetic_clips_collide_are_smooth_and_within_limits(name: str) -> None
     assert not wb.check(clip[:1]).contacts
 
 
-@pytest.mark.parametrize("worn", clips.EQUIPMENT)
+@pytest.mark.parametrize("worn", motion.EQUIPMENT)
 def test_equipment_is_attached(worn: str) -> None:
     scene = dressed(wb.load("human"), worn)
     assert all(thing.segment is not None for thing in scene.objects.values())
@@ -60,8 +60,8 @@ def test_a_summary_has_every_method_and_the_report_every_case_without_a_clip(tmp
 def test_the_command_frees_and_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    short = clips.synthetic("squat", wb.load("human"))[:8]
-    monkeypatch.setattr(clips, "synthetic", lambda name, figure: short)
+    short = motion.synthetic("squat", wb.load("human"))[:8]
+    monkeypatch.setattr(motion, "synthetic", lambda name, figure: short)
     words = ["bench", "motion", "--only", "squat", "--equipment", "nothing", "--methods", "frames", "--out"]
     for said in ("squat, nothing, frames: free\n", ""):
         assert main([*words, str(tmp_path)]) == 0

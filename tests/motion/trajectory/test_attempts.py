@@ -13,6 +13,7 @@ from tests.freeing import begun
 from wholebody.figures.figure import Figure
 from wholebody.motion.faults import dips
 from wholebody.motion.one_side import followed
+from wholebody.motion.trajectory import method as trajectory
 from wholebody.motion.trajectory import window_run
 from wholebody.motion.trajectory.deviations import Objective
 from wholebody.motion.trajectory.nodes import Node, Rows
@@ -199,3 +200,28 @@ def test_what_passes_a_thing_by_more_than_a_step_asks_for_ends_an_attempt(
     first, second, *_ = runs_of_a_window(planar_arm, monkeypatch, 60, passed)
     assert not first[0].any()
     assert np.array_equal(second[0], first[3]) is not ends
+
+
+def test_a_long_window_is_freed_in_parts_without_seams(
+    planar_arm: Callable[..., Figure], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An arm that sways inside of a ball for five seconds: as when all frames are freed at once, to a milliradian."""
+    figure = planar_arm((0.5, 0.5))
+    t = np.arange(75) / 15.0
+    clip = wb.Clip(figure, np.stack([0.02 * np.sin(2.0 * t), 0.3 + 0.02 * np.cos(3.0 * t)], axis=1), 1 / 15)
+    scene = wb.Scene(figure).add(wb.Sphere(0.1), name="ball", at=(0.8, 0.17, 0.0))
+    run, longest = WindowProgram.run, []
+
+    def told(self: WindowProgram, x: np.ndarray, *given: Any) -> SQPResult:
+        longest.append(len(x))
+        return run(self, x, *given)
+
+    monkeypatch.setattr(WindowProgram, "run", told)
+    parts = wb.avoid(clip, scene, method=wb.motion.Trajectory(time=0.1))
+    assert parts.report.solved, parts.report.message
+    assert max(longest) <= 60
+    monkeypatch.setattr(trajectory, "LONG", 100.0)
+    whole = wb.avoid(clip, scene, method=wb.motion.Trajectory(time=0.1))
+    assert max(longest) == 75
+    np.testing.assert_allclose(parts.clip.q, whole.clip.q, atol=1e-3)
+    assert parts.report.jerk < 1.05 * whole.report.jerk

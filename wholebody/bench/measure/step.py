@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -11,7 +12,7 @@ import pinocchio as pin
 from wholebody.assessment.motion import pairs_along
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
-from wholebody.bench.measure.track import SETTING, Track, judge
+from wholebody.bench.measure.track import SETTING, Track, Verdict, judge
 from wholebody.bench.rows import Figure, Panel, Row, across, only, quiet, report, shares, texts, times
 from wholebody.bench.statistics import BLOCK, quantile_ratio
 from wholebody.bench.suite.adapters.base import Tool
@@ -35,9 +36,9 @@ class Run:
 
     def __init__(self, track: Track, name: str) -> None:
         """Set the tool up, make a first step and go back to the start."""
-        steps = len(track.targets)
+        self.track, steps = track, len(track.targets)
         self.wall, self.cpu = np.zeros(steps), np.zeros(steps)
-        self.postures, self._targets = np.empty((steps, track.scene.model.nq)), track.targets
+        self.postures = np.empty((steps, track.scene.model.nq))
         began = time.perf_counter()
         self.tool: Tool = make_tool(name, track)
         self.tool.step(track.targets[0])
@@ -47,12 +48,17 @@ class Run:
     def go_on(self, first: int, last: int) -> None:
         """Make these steps, without the last."""
         for number in range(first, last):
-            target = self._targets[number]
+            target = self.track.targets[number]
             worked, clock = time.thread_time_ns(), time.perf_counter_ns()
             self.tool.step(target)
             self.wall[number] = 1e-3 * (time.perf_counter_ns() - clock)
             self.cpu[number] = 1e-3 * (time.thread_time_ns() - worked)
             self.postures[number] = self.tool.posture()
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """What its postures come to."""
+        return judge(self.track, self.postures)
 
 
 Runs = Mapping[str, Sequence[Run]]
@@ -146,7 +152,7 @@ def result_rows(track: Track, runs: Runs) -> list[Row]:
     """What the first repeat of each tool came to, judged from its postures."""
     rows = []
     for name, (run, *_) in runs.items():
-        verdict, told = judge(track, run.postures), run.tool.remarks()
+        verdict, told = run.verdict, run.tool.remarks()
         figures: dict[str, Figure] = {
             "least distance mm": 1e3 * float(verdict.least_distance.min()),
             "steps inside": int((verdict.least_distance < 0.0).sum()),
@@ -181,7 +187,7 @@ def taking(track: Track, tools: Sequence[str]) -> tuple[list[str], dict[str, str
     return taken, refused
 
 
-def panels(found: Mapping[str, Runs], tracks: Mapping[str, Track]) -> list[Panel]:
+def panels(found: Mapping[str, Runs]) -> list[Panel]:
     """Of every reach: the share of steps within a time, and the least distance of any pair after every step."""
     drawn = []
     for name, runs in found.items():
@@ -191,10 +197,10 @@ def panels(found: Mapping[str, Runs], tracks: Mapping[str, Track]) -> list[Panel
     for name, runs in found.items():
         lines = {}
         for tool, (run, *_) in runs.items():
-            least = 1e3 * judge(tracks[name], run.postures).least_distance
+            least = 1e3 * run.verdict.least_distance
             lines[tool] = np.arange(1, len(least) + 1), np.minimum(least, 30.0)
         if lines:
-            levels = (0.0, 1e3 * tracks[name].clearance)
+            levels = (0.0, 1e3 * run.track.clearance)
             drawn.append(Panel(name, "step", "least distance of any pair [mm]", lines, levels=levels))
     return drawn
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from wholebody.bench.attack.case import Case
     from wholebody.bench.suite.adapters.base import Adapter
     from wholebody.bench.suite.stability.asking import Cell
-    from wholebody.bench.suite.stability.case import HardCase
+    from wholebody.bench.suite.stability.catalogue import HardCase
     from wholebody.bench.suite.stability.verdict import Result
 
 

@@ -62,7 +62,7 @@ def step(arguments: argparse.Namespace) -> None:
     name = "step-figures" if figures else "step"
     text = step.step_report(spent, judged, facts, bool(figures), notes)
     rows = {f"{name}-time": spent, f"{name}-result": judged}
-    charts = _charts(name, step.panels(runs, tracks), "Share of steps within a time, and least distance of any pair")
+    charts = _charts(name, step.panels(runs), "Share of steps within a time, and least distance of any pair")
     publish(name, text, arguments, facts=facts, tables=rows, charts=charts, page=None if figures else "results.md")
 
 
@@ -106,7 +106,7 @@ CLIPS = (
 
 def clips(arguments: argparse.Namespace, most: int | None) -> dict[str, Path | None]:
     """The chosen clips, at most so many: their recordings, None for one that needs none."""
-    from wholebody.bench.measure.clips import SYNTHETIC, recordings
+    from wholebody.bench.measure.motion import SYNTHETIC, recordings
 
     known: dict[str, Path | None] = dict.fromkeys(SYNTHETIC)
     known |= {path.stem: path for path in recordings(arguments.clips)}
@@ -127,7 +127,7 @@ def clips(arguments: argparse.Namespace, most: int | None) -> dict[str, Path | N
 def motion(arguments: argparse.Namespace) -> None:
     """Free, or go on; --quick takes two clips with two pieces of equipment."""
     from wholebody.bench.measure import motion
-    from wholebody.bench.measure.clips import EQUIPMENT, recorded, synthetic
+    from wholebody.bench.measure.motion import EQUIPMENT, recorded, synthetic
     from wholebody.figures import load
     from wholebody.motion.avoidance import METHODS
     from wholebody.motion.batch import BatchProgress, avoid_many

@@ -30,31 +30,19 @@ class LinkVisual(NamedTuple):
 
 
 class UrdfFile(NamedTuple):
-    """A checked URDF.
+    """A checked URDF."""
 
-    Attributes:
-        path: the file.
-        name: of the robot.
-        links: names, the root link first.
-        inertials: link to its ``<inertial>`` element.
-        joints: in the order of the file.
-        shapes: collision shapes in the order of the file.
-        colors: link to red, green, blue, alpha of the first of its visuals that has a colour.
-        visuals: what the file wants drawn, without what is wholly transparent or cannot be read.
-        extension: the element `EXTENSION`, or None.
-        notes: one sentence for each missing part that was filled in.
-    """
-
-    path: Path
-    name: str
-    links: tuple[str, ...]
-    inertials: dict[str, Element]
-    joints: tuple[UrdfJoint, ...]
-    shapes: tuple[LinkShape, ...]
+    path: Path  # the file
+    name: str  # of the robot
+    links: tuple[str, ...]  # names, the root link first
+    inertials: dict[str, Element]  # link to its ``<inertial>`` element
+    joints: tuple[UrdfJoint, ...]  # in the order of the file
+    shapes: tuple[LinkShape, ...]  # collision shapes in the order of the file
+    # link to red, green, blue, alpha of the first of its visuals that has a colour
     colors: dict[str, tuple[float, float, float, float]]
-    visuals: tuple[LinkVisual, ...]
-    extension: Element | None
-    notes: tuple[str, ...]
+    visuals: tuple[LinkVisual, ...]  # what the file wants drawn, without what is wholly transparent or cannot be read
+    extension: Element | None  # the element `EXTENSION`, or None
+    notes: tuple[str, ...]  # one sentence for each missing part that was filled in
 
 
 def read_urdf(path: Path, package_dirs: Sequence[Path] = ()) -> UrdfFile:
@@ -167,7 +155,7 @@ def _shapes(link: Element, path: Path, package_dirs: tuple[Path, ...]) -> Iterat
 def _shape(element: Element, link: str, path: Path, package_dirs: tuple[Path, ...]) -> LinkShape:
     """The shape of a ``<collision>`` or ``<visual>``."""
     place = f"{path}: {element.tag} of link {shown(link)}"
-    shapes = list(element.find("geometry") or ())
+    shapes = element.findall("geometry/*")
     if len(shapes) != 1:
         raise FileFormatError(f"{place} has {len(shapes)} shapes in its <geometry>; give one")
     shape = shapes[0]

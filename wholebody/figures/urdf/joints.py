@@ -28,33 +28,19 @@ class Mimic(NamedTuple):
 
 
 class UrdfJoint(NamedTuple):
-    """One joint.
+    """One joint."""
 
-    Attributes:
-        name: its name.
-        kind: one of `JOINT_TYPES`.
-        parent: link.
-        child: link.
-        origin: placement of the child in the parent at zero.
-        axis: (3,) unit direction.
-        lower: radians or metres; -inf without a limit.
-        upper: inf without a limit.
-        velocity: largest velocity, 1/s or m/s; inf if the file gives none.
-        effort: largest torque or force; inf if the file gives none.
-        mimic: the joint it follows.
-    """
-
-    name: str
-    kind: str
-    parent: str
-    child: str
-    origin: pin.SE3
-    axis: NDArray[np.float64]
-    lower: float
-    upper: float
-    velocity: float
-    effort: float
-    mimic: Mimic | None
+    name: str  # its name
+    kind: str  # one of `JOINT_TYPES`
+    parent: str  # link
+    child: str  # link
+    origin: pin.SE3  # placement of the child in the parent at zero
+    axis: NDArray[np.float64]  # (3,) unit direction
+    lower: float  # radians or metres; -inf without a limit
+    upper: float  # inf without a limit
+    velocity: float  # largest velocity, 1/s or m/s; inf if the file gives none
+    effort: float  # largest torque or force; inf if the file gives none
+    mimic: Mimic | None  # the joint it follows
 
 
 def read_joints(

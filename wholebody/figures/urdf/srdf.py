@@ -23,19 +23,13 @@ READ = {
 
 
 class Srdf(NamedTuple):
-    """What an SRDF says of a robot.
+    """What an SRDF says of a robot."""
 
-    Attributes:
-        groups: group to joints that move.
-        postures: name to posture (nq,); "<group>/<state>" where several groups have a state of that name.
-        disabled: two links -> why they are never tested.
-        notes: sentences on lines that name what the URDF does not have.
-    """
-
-    groups: Mapping[str, tuple[str, ...]]
+    groups: Mapping[str, tuple[str, ...]]  # group to joints that move
+    # name to posture (nq,); "<group>/<state>" where several groups have a state of that name
     postures: Mapping[str, Array]
-    disabled: Mapping[frozenset[str], str]
-    notes: tuple[str, ...]
+    disabled: Mapping[frozenset[str], str]  # two links -> why they are never tested
+    notes: tuple[str, ...]  # sentences on lines that name what the URDF does not have
 
 
 def read_srdf(path: Path, model: pin.Model, links: tuple[str, ...]) -> Srdf:

@@ -21,15 +21,10 @@ _KINDS = {("R", 1): "revolute", ("R", 2): "continuous", ("P", 1): "prismatic"}
 
 
 class UrdfAxis(NamedTuple):
-    """A joint of one degree of freedom as URDF says it.
+    """A joint of one degree of freedom as URDF says it."""
 
-    Attributes:
-        kind: "revolute", "continuous" or "prismatic".
-        axis: (3,) unit direction in the frame of the joint.
-    """
-
-    kind: str
-    axis: Array
+    kind: str  # "revolute", "continuous" or "prismatic"
+    axis: Array  # (3,) unit direction in the frame of the joint
 
 
 def urdf_axis(model: pin.Model, index: int) -> UrdfAxis | None:

@@ -18,14 +18,10 @@ def far_moved(
     before: Array, after: Array, table: tuple[Indices, Array, Array],
     near: tuple[Indices, Array, float, Indices, Array, float],
 ) -> Indices:  # fmt: skip
-    """Return the pairs (k,) that moved against each other by more than their distance.
+    """Return the pairs (k,) that moved against each other by more than their distance; placements are (n, 4, 3).
 
-    Args:
-        before: (n, 4, 3) placements of the pieces before the motion.
-        after: the same after the motion.
-        table: `pairs`, `widths` and `reach` of the pair table.
-        near: pairs that were near before, their distances, and the query distance, all others being farther apart; the
-            same after the motion.
+    `table` has `pairs`, `widths` and `reach` of the pair table; `near` has the pairs that were near before, their
+    distances, and the query distance, all others being farther apart; then the same after the motion.
     """
     pairs, widths, reach = table
     number_before, distance_before, within_before, number_after, distance_after, within_after = near
@@ -77,15 +73,9 @@ def separated(
     doubtful: Indices, before: Array, after: Array, near: tuple[Indices, Indices, Array, Array, Array],
     outline: Outline, overlap: float,
 ) -> Mask:  # fmt: skip
-    """Return whether the plane between the pieces of a pair before a motion, fixed to either, parts them after it (k,).
+    """Return whether a plane still separates pairs, (k,); see `moved_pairs.separated`.
 
-    Args:
-        doubtful: (k,) pairs; those that were not near before are not separated.
-        before: (n, 4, 3) placements of the pieces before the motion.
-        after: the same after the motion.
-        near: pairs that were near before: their numbers, pieces, normals and nearest points of both.
-        outline: of the pieces.
-        overlap: metres by which a piece may be beyond the plane.
+    `near` has the numbers of the pairs that were near before, their pieces, normals and nearest points of both.
     """
     number, pair, normal, point_a, point_b = near
     found = np.zeros(len(doubtful), dtype=np.bool_)

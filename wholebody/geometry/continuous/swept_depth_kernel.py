@@ -82,20 +82,12 @@ class Parts(NamedTuple):
 def lower_bounds(
     parts: Parts, places: Array, shapes: Shapes, motion: Speeds, share: float, accuracy: float, bound: Array
 ) -> None:
-    """Bound the distances of pairs from below, over a part of a motion.
+    """Bound the distances of pairs from below, over a part of a motion, into `bound` (k,).
 
     A distance changes by at most `speed` over the whole motion. And it is at least the height of one piece above a
     plane that moves with the other one and supports it. The height of a point, as a function of time, is above its
-    chord by at most its acceleration times the squared time over eight.
-
-    Args:
-        parts: the pairs.
-        places: (m, n, 4, 3) where the pieces are at some times.
-        shapes: of the pieces.
-        motion: bounds of the whole motion.
-        share: length of each part, of the whole motion.
-        accuracy: metres to which the distances are known.
-        bound: (k,) room for the answer.
+    chord by at most its acceleration times the squared time over eight. `places` (m, n, 4, 3) are those of the pieces
+    at some times, `share` is the length of each part of the motion, `accuracy` that of the distances, metres.
     """
     # a record is taken apart once: in a loop each array that is read from it would be counted again
     asked, first_place, last_place, rows0, rows1, speed, wanted = parts
@@ -169,18 +161,12 @@ class Sliding(NamedTuple):
 
 @compiled()
 def keep_apart(sliding: Sliding, shapes: Shapes, motion: Speeds, safe: Array) -> None:
-    """Raise the shares of a motion for which pairs stay apart, from heights above planes to second order.
+    """Raise the shares `safe` (k,) of a motion for which pairs stay apart, from heights above planes to second order.
 
     A plane that moves with one piece and supports it bounds the distance from below by the least height of the other
     piece's swept points. Each height has its exact rate now, and an acceleration of at most `_curvature`. The plane is
     across coal's normal, and across that of the face nearest to it: a wide face needs its exact normal for a useful
     bound, and where faces touch, coal's normal can be 1e-4 rad off.
-
-    Args:
-        sliding: the pairs.
-        shapes: of the pieces.
-        motion: bounds of the whole motion.
-        safe: (k,) raised to what is found.
     """
     asked, rows, level, place, _ = sliding
     pairs, joint, reach, points, first_point, radius, radii, faces, first_face = shapes

@@ -42,19 +42,12 @@ def satisfy(
     early_exit: bool = False,
     thorough: bool = False,
 ) -> FeasibilityResult:
-    """Satisfy all equations from x (7 n,), or reduce their error as far as possible.
+    """Satisfy all equations from x (7 n,) to tolerances [m, rad], or reduce their error as far as possible.
 
-    Args:
-        active_system: the equations.
-        x: the start.
-        tolerance: metres and radians.
-        iterations: most iterations.
-        kind: treatment of inequalities.
-        goal_tolerance: of the goals, if it differs.
-        early_exit: end at the first steps that gain little, and do not minimise the error of goals that are not met.
-        thorough: where no step lowers the error, go on from states nearby, in a frame if its time lasts; and, unless
-            `early_exit`, from where goals out of reach pulled the constraints open and these were restored, with goals
-            that give way: the end is nearer to the goals then.
+    `early_exit` ends at the first steps that gain little, and does not minimise the error of goals that are not met.
+    `thorough` goes on from states nearby where no step lowers the error, in a frame if its time lasts; and, unless
+    `early_exit`, from where goals out of reach pulled the constraints open and these were restored, with goals that
+    give way: the end is nearer to the goals then.
     """
     run = Iteration(active_system, x, tolerance, tolerance if goal_tolerance is None else goal_tolerance, kind)
     far = run.goal

@@ -11,6 +11,7 @@ from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.memory_views import placement_view
+from wholebody.geometry.placement import quaternions
 from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.newton.batches import ONE_SIDED, Angle, EquationSet, Role, with_world
 from wholebody.methods.newton.quaternions import axes_with_z, relative_forms
@@ -185,7 +186,7 @@ class FigureBodies:
             places = self._placements
         bodies = np.empty((self.count, 7))
         bodies[:, :3] = places[1:, 3]
-        bodies[:, 3:] = _quaternions(places[1:, :3])
+        bodies[:, 3:] = quaternions(places[1:, :3].transpose(0, 2, 1))
         result: Array = bodies.ravel()
         return result
 
@@ -312,27 +313,4 @@ def _axis(kind: Any) -> Array:
 def _unit(body: Array) -> Array:
     result: Array = body.copy()
     result[3:] /= np.linalg.norm(result[3:])
-    return result
-
-
-def _quaternions(columns: Array) -> Array:
-    """Quaternions (k, 4) of rotations whose columns are [k, j]: the largest component by its square, then the others.
-
-    Shepperd 1978, "Quaternion from rotation matrix", Journal of Guidance and Control 1.
-    """
-    m = columns.transpose(0, 2, 1)
-    x, y, z = m[:, 0, 0], m[:, 1, 1], m[:, 2, 2]
-    four = np.empty((len(m), 4, 4))  # 4 e e'
-    four[:, 0, 0], four[:, 1, 1], four[:, 2, 2] = 1 + x - y - z, 1 - x + y - z, 1 - x - y + z
-    four[:, 3, 3] = 1 + x + y + z
-    four[:, 0, 1] = four[:, 1, 0] = m[:, 0, 1] + m[:, 1, 0]
-    four[:, 0, 2] = four[:, 2, 0] = m[:, 0, 2] + m[:, 2, 0]
-    four[:, 1, 2] = four[:, 2, 1] = m[:, 1, 2] + m[:, 2, 1]
-    four[:, 0, 3] = four[:, 3, 0] = m[:, 2, 1] - m[:, 1, 2]
-    four[:, 1, 3] = four[:, 3, 1] = m[:, 0, 2] - m[:, 2, 0]
-    four[:, 2, 3] = four[:, 3, 2] = m[:, 1, 0] - m[:, 0, 1]
-    k = np.arange(len(m))
-    largest = np.argmax(four[:, np.arange(4), np.arange(4)], axis=1)
-    row = four[k, largest]
-    result: Array = row / np.sqrt((row * row).sum(axis=1, keepdims=True))
     return result

@@ -57,8 +57,7 @@ class SquaredSlacks:
     def correct(self, predicted: Array, multiplier: Array) -> tuple[float, bool]:
         """Set slacks to zero, or release them, as the values and multipliers (k,) of a linear solution say.
 
-        Returns:
-            Share of the motion from the last solution to this one, and whether to solve again.
+        Return the share of the motion from the last solution to this one, and whether to solve again.
         """
         active = self.slack == 0.0
         crossing = ~active & (predicted < -1e-9)  # m or rad

@@ -125,11 +125,8 @@ class Iteration:
     def iterate(self, iterations: int, *, goals: bool, measures: Measures, early_exit: bool = False) -> None:
         """Step until everything holds, nothing moves any more, or the iterations are spent.
 
-        Args:
-            iterations: most iterations.
-            goals: whether goals are pursued.
-            measures: minimised, kept from growing, or ignored.
-            early_exit: end at the first step that gains little, as in a frame whose goal lies inside something.
+        Measures are minimised, kept from growing, or ignored. `early_exit` ends at the first step that gains little,
+        as in a frame whose goal lies inside something.
         """
         self.stationary, active, norms = False, self.active_system, self._norms(self.residual)
         trust = _Trust(self.least_damping, max(STEPS.funnel * norms[1], self.tolerance))
@@ -137,10 +134,11 @@ class Iteration:
         enough = FRAMES.least_progress if early_exit else STEPS.least_progress
         patience = FRAMES.patience if early_exit else STEPS.patience
         begun, most = self.x, FRAMES.time_share if early_exit else 1.0
-        for _ in range(iterations):
+        for tried in range(iterations):
             over = active.control.over or active.control.spent > most
-            # a frame gets on in any case: its budget ends it after a step
-            if self._holds(goals) or active.control.reason or (over and self.x is not begun):
+            # a frame gets on if it can: its budget ends it after a step, or three that failed
+            late = over and (self.x is not begun or tried >= 3)
+            if self._holds(goals) or active.control.reason or late:
                 return
             active.control.tell(TraceEntry(self.goal, self.hard, 0.0, 0.0))
             before = self._norms(self.residual)
@@ -239,13 +237,9 @@ class Iteration:
     ) -> Array:
         """The step of one iteration; the active set changes until the linear solution agrees with it.
 
-        Args:
-            damping: of the goals; its square applies to constraints.
-            share: of the constraints' errors that the step corrects.
-            goal_share: share of the goals' errors that the step corrects.
-            goals: whether goals are pursued at all.
-            measures: minimised, kept from growing, or ignored.
-            proximity: factor of the least motion, against the measures.
+        The damping is that of the goals, its square that of constraints. `share` and `goal_share` are the parts of the
+        errors of constraints and goals that the step corrects, `proximity` is the factor of the least motion, against
+        the measures.
         """
         asked = self.residual * share
         asked[self.goal_rows] = self.residual[self.goal_rows] * min(goal_share, share)

@@ -157,10 +157,7 @@ def refine(
 ) -> tuple[Array, int]:
     """Lower the measures, a function of the variables (7 n,), from x, where all equations hold to the tolerance.
 
-    A round that moves nothing by more, metres and radians, is the last, and there are at most `rounds`.
-
-    Returns:
-        The variables, and the number of iterations.
+    A round that moves nothing by more, m and rad, is the last. Return the variables, and the number of iterations.
     """
     run = Iteration(active_system, x, REFINEMENT.finer * tolerance, REFINEMENT.finer * tolerance, "slack")
     run.iterate(REFINEMENT.back, goals=True, measures="keep")

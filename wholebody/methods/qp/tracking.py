@@ -14,6 +14,7 @@ from wholebody.base.errors import TermError
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
 from wholebody.methods.base import Method, begun, goal_error, nearest_to
+from wholebody.methods.control import BUDGET
 from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.methods.qp.escaping import ProjectionRows, free_end, projection_rows
 from wholebody.methods.qp.escaping import compiled_kernel as compiled_escape
@@ -152,13 +153,14 @@ class QPTracker(NotCopyable):
     def _among_moving(self, q: Array, measures: bool, motion: FrameMotion) -> QPStep:
         """A step in which things move, or did and are still in the figure: they advance by shares, and it gives way.
 
-        Bounds on speeds are bounds on the way of the whole step.
+        Bounds on speeds are bounds on the way of the whole step. Where a frame's budget ends before, things go the rest
+        of their way while the figure stays.
         """
         workspace, model = self.workspace, self.workspace.model
         q = posture(q, model.nq)
         most = at_speeds(self.problem.bounds, workspace.state.update(q), self.dt)
-        path, steps, before = [(0.0, q)], list[QPStep](), np.inf
-        while True:
+        path, steps, before, depth = [(0.0, q)], list[QPStep](), np.inf, 0.0
+        while not steps or BUDGET.spent <= 1.0:
             share, here = path[-1]
             if share < 1.0:
                 workspace.place(motion.placements(share))
@@ -174,6 +176,9 @@ class QPTracker(NotCopyable):
             steps.append(self._step(here, measures and following > share))
             path.append((following, clipped(model, q, steps[-1].q, most)))
         self._left = None
+        if path[-1][0] < 1.0:
+            path.append((1.0, path[-1][1]))
+            workspace.place(motion.placements(1.0))
         free = (
             None if depth <= TRACKING.out or motion.still else free_end(model, q, TRACKING.out, self._projection_rows)
         )
@@ -270,7 +275,7 @@ class QPTracker(NotCopyable):
         contacts, asked = at.contacts, at.clearance[: len(at.contacts.distance)]
         began, unseen = np.minimum(contacts.distance, asked), unseen_by_rows(asked)
         rows, groups = self._program.rows, None
-        for _ in range(TRACKING.corrections):
+        for _ in range(TRACKING.corrections if BUDGET.spent <= 1.0 else 0):
             short, q = self._shortfall(
                 at, displacement, np.maximum(began, predicted_distances(rows, asked, displacement)), began, midway
             )

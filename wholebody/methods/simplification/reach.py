@@ -149,14 +149,9 @@ def still_dofs(problem: Problem) -> list[int]:
 
 
 def reachable_pairs(problem: Problem, still: Iterable[int], numbers: Indices) -> Mask:
-    """Which pairs (k,) of a problem's scene are not proven to stay farther apart than their clearance.
+    """Which pairs (k,), by their numbers, are not proven to stay farther apart than their clearance.
 
-    Frames that are held in the world bound the positions of all pieces.
-
-    Args:
-        problem: the problem.
-        still: degrees of freedom (tangent indices) that stay as at the start.
-        numbers: (k,) of the pairs in the scene's pair table.
+    The degrees of freedom `still` stay as at the start. Frames that are held in the world bound all pieces.
     """
     scene = problem.scene
     pieces, table, clearances = scene.geometry.geometryObjects, scene.pair_table, problem.clearances[numbers]

@@ -83,14 +83,10 @@ class Predictor:
         effort_from: Array | None = None,
         most: int | None = None,
     ) -> Prediction:
-        """Predict the posture of a frame.
+        """Predict the posture of a frame, from a start (nq,) and within further planes.
 
-        Args:
-            frame: which; holds and the effort refer to its original posture.
-            start: (nq,) where the search starts.
-            planes: further constraints.
-            effort_from: (nq,) posture from which the effort is counted instead.
-            most: iterations of the method after which its best posture so far is taken; None for any.
+        Holds and the effort refer to the original posture of the frame, the effort to `effort_from` (nq,) where that
+        is given. After `most` iterations of the method its best posture so far is taken.
         """
         scene, terms = self.run.scene, self.run.terms
         asked = terms.asked(frame)

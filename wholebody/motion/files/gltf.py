@@ -114,12 +114,8 @@ class JointTree:
     ) -> None:  # fmt: skip
         """Add one mesh that bones bend, a primitive for each colour.
 
-        Args:
-            name: of the body.
-            surface: of it.
-            places: of its bones: the joint that carries each, and its placement (4, 4) there.
-            prefix: before the names of the joints in the model.
-            color: of all of it; each patch's own if None.
+        The places are the joints that carry the bones, by names that a prefix precedes in the model, and the
+        placements (4, 4) of the bones there. `color` is that of all of it; each patch has its own if None.
         """
         bones: list[int] = []
         held = [(joint_in(self._model, prefix, joint), offset) for joint, offset in places]

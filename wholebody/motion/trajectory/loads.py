@@ -50,20 +50,14 @@ class Defects(NamedTuple):
 
 
 class LoadBounds(NamedTuple):
-    """What loads keep to.
+    """What loads keep to."""
 
-    Attributes:
-        lower: (nv,) least torques, N m; -inf for none.
-        upper: (nv,) largest torques.
-        slowed: (2, nv) least and largest torques of a clip that may be slowed: strength, if the original slowed by as
-            much as can be keeps to it, or else `lower` and `upper`.
-        outside: for each frame (e,) by how far it may lean outside of each edge of its support, metres.
-    """
-
-    lower: Array
-    upper: Array
+    lower: Array  # (nv,) least torques, N m; -inf for none
+    upper: Array  # (nv,) largest torques
+    # (2, nv) least and largest torques of a clip that may be slowed: strength, if the original slowed by as much as can
+    # be keeps to it, or else `lower` and `upper`
     slowed: Array
-    outside: tuple[Array, ...]
+    outside: tuple[Array, ...]  # for each frame (e,) by how far it may lean outside of each edge of its support, metres
 
 
 class ClipLoads:

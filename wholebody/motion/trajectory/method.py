@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -13,20 +14,18 @@ from wholebody.base.arrays import Array, Mask
 from wholebody.base.fields import Checked, Range
 from wholebody.motion.avoider import CLEARANCE, MethodResult, Run
 from wholebody.motion.clip import Clip
+from wholebody.motion.faults import Faults
 from wholebody.motion.frame_terms import FrameTerms, between
 from wholebody.motion.stance import standing_feet
 from wholebody.motion.strength import Strength
 from wholebody.motion.trajectory.loads import ClipLoads
 from wholebody.motion.trajectory.retiming import Timing, allowance, slowed, speed_bounds, timing
-from wholebody.motion.trajectory.window_run import ClipRun
+from wholebody.motion.trajectory.window_run import ClipRun, WindowResult
 from wholebody.motion.windows import Window
 
 BEYOND = 1.5e-3  # m, see `loads.LENGTH`: loads beyond their bounds by more are computed again; the judge allows 2e-3
-
-
-def _worst(loads: ClipLoads, q: Array) -> float:
-    """How far loads of postures (n, nq), as `torques` measures them, are beyond their bounds, see `loads.LENGTH`."""
-    return float(loads.corrected(q).of(q).worst().max(initial=0.0))
+LONG = 2.0  # s: a window over twice as long is freed in parts of this length
+LOADED = 0.2  # s, smoothness with loads: a push that spreads farther accelerates less, and filters change less of it
 
 
 @dataclass(frozen=True)
@@ -39,8 +38,7 @@ class Trajectory(Checked):
         clearance: least distance of every pair, metres.
         time: seconds: how far a push at one frame spreads to its neighbours; larger = smoother, farther off. None is
             0.1 s at first. Where an answer has over 1.2 of the jerk of the original, 0.15 s follow, else 0.04 s if that
-            brings it nearer with no more jerk than this. With `dynamics` it stays 0.1 s, or is 0.2 s where loads are
-            beyond their bounds then.
+            brings it nearer with no more jerk than this. With `dynamics` it is 0.2 s.
         margin: seconds before and after a collision in which frames may be changed.
         stretch: factor by which the clip may be slowed, at most and anywhere, so that joints keep to their speed
             limits. The postures stay on their path, and the clip gets more frames of the same time step. 1 keeps the
@@ -79,13 +77,7 @@ class Trajectory(Checked):
         freed, missed = self._freed(run, run.terms.q, loads, self.stretch)
         new = None if run.ended else self._timing(freed, run.terms, loads)
         if new is None:
-            q = self._measured(run, q, freed, loads, self.stretch)
-            result = MethodResult(q, message="; ".join(missed))
-            if loads is None or self.time is not None or run.ended or (worst := _worst(loads, q)) <= BEYOND:
-                return result
-            # a push that spreads farther accelerates less, and its program has other optima
-            other = replace(self, time=0.2, stretch=1.0).avoid(run)
-            return other if not run.faults(other.q).number and _worst(loads, other.q) < worst else result
+            return MethodResult(self._measured(run, q, freed, loads, self.stretch), message="; ".join(missed))
         # On the same path nothing is new but chords, which cut its corners; what they touch is freed from there.
         slower = run.of(run.terms.at(new.times))
         passed = between(run.scene.model, freed, new.times / run.terms.dt)
@@ -102,15 +94,13 @@ class Trajectory(Checked):
         """
         if loads is None:
             return q
-        # s: smoothness of the answers, the next where one gets no farther; filters change less of what is smoother
-        times = [0.2, 0.1]
         faults, corrected = run.faults(reference), loads.corrected(q)
         worst = corrected.of(q).worst()
         for _ in range(6):  # more leave fewer loads beyond their bounds, and take longer where these cannot be kept
             beyond = worst > BEYOND
-            if not beyond.any() or not times or run.ended:
+            if not beyond.any() or run.ended:
                 break
-            windows = ClipRun(run, reference, times[0], rate, corrected)
+            windows = ClipRun(run, reference, LOADED, rate, corrected)
             changed: Mask = beyond | (q != reference).any(axis=1)
             other = np.array(q)
             for window in run.windows(changed, self.margin):
@@ -121,16 +111,15 @@ class Trajectory(Checked):
             again = loads.corrected(other)
             now = again.of(other).worst()
             if run.faults(other).number or now.max() > 0.9 * worst.max():
-                times.pop(0)
-            else:
-                q, corrected, worst = other, again, now
+                break
+            q, corrected, worst = other, again, now
         return q
 
     def _freed(
         self, run: Run, reference: Array, loads: ClipLoads | None, rate: float, beyond: Mask | None = None
     ) -> tuple[Array, list[str]]:
         """Postures (n, nq) that are free, near reference postures (n, nq), and what is missed; `beyond` change too."""
-        windows = ClipRun(run, reference, self.time, rate, loads)
+        windows = ClipRun(run, reference, LOADED if loads and self.time is None else self.time, rate, loads)
         q: Array = np.array(reference)
         run.watch.tell(0.0, "looking for collisions")
         faults = run.faults(reference)
@@ -140,7 +129,10 @@ class Trajectory(Checked):
         while found:
             window = found.pop(0)
             told = run.watch.teller(done / total, len(window) / total, f"frames {window.first} to {window.end - 1}")
-            freed = windows.window(window, faults, told)
+            if loads is None:
+                freed = _in_parts(run, windows, window, q, faults, told)
+            else:  # loads of a frame are those of its neighbours too
+                freed = windows.window(window, faults, told)
             q[window.first : window.end] = freed.q
             if freed.missed and not run.ended:
                 window, freed = windows.kept_back(window, freed, q, faults, told, self.margin)
@@ -169,3 +161,26 @@ class Trajectory(Checked):
             for _ in range(3):  # the ground's forces are split as the timing before makes them
                 b = slowed(most, terms.dt, stretch, path.timed(b))
         return timing(b, terms.dt)
+
+
+def _in_parts(
+    run: Run, windows: ClipRun, window: Window, reference: Array, faults: Faults, told: Callable[[float], bool]
+) -> WindowResult:
+    """A window freed part by part, each from where the one before it is; at once where a part is not freed.
+
+    What is tried again is then a part, and not all of a long window.
+    """
+    length, shared = run.frames(LONG, 2), run.frames(LONG / 4.0, 1)
+    q, first = np.array(reference), window.first
+    while window.end - first > 2 * length:
+        part = Window(first, first + length)
+        freed = windows.window(part, faults, told, around=q, whole=False)
+        if freed.missed or run.ended:
+            return windows.window(window, faults, told)
+        q[part.first : part.end] = freed.q
+        first = part.end - shared
+    freed = windows.window(Window(first, window.end), faults, told, around=q)
+    if freed.missed and first > window.first:
+        return windows.window(window, faults, told)
+    q[first : window.end] = freed.q
+    return WindowResult(q[window.first : window.end], freed.missed)

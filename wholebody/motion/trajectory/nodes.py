@@ -25,16 +25,11 @@ Terms = Sequence[Constraint | Goal]
 
 
 class Node(NamedTuple):
-    """A frame of the window, a share (0 to 1) of the way from it to the next, or the loads of a frame.
+    """A frame of the window, a share (0 to 1) of the way from it to the next, or the loads of a frame."""
 
-    Attributes:
-        frame: the first frame whose deviation counts.
-        share: of the way to the next one.
-        loaded: the frame whose loads are looked at, which depend on the frames before and after it; -1 for contacts.
-    """
-
-    frame: int
-    share: float = 0.0
+    frame: int  # the first frame whose deviation counts
+    share: float = 0.0  # of the way to the next one
+    # the frame whose loads are looked at, which depend on the frames before and after it; -1 for contacts
     loaded: int = -1
 
     @classmethod
@@ -54,23 +49,15 @@ class Node(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """What holds at a node, to first order in the deviations of its frame and of the next ones.
+    """What holds at a node, to first order in the deviations of its frame and of the next ones."""
 
-    Attributes:
-        node: where.
-        gap: (r,) by how much a row is met, metres and radians; to be at least zero.
-        parts: (r, nv) derivatives with respect to the deviations of the node's frame and of those after it that count.
-        group: (r,) rows of one contact share a number; the worst of them counts.
-        equal: (e,) values of the equalities; to be zero.
-        equal_rows: (e, nv) their derivatives.
-    """
-
-    node: Node
-    gap: Array
+    node: Node  # where
+    gap: Array  # (r,) by how much a row is met, metres and radians; to be at least zero
+    # (r, nv) derivatives with respect to the deviations of the node's frame and of those after it that count
     parts: tuple[Array, ...]
-    group: Indices
-    equal: Array
-    equal_rows: Array
+    group: Indices  # (r,) rows of one contact share a number; the worst of them counts
+    equal: Array  # (e,) values of the equalities; to be zero
+    equal_rows: Array  # (e, nv) their derivatives
 
     @property
     def shortfalls(self) -> Array:

@@ -42,28 +42,19 @@ Cancel = Callable[[int, float], bool]
 
 @dataclass(frozen=True)
 class SQPSettings:
-    """Numbers of the iterations.
+    """Numbers of the iterations."""
 
-    Attributes:
-        radius: first trust region, radians and metres; larger = fewer programs on clear ways, more that are refused.
-        largest: largest trust region.
-        smallest: a smaller one ends the iterations, or raises the penalty.
-        within: metres; pairs nearer than this have rows: what a radius moves the end of a limb by.
-        still: radians and metres; a step no larger ends the iterations where everything is met. Larger = rougher
-            optima, faster.
-        gain: share of the objective; a step that brings no more ends them too.
-        penalty: of a shortfall at first, 1/m; it is raised tenfold where a step leaves more than half of a shortfall.
-        highest: penalty, 1/m.
-    """
-
+    # first trust region, radians and metres; larger = fewer programs on clear ways, more that are refused
     radius: float = 0.25
-    largest: float = 0.5
-    smallest: float = 1e-4
-    within: float = 0.1
+    largest: float = 0.5  # largest trust region
+    smallest: float = 1e-4  # a smaller one ends the iterations, or raises the penalty
+    within: float = 0.1  # metres; pairs nearer than this have rows: what a radius moves the end of a limb by
+    # radians and metres; a step no larger ends the iterations where everything is met. Larger = rougher optima, faster.
     still: float = 2e-3
-    gain: float = 5e-3
+    gain: float = 5e-3  # share of the objective; a step that brings no more ends them too
+    # of a shortfall at first, 1/m; it is raised tenfold where a step leaves more than half of a shortfall
     penalty: float = 1e3
-    highest: float = 1e6
+    highest: float = 1e6  # penalty, 1/m
 
 
 SETTINGS = SQPSettings()
@@ -79,21 +70,13 @@ class End(Enum):
 
 
 class SQPResult(NamedTuple):
-    """Deviations that the iterations ended with.
+    """Deviations that the iterations ended with."""
 
-    Attributes:
-        x: (n, nv) deviations.
-        objective: there, loads beyond their bounds included.
-        worst: largest shortfall of any row but of loads, metres or radians.
-        programs: how many programs were solved.
-        end: why they ended.
-    """
-
-    x: Array
-    objective: float
-    worst: float
-    programs: int
-    end: End = End.LAST
+    x: Array  # (n, nv) deviations
+    objective: float  # there, loads beyond their bounds included
+    worst: float  # largest shortfall of any row but of loads, metres or radians
+    programs: int  # how many programs were solved
+    end: End = End.LAST  # why they ended
 
     @property
     def met(self) -> bool:

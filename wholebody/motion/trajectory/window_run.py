@@ -34,24 +34,17 @@ NEARLY = 0.03  # rad, m: first trust region of the rounds after the first; few r
 
 @dataclass(frozen=True)
 class WindowSettings:
-    """Numbers of the windows.
+    """Numbers of the windows."""
 
-    Attributes:
-        first: seconds of smoothness of the first answer; where it is shorter, more attempts end on a wrong side.
-        rougher, smoother: shares of this time in the second answer.
-        jerk: parts of the original's; an answer with more is made smoother.
-        share: of the squared deviation; acceleration that costs less leaves little to gain.
-        rounds: of sweeping and adding places between frames.
-        iterations: most steps of one run; a step takes one to three programs.
-    """
-
+    # seconds of smoothness of the first answer; where it is shorter, more attempts end on a wrong side
     first: float = 0.1
+    # rougher and smoother: shares of this time in the second answer
     rougher: float = 0.4
     smoother: float = 1.5
-    jerk: float = 1.2
-    share: float = 0.1
-    rounds: int = 12
-    iterations: int = 40
+    jerk: float = 1.2  # parts of the original's; an answer with more is made smoother
+    share: float = 0.1  # of the squared deviation; acceleration that costs less leaves little to gain
+    rounds: int = 12  # of sweeping and adding places between frames
+    iterations: int = 40  # most steps of one run; a step takes one to three programs
 
 
 SETTINGS = WindowSettings()
@@ -103,6 +96,7 @@ class _Window(NamedTuple):
     always: set[int]
     cancel: Callable[[float], bool]
     around: Array  # (clip's frames, nq): what lies beyond the window stays so
+    seams: tuple[bool, bool]  # whether the clip goes on before and after it
 
     def moved(self, x: Array) -> list[int]:
         """Gaps beside frames with a deviation (n, nv), and those that are looked at always."""
@@ -159,8 +153,9 @@ class ClipRun:
         return window, freed
 
     def window(
-        self, window: Window, found: Faults, cancel: Callable[[float], bool], begun: Array | None = None
-    ) -> WindowResult:
+        self, window: Window, found: Faults, cancel: Callable[[float], bool], begun: Array | None = None,
+        around: Array | None = None, whole: bool = True,
+    ) -> WindowResult:  # fmt: skip
         """Free one window.
 
         Args:
@@ -169,8 +164,11 @@ class ClipRun:
             cancel: told the share done; true ends the attempt, and the window stays as it was.
             begun: (n, nq) postures of the clip to begin with, of which those beyond the window stay; None for the
                 original ones, and others after them.
+            around: (n, nq) postures of the clip, of which those beyond the window stay; None for the original ones.
+            whole: False for a part of a window that goes on after it: its last frame is free.
         """
-        own = self._of(window, found, cancel, begun)
+        around = begun if around is None else around
+        own = self._of(window, found, cancel, around, (window.first > 0, whole and window.end < len(self._reference)))
         objective = self._objective(own, SETTINGS.first if self._time is None else self._time)
         starts: Iterable[tuple[_Attempt, _Way]]
         if begun is None:
@@ -203,16 +201,20 @@ class ClipRun:
         q[changed] = own.chart.postures(best.x)[changed]
         return WindowResult(q, missed)
 
-    def _of(self, window: Window, found: Faults, cancel: Callable[[float], bool], begun: Array | None) -> _Window:
+    def _of(
+        self, window: Window, found: Faults, cancel: Callable[[float], bool], begun: Array | None,
+        seams: tuple[bool, bool],
+    ) -> _Window:  # fmt: skip
         terms, around = self._run.terms, self._reference if begun is None else begun
         chart = Chart(self._run.workspace.model, np.array(self._reference[window.first : window.end]))
         ends = (window.first, window.end - 1)
         kept = None if begun is None else np.array([self._away(begun, frame) for frame in ends])
-        limits = Limits.of(terms, chart, window.first, self._seams(window), self._rate, kept)
+        limits = Limits.of(terms, chart, window.first, seams, self._rate, kept)
         held = [terms.held(frame) for frame in range(window.first, window.end)]
         loads = None if self._loads is None else WindowLoads(self._loads, window.first, len(window))
         evaluator = NodeEvaluator(self._run.workspace, chart, held, self._run.clearance, loads)
-        return _Window(window, chart, evaluator, limits, {gap - window.first for gap in found.gaps}, cancel, around)
+        gaps = {gap - window.first for gap in found.gaps}
+        return _Window(window, chart, evaluator, limits, gaps, cancel, around, seams)
 
     def _away(self, q: Array, frame: int) -> Array:
         """(nv,) deviation of a frame of postures (n, nq); none beyond the clip."""
@@ -221,15 +223,11 @@ class ClipRun:
             return np.zeros(model.nv)
         return np.asarray(pin.difference(model, self._reference[frame], q[frame]))
 
-    def _seams(self, window: Window) -> tuple[bool, bool]:
-        """Whether the clip goes on before and after a window."""
-        return window.first > 0, window.end < len(self._reference)
-
     def _objective(self, own: _Window, time: float) -> Objective:
         window, weights = own.window, np.ones(self._run.workspace.model.nv)
         beyond = (window.first - 2, window.first - 1, window.end, window.end + 1)
         ends = np.array([self._away(own.around, frame) for frame in beyond])
-        return Objective(len(window), weights, time, self._run.terms.dt, self._seams(window), ends)
+        return Objective(len(window), weights, time, self._run.terms.dt, own.seams, ends)
 
     def _again(self, found: _Attempt, own: _Window) -> _Attempt:
         """An answer once more, smoother where its jerk is not allowed, else less smooth and nearer to the original."""
@@ -247,7 +245,7 @@ class ClipRun:
     def _jerk(self, own: _Window, x: Array) -> float:
         """Of the frames that deviations (n, nv) of a window change the jerk of, in parts of the original's."""
         window, figure, dt = own.window, self._run.scene.figure, self._run.terms.dt
-        first, end = max(0, window.first - 3), min(len(self._reference), window.end + 3)
+        first, end = max(0, window.first - 3), min(len(self._reference), window.end + 3 * own.seams[1])
         before, after = self._reference[first:end], own.around[first:end].copy()
         after[window.first - first : window.end - first] = own.chart.postures(x)
         return jerk_ratio(Clip(figure, before, dt), Clip(figure, after, dt))

@@ -12,7 +12,7 @@ from wholebody.bench.suite.adapters.loop import margins, size
 from wholebody.bench.suite.adapters.registry import adapters
 from wholebody.bench.suite.stability import catalogue
 from wholebody.bench.suite.stability.asking import ask, judge
-from wholebody.bench.suite.stability.case import Posed, Stream
+from wholebody.bench.suite.stability.catalogue import Posed, Stream
 from wholebody.bench.suite.stability.verdict import decide
 
 CASES = ("inside-obstacle", "narrow-passage", "edge-on-edge", "100-m-scale", "start-1-mm-inside")

@@ -9,8 +9,7 @@ from wholebody.assessment.posture import assess
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.suite.adapters.registry import adapters
 from wholebody.bench.suite.stability.asking import ask, judge
-from wholebody.bench.suite.stability.case import HardCase, Nonsense, Posed, Stream
-from wholebody.bench.suite.stability.catalogue import cases, names, quick
+from wholebody.bench.suite.stability.catalogue import HardCase, Nonsense, Posed, Stream, cases, names, quick
 from wholebody.bench.suite.stability.verdict import decide
 
 FAST = (

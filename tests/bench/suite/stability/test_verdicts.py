@@ -15,8 +15,7 @@ from wholebody.base.errors import InputError
 from wholebody.bench.suite.adapters.base import Adapter
 from wholebody.bench.suite.stability import asking
 from wholebody.bench.suite.stability.asking import Judged, ask, judge, run
-from wholebody.bench.suite.stability.case import NOTHING, Answer, Stream
-from wholebody.bench.suite.stability.catalogue import cases
+from wholebody.bench.suite.stability.catalogue import NOTHING, Answer, Stream, cases
 from wholebody.bench.suite.stability.verdict import Verdict, decide, length, result
 from wholebody.problem import Problem
 

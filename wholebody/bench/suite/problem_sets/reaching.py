@@ -1,4 +1,4 @@
-"""Reaches of a fingertip, or of both hands and the eyes: alone, among things, through a passage, along a curve."""
+"""Reaches of a fingertip, or of both hands and the eyes: alone, among things, through a passage, balanced, dragged."""
 
 from __future__ import annotations
 
@@ -184,6 +184,66 @@ def _boards(kind: int, wrist: pin.SE3, rng: np.random.Generator) -> list[tuple[w
 
 def _at(middle: tuple[float, float, float]) -> pin.SE3:
     return pin.SE3(np.eye(3), np.array(middle))
+
+
+of_balance = numbers("balance")
+
+
+def balance(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
+    """In turn: a fingertip low down, one far out, both low down; sides change too."""
+    figure, tip = bodies.human(), bodies.TIPS[number // 3 % 2]
+
+    def attempt() -> tuple[list[wb.Point], Array] | None:
+        goals = _far_goals(number % 3, tip, rng)
+        equalities = [*_standing_and(figure, goals), bodies.MassAbove(rng.uniform(*of_balance.over_m))]
+        found = bodies.fitted(figure, _bent_anyhow(figure, rng), equalities, bodies.movable(figure))
+        if found is None or not bodies.is_free(bodies.alone(figure), found):
+            return None
+        return (goals, found) if _least_room(found) > of_balance.margin_m + of_balance.spare_m else None
+
+    goals, witness = bodies.until_found(attempt)
+    reached = [bodies.point(figure, witness, goal.frame) for goal in goals]
+    start = figure.posture("standing")
+    return bodies.standing_problem(
+        bodies.floor_scene(figure), start, reached, wb.Balance(margin=of_balance.margin_m)
+    ), witness
+
+
+def _far_goals(kind: int, tip: str, rng: np.random.Generator) -> list[wb.Point]:
+    if kind < 2:
+        return [wb.Point(tip, rng.uniform(*(of_balance.low_m if kind == 0 else of_balance.far_m)))]
+    left, right = rng.uniform(*of_balance.two_m), rng.uniform(*of_balance.two_m) * (1.0, -1.0, 1.0)
+    return [wb.Point("left_index_tip", left), wb.Point("right_index_tip", right)]
+
+
+def _standing_and(figure: wb.Figure, goals: list[wb.Point]) -> list[wb.Goal]:
+    start, scene = figure.posture("standing"), bodies.alone(figure)
+    feet = [wb.Frame(foot, figure.placement(start, foot)) for foot in bodies.FEET]
+    return [goal.resolve(scene, start) for goal in (*goals, *feet)]
+
+
+def _bent_anyhow(figure: wb.Figure, rng: np.random.Generator) -> Array:
+    """A posture (nq,) with bent legs and the upper body anyhow; the feet are not yet where they belong."""
+    q = figure.posture("standing")
+    bend = float(rng.uniform())
+    ends = vars(of_balance.stance_degrees).items()
+    q = bodies.bent(figure, q, {name: least + bend * (most - least) for name, (least, most) in ends})
+    q = bodies.shaken(figure, figure.clamp(q), of_balance.arms, rng)
+    q[2] -= 0.45 * bend
+    q[:2] += rng.uniform(-0.1, 0.1, 2)
+    pitch = rng.uniform(0.0, 0.6) + 0.3 * bend
+    q[3:7] = 0.0, np.sin(pitch / 2.0), 0.0, np.cos(pitch / 2.0)
+    return q
+
+
+@lru_cache(maxsize=1)
+def _support() -> wb.Balance:
+    return wb.Balance().resolve(bodies.alone(bodies.human()), bodies.human().posture("standing"))
+
+
+def _least_room(q: Array) -> float:
+    """Distance of the centre of mass from the nearest edge of the support polygon, metres."""
+    return float(_support().value(bodies.alone(bodies.human()).state(q)).min())
 
 
 of_drag = numbers("drag")

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from wholebody.base.errors import InputError, UnknownNameError
-from wholebody.bench.suite.problem_sets import balance, drivers, grips, hands, pairs, reaching, robots
+from wholebody.bench.suite.problem_sets import drivers, grips, hands, pairs, reaching, robots
 from wholebody.bench.suite.problem_sets.case import Pose, ProblemSet, numbers
 
 
@@ -24,7 +24,7 @@ SETS = _sets(
         "free_reach_several": reaching.several,
         "clutter": reaching.among,
         "self_contact": hands.self_contact,
-        "balance": balance.posed,
+        "balance": reaching.balance,
         "closed_loop": hands.closed_loop,
         "passage": reaching.passage,
         "drag": reaching.drag,

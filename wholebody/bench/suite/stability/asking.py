@@ -14,7 +14,7 @@ from wholebody.base.compiled import compile_all
 from wholebody.base.errors import WholebodyError
 from wholebody.base.runner import BY_THE_CLOCK, Child, EndedError, Job, allow_processor, run_jobs, tell
 from wholebody.bench.suite.adapters.base import Adapter
-from wholebody.bench.suite.stability.case import NOTHING, Answer, HardCase, Nonsense, Posed, Stream
+from wholebody.bench.suite.stability.catalogue import NOTHING, Answer, HardCase, Nonsense, Posed, Stream, cases
 from wholebody.problem import Problem
 from wholebody.tasks import Point
 from wholebody.tracking.drag import Drag
@@ -135,7 +135,6 @@ def run(asked: Iterable[tuple[HardCase, Adapter]], jobs: int = 1, cap: float = 2
 
 def _warm() -> None:
     """Import and compile in this process what most cells need, so that no cell is timed with it."""
-    from wholebody.bench.suite.stability.catalogue import cases
     from wholebody.methods.qp.method import QP
 
     compile_all()

@@ -12,7 +12,7 @@ from wholebody.bench import plot_style
 from wholebody.bench.report import render
 from wholebody.bench.rows import Figure, Row
 from wholebody.bench.suite.stability.asking import INSIDE, Cell, Judged
-from wholebody.bench.suite.stability.case import Answer, HardCase, Kind
+from wholebody.bench.suite.stability.catalogue import Answer, HardCase, Kind
 
 BROKEN = 1e-4  # m, rad: farther than this a constraint does not hold
 
