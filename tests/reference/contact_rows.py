@@ -23,7 +23,7 @@ class ReferenceRowBuilder(ContactRowBuilder):
     def rows(self, contacts: Contacts, clearance: Array | float = 0.0) -> ContactRows:
         k = len(contacts.distance)
         joint = self.table.joint
-        wide = np.flatnonzero(self._extended[contacts.number] & (contacts.distance < clearance + module.LEVER_DISTANCE))
+        wide = np.flatnonzero(self.arrays[0][contacts.number] & (contacts.distance < clearance + module.LEVER_DISTANCE))
         if len(wide):
             self._snap(contacts, wide)
         wrench = _wrenches(contacts.normal, contacts.point_a)

@@ -17,7 +17,8 @@ ShapeArrays: TypeAlias = tuple[Array, Indices, Array, Indices, Array, Array]
 
 TableArrays: TypeAlias = tuple[Mask, Indices, Array, Array, Indices, Array, Indices, Array, Array]
 """Whether both pieces of a pair have more than one swept point (pairs,), and the joint of each piece (n,); lever
-distance, band, inset, shortest lever, cosine of the same normal, room for it and setback; the arrays of the shapes."""
+distance, band, inset, shortest lever, cosine of the same normal, room for it, setback and most ends; the arrays of the
+shapes."""
 
 RowArrays: TypeAlias = tuple[Array, Array, Indices, Indices]
 """Room for the wrench (m, 6), gap (m,), contact (m,) and both joints (m, 2) of each row."""
@@ -226,8 +227,8 @@ def _farthest_first(place: Array, gap: Array, witness: Array, distance: float, s
 
 
 @compiled()
-def contact_rows(contacts: ContactArrays, clearance: Array, table: TableArrays, most_ends: int, room: RowArrays) -> int:
-    """Write the rows of all contacts, with clearances (k,), as `ContactRowBuilder.write` does; how many there are."""
+def contact_rows(contacts: ContactArrays, clearance: Array, table: TableArrays, room: RowArrays) -> int:
+    """Write the rows of all contacts, of which distances (k,) are asked, metres; how many there are."""
     pair, distance, normal, point_a, _, number, _ = contacts
     extended, joint, lengths, points, first_point, faces, first_face, radius, axis = table
     shapes = points, first_point, faces, first_face, radius, axis
@@ -248,7 +249,7 @@ def contact_rows(contacts: ContactArrays, clearance: Array, table: TableArrays, 
         _wrench(normal[c], point_a[c], wrench[c])
     if not found:
         return count
-    owner, place, open_by = _patch_ends(wide, contacts, shapes, lengths, most_ends)
+    owner, place, open_by = _patch_ends(wide, contacts, shapes, lengths, int(lengths[7]))
     for e in range(len(owner)):
         c, row = owner[e], count + e
         gap[row], contact[row] = open_by[e], c
