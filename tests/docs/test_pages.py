@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 from collections.abc import Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -35,6 +36,9 @@ def test_code_on_the_page_runs(page: str, root: Path, tmp_path: Path, monkeypatc
     assert names
     for name in {"solution", "taken", "put"} & names.keys():
         assert names[name].solved, name
+    if page == "docs/figures.md" and find_spec("mujoco"):  # a configuration of MuJoCo is a start
+        names = _run(root / page, "mujoco", names)
+        assert names["arm"].joint_values(names["start"]) == {"turn": 0.6}
 
 
 def test_a_real_robot_on_the_page(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -45,13 +49,6 @@ def test_a_real_robot_on_the_page(root: Path, tmp_path: Path, monkeypatch: pytes
     assert names["solution"].solved
     hand = names["panda"].placement(names["solution"].q, "panda_hand_tcp")
     np.testing.assert_allclose(hand.translation, (0.54, 0.05, 0.45), atol=1e-4)
-
-
-def test_a_configuration_of_mujoco_is_a_start(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("mujoco")
-    monkeypatch.chdir(tmp_path)
-    names = _run(root / "docs/figures.md", "mujoco", _run(root / "docs/figures.md"))
-    assert names["arm"].joint_values(names["start"]) == {"turn": 0.6}
 
 
 def test_the_study_on_the_page(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

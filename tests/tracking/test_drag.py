@@ -90,6 +90,28 @@ def test_frames_whose_time_is_spent_are_free_and_arrive(
     assert any(drag.to((0.3, -0.25, 1.0)).error < 2e-3 for _ in range(60))
 
 
+def test_a_thing_goes_the_rest_of_its_way_when_the_time_is_spent_and_what_it_meets_is_named(planar_arm) -> None:
+    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.08), name="ball", at=(0.7, 0.6, 0.0))
+    start = np.array([0.1, 0.2, 0.2])
+    tip = scene.state(start).frame(scene.frame_id("tip")).translation.copy()
+    problem = wb.Problem(scene, start, goals=[wb.Point("tip", tip)])
+    frames = []
+    for budget in (1e-9, np.inf):
+        scene.move("ball", at=(0.7, 0.6, 0.0))
+        drag = wb.Drag(problem, "qp", budget=budget)
+        drag.to(tip)
+        scene.move("ball", at=(0.7, 0.2, 0.0), over=1.0 / 60.0)
+        frames.append(drag.to(tip))
+        named = max((one.depth for one in frames[-1].collisions if one.inside), default=0.0)
+        assert named == pytest.approx(wb.assess(problem, frames[-1].q).penetration, abs=2e-5)
+    spent, whole = frames
+    assert [share for share, _ in spent.path][-1] == 1.0
+    assert len(spent.path) == 3  # one program
+    assert {one.second for one in spent.collisions} == {"ball"}
+    assert len(whole.path) > 5
+    assert not whole.collisions
+
+
 def test_newton_needs_few_iterations_a_frame_and_does_not_drift(scene: wb.Scene) -> None:
     problem = _problem(scene)
     drag = wb.Drag(problem, "newton")

@@ -75,6 +75,32 @@ def test_a_thing_pushes_the_hand_away_and_undo_brings_both_back(drag: LiveDrag) 
     assert not drag.undo()
 
 
+@pytest.mark.parametrize("method", ["qp", "newton", "assembly"])
+def test_a_thing_that_is_thrown_at_what_is_held_stays_before_it(drag: LiveDrag, method: str) -> None:
+    if method == "assembly":
+        drag, thing, aim = LiveDrag(jointed()), "block", np.array((-0.4, 0.0, 0.5))
+        assert drag.toggle("rod")
+    else:
+        drag.choose(method)
+        drag.toggle("pelvis")
+        thing, aim = "table", drag.place("pelvis")
+    drag.take(thing)
+    stays = 0
+    for _ in range(40):
+        before = drag.q, drag.place(thing)
+        frame = drag.move(aim)
+        assert np.linalg.norm(drag.place(thing) - before[1]) < 0.05 + 1e-9
+        assert frame.error == pytest.approx(np.linalg.norm(drag.place(thing) - aim), abs=1e-12)
+        assert frame.overlap <= 5e-4  # m
+        if f"{thing} stays: " in frame.status:
+            stays += 1
+            assert np.array_equal(drag.place(thing), before[1])
+            np.testing.assert_allclose(frame.q, before[0], atol=1e-12)
+    assert stays
+    assert frame.error > 0.05
+    assert "stays" not in drag.move(drag.place(thing)).status
+
+
 def test_the_posture_is_a_task(drag: LiveDrag, tmp_path: Any) -> None:
     along(drag, "right_palm", (0.1, 0.0, 0.2))
     task = wb.read_task(wb.taskfile.write_task(drag.stated(), tmp_path / "posture.toml"))

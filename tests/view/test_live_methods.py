@@ -77,6 +77,6 @@ def test_the_way_within_a_frame_is_shown(tmp_path: Path, monkeypatch: pytest.Mon
         way = ((0.0, drag.q), (0.25, aside), (1.0, drag.q))
         monkeypatch.setattr(drag, "move", lambda place: move(place)._replace(path=way))
         page.follow(np.array((1.6, 0.0, 1.0)))
-        assert seen == [(aside[0], pytest.approx(1.9)), (drag.q[0], pytest.approx(1.6))]
+        assert seen == [(aside[0], pytest.approx(1.9875)), (drag.q[0], pytest.approx(1.95))]
     finally:
         page.stop()

@@ -105,6 +105,8 @@ class LiveWorld:
         self.taken = name
         if name in self.handles:
             self._goal(name, self._tracked_place(name))
+            if self._tracker is None:
+                self._prepare()
 
     def let_go(self) -> None:
         """Let the handle go: a body flies on, a frame of the figure stays."""
@@ -224,12 +226,18 @@ class LiveWorld:
         """The tracked posture of this frame."""
         if not self._goals:
             return self._tracked
-        goals = [Point(name, place) for name, place in self._goals.items()]
         if self._tracker is None:
-            held = self.held - set(self._goals)
-            self._problem = self._subject.stated(self._tracked, goals, held)
-            self._tracker = QP().tracker(self._problem, dt=self.world.dt)
+            self._prepare()
         else:
-            self._problem.retarget(goals)
+            self._problem.retarget(self._points())
         self._tracked = np.array(self._tracker.step(self._tracked).q)
         return self._tracked
+
+    def _points(self) -> list[Point]:
+        return [Point(name, place) for name, place in self._goals.items()]
+
+    def _prepare(self) -> None:
+        """Make a tracker of the present goals and holds: for two people it takes as long as a frame."""
+        held = self.held - set(self._goals)
+        self._problem = self._subject.stated(self._tracked, self._points(), held)
+        self._tracker = QP().tracker(self._problem, dt=self.world.dt)

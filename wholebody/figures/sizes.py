@@ -32,20 +32,15 @@ those that were stated."""
 
 
 class TrunkPart(NamedTuple):
-    """A slice of the trunk.
+    """A slice of the trunk."""
 
-    Attributes:
-        segment: that carries it.
-        depth, breadth: names of its dimensions.
-        share: of the depth that it has.
-        behind: (2,) its rear behind the joints of the spine: share of its depth, and of the stature. Who is heavy
-            has most of the depth in front (estimate).
-    """
-
-    segment: str
+    segment: str  # that carries it
+    # depth and breadth: names of its dimensions
     depth: str
     breadth: str
-    share: float
+    share: float  # of the depth that it has
+    # (2,) its rear behind the joints of the spine: share of its depth, and of the stature. Who is heavy has most of the
+    # depth in front (estimate).
     behind: tuple[float, float]
 
     def back(self, of: Mapping[str, float]) -> float:

@@ -37,15 +37,12 @@ class Miss(NamedTuple):
 
 
 class FrameBounds(NamedTuple):
-    """Bounds of a frame, radians and metres; infinite for none.
+    """Bounds of a frame, radians and metres; infinite for none."""
 
-    Attributes:
-        lower, upper: (nv,) least and greatest deviation from the original posture.
-        slowest, fastest: (nv,) least and greatest motion to the next frame.
-    """
-
+    # lower and upper: (nv,) least and greatest deviation from the original posture
     lower: Array
     upper: Array
+    # slowest and fastest: (nv,) least and greatest motion to the next frame
     slowest: Array
     fastest: Array
 

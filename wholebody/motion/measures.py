@@ -158,20 +158,14 @@ class MotionBounds(Checked):
 
 
 class Excess(NamedTuple):
-    """What a changed clip has of jerk, speed and deviation, and where that is beyond its bounds.
+    """What a changed clip has of jerk, speed and deviation, and where that is beyond its bounds."""
 
-    Attributes:
-        jerk, speed: the largest, in parts of the original's.
-        deviation: largest of a posture that was free, radians or metres.
-        beyond: (n,) frames that are beyond a bound.
-        said: what is beyond its bound, and by how much; empty where nothing is.
-    """
-
+    # jerk and speed: the largest, in parts of the original's
     jerk: float
     speed: float
-    deviation: float
-    beyond: Mask
-    said: tuple[str, ...]
+    deviation: float  # largest of a posture that was free, radians or metres
+    beyond: Mask  # (n,) frames that are beyond a bound
+    said: tuple[str, ...]  # what is beyond its bound, and by how much; empty where nothing is
 
 
 def resolved(bounds: MotionBounds, free: Mask, passed: Mask) -> MotionBounds:

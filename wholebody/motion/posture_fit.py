@@ -42,22 +42,15 @@ class Goals(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """What goals are of.
+    """What goals are of."""
 
-    Attributes:
-        points, turns: frames of the figure.
-        bones: (b, p) combinations of points: a row has 1 and -1 for a bone, or positive shares for the anchor.
-        bone_weights: (b,) weight of each.
-        turn_weights: (t,) weight of each angle, metres per radian.
-        held: joint and place (3,) in it of each point that may be held.
-    """
-
+    # points and turns: frames of the figure
     points: list[str]
     turns: list[str]
-    bones: Array
-    bone_weights: Array
-    turn_weights: Array
-    held: list[tuple[int, Array]]
+    bones: Array  # (b, p) combinations of points: a row has 1 and -1 for a bone, or positive shares for the anchor
+    bone_weights: Array  # (b,) weight of each
+    turn_weights: Array  # (t,) weight of each angle, metres per radian
+    held: list[tuple[int, Array]]  # joint and place (3,) in it of each point that may be held
 
 
 class Fitter:

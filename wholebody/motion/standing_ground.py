@@ -26,20 +26,14 @@ NEAR_GROUND = 0.12  # m: highest place of a knee's or wrist's joint above the gr
 
 
 class Foothold(NamedTuple):
-    """A point that rests at one place.
+    """A point that rests at one place."""
 
-    Attributes:
-        role: part of the body, such as "left_toe".
-        first, end: frames, without the last.
-        place: (3,) mean place of the joint, metres, in the recording's world.
-        height: of the ground there above the lowest level, metres.
-    """
-
-    role: str
+    role: str  # part of the body, such as "left_toe"
+    # first and end: frames, without the last
     first: int
     end: int
-    place: Array
-    height: float
+    place: Array  # (3,) mean place of the joint, metres, in the recording's world
+    height: float  # of the ground there above the lowest level, metres
 
 
 @dataclass(frozen=True, eq=False)

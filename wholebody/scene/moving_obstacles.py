@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.geometry.continuous.passing_through import OVERLAP, Entered, entered
+from wholebody.geometry.continuous.passing_through import OVERLAP, entered
 from wholebody.geometry.continuous.sweep import FirstContact, Sweep
 from wholebody.geometry.continuous.swept_depth import SweptDepth
 from wholebody.geometry.proximity import Contacts, PairTable
@@ -88,11 +88,7 @@ class FrameMotion:
         Nothing is in the way if the straight motion from the first posture to the last is free, or that along the path.
         """
         along = [self._at(q, share) for share, q in path]
-        found: list[Entered] = []
-        for way in ([along[0], along[-1]], along):
-            found = entered(self._both.sweep, self._both.depths, way, self._both.moves)
-            if not found:
-                return ()
+        found = entered(self._both.sweep, self._both.depths, along, self._both.moves)
         owners, pairs = self._scene.owners, self._both.table.pairs
         deepest: dict[tuple[str, str], Collision] = {}
         for one in found:

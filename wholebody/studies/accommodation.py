@@ -29,19 +29,14 @@ REACHED = 1e-3  # m, rad: by which a goal may be missed by somebody who reaches 
 
 
 class Share(NamedTuple):
-    """Share of some people.
+    """Share of some people."""
 
-    Attributes:
-        share: of those that were tried.
-        low, high: between which the share of all such people is, at 95 % confidence, were they drawn at random
-            (Wilson 1927). Those of `wb.people` stand for all more closely than that.
-        tried: how many were tried.
-    """
-
-    share: float
+    share: float  # of those that were tried
+    # low and high: between which the share of all such people is, at 95 % confidence, were they drawn at random (Wilson
+    # 1927). Those of `wb.people` stand for all more closely than that.
     low: float
     high: float
-    tried: int
+    tried: int  # how many were tried
 
     def __str__(self) -> str:
         return f"{self.share:.0%} ({self.low:.0%} to {self.high:.0%})"

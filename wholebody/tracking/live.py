@@ -15,17 +15,19 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import known, numbers, shown
 from wholebody.base.errors import InputError, WholebodyError
+from wholebody.geometry.continuous.passing_through import GRAZE
+from wholebody.geometry.proximity import Contacts
 from wholebody.methods import installed_methods
 from wholebody.methods.base import Method
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.solve import method_for_motions
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
-from wholebody.tracking.drag import Drag
+from wholebody.tracking.drag import Drag, DragFrame
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.live_subjects import LiveSubject, live_subject, things_of
 
-FARTHEST_STEP = 0.5  # m: a thing does not jump farther than this in a frame
+FARTHEST_STEP = 0.05  # m: a thing does not move farther than this in a frame, 3 m/s
 
 
 class LiveFrame(NamedTuple):
@@ -76,10 +78,9 @@ class LiveDrag:
         if isinstance(problem, Assembly):
             self.methods = {"newton": "newton"}
             method = "newton" if method == "qp" else method
-        self._undo: list[tuple[Array, Any]] = []
-        self.taken, self._turns = "", False
-        self._drag: Drag[Any] | None = None
-        self._trouble = ""
+        self._undo: list[Any] = []
+        self._deepest = 0.0
+        self.let_go()
         self._state = self.scene.state(self.q)
         self.choose(method)
 
@@ -97,32 +98,30 @@ class LiveDrag:
 
     def let_go(self) -> None:
         """Let the handle go; the figure stays."""
-        self.taken, self._turns, self._drag, self._trouble = "", False, None, ""
+        self.taken, self._turns, self._trouble, self._stopped = "", False, "", ""
+        self._drag: Drag[Any] | None = None
 
     def move(self, place: Array) -> LiveFrame:
         """Move the handle that was taken to a place (3,), or an orientation (4,) if it is turned, and make one frame.
 
         An orientation is a quaternion (x, y, z, w). A frame has a budget of the processor's time, see `Drag`; moved to
-        the same target again, the figure goes on. A figure that cannot follow keeps its posture, and the status says
-        why. Raises InputError where no handle was taken.
+        the same target again, figure and thing go on. A figure that cannot follow keeps its posture, and the status
+        says why. A thing moves by 50 mm at most. Where the figure does not get out of its way, which the status says,
+        it stays and tries half as far in the next frame. Raises InputError where no handle was taken.
         """
         if not self.taken:
             raise InputError("no handle was taken; take one first")
         place = numbers(place, (4,) if self._turns else (3,), "the target of a handle")
-        began, error, path = time.perf_counter(), 0.0, tuple[tuple[float, Array], ...]()
+        began, path = time.perf_counter(), tuple[tuple[float, Array], ...]()
         if self._drag is not None:
             try:
-                if self.taken in self.things:
-                    self._push(place)
-                    frame = self._drag.to(self.place(next(iter(self.handles))))
-                else:
-                    frame = self._drag.to(place)
-                    error = self._away(frame.q, place)
-                self.q, path = np.array(frame.q), frame.path
-                self._subject.arrived()
+                frame = self._pushed(self._drag, place) if self.taken in self.things else self._drag.to(place)
+                if frame is not None:
+                    self.q, path = np.array(frame.q), frame.path
+                    self._subject.arrived()
             except WholebodyError as trouble:
                 self._trouble = str(trouble)
-        return with_values(self._report(error, time.perf_counter() - began), path=path)
+        return with_values(self._report(self._away(self.q, place), time.perf_counter() - began), path=path)
 
     @property
     def constraints(self) -> Mapping[str, bool]:
@@ -167,8 +166,7 @@ class LiveDrag:
         if not self._undo:
             return False
         self.let_go()
-        self.q, remembered = self._undo.pop()
-        self._subject.restore(remembered)
+        self.q = self._subject.restore(self._undo.pop())
         return True
 
     # ---- what is seen
@@ -214,12 +212,12 @@ class LiveDrag:
 
     def _remember(self) -> None:
         """Note what `undo` goes back to."""
-        self._undo.append((self.q.copy(), self._subject.remembered()))
+        self._undo.append(self._subject.remembered(self.q))
         del self._undo[:-100]  # postures that are remembered
 
     def _restart(self) -> None:
         """Begin to follow anew: holds, handle or method are others."""
-        self._trouble = ""
+        self._trouble, self._stopped, self._reach = "", "", FARTHEST_STEP
         followed = self.taken if self.taken in self.handles else next(iter(self.handles))
         held = self.held - {self.taken}
         target = self.orientation(followed) if self._turns else self.place(followed)
@@ -238,7 +236,7 @@ class LiveDrag:
 
         A handle stays where it is, and a thing moves by a micrometre.
         """
-        q, remembered = self.q, self._subject.remembered()
+        q, remembered = self.q, self._subject.remembered(self.q)
         name = next(iter(self.handles))
         place = self.place(name)
         try:
@@ -254,21 +252,38 @@ class LiveDrag:
         finally:
             self._subject.restore(remembered)
 
-    def _push(self, place: Array) -> None:
+    def _pushed(self, drag: Drag[Any], place: Array) -> DragFrame | None:
+        """A frame in which the thing that was taken comes nearer to a place (3,); None where it has to stay."""
+        before, deep = self._subject.remembered(self.q), self._deepest
         at = self.scene.objects[self.taken].placement
         way = place - at.translation
-        length = float(np.linalg.norm(way))
-        if length > FARTHEST_STEP:
-            way *= FARTHEST_STEP / length
+        way *= min(1.0, self._reach / max(float(np.linalg.norm(way)), 1e-12))
         self._subject.move(self.taken, pin.SE3(at.rotation, at.translation + way), FRAME)
+        frame = drag.to(self.place(next(iter(self.handles))))
+        met = [str(one) for one in frame.collisions if one.depth > max(deep, GRAZE)]
+        left = self._contacts(np.array(frame.q))
+        if -left.distance.min(initial=0.0) > max(deep, GRAZE):  # bodies that are held are not tested in a drag
+            first, second = (self.scene.piece_owner[piece] for piece in left.pair[0])
+            met.append(f"{first} and {second} would overlap")
+        if not met:
+            self._stopped, self._reach = "", min(1.25 * self._reach, FARTHEST_STEP)
+            return frame
+        self._subject.restore(before)
+        self._stopped = f"{self.taken} stays: {met[0]}"
+        # m: a thing tries to move at least so far
+        self._reach = max(0.5 * self._reach, 0.002)
+        return None
+
+    def _contacts(self, q: Array) -> Contacts:
+        # m: pairs nearer than this are counted as contacts
+        return self.scene.contacts(q, within=0.002)
 
     def _report(self, error: float, seconds: float) -> LiveFrame:
-        # m: pairs nearer than this are counted as contacts
-        contacts = self.scene.contacts(self.q, within=0.002)
-        overlap = float(-contacts.distance.min(initial=0.0))
+        contacts = self._contacts(self.q)
+        overlap = self._deepest = float(-contacts.distance.min(initial=0.0))
         verb = "turning" if self._turns else "dragging"
         doing = f"{verb} {self.taken}" if self.taken else "take a handle and drag it; click one to hold it"
         status = f"{doing}, by {self.method.name}"
-        if self._trouble:
-            status = f"{status}: {self._trouble}"
+        if self._trouble or self._stopped:
+            status = f"{status}: {self._trouble or self._stopped}"
         return LiveFrame(self.q, error, len(contacts.distance), overlap, seconds, status)

@@ -75,6 +75,7 @@ class LiveProblem:
         stated = (*problem.stated, *problem.bounds)
         self._fixed: tuple[Any, ...] = tuple(term for term in stated if not _handle_of(term, self.handles))
         self.held: Set[str] = {_handle_of(term, self.handles) for term in problem.constraints} - {""}
+        self._drag: Drag[Any] | None = None
 
     def stated(self, q: Array, goals: object, held: Collection[str]) -> Problem:
         """The problem with the start q (nq,), goals, and holds."""
@@ -107,7 +108,8 @@ class LiveProblem:
         The target is a place (3,), or an orientation (4,) as a quaternion.
         """
         goal = Point(followed, target) if len(target) == 3 else Orientation(followed, target)
-        return Drag(self.stated(q, [goal, *self.problem.goals], held), method, budget=BUDGET)
+        self._drag = Drag(self.stated(q, [goal, *self.problem.goals], held), method, budget=BUDGET)
+        return self._drag
 
     def move(self, name: str, at: pin.SE3, over: float | None = None) -> None:
         """Move a thing."""
@@ -116,14 +118,18 @@ class LiveProblem:
     def arrived(self) -> None:
         """Note that what follows has made a frame: nothing."""
 
-    def remembered(self) -> Any:
-        """What `restore` goes back to: the placements of the things."""
-        return {name: self.scene.objects[name].placement for name in things_of(self.scene)}
+    def remembered(self, q: Array) -> Any:
+        """What `restore` goes back to: the placements of the things, and the posture q (nq,)."""
+        return {name: self.scene.objects[name].placement for name in things_of(self.scene)}, q.copy()
 
-    def restore(self, remembered: Any) -> None:
-        """Put the things back."""
-        for name, at in remembered.items():
+    def restore(self, remembered: Any) -> Array:
+        """Put the things back; returns the posture (nq,), from which what follows goes on."""
+        things, q = remembered
+        for name, at in things.items():
             self.scene.move(name, at=at)
+        if self._drag is not None:
+            self._drag.q = q
+        return np.array(q)
 
 
 class LiveAssembly:
@@ -177,21 +183,23 @@ class LiveAssembly:
         if self._dragged is not None:
             self._still.place(self._dragged.variables())
 
-    def remembered(self) -> Any:
+    def remembered(self, q: Array) -> Any:
         """The placements of the things and of the bodies, and what holds."""
         things = {name: self.scene.objects[name].placement for name in things_of(self.scene)}
         return things, self._still.variables(), self.constraints
 
-    def restore(self, remembered: Any) -> None:
+    def restore(self, remembered: Any) -> Array:
         """Put things, bodies and constraints back."""
         things, variables, constraints = remembered
         for name, holds in constraints.items():
             if holds != self.constraints[name]:
                 self.constrain(name, holds)
-        self._dragged = None
-        self._still.place(variables)
-        for name, at in things.items():
-            self._still.move(name, at=at)
+        for made in (self._still, self._dragged):
+            if made is not None:
+                made.place(variables)
+                for name, at in things.items():
+                    made.move(name, at=at)
+        return self._still.q
 
     def stated(self, q: Array, goals: object, held: Collection[str]) -> Problem:
         """Raise InputError."""

@@ -30,26 +30,19 @@ class Marker:
 
 @dataclass
 class Keyframe:
-    """Everything that can change from one posture to the next.
+    """Everything that can change from one posture to the next."""
 
-    Attributes:
-        transforms: placement (4, 4) by node, relative to the node above.
-        colors: by node.
-        crowds: pieces that are drawn together, by node; a motion shows those of its first keyframe.
-        markers: marker and placement (4, 4) by node. Markers of earlier keyframes that are not named are hidden.
-        contacts_shown: whether all pairs that overlap are shown.
-        touching, overlapping: numbers of pairs that are shown as touching, and that overlap.
-        overlap: depth of the deepest overlap, metres.
-    """
-
-    transforms: dict[str, Array] = field(default_factory=dict)
-    colors: dict[str, Color] = field(default_factory=dict)
+    transforms: dict[str, Array] = field(default_factory=dict)  # placement (4, 4) by node, relative to the node above
+    colors: dict[str, Color] = field(default_factory=dict)  # by node
+    # pieces that are drawn together, by node; a motion shows those of its first keyframe
     crowds: dict[str, Instances] = field(default_factory=dict)
+    # marker and placement (4, 4) by node. Markers of earlier keyframes that are not named are hidden.
     markers: dict[str, tuple[Marker, Array]] = field(default_factory=dict)
-    contacts_shown: bool = True
+    contacts_shown: bool = True  # whether all pairs that overlap are shown
+    # touching and overlapping: numbers of pairs that are shown as touching, and that overlap
     touching: int = 0
     overlapping: int = 0
-    overlap: float = 0.0
+    overlap: float = 0.0  # depth of the deepest overlap, metres
 
 
 class SceneGraph:

@@ -154,6 +154,9 @@ def test_a_clip_asks_the_same_when_it_is_looked_at_again() -> None:
          for k in range(5)]  # fmt: skip
     swept = SweptDepth(scene.pair_table, scene.geometry, DEPTH)
 
+    swept.start(q[0])
+    assert swept.asked < 0.2 * len(scene.pair_table.pairs)  # only those whose bounds overlap
+
     def run() -> list[Any]:
         found = [swept.start(q[0])]
         return [*found, *(part for posture in q[1:] for part in swept.advance(posture))]

@@ -25,25 +25,20 @@ class Bone(NamedTuple):
 
 
 class Patch(NamedTuple):
-    """A part of the surface, of which most is moved by the bones of a segment.
+    """A part of the surface, of which most is moved by the bones of a segment."""
 
-    Attributes:
-        name, segment, color: such as "shirt:left_upper_arm", which is unique; its segment; red, green, blue.
-        vertices, normals: (n, 3) metres, in the world of the binding posture, and outward unit vectors.
-        bones, weights: (n, 4) indices of bones, and their influences, which add up to 1.
-        faces: (m, 3) indices of vertices, wound outwards.
-        coarse: (k, 3) the same of fewer and larger triangles, for shadows and small pictures.
-    """
-
+    # name, segment and color: such as "shirt:left_upper_arm", which is unique; its segment; red, green, blue
     name: str
     segment: str
     color: tuple[float, float, float]
+    # vertices and normals: (n, 3) metres, in the world of the binding posture, and outward unit vectors
     vertices: Array
     normals: Array
+    # bones and weights: (n, 4) indices of bones, and their influences, which add up to 1
     bones: NDArray[np.uint8]
     weights: Array
-    faces: NDArray[np.int64]
-    coarse: NDArray[np.int64]
+    faces: NDArray[np.int64]  # (m, 3) indices of vertices, wound outwards
+    coarse: NDArray[np.int64]  # (k, 3) the same of fewer and larger triangles, for shadows and small pictures
 
 
 class Surface(NamedTuple):
@@ -84,25 +79,18 @@ class Claim(NamedTuple):
 
 
 class Garment(NamedTuple):
-    """A part of one colour, before it is made.
+    """A part of one colour, before it is made."""
 
-    Attributes:
-        name, color: such as "shirt", and red, green, blue.
-        field: its solid in the world of the body's binding posture.
-        low, high: (3,) corners of a box around it.
-        cell: size of the grid's cells, metres.
-        claims: regions of the bones that move it.
-        cuts: half spaces that end it at sharp edges: hem, collar, cuffs.
-    """
-
+    # name and color: such as "shirt", and red, green, blue
     name: str
     color: tuple[float, float, float]
-    field: Field
+    field: Field  # its solid in the world of the body's binding posture
+    # low and high: (3,) corners of a box around it
     low: Array
     high: Array
-    cell: float
-    claims: Sequence[Claim]
-    cuts: Sequence[Field] = ()
+    cell: float  # size of the grid's cells, metres
+    claims: Sequence[Claim]  # regions of the bones that move it
+    cuts: Sequence[Field] = ()  # half spaces that end it at sharp edges: hem, collar, cuffs
 
 
 def bounds(points: Sequence[Array], margin: float) -> tuple[Array, Array]:

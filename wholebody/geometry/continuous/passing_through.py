@@ -73,16 +73,18 @@ class Entered(NamedTuple):
     inside: bool  # whether it overlaps at the end
 
 
-def entered(sweep: Sweep, depths: SweptDepth, path: Sequence[Array], watched: NDArray[np.bool_]) -> list[Entered]:
+def entered(
+    sweep: Sweep, depths: SweptDepth, path: Sequence[Array], watched: NDArray[np.bool_]
+) -> list[Entered]:  # fmt: skip
     """The pairs that one motion after the other leads through each other, and those that overlap where it ends.
 
     They get deeper on the way than at the beginning by `OVERLAP`, or overlap at the end by `INSIDE`: if they are not
-    watched (pairs,), by that much more than at the beginning. The path has one configuration (nq,) or more.
+    watched (pairs,), by that much more than at the beginning. There are none where the motions one after the other are
+    free, or the straight one from the first configuration to the last. The path has one configuration (nq,) or more.
     """
     last = _by_pair(depths.start(path[-1]), len(watched))
-    if not (last > INSIDE).any() and all(
-        sweep.first_contact(q0, q1, tolerance=OVERLAP) is None for q0, q1 in pairwise(path)
-    ):
+    ways = ((path[0], path[-1]), path) if len(path) > 2 else (path,)
+    if not (last > INSIDE).any() and any(_is_clear(sweep, way) for way in ways):
         return []
     first = _by_pair(depths.start(path[0]), len(watched))
     most = first.copy()
@@ -93,6 +95,10 @@ def entered(sweep: Sweep, depths: SweptDepth, path: Sequence[Array], watched: ND
         Entered(number, float(last[number] if inside[number] else most[number]), bool(inside[number]))
         for number in np.flatnonzero(inside | (most > first + OVERLAP)).tolist()
     ]
+
+
+def _is_clear(sweep: Sweep, path: Sequence[Array]) -> bool:
+    return all(sweep.first_contact(q0, q1, tolerance=OVERLAP) is None for q0, q1 in pairwise(path))
 
 
 def _by_pair(depths: Depths, pairs: int) -> Array:

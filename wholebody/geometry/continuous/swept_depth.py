@@ -63,7 +63,9 @@ class SweptDepth:
             place.distances.reset()
         self._now.move(q)
         self._q = q
-        return self._look(np.full(len(self._table.pairs), -np.inf), np.zeros(len(self._table.pairs)))[0]
+        nothing = np.zeros(len(self._table.pairs))
+        self._screened(np.full(len(nothing), -np.inf), nothing)
+        return self._overlaps(np.flatnonzero(self._now.least < 0.0))
 
     def advance(self, q: Array) -> tuple[Depths, Depths]:
         """Go on to the next posture (nq,), along ``pin.interpolate``.
@@ -93,17 +95,26 @@ class SweptDepth:
 
     def _look(self, before: Array, speed: Array) -> tuple[Depths, Indices]:
         """Overlaps at the present posture, and the pairs that may overlap on the way there."""
+        doubtful = self._screened(before, speed)
+        overlaps = self._overlaps(doubtful)
+        return overlaps, doubtful[before[doubtful] + self._now.least[doubtful] - speed[doubtful] < 0.0]
+
+    def _screened(self, before: Array, speed: Array) -> Indices:
+        """The pairs that may overlap on the way to the present posture or at it; bounds there of all."""
         now, table = self._now, self._table
         count = self._kernel.screen(
             now.places, (table.pairs, table.reach, table.half), speed, before, now.least, self._extent, self._index
         )
-        doubtful = self._index[:count].copy()
         now.exact[:] = False
-        self._ask(now, doubtful)
-        overlap = doubtful[now.rows[doubtful, 0] < 0.0]
-        with np.errstate(invalid="ignore"):  # before the first posture bounds are infinite
-            still = before[doubtful] + now.least[doubtful] - speed[doubtful] < 0.0
-        return Depths(overlap, -now.rows[overlap, 0]), doubtful[still]
+        screened: Indices = self._index[:count].copy()
+        return screened
+
+    def _overlaps(self, numbers: Indices) -> Depths:
+        """Those of some pairs that overlap at the present posture."""
+        now = self._now
+        self._ask(now, numbers)
+        overlap = numbers[now.rows[numbers, 0] < 0.0]
+        return Depths(overlap, -now.rows[overlap, 0])
 
     def _ask(self, place: _Postures, numbers: Indices) -> None:
         self.asked += len(numbers)

@@ -134,10 +134,11 @@ class Iteration:
         enough = FRAMES.least_progress if early_exit else STEPS.least_progress
         patience = FRAMES.patience if early_exit else STEPS.patience
         begun, most = self.x, FRAMES.time_share if early_exit else 1.0
-        for _ in range(iterations):
+        for tried in range(iterations):
             over = active.control.over or active.control.spent > most
-            # a frame gets on in any case: its budget ends it after a step
-            if self._holds(goals) or active.control.reason or (over and self.x is not begun):
+            # a frame gets on if it can: its budget ends it after a step, or three that failed
+            late = over and (self.x is not begun or tried >= 3)
+            if self._holds(goals) or active.control.reason or late:
                 return
             active.control.tell(TraceEntry(self.goal, self.hard, 0.0, 0.0))
             before = self._norms(self.residual)

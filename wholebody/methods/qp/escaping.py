@@ -17,6 +17,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.figures.state import free_roots, root_freedoms
+from wholebody.methods.control import BUDGET
 from wholebody.methods.qp.settings import ESCAPE
 from wholebody.terms.linearisation import PackedLinearisation
 
@@ -53,7 +54,7 @@ def projection_rows(at: PackedLinearisation, rows: Array, room: Array) -> Projec
 
 
 def free_end(model: pin.Model, q: Array, out: float, rows_at: Callable[[Array], ProjectionRows]) -> Array | None:
-    """A posture (nq,) that is free, whatever passes on the way to it; None if none was found.
+    """A posture (nq,) that is free, whatever passes on the way to it; None if none was found in a frame's budget.
 
     Args:
         model: of the figure.
@@ -65,6 +66,8 @@ def free_end(model: pin.Model, q: Array, out: float, rows_at: Callable[[Array], 
     for start in _starts(model, box):
         gone, least, weak = start, np.inf, 0
         for _ in range(ESCAPE.rounds):
+            if BUDGET.spent > 1.0:
+                return None
             here = np.asarray(pin.integrate(model, q, gone))
             at = rows_at(here)
             if at.depth <= out:

@@ -14,6 +14,7 @@ from wholebody.base.errors import TermError
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
 from wholebody.methods.base import Method, begun, goal_error, nearest_to
+from wholebody.methods.control import BUDGET
 from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.methods.qp.escaping import ProjectionRows, free_end, projection_rows
 from wholebody.methods.qp.escaping import compiled_kernel as compiled_escape
@@ -75,7 +76,7 @@ class QPTracker(NotCopyable):
         self.workspace = problem.workspace()
         self._distance = np.full(len(self.workspace.table.pairs), np.inf)  # room of `_nearer`
         self._left: Array | None = None
-        self._begun = False
+        self._begun, self._revision = False, problem.scene.revision
         self._set_up()
 
     def step(self, q: Array, measures: bool = True) -> QPStep:
@@ -94,7 +95,8 @@ class QPTracker(NotCopyable):
         """
         measures = flag(measures, "measures")
         with self._alone:
-            self.problem.check_fresh()
+            if self.problem.scene.revision != self._revision:
+                self.problem.check_fresh()
             if not self._begun or type(q) is not np.ndarray:  # a step takes as long as ten such checks
                 q, self._begun = begun(self.problem, q), True
             self.workspace.refresh()
@@ -151,13 +153,14 @@ class QPTracker(NotCopyable):
     def _among_moving(self, q: Array, measures: bool, motion: FrameMotion) -> QPStep:
         """A step in which things move, or did and are still in the figure: they advance by shares, and it gives way.
 
-        Bounds on speeds are bounds on the way of the whole step.
+        Bounds on speeds are bounds on the way of the whole step. Where a frame's budget ends before, things go the rest
+        of their way while the figure stays.
         """
         workspace, model = self.workspace, self.workspace.model
         q = posture(q, model.nq)
         most = at_speeds(self.problem.bounds, workspace.state.update(q), self.dt)
-        path, steps, before = [(0.0, q)], list[QPStep](), np.inf
-        while True:
+        path, steps, before, depth = [(0.0, q)], list[QPStep](), np.inf, 0.0
+        while not steps or BUDGET.spent <= 1.0:
             share, here = path[-1]
             if share < 1.0:
                 workspace.place(motion.placements(share))
@@ -173,6 +176,9 @@ class QPTracker(NotCopyable):
             steps.append(self._step(here, measures and following > share))
             path.append((following, clipped(model, q, steps[-1].q, most)))
         self._left = None
+        if path[-1][0] < 1.0:
+            path.append((1.0, path[-1][1]))
+            workspace.place(motion.placements(1.0))
         free = (
             None if depth <= TRACKING.out or motion.still else free_end(model, q, TRACKING.out, self._projection_rows)
         )
@@ -218,11 +224,8 @@ class QPTracker(NotCopyable):
             answer = program.solve(at, measures)
             motion = answer.motion
         share = min(1.0, 0.5 * self._query_distance / max(motion, 1e-12))
-        displacement = answer.x.copy() if share == 1.0 else share * answer.x
-        following, curved = (
-            None,
-            share * motion * (share * answer.turn + TRACKING.off),
-        )  # roughly, and rather too much
+        displacement, following = share * answer.x, None
+        curved = share * motion * (share * answer.turn + TRACKING.off)  # roughly, and rather too much
         if curved > TRACKING.inside and answer.spare < 0.5 * TRACKING.spare * curved:
             bent = 0.0
             if curved > least_unseen(answer.asked):
@@ -272,7 +275,7 @@ class QPTracker(NotCopyable):
         contacts, asked = at.contacts, at.clearance[: len(at.contacts.distance)]
         began, unseen = np.minimum(contacts.distance, asked), unseen_by_rows(asked)
         rows, groups = self._program.rows, None
-        for _ in range(TRACKING.corrections):
+        for _ in range(TRACKING.corrections if BUDGET.spent <= 1.0 else 0):
             short, q = self._shortfall(
                 at, displacement, np.maximum(began, predicted_distances(rows, asked, displacement)), began, midway
             )
@@ -332,10 +335,12 @@ class QPTracker(NotCopyable):
         """Take what was replaced of the problem since the last step; where targets moved only, keep what is set up."""
         problem, own = self.problem, self._lineariser
         if problem.bounds is not own.bounds or problem.measures is not own.measures:
+            problem.check_fresh()
             self._set_up()
             return
         moved, held = problem.goals is not own.goals, problem.constraints is not own.constraints
-        own.take(problem.goals, problem.clearances, problem.constraints)
+        if own.take(problem.goals, problem.clearances, problem.constraints):
+            problem.check_fresh()
         kept = not held or (self._of_constraints() == self._constraints and self._program.hold(problem.constraints))
         if not kept or (moved and self._of_goals() != self._goals):
             self._lay_out()

@@ -15,22 +15,15 @@ from wholebody.tracking.tracks import MOST_FRAMES
 
 
 class NodeMotion(NamedTuple):
-    """An animated tree: y up, z forward, metres as its format has it.
+    """An animated tree: y up, z forward, metres as its format has it."""
 
-    Attributes:
-        names, parents: of the k nodes; -1 for those on top.
-        worlds: (n, k, 4, 4) placements in the world.
-        bind: (k, 4, 4) placements in the posture in which a body is bound to them, or in which they rest.
-        dt: seconds.
-        notes: sentences on what was chosen.
-    """
-
+    # names and parents: of the k nodes; -1 for those on top
     names: Sequence[str]
     parents: Indices
-    worlds: Array
-    bind: Array
-    dt: float
-    notes: tuple[str, ...] = ()
+    worlds: Array  # (n, k, 4, 4) placements in the world
+    bind: Array  # (k, 4, 4) placements in the posture in which a body is bound to them, or in which they rest
+    dt: float  # seconds
+    notes: tuple[str, ...] = ()  # sentences on what was chosen
 
     def skeleton(self, joints: Collection[int], title: str, unit: str | None, up: str | None) -> SkeletonMotion:
         """The skeleton of some nodes and those between them, in metres with z up; see `read_skeleton`.

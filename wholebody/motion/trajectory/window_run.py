@@ -34,24 +34,17 @@ NEARLY = 0.03  # rad, m: first trust region of the rounds after the first; few r
 
 @dataclass(frozen=True)
 class WindowSettings:
-    """Numbers of the windows.
+    """Numbers of the windows."""
 
-    Attributes:
-        first: seconds of smoothness of the first answer; where it is shorter, more attempts end on a wrong side.
-        rougher, smoother: shares of this time in the second answer.
-        jerk: parts of the original's; an answer with more is made smoother.
-        share: of the squared deviation; acceleration that costs less leaves little to gain.
-        rounds: of sweeping and adding places between frames.
-        iterations: most steps of one run; a step takes one to three programs.
-    """
-
+    # seconds of smoothness of the first answer; where it is shorter, more attempts end on a wrong side
     first: float = 0.1
+    # rougher and smoother: shares of this time in the second answer
     rougher: float = 0.4
     smoother: float = 1.5
-    jerk: float = 1.2
-    share: float = 0.1
-    rounds: int = 12
-    iterations: int = 40
+    jerk: float = 1.2  # parts of the original's; an answer with more is made smoother
+    share: float = 0.1  # of the squared deviation; acceleration that costs less leaves little to gain
+    rounds: int = 12  # of sweeping and adding places between frames
+    iterations: int = 40  # most steps of one run; a step takes one to three programs
 
 
 SETTINGS = WindowSettings()
