@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Hashable, Sequence
 from typing import Annotated, Any, NamedTuple, TypeAlias, TypeVar
 
@@ -99,9 +100,12 @@ def point(value: object, where: str) -> Array:
 
 def check_reachable(place: Array, where: str) -> None:
     """Refuse a position that cannot be in metres."""
-    if place.dot(place) > FARTHEST**2:
-        distance = math.hypot(*place)
+    if place.dot(place) <= 900.0:  # m^2: farther is hardly meant
+        return
+    distance = math.hypot(*place)
+    if distance > FARTHEST:
         raise InputError(f"{where} is {distance:.4g} m away; lengths are in metres, so divide millimetres by 1000")
+    warnings.warn(f"{where} is {distance:.3g} m away; lengths are in metres: divide centimetres by 100", stacklevel=3)
 
 
 def direction(value: object, where: str) -> Array:
