@@ -18,7 +18,7 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeAlias, Union, get_ar
 import numpy as np
 
 from wholebody.base import checks
-from wholebody.base.errors import InputError, WholebodyError
+from wholebody.base.errors import InputError
 
 Check: TypeAlias = Callable[[Any, str], Any]
 """A function of a value and its name in messages: the value in the form in which it is used, or an InputError."""
@@ -111,16 +111,14 @@ class Checked:
     def __post_init__(self) -> None:
         """Check the fields."""
         kind: Any = type(self)
+        where = ""
         for field in _checked(kind):
             value = getattr(self, field.name)
             if value is field.default:
                 checks.settle(self, field.kept, field.found)
             elif value is not None or not field.optional:
-                try:
-                    found = field.check(value, field.name)
-                except WholebodyError:  # again, with the name, which takes longer than most checks
-                    found = field.check(value, f"{called(self)}: {field.name}")
-                checks.settle(self, field.kept, found)
+                where = where or called(self)
+                checks.settle(self, field.kept, field.check(value, f"{where}: {field.name}"))
                 if field.kept != field.name and hasattr(value, "copy"):  # the caller may change an array of its own
                     checks.settle(self, field.name, value.copy())
 
