@@ -45,7 +45,7 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> Recording:
     if pictures:
         film(
             "avatar_two_arms", scene, recording, 110, out,
-            eye=(-1.2, -2.9, 1.8), target=(0.75, 0.0, 1.0), see_through=["wall"],
+            eye=(-0.3, -2.5, 2.0), target=(0.8, 0.0, 1.1), see_through=["wall"],
         )  # fmt: skip
     return recording
 

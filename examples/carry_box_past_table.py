@@ -12,7 +12,7 @@ import wholebody as wb
 SIZE = (0.24, 0.22, 0.36)  # m: of the box; the last from palm to palm
 GRIP = 0.001  # m: between a palm and the box
 MIDDLE = (0.09, 0.0, 0.5 * SIZE[2] + GRIP)  # m: of the box, in the axes of the right palm
-OTHER_PALM = (0.0, 0.0, SIZE[2] + 2.0 * GRIP, 1.0, 0.0, 0.0, 0.0)  # across the box, turned to face the right one
+OTHER_PALM = (0.0, 0.0, SIZE[2] + 2.0 * GRIP, -1.0, 0.0, 0.0, 0.0)  # across the box, turned to face the right one
 PLACE = (0.42, 0.03, 1.0)  # m: target of the middle of the box, close beside the vase
 
 VASE = (0.50, -0.22, 0.94)  # m: its middle

@@ -45,11 +45,11 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> int:
         motion = [viewed.configuration(frame.q, frame.placements) for frame in frames]
         out.mkdir(parents=True, exist_ok=True)
         with wb.Viewer(viewed, contact_distance=0.0, title="dominoes") as viewer:
-            viewer.look(eye=(0.10, -0.75, 0.35), target=(0.25, 0.0, 0.03))
+            viewer.look(eye=(-0.12, -0.36, 0.26), target=(0.19, 0.0, 0.02))
             viewer.play(motion, 1.0 / 60.0)
             print(f"  {viewer.save(out / 'dominoes.html')}")
             try:
-                print(f"  {write_filmstrip(viewer, [motion[k] for k in (10, 35, 55, 140)], out / 'dominoes.png')}")
+                print(f"  {write_filmstrip(viewer, [motion[k] for k in (20, 45, 60, 140)], out / 'dominoes.png')}")
             except wb.MissingPackageError as error:
                 print(f"  no picture: {error}")
     return fallen

@@ -1,7 +1,7 @@
 """A method of one's own in forty lines: the Jacobian transpose, accepted wherever a method is named.
 
 wholebody pose examples/tasks/shelf.toml --method own_method:JacobianTranspose     # in the folder of this file
-wholebody bench compare free_reach --methods own_method:JacobianTranspose qp
+wholebody bench compare --sets free_reach --methods own_method:JacobianTranspose qp
 """
 
 from __future__ import annotations
@@ -58,15 +58,17 @@ class JacobianTranspose(SolvesAnew):
 
 def main(out: Path = Path("pictures"), pictures: bool = True) -> None:
     """Reach with a hand, compare with the QP method, and draw."""
+    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Box((0.6, 1.2, 0.04)), name="table", at=(0.65, 0.0, 0.74))
     problem = wb.Problem(
-        wb.Scene(wb.load("human")), "standing", goals=[wb.Point("right_palm", (0.5, -0.3, 1.1))],
+        scene, "standing", goals=[wb.Point("right_palm", (0.5, -0.3, 1.1))],
         constraints=[wb.Freeze("root")], range_of_motion=False,
     )  # fmt: skip
-    for method in (JacobianTranspose(), wb.QP()):
+    for method in (JacobianTranspose(tolerance=1e-5), wb.QP()):
         solution = wb.solve(problem, method)
         print(f"{solution.method}: {solution.message}, {solution.iterations} iterations")
         if pictures and solution.method == "transpose":
-            picture("own_method", problem, solution, out, eye=(2.9, -2.9, 1.7), target=(0.1, 0.0, 0.85))
+            picture("own_method", problem, solution, out, eye=(1.6, -2.4, 1.9), target=(0.2, 0.0, 1.1))
 
 
 if __name__ == "__main__":

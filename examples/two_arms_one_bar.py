@@ -14,7 +14,7 @@ ARM = Path(__file__).parent / "tasks" / "arm.urdf"
 APART = 1.10  # m: between the two arms, which face each other
 BAR, GRIPS = 0.36, 0.22  # m: length of the bar, and from one grip to the other
 FROM, TO = -0.22, 0.24  # m: where the bar is along the bench, and where it is to be, turned by 0.4 rad
-DOWN = {"left": (1.0, 0.0, 0.0, 0.0), "right": (0.0, 1.0, 0.0, 0.0)}  # of the grips: from above, along the bar
+DOWN = {"left": (-1.0, 0.0, 0.0, 0.0), "right": (0.0, 1.0, 0.0, 0.0)}  # of the grips: from above, along the bar
 
 
 def build() -> tuple[wb.Scene, np.ndarray]:

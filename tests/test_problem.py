@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wholebody as wb
@@ -196,12 +197,14 @@ def test_clearances_of_another_shape_are_refused_by_every_method(method, shape):
         wb.assess(problem, problem.start)
 
 
-def test_defaults_follow_what_the_feet_carry():
+@pytest.mark.parametrize("stated", [(), (wb.Balance(),)], ids=["default", "stated"])
+def test_balance_follows_what_the_feet_carry(stated):
     """Shoes that are moved between two problems move the support polygon, as in a scene that never saw them before."""
     soles = [wb.Hold(f"{side}_sole") for side in ("left", "right")]
 
     def polygon(scene):
-        return next(term for term in wb.Problem(scene, constraints=soles).defaults if isinstance(term, wb.Balance))
+        constraints = wb.Problem(scene, constraints=[*soles, *stated]).constraints
+        return next(term for term in constraints if isinstance(term, wb.Balance))
 
     def shod(at):
         scene = wb.Scene(wb.load("human"))
@@ -230,3 +233,16 @@ def test_a_start_that_was_stated_before_sees_where_things_are_now() -> None:
             break
     assert 0.0 < scene.contacts(start, 0.5).distance.min() < 0.015
     assert (wb.Problem(scene, start, clearance=0.02).clearances < away.clearances).any()
+
+
+def test_constraints_that_were_stated_before_at_this_start_are_those_of_their_own_words() -> None:
+    """What follows from a start is kept for the same constraints alone: not for other words, nor for another start."""
+    scene = wb.Scene(wb.load("hand"))
+    starts = [scene.figure.neutral, pin.integrate(scene.model, scene.figure.neutral, np.full(scene.model.nv, 0.1))]
+    for q in (starts[0], starts[1], starts[0]):
+        for frame, turned in (("right_index_tip", True), ("right_thumb_tip", True), ("right_index_tip", False)):
+            for _ in range(2):
+                (held,) = wb.Problem(scene, q, constraints=[wb.Hold(frame, orientation=turned)]).stated
+                assert np.abs(held.value(scene.state(q))).max() < 1e-12
+                assert len(held.value(scene.state(q))) == 3 + 3 * turned
+                assert held.frame == frame

@@ -27,6 +27,7 @@ from wholebody.tasks.answers import in_words, is_own
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.checks import KINDS, check_measure, check_rows, checked_terms
 from wholebody.tasks.defaults import balancing, default_constraints, default_measures, stances, standing
+from wholebody.tasks.inputs import once
 from wholebody.terms.linearisation import Lineariser
 from wholebody.terms.plan import TermPlan, Terms, make_plan
 
@@ -112,7 +113,7 @@ class Problem(checks.FixedAttributes):
         self.balance = balance if balance is None else checks.flag(balance, "balance")
         measured = None if measures is None else checked_terms(measures, (Measure,), "measures")
         self.goals: tuple[Goal, ...] = tuple(goal.resolve(scene, self.start) for goal in terms)
-        stated = tuple(term.resolve(scene, self.start) for term in given if isinstance(term, Constraint))
+        stated = self._resolved([term for term in given if isinstance(term, Constraint)])
         self._places = tuple(place for place, term in enumerate(given) if isinstance(term, Constraint))
         self.bounds: tuple[Bound, ...] = tuple(
             term.resolve(scene, self.start) for term in given if isinstance(term, Bound)
@@ -134,6 +135,16 @@ class Problem(checks.FixedAttributes):
             _check_goals(self.goals, state)
             self._check_terms(state)
             self.clearances = self._clearances(workspace)
+
+    def _resolved(self, terms: Sequence[Constraint]) -> tuple[Constraint, ...]:
+        """Constraints that were stated, resolved; the same ones in the same scene at the same start are known."""
+        found = (term.resolve(self.scene, self.start) for term in terms)
+        key = self.start.tobytes(), *((type(term), *vars(term).values()) for term in terms)
+        try:
+            hash(key)
+        except TypeError:  # arrays and placements
+            return tuple(found)
+        return tuple(found) if any(map(is_own, terms)) else once(self.scene, key, partial(tuple, found))
 
     def _usual_measures(self, stated: Sequence[Constraint]) -> tuple[Measure, ...]:
         scene, start, ranges = self.scene, self.start, self.range_of_motion
@@ -171,7 +182,7 @@ class Problem(checks.FixedAttributes):
         if name == "start":
             return checks.posture(value, self.scene.model.nq, "start")
         if name == "clearances":
-            return checks.array(value, name, "one number a collision pair, metres")
+            return checks.array(value, name, "one number a collision pair, metres").copy()
         if name == "measures_given":
             return checks.flag(value, name)
         terms = checked_terms(value, KINDS[name], name)
@@ -228,7 +239,7 @@ class Problem(checks.FixedAttributes):
         if any(map(is_own, resolved)):
             with self.borrow() as workspace:
                 _check_goals(resolved, workspace.state.update(self.start))
-        self.goals = resolved
+        object.__setattr__(self, "goals", resolved)  # they need no other check
 
     def with_start(self, q: Array) -> Problem:
         """Copy with another start; terms that were resolved at the old start stay.

@@ -18,7 +18,7 @@ import wholebody as wb
 def build(figure, target, layout=None):
     """One case: the gripper of an arm to a place."""
     scene = wb.Scene(figure).add(wb.Box((0.3, 0.3, 0.3)), name="box", at=(0.5, 0.0, 0.15))
-    return wb.Problem(scene, goals=[wb.Point(next(iter(figure.chains.values())).tip, target)])
+    return wb.Problem(scene, goals=[wb.Point(list(figure.chains.values())[-1].tip, target)])
 
 
 class Table:

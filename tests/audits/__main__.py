@@ -290,11 +290,11 @@ def pen(arguments: argparse.Namespace) -> None:
 )
 def plans(arguments: argparse.Namespace) -> None:
     """Measure plans."""
-    from tests.audits.plans import rows
+    from tests.audits.plans import gap_row, rows
 
     sets = arguments.sets or ("arms_among_things", "clutter", "passage")
     cases, seeds = (1, 1) if arguments.quick else (arguments.cases, arguments.seeds)
-    facts, found = machine(), rows(sets, cases, seeds)
+    facts, found = machine(), [*rows(sets, cases, seeds), gap_row(2 if arguments.quick else 10)]
     text = report("Motions from starts to goals; lengths by the shortest of each problem.", {"": found}, facts)
     publish("plans", text, arguments, facts=facts, tables={"plans": found}, page=None)
 

@@ -14,7 +14,8 @@ from wholebody.figures import load
 from wholebody.motion.avoidance import avoid
 from wholebody.motion.checking import ClipCheck
 from wholebody.motion.clip import Clip
-from wholebody.motion.clip_torques import PLACE, LoadChange, load_change, torques
+from wholebody.motion.clip_torques import torques
+from wholebody.motion.load_change import PLACE, LoadChange, load_change
 from wholebody.motion.measures import deviation, foot_sliding
 from wholebody.motion.stance import usual_feet
 from wholebody.motion.strength import Strength

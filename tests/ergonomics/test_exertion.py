@@ -30,7 +30,7 @@ def bent(person: wb.Figure) -> Any:
 
 @pytest.mark.parametrize(
     "term",
-    [Exertion([*CARRIED, *PUSHED]), StrengthLimit(PUSHED), LoadedBalance(PUSHED)],
+    [Exertion([*CARRIED, *PUSHED]), StrengthLimit(PUSHED, standing=False), LoadedBalance(PUSHED)],
     ids=lambda term: type(term).__name__,
 )  # fmt: skip
 def test_derivatives_are_those_of_finite_differences(person: wb.Figure, bent: Any, term: Any) -> None:

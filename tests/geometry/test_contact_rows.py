@@ -211,6 +211,22 @@ def test_lever_rows_tell_the_gap_where_they_stand(free_bodies, kind, gap):
     assert levers >= 12
 
 
+def test_what_lies_on_an_edge_tilts_about_it_and_not_into_the_face(free_bodies):
+    """Past the edge the face falls away: at an angle of 0.05 a turn by 0.04 towards it is free, by 0.06 overlaps."""
+    scene = wb.Scene(free_bodies(wb.Box((0.2, 0.2, 0.02))))
+    scene.add(wb.Box((0.4, 0.4, 0.2)), name="table", at=(-0.2, 0.0, -0.1))  # its edge is the world's y axis
+
+    def tilted(angle):
+        turn = pin.exp3(np.array([0.0, angle, 0.0]))
+        return np.concatenate([turn @ (0.0, 0.0, 0.01), pin.Quaternion(turn).coeffs()])
+
+    contacts, rows, jacobian = rows_of(scene, tilted(0.05))
+    assert contacts.distance == pytest.approx([0.0], abs=1e-7)
+    for angle, fits in ((0.01, True), (-0.01, False)):
+        ahead = rows.gap + jacobian @ pin.difference(scene.model, tilted(0.05), tilted(angle))
+        assert (ahead.min() > -1e-6) == fits == (distance_of(scene, tilted(angle))[0] > -1e-6)
+
+
 def places(scene, q):
     """Where the rows stand, (m, 3), in the plane through the origin along the normal."""
     contacts, rows, _ = rows_of(scene, q)
@@ -356,14 +372,18 @@ def slowly(scene, q, contacts):
                 if drop >= module.BAND:
                     continue
                 lever = lever - (lever @ towards) * towards
-                share = 1.0
+                share, sag = 1.0, 0.0
                 base = placed.oMg[other].actInv(facing + module.INSET * towards)
                 for *outward, offset in planes(piece[other].geometry):
                     rate = np.dot(outward, placed.oMg[other].rotation.T @ lever)
                     if rate > 1e-12:
                         share = min(share, max(offset - np.dot(outward, base), 0.0) / rate)
+                    slope = -np.dot(outward, placed.oMg[other].rotation.T @ towards)
+                    there = offset - np.dot(outward, placed.oMg[other].actInv(facing)) < module.NORMAL_ROOM
+                    sag = max(sag, rate / slope) if there and slope > 0.0 else sag
                 over = over and share >= 1.0
-                corners.append((distance + share * drop, at + share * lever, share * np.linalg.norm(lever)))
+                gap = distance + share * drop + min(share * sag, module.INSET)
+                corners.append((gap, at + share * lever, share * np.linalg.norm(lever)))
             sides.append((corners, over and bool(corners)))
         (first, first_over), (second, second_over) = sides
         kept = first if first_over else second if second_over else first + second

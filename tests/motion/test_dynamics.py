@@ -10,8 +10,8 @@ import pytest
 
 import wholebody as wb
 from wholebody.motion.avoider import MethodResult, Run
-from wholebody.motion.clip_torques import LoadChange
 from wholebody.motion.frame_terms import frame_terms
+from wholebody.motion.load_change import LoadChange
 from wholebody.motion.stance import standing_feet
 from wholebody.motion.trajectory.loads import ClipLoads, standing_frames
 

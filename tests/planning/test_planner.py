@@ -173,3 +173,16 @@ def test_the_first_motion_is_tried_whatever_the_limit_of_time_and_goals_come_in_
     assert found.solved
     with pytest.raises(wb.InputError, match="goal is empty"):
         wb.plan(problem.scene, problem.start, [])
+
+
+def test_a_board_turns_to_get_through_a_gap(free_bodies: Callable[..., wb.Figure], least_distance: Distance) -> None:
+    """It is wider than the gap and stands across it at both ends, so its root turns on the way."""
+    figure = free_bodies(wb.Box((0.1, 0.7, 0.1)))
+    scene = wb.Scene(figure)
+    for name, y in (("left", 0.85), ("right", -0.85)):
+        scene.add(wb.Box((0.1, 1.2, 4.0)), name=name, at=(0.8, y, 0.0))  # the gap is 0.5 m wide
+    end = figure.neutral.copy()
+    end[0] += 1.6
+    found = wb.plan(scene, figure.neutral, end)
+    check(found, figure.neutral, end, Pace())
+    assert least_along(scene, found.clip.q, least_distance) >= -1e-6

@@ -23,7 +23,7 @@ class ReferenceRowBuilder(ContactRowBuilder):
     def rows(self, contacts: Contacts, clearance: Array | float = 0.0) -> ContactRows:
         k = len(contacts.distance)
         joint = self.table.joint
-        wide = np.flatnonzero(self._extended[contacts.number] & (contacts.distance < clearance + module.LEVER_DISTANCE))
+        wide = np.flatnonzero(self.arrays[0][contacts.number] & (contacts.distance < clearance + module.LEVER_DISTANCE))
         if len(wide):
             self._snap(contacts, wide)
         wrench = _wrenches(contacts.normal, contacts.point_a)
@@ -124,6 +124,10 @@ class ReferenceRowBuilder(ContactRowBuilder):
             rising = climb > 1e-12
             limit = np.where(rising, np.maximum(room, 0.0) / np.where(rising, climb, 1.0), 1.0)
             np.minimum.at(reach, row, limit)
+            slope = -np.einsum("ij,ij->i", plane[:, :3], np.einsum("ijk,ik->ij", rotation, towards)[row])
+            here = (slope > 0.0) & (room - module.INSET * slope < module.NORMAL_ROOM)  # faces of the witness point
+            below = np.where(here, reach[row] * climb / np.where(here, slope, 1.0), 0.0)
+            np.maximum.at(sag, row, np.minimum(below, module.INSET))
 
         capsule: Indices = np.flatnonzero(self._is_capsule[other])
         if len(capsule):

@@ -21,7 +21,7 @@ class ReferenceLineariser(Lineariser):
     def at(self, q: Array, within: float) -> Linearisation:
         """Everything at the posture q, shape (nq,), with the pairs nearer than `within` metres plus their clearance."""
         state, workspace = self.state, self.workspace
-        contacts = workspace.near(q, within + self._largest_clearance, self._most)
+        contacts = workspace.near(q, within + self._largest, self._clearances[1])
         clearance = self.clearances[contacts.number]
         rows = ReferenceRowBuilder(workspace.table).rows(contacts, clearance)
 
@@ -31,7 +31,7 @@ class ReferenceLineariser(Lineariser):
         jacobian = self._jacobians(state, sizes, rows.wrench, rows.second, rows.first)
         goal_rows = sum(len(error) for error in errors)
         value_rows = sum(len(value) for value in values)
-        lower, upper = self._box(state)
+        lower, upper = self._bounded(state)
         measure, gradient, curvature = self._measured(state)
         return Linearisation(
             q=np.array(q, dtype=float),
@@ -106,7 +106,7 @@ class ReferenceLineariser(Lineariser):
                 upper[bounded & (upper > 0.0)] *= share
         return lower, upper
 
-    def _box(self, state: State) -> tuple[Array, Array]:
+    def _bounded(self, state: State) -> tuple[Array, Array]:
         lower, upper = self._limited(state.q)
         for bound in self.bounds:
             # a joint out of its limits comes back no faster than the bound lets it

@@ -91,7 +91,9 @@ def humanoid() -> Any:
         geometry.addGeometryObject(pin.GeometryObject(f"{side}foot", joint, frame, placement, box))
     tip = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.7, 1.1), np.array([0.02, 0.01, -0.2]))
     model.addFrame(pin.Frame("tip", model.getJointId("larm_wrist2_joint"), 0, tip, pin.FrameType.OP_FRAME))
-    return SimpleNamespace(figure=StandInFigure(model), model=model, geometry=geometry)
+    figure = StandInFigure(model)
+    built = SimpleNamespace(moves=0, known=lambda key, make: make())
+    return SimpleNamespace(figure=figure, model=model, geometry=geometry, built=built)
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -87,3 +88,17 @@ def test_other_mistakes_are_found_when_the_figure_is_known(humanoid: Any) -> Non
     humanoid.figure.cones = {"left_shoulder": None}
     with pytest.raises(UnknownNameError, match="ReachCones: no reach cone is called 'left_sholder'"):
         tasks.ReachCones(("left_sholder",)).resolve(humanoid, q)
+
+
+def test_what_is_hardly_meant_is_told() -> None:
+    with pytest.warns(
+        UserWarning, match=r"target: the quaternion \(1, 0, 0, 0\) is half a turn about x; .* x, y, z, w"
+    ):
+        tasks.Orientation("tip", (1.0, 0.0, 0.0, 0.0))
+    with pytest.warns(UserWarning, match="quaternions are x, y, z, w"):
+        tasks.Frame("tip", (0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+    with pytest.warns(UserWarning, match="target is 98.7 m away; .* centimetres"):
+        tasks.Point("tip", (55.0, -20.0, 79.5))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        tasks.Frame("tip", (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0))

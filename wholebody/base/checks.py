@@ -262,7 +262,7 @@ def numbers(value: object, shape: tuple[int, ...], what: str) -> Array:
     found: Array = array(value, what, plain).copy()
     if found.shape != shape:
         raise InputError(f"{what} has shape {shape}, not {found.shape}; give {math.prod(shape)} numbers")
-    if not np.isfinite(found).all():
+    if not math.isfinite(np.vdot(found, found)) and not np.isfinite(found).all():  # the first takes a fifth of the time
         raise InputError(f"{what} is {shown(found.tolist())}; give finite numbers")
     found.flags.writeable = False
     return found

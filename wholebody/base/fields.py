@@ -96,6 +96,8 @@ class _Checked(NamedTuple):
     check: Check
     optional: bool
     kept: str
+    default: object  # a default that was checked, and what the check returned; MISSING where there is none
+    found: object
 
 
 class Checked:
@@ -109,10 +111,13 @@ class Checked:
     def __post_init__(self) -> None:
         """Check the fields."""
         kind: Any = type(self)
-        where = called(self)
+        where = ""
         for field in _checked(kind):
             value = getattr(self, field.name)
-            if value is not None or not field.optional:
+            if value is field.default:
+                checks.settle(self, field.kept, field.found)
+            elif value is not None or not field.optional:
+                where = where or called(self)
                 checks.settle(self, field.kept, field.check(value, f"{where}: {field.name}"))
                 if field.kept != field.name and hasattr(value, "copy"):  # the caller may change an array of its own
                     checks.settle(self, field.name, value.copy())
@@ -139,8 +144,18 @@ def _checked(kind: Any) -> tuple[_Checked, ...]:
         check = next(filter(None, map(_check, parts)), None)
         if check is not None:
             kept = f"resolved_{field.name}"
-            found.append(_Checked(field.name, check, type(None) in parts, kept if kept in names else field.name))
+            kept = kept if kept in names else field.name
+            found.append(_Checked(field.name, check, type(None) in parts, kept, *_default(field.default, check)))
     return tuple(found)
+
+
+def _default(default: object, check: Check) -> tuple[object, object]:
+    """A default with what its check returns, if any number of records may share that; else nothing."""
+    if default is MISSING or default is None:
+        return MISSING, MISSING
+    found = check(default, "default")
+    shared = not found.flags.writeable if isinstance(found, np.ndarray) else isinstance(found, (float, int, str, tuple))
+    return (default, found) if shared else (MISSING, MISSING)
 
 
 def _check(hint: Any) -> Check | None:

@@ -176,24 +176,24 @@ class Articulated:
             np.zeros((3 * count, model.nv)), np.zeros((3 * count, 6 * len(bodies))), np.zeros(3 * count),
             np.zeros(count), np.zeros(count), np.zeros(count), [], bodies, np.zeros(count, dtype=bool),
         )  # fmt: skip
-        jacobians = [np.zeros((6, model.nv))] + [
-            pin.getJointJacobian(model, self._data, joint, pin.WORLD) for joint in range(1, model.njoints)
-        ]
-        for c, (row, joints) in enumerate(
-            zip(contact.tolist(), zip(rows.first[kept], rows.second[kept], strict=True), strict=True)
-        ):
-            axes = _axes(normal[c])
-            here = slice(3 * c, 3 * c + 3)
-            directions = np.hstack([axes, np.cross(place[c], axes)])
-            made.figure[here] = directions @ (jacobians[joints[1]] - jacobians[joints[0]])
+        jacobians = np.array(
+            [np.zeros((6, model.nv))]
+            + [pin.getJointJacobian(model, self._data, joint, pin.WORLD) for joint in range(1, model.njoints)]
+        )
+        axes_of = _axes(normal)
+        directions_of = np.concatenate([axes_of, np.cross(place[:, None], axes_of)], axis=2)
+        moves = directions_of @ (jacobians[rows.second[kept]] - jacobians[rows.first[kept]])
+        made.figure[: 3 * len(contact)] = moves.reshape(-1, model.nv)
+        made.gap[: len(contact)] = rows.gap[kept]
+        for c, row in enumerate(contact.tolist()):
+            axes, directions, here = axes_of[c], directions_of[c], slice(3 * c, 3 * c + 3)
             owners = self._owners(near.pair[row])
-            made.gap[c] = rows.gap[kept][c]
             made.restitution[c], made.friction[c] = self._surface(*owners)
             for owner, sign in zip(owners, (-1.0, 1.0), strict=True):
                 if owner in names:
                     b = 6 * bodies.index(owner)
                     lever = place[c] - engine.centre(owner)  # type: ignore[union-attr]
-                    made.things[here, b : b + 6] += sign * np.hstack([axes, np.cross(lever, axes)])
+                    made.things[here, b : b + 6] += sign * np.hstack([axes, axes @ pin.skew(lever).T])
                     made.pushes.append((owner, c, place[c], sign * axes))
                 if owner in moved:
                     before, after = moved[owner]
@@ -327,7 +327,7 @@ class Articulated:
 
 
 def _axes(normal: Array) -> Array:
-    """(3, 3) the normal and two tangents, one a row."""
-    first = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
-    first /= np.linalg.norm(first)
-    return np.array([normal, first, np.cross(normal, first)])
+    """(m, 3, 3) normals (m, 3) and two tangents of each, one a row."""
+    first = np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=1)])
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    return np.stack([normal, first, np.cross(normal, first)], axis=1)

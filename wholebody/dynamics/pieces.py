@@ -25,7 +25,7 @@ HUMAN = MATERIALS["human"]  # of every figure
 class PlacedProximity(Proximity):
     """Distances between pieces that stand where they are said to stand."""
 
-    def placements(self, data: Array) -> Array:
+    def place(self, data: Array) -> Array:
         """Take placements (pieces, 4, 3) over, in the place of Pinocchio's data; see `Contacts.placements`."""
         self.distances.put(data)
         return data

@@ -203,8 +203,9 @@ class Figure(checks.FixedAttributes):
 
     def frame_id(self, name: str) -> int:
         """Return the index of a frame, a segment or a joint in `model.frames`."""
-        offered = {*self.frames, *self.segments}
-        return int(self._frame_ids[checks.known(name, self._frame_ids, "frame", offered=offered)])
+        if not isinstance(name, str) or name not in self._frame_ids:
+            checks.known(name, self._frame_ids, "frame", offered={*self.frames, *self.segments})
+        return int(self._frame_ids[name])
 
     def placement(self, q: Array, name: str) -> pin.SE3:
         """Return the placement in the world, at the posture q (nq,), of a frame, a segment or a joint."""

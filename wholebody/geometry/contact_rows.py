@@ -32,7 +32,7 @@ NORMAL_ROOM = 2.0 * COAL_ACCURACY  # m: by which a face's normal may part the pi
 MOST_ENDS = 8  # rows of one contact beside the witness row: a round face has dozens of corners; fewer rows rock more
 SETBACK = 1e-3  # m: of too many ends, one this much farther off counts as half as far out; less = more of the near ones
 SHORTEST_LEVER = 8e-3  # m: rows nearer to the witness point than this say what the witness row says
-LENGTHS = np.array([LEVER_DISTANCE, BAND, INSET, SHORTEST_LEVER, SAME_NORMAL, NORMAL_ROOM, SETBACK])
+LENGTHS = np.array([LEVER_DISTANCE, BAND, INSET, SHORTEST_LEVER, SAME_NORMAL, NORMAL_ROOM, SETBACK, MOST_ENDS])
 """What the compiled loops take of the above."""
 
 
@@ -47,7 +47,11 @@ class ContactRows(NamedTuple):
 
 
 class ContactRowBuilder:
-    """Builds contact rows for all near pairs at once. It remembers no posture, so any number of runs may share one."""
+    """Builds contact rows for all near pairs at once. It remembers no posture, so any number of runs may share one.
+
+    Attributes:
+        arrays: of the pieces, as compiled loops take them; see `patch_kernel.TableArrays`.
+    """
 
     def __init__(self, table: PairTable, most_ends: int = MOST_ENDS, same_normal: float = SAME_NORMAL) -> None:
         """Take the pieces and pairs, and how many rows a contact has at most beside its witness row.
@@ -55,13 +59,12 @@ class ContactRowBuilder:
         `same_normal` is the cosine of the angle to a face's normal within which coal's may be meant to be it.
         """
         self.table, self.most_ends = table, most_ends
-        self._lengths = LENGTHS.copy()
-        self._lengths[4] = same_normal
+        lengths = LENGTHS.copy()
+        lengths[4], lengths[7] = same_normal, most_ends
         flat = (np.diff(table.first_point) >= 2) | np.isinf(table.reach)
-        self._extended = flat[table.pairs].all(axis=1)
-        self._arrays = (
-            self._extended, table.joint, self._lengths, table.points, table.first_point, table.faces, table.first_face,
-            table.radius, table.axis,
+        self.arrays = (
+            flat[table.pairs].all(axis=1), table.joint, lengths, table.points, table.first_point, table.faces,
+            table.first_face, table.radius, table.axis,
         )  # fmt: skip
         self._kernel = compiled_kernel()
 
@@ -85,20 +88,11 @@ class ContactRowBuilder:
         wrench, gap = np.empty((most, 6)), np.empty(most)
         contact, joints = np.empty(most, dtype=np.intp), np.empty((most, 2), dtype=np.intp)
         asked = np.full(contacts.distance.shape, clearance, dtype=float)  # not a view: numba takes it for another type
-        count = self.write(contacts, asked, (wrench, gap, contact, joints))
+        count: int = self._kernel.contact_rows(contacts[:], asked, self.arrays, (wrench, gap, contact, joints))
         return ContactRows(
             gap[:count].copy(), wrench[:count].copy(), contact[:count].copy(), joints[:count, 0].copy(),
             joints[:count, 1].copy(),
         )  # fmt: skip
-
-    def write(self, contacts: Contacts, clearance: Array, room: tuple[Array, Array, Indices, Indices]) -> int:
-        """Write the rows of all contacts with clearances (k,), metres, into `room`; how many there are.
-
-        It is for ``k * (1 + most_ends)`` rows: wrenches (rows, 6), gaps (rows,), the contact that each row belongs to
-        (rows,), and the joints of its first and second piece (rows, 2).
-        """
-        count: int = self._kernel.contact_rows(contacts[:], clearance, self._arrays, self.most_ends, room)
-        return count
 
 
 @lru_cache(maxsize=1)
@@ -111,5 +105,5 @@ def compiled_kernel() -> Any:
     contacts = pair, lengths, points, points, points, none, placement
     table = yes, none, LENGTHS, points, none, faces, none, lengths, points
     room = np.zeros((0, 6)), lengths, none, pair
-    patch_kernel.contact_rows(contacts, lengths, table, MOST_ENDS, room)
+    patch_kernel.contact_rows(contacts, lengths, table, room)
     return patch_kernel

@@ -17,7 +17,8 @@ ShapeArrays: TypeAlias = tuple[Array, Indices, Array, Indices, Array, Array]
 
 TableArrays: TypeAlias = tuple[Mask, Indices, Array, Array, Indices, Array, Indices, Array, Array]
 """Whether both pieces of a pair have more than one swept point (pairs,), and the joint of each piece (n,); lever
-distance, band, inset, shortest lever, cosine of the same normal, room for it and setback; the arrays of the shapes."""
+distance, band, inset, shortest lever, cosine of the same normal, room for it, setback and most ends; the arrays of the
+shapes."""
 
 RowArrays: TypeAlias = tuple[Array, Array, Indices, Indices]
 """Room for the wrench (m, 6), gap (m,), contact (m,) and both joints (m, 2) of each row."""
@@ -75,7 +76,7 @@ def _patch_ends(
     """Ends of the patches of the contacts `wide`, at most `most_ends` each: contact (m,), point (m, 3) and gap (m,)."""
     pair, distance, normal, point_a, point_b, _, placement = contacts
     points, first_point, faces, first_face, radius, axis = shapes
-    band, inset, shortest, setback = lengths[1], lengths[2], lengths[3], lengths[6]
+    band, inset, shortest, accuracy, setback = lengths[1], lengths[2], lengths[3], lengths[5], lengths[6]
     most, most_points = 0, 0
     for c in wide:
         for side in range(2):
@@ -87,6 +88,7 @@ def _patch_ends(
     gap = np.empty(most)
     # of the points of one side that are in the band
     drop, length, worst = np.empty(most_points), np.empty(most_points), np.empty(most_points)
+    sagging = np.empty(most_points)  # how far the other piece falls below the plane until there, as it begins to
     lever, along = np.empty((3, most_points)), np.empty((3, most_points))
     filled = 0
     base, down, shift = np.empty(3), np.empty(3), np.empty(3)
@@ -141,11 +143,21 @@ def _patch_ends(
                         climb = share * (x * along[0, e] + y * along[1, e] + z * along[2, e])
                         if climb > worst[e]:
                             worst[e] = climb
+            _to_frame(placement[other], normal[c], sign, shift)
+            for e in range(count):
+                sagging[e] = 0.0
+            for f in range(first_face[other], first_face[other + 1] if count else 0):
+                x, y, z = faces[f, 0], faces[f, 1], faces[f, 2]
+                slope = -(x * shift[0] + y * shift[1] + z * shift[2])
+                room = faces[f, 3] - x * base[0] - y * base[1] - z * base[2]
+                if slope > 0.0 and room - inset * slope < accuracy:  # the witness point is on this face
+                    for e in range(count):
+                        climb = x * along[0, e] + y * along[1, e] + z * along[2, e]
+                        sagging[e] = max(sagging[e], climb / slope)
             for e in range(count):
                 reach = 1.0 / worst[e]
-                sag = 0.0
+                sag = min(reach * sagging[e], inset)
                 if capsule:
-                    _to_frame(placement[other], normal[c], sign, shift)
                     across0 = axis[other, 1] * shift[2] - axis[other, 2] * shift[1]
                     across1 = axis[other, 2] * shift[0] - axis[other, 0] * shift[2]
                     across2 = axis[other, 0] * shift[1] - axis[other, 1] * shift[0]
@@ -215,8 +227,8 @@ def _farthest_first(place: Array, gap: Array, witness: Array, distance: float, s
 
 
 @compiled()
-def contact_rows(contacts: ContactArrays, clearance: Array, table: TableArrays, most_ends: int, room: RowArrays) -> int:
-    """Write the rows of all contacts, with clearances (k,), as `ContactRowBuilder.write` does; how many there are."""
+def contact_rows(contacts: ContactArrays, clearance: Array, table: TableArrays, room: RowArrays) -> int:
+    """Write the rows of all contacts, of which distances (k,) are asked, metres; how many there are."""
     pair, distance, normal, point_a, _, number, _ = contacts
     extended, joint, lengths, points, first_point, faces, first_face, radius, axis = table
     shapes = points, first_point, faces, first_face, radius, axis
@@ -237,7 +249,7 @@ def contact_rows(contacts: ContactArrays, clearance: Array, table: TableArrays, 
         _wrench(normal[c], point_a[c], wrench[c])
     if not found:
         return count
-    owner, place, open_by = _patch_ends(wide, contacts, shapes, lengths, most_ends)
+    owner, place, open_by = _patch_ends(wide, contacts, shapes, lengths, int(lengths[7]))
     for e in range(len(owner)):
         c, row = owner[e], count + e
         gap[row], contact[row] = open_by[e], c

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from typing import TypeAlias
 
@@ -50,6 +51,9 @@ def placement(at: PlacementLike, what: str = "placement") -> pin.SE3:
         norm = float(np.linalg.norm(values[3:]))
         if np.isfinite(norm) and abs(norm - 1.0) > ROUNDING:
             raise InputError(f"{what}: the quaternion has length {norm:.6g}, not 1; give qx, qy, qz, qw of a rotation")
+        if values[3] == 1.0:
+            told = "is half a turn about x; quaternions are x, y, z, w, and (0, 0, 0, 1) is no turn"
+            warnings.warn(f"{what}: the quaternion (1, 0, 0, 0) {told}", stacklevel=3)
         x, y, z, w = values[3:] / norm if np.isfinite(norm) else values[3:]
         rotation = np.array(
             [

@@ -70,7 +70,7 @@ class Contacts(NamedTuple):
         return Contacts(*chosen)
 
 
-class _ContactBuffer:
+class ContactBuffer:
     """Room for so many contacts: distances; normals, points on the first and on the second piece; numbers; pairs."""
 
     def __init__(self, size: int) -> None:
@@ -144,16 +144,16 @@ class Proximity:
     Attributes:
         table: the pieces and pairs.
         geometry: the geometry model with the pieces' own placements.
-        seconds: what all queries have taken together.
+        seconds: what all questions have taken together.
         asked: how many distances coal was asked for.
         distances: what asks it, and `results`, Pinocchio's data.
+        known: pairs, how far each piece can have moved, and bounds of the pairs; see `proximity_kernel.gather`.
     """
 
     def __init__(self, table: PairTable) -> None:
         self.table = table
         self.geometry = table.geometry.copy()  # shapes are shared
-        self.seconds = 0.0
-        self.asked = 0
+        self.seconds, self.asked = 0.0, 0
         self.distances = PairDistances(self.geometry, table.pairs)
         self.results = self.distances.data
         self._kernel = compiled_kernel()
@@ -163,12 +163,12 @@ class Proximity:
         self._singly = pairs >= SINGLY
         self._travelled, self._endless = np.zeros(count), np.full(pairs, np.inf)
         self._bound = np.array([self._endless, table.points_meet])
-        self._placed, self._buffer = np.zeros((count, 4, 3)), _ContactBuffer(64)
+        self._placed, self._buffer = np.zeros((count, 4, 3)), ContactBuffer(64)
         self._looked = (
             table.pairs, table.reach, table.half, np.zeros((count, 4, 3)), self._travelled, self._bound,
             np.zeros((count, 3)), marks,
         )  # fmt: skip
-        self._gathered = table.pairs, self._travelled, self._bound
+        self.known = table.pairs, self._travelled, self._bound
         # memory that is never written takes none
         self._read = None if self.distances.kept else np.zeros((pairs, RESULT_DOUBLES))
         self.reset()
@@ -184,10 +184,14 @@ class Proximity:
         """Place a piece anew in its joint's frame."""
         self.geometry.geometryObjects[index].placement = placement
 
+    def place(self, data: Any) -> Array:
+        """Move the pieces to where the joints are in Pinocchio's `data`; a view of their placements (n, 4, 3)."""
+        self.distances.place(self.table.model, data)
+        return self.distances.placed
+
     def placements(self, data: Any) -> Array:
         """Placements (n, 4, 3) of the pieces with the joints as in Pinocchio's `data`; see `Contacts.placements`."""
-        self.distances.place(self.table.model, data)
-        return np.array(self.distances.placed)
+        return np.array(self.place(data))
 
     def query(self, data: Any, within: float, most: Array | None = None) -> Contacts:
         """Every pair nearer than `within` metres with the joints as in Pinocchio's `data`, in the order of the pairs.
@@ -195,36 +199,33 @@ class Proximity:
         With `most`, shape (pairs,), a pair that is as far apart as its entry [m] is left out too. Nothing else is left
         out. Results of pairs that were culled are never read: coal leaves old numbers in them.
         """
-        return self._query(self.placements(data), within, most, None)
+        index, placed = self.ask(data, within, most)
+        return self._gathered(ContactBuffer(len(index)), np.array(placed), index, within, most)
 
     def query_views(self, data: Any, within: float, most: Array | None = None) -> Contacts:
         """What `query` returns, in arrays that the next call of this overwrites."""
-        self.distances.place(self.table.model, data)
-        self._placed[:] = self.distances.placed
-        return self._query(self._placed, within, most, self._buffer)
+        index, placed = self.ask(data, within, most)
+        self._placed[:] = placed
+        if len(index) > self._buffer.size:
+            self._buffer = ContactBuffer(2 * len(index))
+        return self._gathered(self._buffer, self._placed, index, within, most)
 
-    def _query(self, placements: Array, within: float, most: Array | None, room: _ContactBuffer | None) -> Contacts:
+    def ask(self, data: Any, within: float, most: Array | None = None) -> tuple[Indices, Array]:
+        """Have coal compute all pairs that can be nearer, see `query`: their numbers (k,), and where the pieces are.
+
+        Both are overwritten by the next question; `results_of` has the distances.
+        """
         began = time.perf_counter()
-        most = self._endless if most is None else most
-        index = self._asked(placements, within, most)
-        if room is None:
-            room = _ContactBuffer(len(index))
-        elif len(index) > room.size:
-            room = self._buffer = _ContactBuffer(2 * len(index))
-        contacts = self._gather(room, placements, index, within, most)
-        self.seconds += time.perf_counter() - began
-        return contacts
-
-    def _asked(self, placements: Array, within: float, most: Array) -> Indices:
-        """Compute with coal the distances of all pairs that can be nearer than `within`; their indices."""
-        results = self.results
+        distances, results, placed = self.distances, self.results, self.place(data)
         try:
-            count, gone, came = self._kernel.look(placements, self._looked, within, most, self._count)
+            count, gone, came = self._kernel.look(
+                placed, self._looked, within, self._endless if most is None else most, self._count
+            )
             self._count = count
             self.asked += count
             numbers = self._index[:count]
             if self._read is not None:
-                fields(self._read)[numbers] = self.distances.measured(numbers)
+                fields(self._read)[numbers] = distances.measured(numbers)
             elif self._singly:
                 for number in numbers.tolist():
                     pin.computeDistance(self.geometry, results, number)
@@ -240,24 +241,32 @@ class Proximity:
         except BaseException:  # Ctrl-C between what is noted and what Pinocchio is told: begin again from no pairs
             self._ask_nothing()
             raise
-        return numbers
+        self.seconds += time.perf_counter() - began
+        return numbers, placed
+
+    def results_of(self, index: Indices) -> Array:
+        """(pairs, 20) what coal computed last, see `memory_views.fields`; only the rows of `index` (k,) count."""
+        results = self.distances.results if self._read is None else self._read
+        if results is None:
+            results = np.zeros((len(self.table.pairs), RESULT_DOUBLES))
+            fields(results)[index] = self.distances.read(index)
+        return results
+
+    def _gathered(
+        self, room: ContactBuffer, placements: Array, index: Indices, within: float, most: Array | None
+    ) -> Contacts:
+        most = self._endless if most is None else most
+        count, broken = self._kernel.gather(self.results_of(index), index, self.known, within, most, room.arrays)
+        contacts = room.contacts(count, placements)
+        if broken:
+            self.repair_normals(contacts)
+        return contacts
 
     def _ask_nothing(self) -> None:
         self.results.deactivateAllCollisionPairs()
         self._count = 0
 
-    def _gather(self, room: _ContactBuffer, placements: Array, index: Indices, within: float, most: Array) -> Contacts:
-        table, results = self.table, self.distances.results if self._read is None else self._read
-        if results is None:
-            results = np.zeros((len(table.pairs), RESULT_DOUBLES))
-            fields(results)[index] = self.distances.read(index)
-        count, broken = self._kernel.gather(results, index, self._gathered, within, most, room.arrays)
-        contacts = room.contacts(count, placements)
-        if broken:
-            self._repair_normals(contacts)
-        return contacts
-
-    def _repair_normals(self, contacts: Contacts) -> None:
+    def repair_normals(self, contacts: Contacts) -> None:
         """Give a normal to pairs where coal has none: capsule axes that cross exactly, concentric spheres."""
         placements = contacts.placements
         for row in np.flatnonzero(contacts.distance <= self.table.points_meet[contacts.number]):

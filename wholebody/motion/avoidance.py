@@ -23,10 +23,11 @@ from wholebody.methods.control import ctrl_c_ends_all
 from wholebody.motion.avoider import Avoider, MethodResult, Progress, Run, Watch, has_setting
 from wholebody.motion.checking import ClipCheck, check, same_joints
 from wholebody.motion.clip import Clip
-from wholebody.motion.clip_torques import load_change, torques
+from wholebody.motion.clip_torques import torques
 from wholebody.motion.faults import DEPTH
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
 from wholebody.motion.judging import COLLISION, HELD, ROUNDING, AvoidanceReport, Avoided, judged
+from wholebody.motion.load_change import load_change
 from wholebody.motion.measures import MotionBounds, resolved
 from wholebody.motion.stance import StanceFeet, has_feet, usual_feet
 from wholebody.motion.strength import Strength

@@ -17,8 +17,8 @@ from wholebody.base.arrays import Array
 from wholebody.motion.avoider import MethodResult, Work
 from wholebody.motion.checking import ClipCheck, check
 from wholebody.motion.clip import Clip
-from wholebody.motion.clip_torques import LoadChange
 from wholebody.motion.frame_terms import FrameTerms
+from wholebody.motion.load_change import LoadChange
 from wholebody.motion.measures import MotionBounds, excess
 from wholebody.tasks.base import filled
 

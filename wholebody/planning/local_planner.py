@@ -21,6 +21,7 @@ from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks import Posture
 from wholebody.tasks.base import filled
+from wholebody.tracking.qp_strategy import Attraction
 
 WITHIN = 0.08  # m: distance within which pairs are looked at; larger = fewer and dearer queries
 MARGIN = 2e-3  # m: distance that motions keep beyond the clearance, where their ends do; larger = fewer queries
@@ -105,8 +106,17 @@ class Geodesics:
             now = min(now + min(most, float(safe.min(initial=np.inf))), 1.0)
 
 
+def holds(problem: Problem) -> bool:
+    """Whether a constraint is an equality, such as a `Hold`, so that most postures near by are not allowed."""
+    return any(bool(np.any(term.lower == term.upper)) for term in problem.constraints)
+
+
 class TrackedMotions:
-    """Motions by steps of the QP tracker, for figures that hold something on the way."""
+    """Motions by steps of the QP tracker, for figures that keep constraints on the way.
+
+    Where nothing is held, a posture is the minimum of a measure, and steps are as long as distances allow. Else it is a
+    goal, and steps are short, as what is held is missed by the square of a step.
+    """
 
     searches: ClassVar[int] = 2
 
@@ -115,11 +125,14 @@ class TrackedMotions:
         self._problem = problem.with_start(problem.start)
         self._model = problem.scene.model
         self._goal = Posture(problem.start).resolve(problem.scene, problem.start)
-        self._problem.goals, self._problem.measures = (self._goal,), ()
+        self._attraction = Attraction(problem.start, np.ones(self._model.nv))
+        self._held = holds(problem)
+        self._problem.goals = (self._goal,) if self._held else ()
+        self._problem.measures = () if self._held else (self._attraction,)
         self._problem.clearances = problem.clearances + MARGIN
         self._tracker = QP(restarts=0).tracker(self._problem, 1.0)
         self._resting = self._problem.with_start(problem.start)
-        self._resting.goals = ()
+        self._resting.goals = self._resting.measures = ()
         self._settling = QP(restarts=0).tracker(self._resting, 1.0)
 
     def admit(self, q: Array) -> None:
@@ -132,7 +145,9 @@ class TrackedMotions:
     def towards(self, q: Array, target: Array, most: float = np.inf) -> tuple[list[Array], bool]:
         """See `LocalPlanner`."""
         way, left, gone = list[Array](), self._apart(q, target), 0.0
-        self._follow(target)
+        self._attraction.toward(target)
+        if self._held:
+            self._problem.goals = (filled(self._goal, target=target, resolved_target=target),)
         while left > REACHED:
             here, before, q = q, left, self._tracker.step(q).q
             left, gone = self._apart(q, target), gone + self._apart(here, q)
@@ -151,9 +166,6 @@ class TrackedMotions:
         ways = [self._apart(*pair) for pair in pairwise([*found, path[-1]])]
         usual = [self._apart(*pair) for pair in pairwise(path)]
         return np.array([*found, path[-1]]), np.array(ways) > JUMP * np.array(usual) + REACHED
-
-    def _follow(self, target: Array) -> None:
-        self._problem.goals = (filled(self._goal, target=target, resolved_target=target),)
 
     def _apart(self, q: Array, target: Array) -> float:
         return float(np.linalg.norm(pin.difference(self._model, q, target)))

@@ -21,7 +21,7 @@ from wholebody.base.runner import processor_time
 from wholebody.figures.self_pairs import random_postures
 from wholebody.methods.qp.method import QP
 from wholebody.motion.clip import Clip
-from wholebody.planning.local_planner import Geodesics, LocalPlanner, TrackedMotions
+from wholebody.planning.local_planner import Geodesics, LocalPlanner, TrackedMotions, holds
 from wholebody.planning.rrt_connect import RRTConnect
 from wholebody.planning.smoothing import SPACING, length, resampled, shortcut, smooth
 from wholebody.planning.timing import Pace, Timing
@@ -202,13 +202,21 @@ def _answers(problem: Problem, rng: np.random.Generator) -> Iterator[_End]:
 
 
 def _drawn(problem: Problem, near: Array, spread: float, rng: np.random.Generator) -> Array:
-    """A posture (nq,) that is a share of the way from another one to a random one; the root stays within metres."""
+    """A posture (nq,) whose joints are a share of the way from another one to a random one.
+
+    A free root is within `ROOM` of that of the other posture; where nothing is held, it is turned about the vertical,
+    else it moves by the same share.
+    """
+    held = holds(problem)
     figure, (drawn,) = problem.scene.figure, random_postures(problem.scene.model, 1, int(rng.integers(2**31)))
-    for root in figure.roots.values():
-        first = int(figure.model.joints[root].idx_q)
-        drawn[first : first + 7] = near[first : first + 7]
-        drawn[first : first + 3] += rng.uniform(-ROOM, ROOM, 3)
     away = spread * np.asarray(pin.difference(figure.model, near, drawn))
+    for root in figure.roots.values():
+        joint = figure.model.joints[root]
+        here = pin.XYZQUATToSE3(near[joint.idx_q : joint.idx_q + 7])
+        turn = np.eye(3) if held else pin.exp3(np.array((0.0, 0.0, rng.uniform(-np.pi, np.pi))))
+        moved = (spread if held else 1.0) * rng.uniform(-ROOM, ROOM, 3)
+        there = pin.SE3(turn @ here.rotation, here.translation + moved)
+        away[joint.idx_v : joint.idx_v + 6] = pin.log6(here.actInv(there)).vector
     away[_frozen(problem)] = 0.0
     return np.asarray(pin.integrate(figure.model, near, away))
 
@@ -227,7 +235,9 @@ class _Search:
         self._problem, self._local, self._ends, self._rng, self._ended = problem, local, ends, rng, ended
         self._reached: list[Array] = []
         self._said = ""
-        self._spreads = (0.1, 0.3, 1.0) if isinstance(local, TrackedMotions) else (1.0,)
+        free_root = bool(problem.scene.figure.roots) and not holds(problem)
+        tracked = (0.0,) * free_root + (0.1, 0.3, 1.0)
+        self._spreads = tracked if isinstance(local, TrackedMotions) else (1.0,)
         local.admit(problem.start)
 
     def shortest(self) -> tuple[list[Array] | None, str]:

@@ -164,15 +164,16 @@ class SceneGeometry:
     def known(self, key: Hashable, make: Callable[[], T]) -> T:
         """What follows from the model and a key alone: made by `make` the first time, and read-only.
 
-        The newest 16 are kept.
+        The 32 that were asked for last are kept.
         """
         found: T | None = self._known.get(key)
         if found is None:
             found = make()
-            with self.lock:
-                self._known[key] = found
-                while len(self._known) > 16:
-                    del self._known[next(iter(self._known))]
+        with self.lock:
+            self._known.pop(key, None)
+            self._known[key] = found
+            if len(self._known) > 32:
+                del self._known[next(iter(self._known))]
         return found
 
     def copied(self) -> SceneGeometry:

@@ -100,6 +100,8 @@ class Workspace(NotCopyable):
         Things are where it ends. Those that were put into the figure are among them: it leaves them, or is told. The
         figure begins at the posture q (nq,).
         """
+        if not (self.moved or self._inside):
+            return None
         still = [name for name, (before, after) in self.moved.items() if before == after]
         if still:
             overlapping = self.near(q, -INSIDE).pair

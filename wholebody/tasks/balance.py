@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
+from functools import partial
 from math import dist, hypot
 from typing import Annotated, Any, TypeAlias
 
@@ -14,6 +15,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Names, Range
 from wholebody.figures.state import State
+from wholebody.geometry.pieces import SweptPoints, swept_points
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Constraint, Surroundings, filled
 from wholebody.tasks.surfaces import outermost
@@ -30,6 +32,7 @@ M258, its abstract): a share of 0.2; about 8 % lean farther than 0.15. The centr
 came 20 to 59 % less far from the middle of the stance than the edges are (Forth, Fiedler & Paloski 2011, Gait & Posture
 33: 715, its abstract); here it is 30 %."""
 
+_DOWN = np.array((0.0, 0.0, -1.0))
 NEAREST = 1e-5  # Distance [m] below which two points count as one corner
 
 
@@ -42,19 +45,28 @@ def standing_points(scene: Surroundings, q: Array, feet: Sequence[str]) -> Array
     points = []
     for foot in feet:
         joint = inputs.find_place(scene, foot, "Balance").joint
-        pieces = [piece for piece in scene.geometry.geometryObjects if joint in scene.model.supports[piece.parentJoint]]
+        pieces = inputs.once(scene, ("pieces", joint), partial(_pieces_of, scene, joint))
         if not pieces or joint == 0:
             raise InputError(f"Balance: {foot!r} has no pieces to stand on; name segments with geometry as feet")
-        for carrier in {int(piece.parentJoint) for piece in pieces} - places.keys():
+        for carrier in {joint for joint, *_ in pieces} - places.keys():
             places[carrier] = scene.figure.joint_placement(q, carrier)
-        lows = np.vstack([low_points(piece.geometry, places[piece.parentJoint] * piece.placement) for piece in pieces])
+        lows = np.vstack([low_points(shape, places[joint] * placed, swept) for joint, placed, shape, swept in pieces])
         points.append(lows[lows[:, 2] <= lows[:, 2].min() + STANDING_HEIGHT])
     return np.vstack(points)
 
 
-def low_points(geometry: Any, placement: pin.SE3) -> Array:
+def _pieces_of(scene: Surroundings, joint: int) -> list[tuple[int, pin.SE3, Any, SweptPoints]]:
+    """Joint, placement in it, shape and swept points of each piece on a joint and beyond it."""
+    pieces = [piece for piece in scene.geometry.geometryObjects if joint in scene.model.supports[piece.parentJoint]]
+    return [
+        (int(piece.parentJoint), pin.SE3(piece.placement), piece.geometry, swept_points(piece.geometry))
+        for piece in pieces
+    ]
+
+
+def low_points(geometry: Any, placement: pin.SE3, swept: SweptPoints | None = None) -> Array:
     """Candidates (n, 3) for the lowest points of a piece: all corners, or the lowest points of its balls."""
-    return outermost(geometry, placement, np.array((0.0, 0.0, -1.0)))
+    return outermost(geometry, placement, _DOWN, swept)
 
 
 def convex_polygon(points: Array) -> Array:
@@ -97,8 +109,10 @@ def hull_corners(points: Array) -> list[int]:
 
 def edges(corners: Array) -> tuple[Array, Array]:
     """Inward unit normals (k, 2) and offsets (k,) of a convex polygon: inside, normals @ x >= offsets."""
-    along = np.roll(corners, -1, axis=0) - corners
-    normals = np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
+    along = np.concatenate([corners[1:], corners[:1]]) - corners
+    normals = np.empty_like(along)
+    normals[:, 0], normals[:, 1] = -along[:, 1], along[:, 0]
+    normals /= np.sqrt((along * along).sum(axis=1))[:, None]
     return normals, np.einsum("ij,ij->i", normals, corners)
 
 
@@ -165,7 +179,7 @@ class Balance(Constraint):
     def on_polygon(self, corners: Array, scene: Surroundings) -> Balance:
         """Copy that is ready to be evaluated, on a support polygon with these corners (k, 2)."""
         joints = inputs.joints_with_mass(scene, "Balance", self.feet)
-        if len(shrunk(corners, self.margin)) == 0:
+        if self.margin and len(shrunk(corners, self.margin)) == 0:
             raise InputError(
                 f"Balance: a margin of {self.margin:g} m leaves nothing of the support polygon; make it smaller"
             )

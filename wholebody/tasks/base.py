@@ -49,6 +49,10 @@ class Surroundings(Protocol):
     def piece_owner(self) -> tuple[str, ...]:
         """The segment or thing that every piece is part of."""
 
+    @property
+    def built(self) -> Any:
+        """The geometry model with its indices; see `SceneGeometry.known`."""
+
 
 def filled(term: _T, **values: object) -> _T:
     """Copy of an immutable term with some of its fields set."""

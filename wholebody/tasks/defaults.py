@@ -36,7 +36,7 @@ def default_measures(
 
     Who kneels and does not at the start spares effort from the posture "kneeling" there.
     """
-    if not (ranges and scene.figure.ranges and girdles_of(scene.figure)):
+    if not (ranges and scene.figure.ranges and inputs.once(scene, "girdles", lambda: girdles_of(scene.figure))):
         return (_effort.resolve(scene, start),)
     shanks = {side for sides in stances for side in sides if side.endswith("_shank")}
     rest = _kneeling(scene, start, shanks) if shanks else start
@@ -87,9 +87,9 @@ def default_constraints(
     figure = scene.figure
     found: list[Constraint] = []
     if ranges and figure.ranges and RangeOfMotion not in known:
-        found.append(RangeOfMotion().resolve(scene, start))
+        found.append(inputs.once(scene, RangeOfMotion, lambda: RangeOfMotion().resolve(scene, start)))
     if ranges and figure.ranges and figure.cones and ReachCones not in known:
-        found.append(ReachCones().resolve(scene, start))
+        found.append(inputs.once(scene, ReachCones, lambda: ReachCones().resolve(scene, start)))
     left_out = ""
     for body in standing:
         feet = tuple(body + foot for foot in FEET)

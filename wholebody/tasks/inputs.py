@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Annotated, Any, NamedTuple, TypeAlias
+import warnings
+from collections.abc import Callable, Hashable, Sequence
+from typing import Annotated, Any, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +18,9 @@ from wholebody.figures.state import State
 from wholebody.geometry.placement import PlacementLike, placement, unit_vector
 from wholebody.tasks.base import Surroundings
 
+T = TypeVar("T")
+
+FAR = 30.0  # m: farther is hardly meant
 FARTHEST = 100.0  # Distance [m] beyond which a position is refused as a wrong unit: 100 mm are a tenth of a metre
 
 WEIGHT = Range(1e-12, 1e12, wanted="a positive number such as 1, or leave it out")
@@ -31,6 +35,12 @@ class Place(NamedTuple):
 
 
 WORLD = Place(0, 0)  # The world: Pinocchio's frame and joint 0
+
+
+def once(scene: Surroundings, key: Hashable, make: Callable[[], T]) -> T:
+    """What follows from figure and things, where they are, and a key alone: made once, and read-only."""
+    found: T = scene.built.known((key, scene.built.moves), make)
+    return found
 
 
 def find_place(scene: Surroundings, name: str, where: str) -> Place:
@@ -91,9 +101,12 @@ def point(value: object, where: str) -> Array:
 
 def check_reachable(place: Array, where: str) -> None:
     """Refuse a position that cannot be in metres."""
+    if place.dot(place) <= FAR**2:
+        return
     distance = math.hypot(*place)
     if distance > FARTHEST:
         raise InputError(f"{where} is {distance:.4g} m away; lengths are in metres, so divide millimetres by 1000")
+    warnings.warn(f"{where} is {distance:.3g} m away; lengths are in metres: divide centimetres by 100", stacklevel=3)
 
 
 def direction(value: object, where: str) -> Array:
@@ -147,7 +160,7 @@ def joints_with_mass(scene: Surroundings, where: str, frames: Sequence[str] = ()
         if body is None:
             raise InputError(f"{where}: {', '.join(frames)} are of several figures; state one {where} for each")
         joints = figure.bodies[body]
-    inertias = list(scene.model.inertias)
-    if not any(inertias[k].mass > 0.0 for k in joints or range(1, len(inertias))):
+    masses = once(scene, "masses", lambda: [inertia.mass for inertia in scene.model.inertias])
+    if not any(masses[k] > 0.0 for k in joints or range(1, len(masses))):
         raise InputError(f"{where}: nothing of {figure.name} that moves has mass; leave it out")
     return joints

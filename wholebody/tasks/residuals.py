@@ -20,13 +20,15 @@ from wholebody.figures.state import State, Wrench
 from wholebody.tasks.base import Surroundings
 from wholebody.tasks.inputs import WORLD, Place
 
+_FORCES: Array = np.eye(3, 6)
+
 
 def point_rows(point: Array) -> Array:
     """Wrenches (3, 6) whose rows are the velocity of a moving point in the world's axes.
 
     Written out because numpy's cross product costs twenty times as much on three rows.
     """
-    rows: Array = np.eye(3, 6)
+    rows: Array = _FORCES.copy()
     fill_point_rows(rows, point)
     return rows
 

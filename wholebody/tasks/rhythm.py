@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -97,15 +98,12 @@ class Rhythm(Measure):
 
     def resolve(self, scene: Surroundings, start: Array) -> Rhythm:
         """Find the joints, and what the lumbar spine has at the start."""
-        figure = scene.figure
-        girdles = girdles_of(figure)
-        spines = {body: spine for body in figure.bodies for spine in _lumbar(figure, start, body)}
+        girdles, knees, spines = inputs.once(scene, Rhythm, partial(_parts, scene.figure))
         if not girdles and not spines:
             raise InputError("Rhythm: this figure has no clavicles and no lumbar spine; leave the measure out")
-        names = ("knee_flexion", "hip_flexion", "hip_abduction")
-        knees = _elevations(figure, names, KNEE_WEIGHT, KNEE_SHARE, KNEE_ONSET, spines)
         knees = tuple(with_values(knee, rest=_beyond(start, knee)[0]) for knee in knees)
-        return filled(self, girdles=girdles, knees=knees, lumbar=tuple(spines.values()))
+        lumbar = tuple(with_values(spine, rest=_bent(start, spine)[0]) for spine in spines)
+        return filled(self, girdles=girdles, knees=knees, lumbar=lumbar)
 
     def value(self, state: State) -> float:
         """The measure."""
@@ -157,6 +155,14 @@ def girdles_of(figure: Figure) -> tuple[Elevation, ...]:
     return _elevations(figure, parts, CLAVICLE_WEIGHT, math.radians(13.0), 0.0, figure.bodies)
 
 
+def _parts(figure: Figure) -> tuple[tuple[Elevation, ...], tuple[Elevation, ...], tuple[Lumbar, ...]]:
+    """Clavicles, knees and lumbar spines, at rest at zero."""
+    spines = {body: spine for body in figure.bodies for spine in _lumbar(figure, body)}
+    names = ("knee_flexion", "hip_flexion", "hip_abduction")
+    knees = _elevations(figure, names, KNEE_WEIGHT, KNEE_SHARE, KNEE_ONSET, spines)
+    return girdles_of(figure), knees, tuple(spines.values())
+
+
 def _elevations(
     figure: Figure, parts: tuple[str, str, str], weight: float, most: float, onset: float, bodies: Iterable[str]
 ) -> tuple[Elevation, ...]:
@@ -175,14 +181,13 @@ def _places(figure: Figure, names: Sequence[str]) -> tuple[Three, Three]:
     return (a.idx_q, b.idx_q, c.idx_q), (a.idx_v, b.idx_v, c.idx_v)
 
 
-def _lumbar(figure: Figure, start: Array, body: str) -> tuple[Lumbar, ...]:
+def _lumbar(figure: Figure, body: str) -> tuple[Lumbar, ...]:
     """The lumbar spine of the figure whose names begin with `body`; none without it or without a free root."""
     names = [f"{body}spine{level}_flexion" for level in (1, 2, 3)]
     if f"{body}root" not in figure.roots or not _has(figure, names):
         return ()
     root = figure.model.joints[figure.roots[f"{body}root"]]
-    part = Lumbar(*_places(figure, names), (int(root.idx_q), int(root.idx_v)), 0.0)
-    return (with_values(part, rest=_bent(start, part)[0]),)
+    return (Lumbar(*_places(figure, names), (int(root.idx_q), int(root.idx_v)), 0.0),)
 
 
 def _beyond(q: Array, part: Elevation) -> tuple[float, tuple[float, float, float]]:

@@ -9,7 +9,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.figures.state import State
 from wholebody.tasks.base import Constraint
-from wholebody.terms.linearisation import NO_JOINTS, NO_LIMITS, NO_WRENCHES, compiled_kernel
+from wholebody.terms.linearisation import NO_CONTACTS, NO_LIMITS, NO_PIECES, compiled_kernel
 from wholebody.terms.plan import Terms, checked_count, make_plan
 
 
@@ -35,7 +35,7 @@ class ConstraintValues:
         """The values (c,) where a state is; overwritten by the next call."""
         plan, value = self._plan, self._value
         self._kernel.linearise(
-            (state.joints, state.columns, state.q), plan[:4], 0, (NO_WRENCHES, NO_JOINTS),
+            (state.joints, state.columns, state.q, NO_PIECES), plan[:4], *NO_CONTACTS,
             (self._wrench, value, self._jacobian, self._box, self._measure, self._no_squares),
         )  # fmt: skip
         for term, evaluate, row, rows in plan.others:

@@ -101,9 +101,9 @@ def _residual(residual: PlacementResidual, model: pin.Model) -> list[Entry]:
 
 
 def _point(term: tasks.Point, model: pin.Model) -> list[Entry]:
-    frame = _in_joint(term.place, model)
-    place = pin.SE3(frame.rotation, frame.act(term.resolved_offset))
-    floats = np.concatenate([placement_floats(place), np.zeros(12), term.resolved_target, np.zeros(9)])
+    frame, floats = _in_joint(term.place, model), np.zeros(36)
+    floats[:9], floats[9:12] = frame.rotation.T.ravel(), frame.act(term.resolved_offset)
+    floats[24:27] = term.resolved_target
     return [Entry(RESIDUAL, (term.place.joint, 0, 1, 0, 0), floats, 3)]
 
 

@@ -7,8 +7,10 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
+from wholebody.geometry.patch_kernel import TableArrays, contact_rows
+from wholebody.geometry.proximity_kernel import gather
 from wholebody.tasks.discomfort import POWER, STEEPNESS
 from wholebody.terms import entries as kinds
 from wholebody.terms.coordinate_kernel import (
@@ -27,6 +29,9 @@ from wholebody.terms.residual_kernel import axis_errors, cones, planes, residual
 
 Plan: TypeAlias = tuple[Array, Integers, Integers, NDArray[np.int8]]
 """Floats, integers, layout and support of a `TermPlan`."""
+
+NearArrays: TypeAlias = tuple[Array, Array, Indices, Indices, Array, Array, Array, Indices, Indices, Array]
+"""Room for contacts and their rows; see `linearise`."""
 
 
 @compiled(inner=True)
@@ -49,25 +54,51 @@ def _table(plan: Plan, table: int) -> tuple[Array, Integers]:
 
 @compiled(error_model="numpy")
 def linearise(
-    state: tuple[Array, Array, Array], plan: Plan, gaps: int, contacts: tuple[Array, Integers],
+    state: tuple[Array, Array, Array, Array], plan: Plan, asked: tuple[Array, Indices, Indices, Array, Array, float],
+    clearances: Array, pieces: TableArrays, near: NearArrays, known: int,
     room: tuple[Array, Array, Array, Array, Array, Array],
-) -> None:  # fmt: skip
-    """Values and Jacobian rows of all terms of a plan, then the Jacobian rows of contacts; bounds and measures.
+) -> tuple[int, int, bool]:  # fmt: skip
+    """Values and Jacobian rows of all terms of a plan, then contacts and their Jacobian rows; bounds and measures.
 
     Args:
         state: placements of the joints (njoints, 4, 3), see `placement_view`; columns of the joint Jacobian (n, 6), in
-            the world; the posture (nq,).
+            the world; the posture (nq,); placements of the pieces (p, 4, 3).
         plan: of the terms.
-        gaps: how many rows contacts have.
-        contacts: of these rows, wrenches (gaps or more, 6) and joints of first and second piece (gaps or more, 2).
+        asked: what `gather` takes: results of coal, the pairs (k,) that were asked; pairs, `travelled` and `bound`;
+            metres within which pairs are near.
+        clearances: (2, pairs) clearance of each pair, and metres in place of `within` where they are less.
+        pieces: their arrays.
+        near: room for distances (k,), normals and points (3, k, 3), numbers (k,) and pieces (k, 2) of the contacts, and
+            for the distance asked of each (k,); for wrench, gap, contact and joints of their rows, and for the
+            clearance of each.
+        known: how many contacts are in their room already; less than 0 to gather them.
         room: for the terms' wrenches (terms' rows, 6) and values (terms' rows,), for all rows (terms' rows + gaps, nv),
             for the bounds on the displacement (2, nv), for the gradient and the value of the measures and for their
             curvature (2, nv + 1), and for the rows S (s, nv) of measures that are sums of squares, whose second
             derivative is S' S: (0, nv) if they are not asked for, otherwise a third row of the measures' room is for
             their part of the curvature.
+
+    Returns:
+        How many contacts there are, how many rows of them, and whether one needs its normal repaired: then there are
+        no rows yet.
     """
-    joints, columns, q = state
-    gap_wrench, gap_joints = contacts
+    joints, columns, q, placement = state
+    results, index, pairs, travelled, bound, within = asked
+    distance, vectors, number, pair, least, gap_wrench, gap, gap_contact, gap_joints, gap_clearance = near
+    if known < 0:
+        told = (pairs, travelled, bound)
+        known, broken = gather(results, index, told, within, clearances[1], (distance, vectors, number, pair))
+        if broken:
+            return known, 0, True
+    for c in range(known):
+        least[c] = clearances[0, number[c]]
+    contacts = (
+        pair[:known], distance[:known], vectors[0][:known], vectors[1][:known], vectors[2][:known], number[:known],
+        placement,
+    )  # fmt: skip
+    gaps = contact_rows(contacts, least, pieces, (gap_wrench, gap, gap_contact, gap_joints))
+    for r in range(gaps):
+        gap_clearance[r] = least[gap_contact[r]]
     wrench, value, jacobian, box, measure, squares = room
     floats, integers, layout, support = plan
     nv = jacobian.shape[1]
@@ -130,6 +161,7 @@ def linearise(
         balls(*_table(plan, kinds.BALL), q, measure, squares, first)
     if layout[kinds.HEIGHT, 1]:
         heights(*_table(plan, kinds.HEIGHT), joints, columns, support, column, measure)
+    return known, gaps, False
 
 
 @compiled(error_model="numpy")

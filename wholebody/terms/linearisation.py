@@ -6,7 +6,7 @@ contacts. Terms of other classes join through their own methods, and cost only t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from copy import copy
 from functools import lru_cache
 from math import sqrt
@@ -19,8 +19,9 @@ from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError, UndefinedTermError
 from wholebody.figures.description import Limits
 from wholebody.figures.state import State, Wrench
-from wholebody.geometry.contact_rows import MOST_ENDS
-from wholebody.geometry.proximity import Contacts
+from wholebody.geometry.contact_rows import LENGTHS, MOST_ENDS
+from wholebody.geometry.memory_views import RESULT_DOUBLES
+from wholebody.geometry.proximity import ContactBuffer, Contacts
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.answers import is_own
 from wholebody.tasks.base import MOST_PLANES, Bound, Constraint, Goal, Measure, Term
@@ -79,14 +80,20 @@ class Linearisation(NamedTuple):
     planes: TermPlanes | None = None  # supporting planes of the terms; None where no term has any
 
 
-_NO_CONTACTS = Contacts(
-    np.zeros((0, 2), dtype=np.intp), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)),
-    np.zeros(0, dtype=np.intp), np.zeros((0, 4, 3)),
-)  # fmt: skip
-
-
 NO_LIMITS = Limits(*np.zeros((2, 0), dtype=np.intp), *np.zeros((2, 0)))
-NO_WRENCHES, NO_JOINTS = np.zeros((0, 6)), np.zeros((0, 2), dtype=np.intp)
+_NONE, _POINTS, _INDEX, _PAIR = (
+    np.zeros(0),
+    np.zeros((0, 3)),
+    np.zeros(0, dtype=np.intp),
+    np.zeros((0, 2), dtype=np.intp),
+)
+NO_PIECES = np.zeros((0, 4, 3))
+NO_CONTACTS = (
+    (np.zeros((0, RESULT_DOUBLES)), _INDEX, _PAIR, _NONE, np.zeros((2, 0)), 0.0), np.zeros((2, 0)),
+    (np.zeros(0, dtype=bool), _INDEX, LENGTHS, _POINTS, _INDEX, np.zeros((0, 4)), _INDEX, _NONE, _POINTS),
+    (_NONE, np.zeros((3, 0, 3)), _INDEX, _PAIR, _NONE, np.zeros((0, 6)), _NONE, _INDEX, _PAIR, _NONE), 0,
+)  # fmt: skip
+"""What `kernel.linearise` takes where no pair counts: `asked` to `known`."""
 
 
 class PackedLinearisation(NamedTuple):
@@ -138,15 +145,19 @@ class Lineariser:
         self._no_squares = np.zeros((0, self.state.model.nv))
         self._plan = self._planned(self.goals) if plan is None else self._again(plan, self.goals)
         self._own = self._own_terms()
-        self._term_wrench = np.empty((self._plan.goal_rows + self._plan.value_rows, 6))
-        self._packed: PackedLinearisation | None = None
+        self._placed = np.zeros((len(workspace.table.joint), 4, 3))
+        self._box, self._measure = np.empty((2, self.state.model.nv)), np.empty((2, self.state.model.nv + 1))
         self._grow(64)
         self._approach = self._largest_approach()
-        self._most: Array | None = None
+        self._clearances, self._given = np.empty((2, len(workspace.table.pairs))), b"none"
         self.take(self.goals, clearances)
 
-    def take(self, goals: Sequence[Goal], clearances: Array, constraints: Sequence[Constraint] | None = None) -> None:
-        """Put other goals and clearances in the place of the present ones, and constraints where they are given."""
+    def take(self, goals: Sequence[Goal], clearances: Array, constraints: Sequence[Constraint] | None = None) -> bool:
+        """Put other goals and clearances in the place of the present ones, and constraints where they are given.
+
+        Returns:
+            Whether clearances are others than before.
+        """
         if clearances.shape != (len(self.workspace.table.pairs),):
             count = len(self.workspace.table.pairs)
             raise InputError(f"clearances have shape {clearances.shape}; give one for each of the {count} pairs")
@@ -156,11 +167,15 @@ class Lineariser:
             before, self._plan = self._plan, self._again(self._plan, goals, others)
             self._own = self._own_terms()
             if (before.goal_rows, before.value_rows) != (self._plan.goal_rows, self._plan.value_rows):
-                self._term_wrench, self._packed = np.empty((self._plan.goal_rows + self._plan.value_rows, 6)), None
+                self._grow(self._near.size)
         self.goals, self.clearances = goals, clearances
-        self._largest_clearance = float(np.maximum.reduce(clearances)) if len(clearances) else 0.0
-        if self._approach is not None:
-            self._most = np.add(clearances, self._approach, out=self._most)
+        given = clearances.tobytes()  # entries may have been set
+        if given == self._given:
+            return False
+        self._given, self._clearances[0] = given, clearances
+        np.add(clearances, self._approach, out=self._clearances[1])
+        self._largest = float(np.maximum.reduce(clearances)) if len(clearances) else 0.0
+        return True
 
     @property
     def plan(self) -> TermPlan:
@@ -178,7 +193,7 @@ class Lineariser:
     def relaxed(self, depth: float) -> Lineariser:
         """The same, with less distance asked of every pair by `depth` metres; both move one workspace."""
         other = copy(self)
-        other._most = None  # it needs its own room
+        other._clearances, other._given = np.empty_like(self._clearances), b"none"
         other.take(self.goals, self.clearances - depth)
         return other
 
@@ -191,73 +206,65 @@ class Lineariser:
         Raises:
             InputError: q is no posture, or a term of one's own has another number of rows than at the start.
         """
-        contacts, clearance, count = self._contacts(self.workspace.near, q, within)
-        nv, rows = self.state.model.nv, self._plan.goal_rows + self._plan.value_rows
-        value, jacobian = np.empty(rows), np.empty((rows + count, nv))
+        nv, rows = self.state.model.nv, len(self._value)
         squares = np.empty((self._plan.squares, nv))
-        box, measure = np.empty((2, nv)), np.empty((3 if len(squares) else 2, nv + 1))
-        self._terms(count, value, jacobian, box, measure, squares)
+        value, box, measure = np.empty(rows), np.empty((2, nv)), np.empty((3 if len(squares) else 2, nv + 1))
+        contacts, count = self._pass(q, within, (value, box, measure, squares))
+        jacobian = self._jacobian[: rows + count].copy()
         squared = measure[2, :nv] if len(squares) else np.zeros(nv)
         for term in self._plan.other_measures:
             part = term.squares(self.state)
             if part is not None:
                 squares = np.vstack([squares, sqrt(2.0 * term.weight) * part[1]])
                 squared = squared + term.weight * term.curvature(self.state)
-        goals, contact = self._plan.goal_rows, self._contact[:count].copy()
+        goals = self._plan.goal_rows
         terms: list[Goal | Constraint] = [*self.goals, *self.constraints]
         found = term_planes(terms, self.rows(), self.state) if planes and self._plan.others else None
+        gap, contact, clearance = (part[:count].copy() for part in self._gaps)
+        contacts = Contacts(*[part.copy() for part in contacts])
         return Linearisation(
-            self.state.q.copy(), value[:goals], jacobian[:goals], value[goals:], jacobian[goals:rows], contacts,
-            self._gap[:count].copy(), jacobian[rows:], contact, clearance[contact], float(measure[0, nv]),
-            measure[0, :nv], measure[1, :nv], box[0], box[1], squares, squared, found,
+            self.state.q.copy(), value[:goals], jacobian[:goals], value[goals:], jacobian[goals:rows], contacts, gap,
+            jacobian[rows:], contact, clearance, float(measure[0, nv]), measure[0, :nv], measure[1, :nv], box[0],
+            box[1], squares, squared, found,
         )  # fmt: skip
 
     def packed(self, q: Array, within: float) -> PackedLinearisation:
-        """What `at` returns, in arrays that the next call of this overwrites."""
-        contacts, clearance, count = self._contacts(self.workspace.near_views, q, within)
-        if self._packed is None or len(self._packed.jacobian) < len(self._packed.value) + count:
-            self._packed = self._buffers()
-        room = self._packed
-        jacobian = room.jacobian[: len(room.value) + count]
-        self._terms(count, room.value, jacobian, room.box, room.measure, self._no_squares)
-        contact = self._contact[:count]
+        """What `at` returns, in arrays that the next call overwrites."""
+        value, box, measure = self._value, self._box, self._measure
+        contacts, count = self._pass(q, within, (value, box, measure, self._no_squares))
+        gap, contact, clearance = self._gaps
         return PackedLinearisation(
-            self.state.q, room.goals, room.value, jacobian, contacts, self._gap[:count], contact, clearance[contact],
-            room.measure, room.box,
+            self.state.q, self._plan.goal_rows, value, self._jacobian[: len(value) + count], contacts, gap[:count],
+            contact[:count], clearance[:count], measure, box,
         )  # fmt: skip
 
-    def _buffers(self) -> PackedLinearisation:
-        nv, rows = self.state.model.nv, self._plan.goal_rows + self._plan.value_rows
-        none = np.zeros(0)
-        return PackedLinearisation(
-            none, self._plan.goal_rows, np.empty(rows), np.empty((rows + len(self._gap), nv)), _NO_CONTACTS, none,
-            none.astype(np.intp), none, np.empty((2, nv + 1)), np.empty((2, nv)),
-        )  # fmt: skip
+    def _pass(self, q: Array, within: float, room: tuple[Array, Array, Array, Array]) -> tuple[Contacts, int]:
+        """Contacts at a posture, and how many rows they have; both, and the Jacobian, are overwritten by the next call.
 
-    def _contacts(
-        self, near: Callable[[Array, float, Array | None], Contacts], q: Array, within: float
-    ) -> tuple[Contacts, Array, int]:
-        """Contacts at a posture by a query, the clearance asked of each, and how many rows were written of them."""
-        contacts = near(q, within + self._largest_clearance, self._most)
-        clearance = self.clearances[contacts.number]
-        if len(clearance) * (1 + MOST_ENDS) > len(self._gap):
-            self._grow(2 * len(clearance))
-        count = self.workspace.rows.write(contacts, clearance, self._room)
-        return contacts, clearance, count
-
-    def _terms(self, count: int, value: Array, jacobian: Array, box: Array, measure: Array, squares: Array) -> None:
-        """Write all terms where the state is, and the Jacobian of `count` rows of contacts."""
-        state, plan = self.state, self._plan
-        self._kernel.linearise(
-            (state.joints, state.columns, state.q), plan[:4], count, self._contact_rows,
-            (self._term_wrench, value, jacobian, box, measure, squares),
-        )  # fmt: skip
+        Values of the terms, bounds, measures and squares of measures are written into `room`.
+        """
+        state, plan, near, within = self.state.update(q), self._plan, self.workspace.proximity, within + self._largest
+        index, placed = near.ask(state.data, within, self._clearances[1])
+        if len(index) > self._near.size:
+            self._grow(2 * len(index))
+        value, box, measure, squares = room
+        there = state.joints, state.columns, state.q, placed
+        asked = near.results_of(index), index, *near.known, within
+        written = self._term_wrench, value, self._jacobian, box, measure, squares
+        given = self._clearances, self.workspace.rows.arrays, self._rows
+        count, gaps, broken = self._kernel.linearise(there, plan[:4], asked, *given, -1, written)
+        self._placed[:] = placed
+        contacts = self._near.contacts(count, self._placed)
+        if broken:
+            near.repair_normals(contacts)
+            _, gaps, _ = self._kernel.linearise(there, plan[:4], asked, *given, count, written)
         if plan.others:
-            self._evaluate(plan.others, value, jacobian)
+            self._evaluate(plan.others, value, self._jacobian)
         if plan.other_bounds:
             self._bound(plan.other_bounds, box)
         if plan.other_measures:
-            self._measure(plan.other_measures, measure)
+            self._measure_others(plan.other_measures, measure)
+        return contacts, gaps
 
     def undefined(self, q: Array) -> UndefinedTermError | None:
         """Why a term of one's own is not finite at a posture (nq,); None where all are, or where there are none."""
@@ -285,25 +292,25 @@ class Lineariser:
             return self._planned(goals)
         return again
 
-    def _largest_approach(self) -> Array | None:
-        """Most by which every pair (pairs,) can come nearer in a step; None where speeds are not bounded."""
+    def _largest_approach(self) -> Array:
+        """Most by which every pair (pairs,) can come nearer in a step; infinite where speeds are not bounded."""
         limits = [bound for bound in self.bounds if type(bound) is StepLimit]
         if self.dt is None or not limits:
-            return None
+            return np.full(len(self.workspace.table.pairs), np.inf)
         most = np.min([bound.bounds(self.state, self.dt)[1] for bound in limits], axis=0)
         # m: that pairs may come nearer than their bound; for postures that are put back into their limits first
         return self.workspace.largest_approach(most) + 1e-3
 
     def _grow(self, contacts: int) -> None:
-        """Make room for the rows of so many contacts."""
-        rows = contacts * (1 + MOST_ENDS)
-        self._wrench, self._gap = np.zeros((rows, 6)), np.zeros(rows)
-        self._contact, self._joints = np.zeros(rows, dtype=np.intp), np.zeros((rows, 2), dtype=np.intp)
-        self._room, self._contact_rows = (
-            (self._wrench, self._gap, self._contact, self._joints),
-            (self._wrench, self._joints),
-        )
-        self._packed = None
+        """Make room for the rows of so many contacts, and for those of the terms."""
+        rows, terms = contacts * (1 + MOST_ENDS), self._plan.goal_rows + self._plan.value_rows
+        self._near = ContactBuffer(contacts)
+        self._gaps = np.zeros(rows), np.zeros(rows, dtype=np.intp), np.zeros(rows)
+        gap, contact, clearance = self._gaps
+        joints = np.zeros((rows, 2), dtype=np.intp)
+        self._rows = *self._near.arrays, np.zeros(contacts), np.zeros((rows, 6)), gap, contact, joints, clearance
+        self._jacobian, self._value = np.empty((terms + rows, self.state.model.nv)), np.empty(terms)
+        self._term_wrench = np.empty((terms, 6))
 
     def _evaluate(self, others: Sequence[OtherTerm], value: Array, jacobian: Array) -> None:
         """Write values and rows of terms of other classes."""
@@ -327,7 +334,7 @@ class Lineariser:
             low, high = bound.bounds(self.state, self.dt)
             np.clip(box, low, high, out=box)
 
-    def _measure(self, measures: Sequence[Measure], measure: Array) -> None:
+    def _measure_others(self, measures: Sequence[Measure], measure: Array) -> None:
         state = self.state
         for term in measures:
             measure[0, -1] += term.weight * term.value(state)
@@ -342,11 +349,11 @@ def compiled_kernel() -> Any:
 
     state = State(pin.buildSampleModelManipulator())
     plan = make_plan(NO_LIMITS, Terms(), None, state)
-    rows = np.zeros((0, state.model.nv))
-    box, measure = np.zeros((2, state.model.nv)), np.zeros((2, state.model.nv + 1))
+    nv = state.model.nv
+    wrenches, rows, box, measure = np.zeros((0, 6)), np.zeros((0, nv)), np.zeros((2, nv)), np.zeros((2, nv + 1))
     term_kernel.linearise(
-        (state.joints, state.columns, state.q), plan[:4], 0, (NO_WRENCHES, NO_JOINTS),
-        (NO_WRENCHES, np.zeros(0), rows, box, measure, rows),
+        (state.joints, state.columns, state.q, NO_PIECES), plan[:4], *NO_CONTACTS,
+        (wrenches, _NONE, rows, box, measure, rows),
     )  # fmt: skip
-    term_kernel.wrench_rows(NO_WRENCHES, 0, 0, state.columns, plan[:4], rows)
+    term_kernel.wrench_rows(wrenches, 0, 0, state.columns, plan[:4], rows)
     return term_kernel

@@ -77,6 +77,8 @@ def test_other_terms_are_followed_as_by_a_new_tracker(scene: wb.Scene) -> None:
     assert tracker.step(q).displacement == pytest.approx(fresh(problem, q), abs=1e-7)
     problem.clearances += 0.02
     assert tracker.step(q).displacement == pytest.approx(fresh(problem, q), abs=1e-7)
+    problem.clearances[:] = 0.05  # its entries alone
+    assert tracker.step(q).displacement == pytest.approx(fresh(problem, q), abs=1e-7)
     problem.clearances = problem.clearances[:-1]
     with pytest.raises(wb.InputError, match="one for each of the"):
         tracker.step(q)

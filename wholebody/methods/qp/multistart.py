@@ -202,20 +202,21 @@ class Multistart:
             return probe
         return self._descend(probe.q, "restart", most=max(self._left, 1))
 
-    def _to_the_place(self) -> None:
-        """Descend to the place of contacts that are met, where they do not bend, and if that is lower from there."""
+    def _to_the_place(self) -> bool:
+        """Descend to the place of contacts that are met, which does not bend, and from there; whether that is lower."""
         there = at_its_place(self.problem, self.lineariser.state.update(self.best.q))
         if there is None or self.control.over:
-            return
-        tolerance, workspace = self.budget.tolerance, self.lineariser.workspace
+            return False
+        tolerance, workspace, before = self.budget.tolerance, self.lineariser.workspace, self.best.measure
         search = Multistart(there, workspace, self.solver, self.budget, self.control)
         local = search._directly(self._start)
         if local.violation.worst > tolerance:
             local = search.feasibility_first(self._start)
         self.spent += search.spent
         self.trace += search.trace
-        if local.violation.worst <= tolerance and local.measure < SEARCH.lower * self.best.measure:
+        if local.violation.worst <= tolerance and local.measure < SEARCH.lower * before:
             self._accept(self._descend(local.q), self.how)
+        return self.best.measure < SEARCH.moved * before
 
     def _descend_again(self) -> bool:
         """Where contacts are met, descend at their place, then from beside a kink; whether the end is no minimum.
@@ -227,7 +228,8 @@ class Multistart:
         touches = any(hasattr(term, "touches") for term in (*problem.goals, *problem.constraints))
         if not (touches and self.budget.measures and self.best.violation.worst <= tolerance):
             return False
-        self._to_the_place()
+        while self._to_the_place():
+            pass
         for share in (0.3, 1.0, 0.1):  # of that step: more leaves more kinks, and comes to other minima
             judged = assess(problem, self.best.q)
             if judged.optimality <= SEARCH.optimal or self.control.over:
@@ -269,8 +271,7 @@ class Multistart:
 
     def _ran(self, stage: SQP | Feasibility | Closest, start: Array) -> LocalSolution:
         """The end of a stage from a posture (nq,), whose iterations count."""
-        local = stage.run(start)
-        self.spent += local.iterations
+        self.spent += (local := stage.run(start)).iterations
         return local
 
     def _feasibility(self, lineariser: Lineariser, most: int, note: str) -> Feasibility:
@@ -310,8 +311,7 @@ class Multistart:
             return False
         tolerance, ends = self.budget.tolerance, list[LocalSolution]()
         given = (self.problem, self.lineariser.state, self._start, np.random.default_rng(self.budget.seed))
-        few = self._moving() < SEARCH.few
-        agreeing = SEARCH.agreeing_few if few else SEARCH.agreeing
+        agreeing = SEARCH.agreeing_few if (few := self._moving() < SEARCH.few) else SEARCH.agreeing
         starts = throughout(*given, SEARCH.reach_trials_few - 1) if few else None
         others = starts or restarts(*given, SEARCH.reach_trials - 1, SEARCH.far)
         enough, programs = SEARCH.reached * tolerance, self._at_most(SEARCH.reach_trial_programs)

@@ -182,6 +182,8 @@ class SearchNumbers(NamedTuple):
     optimal: float = 1e-2  # rad: first-order optimality of a contact's answer from which on it counts as none
     # share of a contact's measures below which those at its place count as another minimum. Less: ends at kinks stay.
     lower: float = 0.9995
+    # share below which they are looked for again, at the place of that minimum. More: slower.
+    moved: float = 0.99
     # how many starts for the measures are descended from where it is none after all. More: lower, slower.
     poor: int = 2
     # feasible postures that are looked for, for each that is descended from; more = lower measures, slower

@@ -194,23 +194,23 @@ class StepProgram:
         Raises:
             InputError: the terms have other numbers of rows than at the start.
         """
-        own, working = self._subproblem, self._working_set
+        own, working, contacts = self._subproblem, self._working_set, at.contacts
         own.check_rows(at.goals, len(at.value) - at.goals)
         k = own.one_sided + len(at.gap)
         if 5 * k > len(self._room.integers):
             self._grow(2 * k)
-        contacts = at.contacts
         self._sizes = (k, own.one_sided + len(contacts.distance))
         if working.held is not self._last:
             self._last[:] = False if working.held is None else working.held
+        fixed = self._fixed
         if self._mixed:
             self._share[:] = given.share
-        self._fixed[2], self._fixed[3] = least_damping, measures
+        fixed[2], fixed[3] = least_damping, measures
         arrays = (
             at.value, at.jacobian, at.gap, at.gap_contact, at.clearance, at.measure, at.box, at.q, contacts.number,
         )  # fmt: skip
         solved, count, motion, turn, worst, spare, missed, least, damping, asked = self._kernel.solve(
-            arrays, self._workspace.state.columns, contacts.placements, working.pushing, self._fixed, self._places,
+            arrays, self._workspace.state.columns, contacts.placements, working.pushing, fixed, self._places,
             self._buffers, working.solver.hot_start,
         )  # fmt: skip
         self._settled = solved

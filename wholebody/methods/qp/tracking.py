@@ -76,7 +76,7 @@ class QPTracker(NotCopyable):
         self.workspace = problem.workspace()
         self._distance = np.full(len(self.workspace.table.pairs), np.inf)  # room of `_nearer`
         self._left: Array | None = None
-        self._begun = False
+        self._begun, self._revision = False, problem.scene.revision
         self._set_up()
 
     def step(self, q: Array, measures: bool = True) -> QPStep:
@@ -95,7 +95,8 @@ class QPTracker(NotCopyable):
         """
         measures = flag(measures, "measures")
         with self._alone:
-            self.problem.check_fresh()
+            if self.problem.scene.revision != self._revision:
+                self.problem.check_fresh()
             if not self._begun or type(q) is not np.ndarray:  # a step takes as long as ten such checks
                 q, self._begun = begun(self.problem, q), True
             self.workspace.refresh()
@@ -223,11 +224,8 @@ class QPTracker(NotCopyable):
             answer = program.solve(at, measures)
             motion = answer.motion
         share = min(1.0, 0.5 * self._query_distance / max(motion, 1e-12))
-        displacement = answer.x.copy() if share == 1.0 else share * answer.x
-        following, curved = (
-            None,
-            share * motion * (share * answer.turn + TRACKING.off),
-        )  # roughly, and rather too much
+        displacement, following = share * answer.x, None
+        curved = share * motion * (share * answer.turn + TRACKING.off)  # roughly, and rather too much
         if curved > TRACKING.inside and answer.spare < 0.5 * TRACKING.spare * curved:
             bent = 0.0
             if curved > least_unseen(answer.asked):
@@ -337,10 +335,12 @@ class QPTracker(NotCopyable):
         """Take what was replaced of the problem since the last step; where targets moved only, keep what is set up."""
         problem, own = self.problem, self._lineariser
         if problem.bounds is not own.bounds or problem.measures is not own.measures:
+            problem.check_fresh()
             self._set_up()
             return
         moved, held = problem.goals is not own.goals, problem.constraints is not own.constraints
-        own.take(problem.goals, problem.clearances, problem.constraints)
+        if own.take(problem.goals, problem.clearances, problem.constraints):
+            problem.check_fresh()
         kept = not held or (self._of_constraints() == self._constraints and self._program.hold(problem.constraints))
         if not kept or (moved and self._of_goals() != self._goals):
             self._lay_out()

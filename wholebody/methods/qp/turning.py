@@ -13,7 +13,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.geometry.contact_rows import BAND, LEVER_DISTANCE
-from wholebody.methods.qp.rows import Bodies, Near, Rows, Seen
+from wholebody.methods.qp.rows import Bodies, Rows, Seen
 from wholebody.methods.qp.settings import TRACKING
 from wholebody.scene.workspace import Workspace
 from wholebody.terms.linearisation import PackedLinearisation
@@ -31,7 +31,8 @@ class Turning:
                  for own, reach in zip(points, table.reach, strict=True)]  # fmt: skip
         self._reach = np.array(reach, dtype=float)
         self._single = np.array([len(own) == 1 for own in points], dtype=bool)
-        self._seen = Seen(TRACKING.room, BAND, LEVER_DISTANCE, TRACKING.off, TRACKING.inside, TRACKING.unseen)
+        seen = Seen(TRACKING.room, BAND, LEVER_DISTANCE, TRACKING.off, TRACKING.inside, TRACKING.unseen)
+        self._lengths = np.array(seen)
         place: Indices = state.spread(np.arange(state.model.nv, dtype=float)).astype(np.intp)
         self.joints: tuple[Indices, Indices, Indices, Indices] = (
             place,
@@ -41,10 +42,10 @@ class Turning:
         )
         self._twists = np.empty((3, workspace.model.njoints, 6))
 
-    def bodies(self, placements: Array, reach: Array | None = None) -> Bodies:
-        """The joints where the state is, and the pieces at their placements; `reach` (p,) is another one of these."""
-        far = self._workspace.table.reach if reach is None else reach
-        return Bodies(self._workspace.state.columns, *self.joints, placements, far, self._twists)
+    def bodies(self, placements: Array) -> Bodies:
+        """The joints where the state is, and the pieces at their placements."""
+        state, table = self._workspace.state, self._workspace.table
+        return Bodies(state.columns, *self.joints, placements, table.reach, self._twists)
 
     def motion(self, at: PackedLinearisation, displacement: Array) -> tuple[float, float]:
         """Longest way of any point of any piece, metres, and largest turn, to first order in the displacement (nv,)."""
@@ -63,9 +64,9 @@ class Turning:
             0 where every pair keeps its distance to that, and more than 1 where one may not.
         """
         contacts = at.contacts
-        near = Near(contacts.pair, contacts.distance, contacts.normal, at.clearance)
-        bodies = self.bodies(contacts.placements, self._reach)
-        return float(self._kernel.linearisation_error(displacement, bodies, self._single, self._seen, near, rows))
+        bodies = self._workspace.state.columns, *self.joints, contacts.placements, self._reach, self._twists
+        near = contacts.pair, contacts.distance, contacts.normal, at.clearance
+        return float(self._kernel.linearisation_error(displacement, bodies, self._single, self._lengths, near, rows[:]))
 
 
 @lru_cache(maxsize=1)
@@ -79,8 +80,7 @@ def compiled_kernel() -> Any:
     rows = Rows(matrix, none, none, 0, matrix, none, index, 0, index, none)
     turning_kernel.moved(np.zeros(1), bodies)
     turning_kernel.linearisation_error(
-        np.zeros(1), bodies, np.zeros(0, dtype=bool), Seen(*np.ones(6).tolist()),
-        Near(index.reshape(0, 2), none, three, none), rows,
+        np.zeros(1), bodies[:], np.zeros(0, dtype=bool), np.ones(6), (index.reshape(0, 2), none, three, none), rows[:],
     )  # fmt: skip
     return turning_kernel
 

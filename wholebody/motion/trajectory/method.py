@@ -77,7 +77,10 @@ class Trajectory(Checked):
         freed, missed = self._freed(run, run.terms.q, loads, self.stretch)
         new = None if run.ended else self._timing(freed, run.terms, loads)
         if new is None:
-            return MethodResult(self._measured(run, q, freed, loads, self.stretch), message="; ".join(missed))
+            q = self._measured(run, q, freed, loads, self.stretch)
+            if missed and loads is None:
+                return MethodResult(q, repair=True)
+            return MethodResult(q, message="; ".join(missed))
         # On the same path nothing is new but chords, which cut its corners; what they touch is freed from there.
         slower = run.of(run.terms.at(new.times))
         passed = between(run.scene.model, freed, new.times / run.terms.dt)
@@ -124,27 +127,20 @@ class Trajectory(Checked):
         run.watch.tell(0.0, "looking for collisions")
         faults = run.faults(reference)
         found = run.windows(faults.frames if beyond is None else faults.frames | beyond, self.margin)
-        total, done = max(1, sum(map(len, found))), 0
-        missed: dict[Window, str] = {}
-        while found:
-            window = found.pop(0)
+        total, done, missed = max(1, sum(map(len, found))), 0, list[str]()
+        for window in found:
             told = run.watch.teller(done / total, len(window) / total, f"frames {window.first} to {window.end - 1}")
             if loads is None:
                 freed = _in_parts(run, windows, window, q, faults, told)
             else:  # loads of a frame are those of its neighbours too
                 freed = windows.window(window, faults, told)
             q[window.first : window.end] = freed.q
-            if freed.missed and not run.ended:
-                window, freed = windows.kept_back(window, freed, q, faults, told, self.margin)
-                q[window.first : window.end] = freed.q
-                found = [other for other in found if not window.first <= other.first < window.end]
-                missed = {other: said for other, said in missed.items() if not window.first <= other.first < window.end}
             if run.ended:
                 break
             if freed.missed:
-                missed[window] = f"frames {window.first} to {window.end - 1}: {freed.missed}"
+                missed.append(f"frames {window.first} to {window.end - 1}: {freed.missed}")
             done += len(window)
-        return q, list(missed.values())
+        return q, missed
 
     def _timing(self, q: Array, terms: FrameTerms, loads: ClipLoads | None) -> Timing | None:
         """The new timing of postures (n, nq); None where it stays."""

@@ -16,10 +16,10 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array
 from wholebody.motion.avoider import Run
 from wholebody.motion.clip import Clip
-from wholebody.motion.faults import FEW, Faults, depths_between, dipping, dips, sampled_dips
+from wholebody.motion.faults import FEW, Faults, depths_between, dips, sampled_dips
 from wholebody.motion.measures import jerk_ratio
 from wholebody.motion.one_side import PASSED, followed, kept_beside
 from wholebody.motion.trajectory.deviations import Chart, Objective
@@ -128,29 +128,6 @@ class ClipRun:
         """
         self._run, self._reference = run, reference
         self._time, self._rate, self._loads, self._near = time, rate, loads, near
-
-    def kept_back(
-        self,
-        window: Window,
-        freed: WindowResult,
-        q: Array,
-        found: Faults,
-        cancel: Callable[[float], bool],
-        margin: float,
-    ) -> tuple[Window, WindowResult]:
-        """A window that was not freed once more, on one side of what it passes, for as many frames as that takes."""
-        for begun in (self._reference, q):
-            gaps = dipping(self._run.workspace, begun, range(window.first, window.end - 1))
-            kept = kept_beside(self._run, Window(0, len(q)), begun, gaps)
-            changed: Mask = (kept != begun).any(axis=1)
-            if changed.any():
-                changed[window.first : window.end] = True
-                marked = self._run.windows(changed, margin)
-                wider = next(one for one in marked if one.first <= window.first < one.end)
-                again = self.window(wider, found, cancel, kept)
-                if not again.missed:
-                    return wider, again
-        return window, freed
 
     def window(
         self, window: Window, found: Faults, cancel: Callable[[float], bool], begun: Array | None = None,

@@ -23,6 +23,7 @@ from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver
 from wholebody.methods.qp.steps import QPStep
 from wholebody.tasks.base import Goal, Surroundings, filled
+from wholebody.tasks.residuals import point_rows
 
 NEWTONS: dict[str, dict[str, Any]] = {
     "slack": {"inequalities": "slack"},
@@ -137,10 +138,12 @@ class MovingPoint(Goal):
 
     def jacobian(self, state: State) -> Wrench:
         """Three forces along the world's axes, through the frame's origin."""
-        x, y, z = state.frame(self._id).translation.tolist()
-        rows = np.eye(3, 6)
-        rows[0, 4], rows[0, 5], rows[1, 3], rows[1, 5], rows[2, 3], rows[2, 4] = z, -y, -z, x, y, -x
-        return Wrench(rows, self._joint)
+        return self.value_and_jacobian(state, self.error)[1]
+
+    def value_and_jacobian(self, state: State, value: Callable[[State], Array]) -> tuple[Array, Wrench]:
+        """Both, from one look at the frame."""
+        place = state.frame(self._id).translation
+        return place - self.target, Wrench(point_rows(place), self._joint)
 
 
 def reach_problem(track: Track, **terms: Any) -> tuple[wb.Problem, MovingPoint]:

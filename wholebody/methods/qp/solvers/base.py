@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections import Counter
 
 import numpy as np
 
@@ -35,7 +34,7 @@ class QPSolver(ABC):
     def __init__(self, hot_start: bool = True) -> None:
         """Begin with no program solved."""
         self.hot_start = hot_start
-        self._programs = Counter[str]()
+        self._programs: dict[str, int] = {}
 
     def solve(self, program: QuadraticProgram) -> QPSolution:
         """Minimise, without an active set that is known.
@@ -53,12 +52,12 @@ class QPSolver(ABC):
 
     def count(self, by: str) -> str:
         """Count one program by what closed it, and return that."""
-        self._programs[by] += 1
+        self._programs[by] = self._programs.get(by, 0) + 1
         return by
 
     def counted(self) -> dict[str, int]:
         """How many programs each closed since this was last asked."""
-        programs, self._programs = dict(self._programs), Counter()
+        programs, self._programs = self._programs, {}
         return programs
 
     def load(self) -> None:

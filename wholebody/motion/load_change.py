@@ -1,0 +1,170 @@
+"""Loads of a clip before and after a change: what is beyond strength or support, in words and in a chart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.lib.stride_tricks import sliding_window_view
+
+from wholebody.base.arrays import Array, brief
+from wholebody.base.charts import new_chart, plain
+from wholebody.motion.clip import Clip
+from wholebody.motion.clip_torques import Torques, torques
+from wholebody.motion.strength import Strength
+
+TORQUE = 0.02
+"""Share of its bound by which a torque may be beyond it: what filters and the frames in which feet stand change."""
+
+PLACE = 2e-3
+"""Metres by which the zero moment point may be farther outside, for the same reason."""
+
+FORCE = 0.05
+"""Share of the weight by which the ground may lack more force."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoadChange:
+    """Loads before and after a change."""
+
+    __repr__ = brief
+
+    before: Torques  # torques of the clip as it was
+    after: Torques  # torques of the answer; both are those of `wb.motion.torques`
+    times: Array  # (m,) place of each frame of the answer in the frames before
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Least and largest torque (nv,) that a joint may need: its strength, or the most that it needed before."""
+        torque = self.before.torque
+        return np.minimum(self.before.lower, torque.min(axis=0)), np.maximum(self.before.upper, torque.max(axis=0))
+
+    @property
+    def beyond(self) -> Array:
+        """(nv,) share by which the largest torque of each joint is beyond its bound; 0 where it is not."""
+        lower, upper = self.bounds
+        with np.errstate(divide="ignore", invalid="ignore"):
+            over = np.maximum(self.after.torque.max(axis=0) / upper, self.after.torque.min(axis=0) / lower) - 1.0
+        known = np.isfinite(self.before.lower) | np.isfinite(self.before.upper)
+        return np.where(known, np.maximum(np.nan_to_num(over, posinf=0.0, neginf=0.0), 0.0), 0.0)
+
+    @property
+    def farther(self) -> Array:
+        """(m,) by how much farther the zero moment point is outside of the support than it was before, metres.
+
+        A frame between two of those before is compared with the worse of both, and a foot stands there before if it
+        stands in both. It is 0 where other feet stand than before: the support is another one.
+        """
+        old, last = self.before, len(self.before.outside) - 1
+        first, second = (np.clip(near(self.times).astype(int), 0, last) for near in (np.floor, np.ceil))
+        same = ((old.stands[first] & old.stands[second]) == self.after.stands).all(axis=1)
+        past = self.after.outside - np.maximum(old.outside[first], old.outside[second])
+        found: Array = np.where(same, np.maximum(past, 0.0), 0.0)
+        return found
+
+    @property
+    def unsupported(self) -> Array:
+        """(m,) share of the weight by which the ground lacks more of the force that the motion needs than before.
+
+        It is compared with the largest lack before within 0.1 s, as feet may leave the ground so much earlier or later.
+        Feet that no longer stand give nothing, and a flight that is slowed needs a force.
+        """
+        old, new = (np.linalg.norm(loads.missing[:, :3], axis=1) for loads in (self.before, self.after))
+        reach, figure = max(1, round(0.1 / self.after.dt)), self.after.figure
+        near = sliding_window_view(np.pad(old, reach), 2 * reach + 1).max(axis=1)
+        places = np.clip(np.rint(self.times).astype(int), 0, len(old) - 1)
+        weight = pin.computeTotalMass(figure.model) * float(np.linalg.norm(figure.model.gravity.linear))
+        found: Array = np.maximum(new - near[places], 0.0) / max(weight, np.finfo(float).tiny)
+        return found
+
+    @property
+    def missed(self) -> list[str]:
+        """Sentences on loads beyond their bounds: which, by how much, where, what is allowed, and what was before."""
+        said, joint, frame = list[str](), int(np.argmax(self.beyond)), int(np.argmax(self.farther))
+        if self.beyond[joint] > TORQUE:
+            said.append(self._torque_missed(joint))
+        unsupported, floating = self.unsupported, int(np.argmax(self.unsupported))
+        if unsupported[floating] > FORCE:
+            said.append(
+                f"the ground lacks {unsupported[floating]:.0%} of the weight more than before at "
+                f"{floating * self.after.dt:.2f} s, where {FORCE:.0%} are allowed, and too much in "
+                f"{int((unsupported > FORCE).sum())} frames: feet have left the ground, or a flight is another one"
+            )
+        if self.farther[frame] > PLACE:
+            said.append(
+                f"the zero moment point is {1e3 * self.farther[frame]:.3g} mm farther outside of the feet than before "
+                f"at {frame * self.after.dt:.2f} s, where {1e3 * PLACE:g} mm are allowed, and too far in "
+                f"{int((self.farther > PLACE).sum())} frames; {self._support(frame)}"
+            )
+        return said
+
+    def plot(self) -> Any:
+        """Draw torques, forces of the ground and the zero moment point over time, a matplotlib figure.
+
+        The torques are those of the four joints that come nearest to their strength, in parts of it. What was before is
+        dashed, at the times of the answer's frames.
+        """
+        chart, (axes,) = new_chart(1, 3, (12.0, 2.8))
+        shares = np.maximum(self.after.share.max(axis=0), self.before.share.max(axis=0))
+        joints = [k for k in np.argsort(-shares)[:4].tolist() if shares[k] > 0.0]
+        for loads, style, times in (
+            (self.before, "--", np.interp(np.arange(len(self.before.torque)), self.times, np.arange(len(self.times)))),
+            (self.after, "-", np.arange(len(self.times))),
+        ):
+            t = times * self.after.dt
+            curves = [
+                [(loads.joint_of(k), loads.share[:, k]) for k in joints],
+                [(name, loads.force[:, k, 2]) for k, name in enumerate(loads.feet)],
+                [("zero moment point", 1e3 * loads.outside)],
+            ]
+            for axis, each in zip(axes, curves, strict=True):
+                for number, (name, values) in enumerate(each):
+                    axis.plot(t, values, style, color=f"C{number}", label=plain(name) if style == "-" else None)
+        for axis, said in zip(axes, ("torque [strength]", "force upwards [N]", "outside of feet [mm]"), strict=True):
+            axis.set(xlabel="time [s]", ylabel=said)
+            if axis.lines:
+                axis.legend(fontsize="x-small")
+        return chart
+
+    def _torque_missed(self, joint: int) -> str:
+        """The sentence on a torque that is beyond its bound."""
+        old, (lower, upper), now = self.before, self.bounds, self.after.torque[:, joint]
+        high = now.max() / upper[joint] >= now.min() / lower[joint]
+        sign, bound, strength = (1.0, upper, old.upper) if high else (-1.0, -lower, -old.lower)
+        needed, before = sign * now, max(float((sign * old.torque[:, joint]).max()), 0.0)
+        kept = "beyond" if before > strength[joint] else "within"
+        others = int((self.beyond > TORQUE).sum()) - 1
+        return (
+            f"{old.joint_of(joint)} needs {needed.max():.4g} N m at {int(needed.argmax()) * self.after.dt:.2f} s, "
+            f"{self.beyond[joint]:.1%} more than its bound of {bound[joint]:.4g} N m, where {TORQUE:.0%} are allowed; "
+            f"before it needed at most {before:.4g} N m, {kept} its strength of {strength[joint]:.4g} N m"
+            + (f"; {others} more joint{'s are' if others > 1 else ' is'} beyond" if others else "")
+        )
+
+    def _support(self, frame: int) -> str:
+        """Where the zero moment point of a frame is, and was."""
+        now, was = 1e3 * self.after.outside[frame], 1e3 * (self.after.outside[frame] - self.farther[frame])
+        feet = " and ".join(
+            name for name, stands in zip(self.after.feet, self.after.stands[frame], strict=True) if stands
+        )
+        before = f"{was:.3g} mm" if was > 1e-3 else "within it"
+        return f"it is {now:.3g} mm outside of the support of {feet} there, and was {before} before"
+
+    def __str__(self) -> str:
+        """One sentence."""
+        was, now = self.before, self.after
+        return (
+            f"most torque {was.largest_share:.0%} of a strength before, {now.largest_share:.0%} after; zero moment "
+            f"point up to {1e3 * was.outside.max():.0f} mm outside before, {1e3 * now.outside.max():.0f} mm after"
+        )
+
+
+def load_change(
+    before: Torques, after: Clip, places: Array | None, strength: Strength, feet: Sequence[str]
+) -> LoadChange:
+    """Compare the loads of a clip before and after a change, whose frames are at places (m,) of those before."""
+    places = np.arange(len(after), dtype=np.float64) if places is None else places
+    return LoadChange(before, torques(after, feet=feet, strength=strength), places)
