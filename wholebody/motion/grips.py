@@ -135,7 +135,7 @@ def _window(grip: _Grip, window: Window, passing: Sequence[int], q: Array, dt: f
     seams = window.first > 0, window.end < len(q)
     bands = Objective(count, np.ones(3), 0.1, dt, seams).bands  # tau is 0.1 s
     lines = [grip.line(q[window.first + k]) for k in range(count)]
-    across = sp.block_diag([np.eye(3) * (line @ line) - np.outer(line, line) for line in lines])
+    across = sp.block_diag([sp.coo_array(np.eye(3) * (line @ line) - np.outer(line, line)) for line in lines])
     P = sp.csc_matrix(sp.kron(sp.csc_matrix(bands), sp.eye(3)) + 100.0 * across)  # c is 100
     shifts = np.zeros((count, 3))
     places = [*map(float, range(window.first, window.end)), *(gap + share for gap in passing for share in SHARES)]

@@ -23,7 +23,7 @@ from wholebody.tasks import Hold, Orientation, Point
 from wholebody.tracking.drag import Drag
 from wholebody.tracking.frame import FRAME
 
-BUDGET = 0.5 * FRAME  # s of the processor for a frame's search; a last iteration, sweeps and drawing take as much
+BUDGET = 0.4 * FRAME  # s of the processor for a frame's search; a last iteration, sweeps and drawing take as much
 
 HANDLES = ("left_palm", "right_palm", "left_sole", "right_sole", "pelvis", "head_top")
 """Frames of people with handles: hands, feet, pelvis, head."""
