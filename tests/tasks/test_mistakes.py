@@ -17,6 +17,7 @@ NAN = float("nan")
     ("make", "message"),
     [
         (lambda: tasks.Point("tip", (550.0, -250.0, 950.0)), r"Point\('tip'\): target is 1126 m away; .* millimetres"),
+        (lambda: tasks.Point("tip", (1e200, 0, 0)), r"target is 1e\+200 m away"),  # whose square is no number
         (lambda: tasks.Point("tip", (0.0, NAN, 0.0)), r"Point\('tip'\): target is .*nan.*; give finite numbers"),
         (lambda: tasks.Point("tip", (0.0, 1.0)), r"Point\('tip'\): target has shape \(3,\), not \(2,\)"),
         (lambda: tasks.Point("tip", "here"), r"Point\('tip'\): target is 'here', not numbers"),
