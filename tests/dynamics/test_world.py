@@ -152,6 +152,12 @@ def test_overlaps_are_of_objects_and_are_shared_where_both_may_move(planar_arm) 
     assert np.linalg.norm(wall.depth) == pytest.approx(float((depths**2).sum() / depths.sum()), rel=1e-6)
 
 
+def test_a_thing_of_the_figures_name_overlaps_it(planar_arm) -> None:
+    figure = planar_arm((0.5, 0.4, 0.3))
+    scene = wb.Scene(figure).add(wb.Sphere(0.1), name=figure.name, at=(1.05, 0.11, 0.0), body=wb.Body())
+    assert [one.second for one in overlaps(scene, np.zeros(3))] == [figure.name]
+
+
 def test_wrong_worlds_are_one_sentence(planar_arm) -> None:
     scene = wb.Scene(planar_arm((0.5, 0.4, 0.3)))
     with pytest.raises(wb.InputError, match="scene"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,14 @@ TANGLE = (
 
 def off(loop: FrameLoop, tracked: Any) -> float:
     return float(np.abs(pin.difference(loop.scene.model, tracked, loop.shown)).max())
+
+
+def test_a_figure_that_is_a_root_alone_is_followed(tmp_path: Path) -> None:
+    box = '<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision>'
+    (tmp_path / "box.urdf").write_text(f'<robot name="box"><link name="box">{box}</link></robot>')
+    scene = wb.Scene(wb.load(tmp_path / "box.urdf", root="free"))
+    q = np.array((0.01, 0, 0, 0, 0, 0, 1.0))
+    np.testing.assert_allclose(FrameLoop(scene, q - (0.01, 0, 0, 0, 0, 0, 0)).frame(q).q, q, atol=1e-6)
 
 
 def test_arms_crossed_before_the_chest_come_back(least_distance: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -216,6 +217,20 @@ def test_a_person_in_an_assembly_has_hands_and_feet() -> None:
     before = drag.place("anna/right_palm")
     along(drag, "anna/right_palm", (0.1, 0.0, 0.1), 12)
     np.testing.assert_allclose(drag.place("anna/right_palm"), before + (0.1, 0.0, 0.1), atol=3e-3)
+
+
+def test_a_robot_has_the_ends_of_its_chains_in_an_assembly_and_beside_a_person(root: Path) -> None:
+    arm = wb.load(root / "examples" / "tasks" / "arm.urdf")
+    ends = {f"arm/{chain.tip}" for chain in arm.chains.values()}
+    alone = LiveDrag(wb.Assembly().figure("arm", arm))
+    assert set(alone.handles) == ends
+    beside = LiveDrag(wb.Problem(wb.Scene({"anna": wb.load("avatar"), "arm": (arm, (1.5, 0, 0))})))
+    assert ends < set(beside.handles)
+    assert "anna/right_palm" in beside.handles
+    assert not any("spine" in name for name in beside.handles)
+    before = alone.place("arm/grip")
+    along(alone, "arm/grip", (0.0, 0.02, 0.0), 10)
+    np.testing.assert_allclose(alone.place("arm/grip"), before + (0.0, 0.02, 0.0), atol=2e-3)
 
 
 @pytest.mark.parametrize("given", [wb.Assembly(), wb.Assembly().body("block", (0, 0, 0))], ids=["empty", "no shapes"])

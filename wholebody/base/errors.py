@@ -129,7 +129,7 @@ class FileFormatError(WholebodyError, ValueError):
     Examples:
         >>> wb.read_clip("missing.bvh", human)
         Traceback (most recent call last):
-        wholebody.base.errors.FileFormatError: BVH file missing.bvh: there is no such file...
+        wholebody.base.errors.FileFormatError: motion missing.bvh: there is no such file in ...
     """
 
 

@@ -29,8 +29,8 @@ class Entanglement:
         self._dofs: list[Array] = []
         for number, (joints, _) in enumerate(chains_of(scene.figure).values()):
             limb_of[joints] = number
-            first = [scene.model.joints[joint] for joint in joints]
-            self._dofs.append(np.concatenate([np.arange(joint.idx_v, joint.idx_v + joint.nv) for joint in first]))
+            spans = [(scene.model.idx_vs[joint], scene.model.nvs[joint]) for joint in joints]  # none of a lone root
+            self._dofs.append(np.array([at for first, nv in spans for at in range(first, first + nv)], dtype=np.intp))
         self._limb = limb_of[workspace.table.joint]
         self._holding: tuple[int, int] | None = None
         self._giving, self._frames = 0, 0

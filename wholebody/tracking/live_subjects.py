@@ -12,6 +12,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import known
 from wholebody.base.errors import InputError
+from wholebody.figures.figure import Figure
 from wholebody.figures.joining import joint_in
 from wholebody.geometry.shapes import HalfSpace
 from wholebody.methods.base import Method
@@ -51,6 +52,14 @@ def handle_frames(frames: Collection[str]) -> list[str]:
     return [name for name in named if name in frames]
 
 
+def handles_of(figure: Figure) -> list[str]:
+    """`handle_frames` of people, and the ends of the chains of other figures, such as a robot's."""
+    names = handle_frames({*figure.frames, *figure.segments})
+    people = {name.rpartition("/")[0] for name in names}
+    ends = [chain.tip for chain in figure.chains.values()] or figure.segments[-1:]
+    return [*names, *dict.fromkeys(name for name in ends if name.rpartition("/")[0] not in people)]
+
+
 class LiveProblem:
     """The figure of a problem. Its holds can be released; its goals and other constraints stay.
 
@@ -68,9 +77,7 @@ class LiveProblem:
         self.problem, self.scene = problem, copy.copy(problem.scene)
         self.q: Array = np.array(problem.start)
         figure = self.scene.figure
-        names = handle_frames({*figure.frames, *figure.segments})
-        names = names or list(dict.fromkeys([chain.tip for chain in figure.chains.values()] or figure.segments[-1:]))
-        frames = {name: figure.model.frames[figure.frame_id(name)] for name in names}
+        frames = {name: figure.model.frames[figure.frame_id(name)] for name in handles_of(figure)}
         self.handles = {name: Handle(int(frame.parentJoint), frame.placement) for name, frame in frames.items()}
         stated = (*problem.stated, *problem.bounds)
         self._fixed: tuple[Any, ...] = tuple(term for term in stated if not _handle_of(term, self.handles))
@@ -145,7 +152,7 @@ class LiveAssembly:
             if name.partition("/")[0] not in figures:
                 self.handles[name] = Handle(int(model.getJointId(name)), pin.SE3.Identity())
         for name, figure in figures.items():
-            for frame in handle_frames({*figure.frames, *figure.segments}):
+            for frame in handles_of(figure):
                 own = figure.model.frames[figure.frame_id(frame)]
                 joint = joint_in(model, f"{name}/", str(figure.model.names[own.parentJoint]))
                 self.handles[f"{name}/{frame}"] = Handle(joint, own.placement)

@@ -49,7 +49,7 @@ def overlaps(scene: Scene, q: Array, give_way: str = "figure") -> tuple[Overlap,
     `give_way` says so. See `Scene.overlapping` for the pairs that are looked at.
     """
     near, owners, objects = scene.overlapping(q), scene.piece_owner, scene.objects
-    figure = scene.figure.name
+    figure = ""  # a thing may have its name
 
     def whole(owner: str) -> str:
         return owner if owner in objects and objects[owner].segment is None else figure
@@ -75,7 +75,7 @@ def overlaps(scene: Scene, q: Array, give_way: str = "figure") -> tuple[Overlap,
         share = 0.5 if all(free) else 1.0
         deepest, _, point, pieces = max(pairs, key=lambda pair: pair[0])
         moves = share * free[0] * depth, -share * free[1] * depth
-        made.append(Overlap(first, second, depth, *moves, len(pairs), point, deepest, pieces))
+        made.append(Overlap(first or scene.figure.name, second, depth, *moves, len(pairs), point, deepest, pieces))
     return tuple(sorted(made, key=lambda one: -float(np.linalg.norm(one.depth))))
 
 

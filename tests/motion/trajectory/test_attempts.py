@@ -210,14 +210,15 @@ def test_a_long_window_is_freed_in_parts_without_seams(
     t = np.arange(75) / 15.0
     clip = wb.Clip(figure, np.stack([0.02 * np.sin(2.0 * t), 0.3 + 0.02 * np.cos(3.0 * t)], axis=1), 1 / 15)
     scene = wb.Scene(figure).add(wb.Sphere(0.1), name="ball", at=(0.8, 0.17, 0.0))
-    run, longest = WindowProgram.run, []
+    run, longest, shares = WindowProgram.run, list[int](), list[float]()
 
     def told(self: WindowProgram, x: np.ndarray, *given: Any) -> SQPResult:
         longest.append(len(x))
         return run(self, x, *given)
 
     monkeypatch.setattr(WindowProgram, "run", told)
-    parts = wb.avoid(clip, scene, method=wb.motion.Trajectory(time=0.1))
+    parts = wb.avoid(clip, scene, method=wb.motion.Trajectory(time=0.1), progress=lambda at: shares.append(at.share))
+    assert max(shares) > 0.3  # the second part goes on from where the first one is
     assert parts.report.solved, parts.report.message
     assert max(longest) <= 60
     monkeypatch.setattr(trajectory, "LONG", 100.0)

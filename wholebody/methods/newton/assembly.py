@@ -76,7 +76,7 @@ class Assembly(AssemblyJoints):
                 1 itself, the sum of the squared changes of all seven variables of each body.
         """
         super().__init__(clearance)
-        self._metric: Metric = choice(metric, METRICS, "Assembly: metric")
+        self._metric = choice(metric, METRICS, "Assembly: metric")
         self._goals: list[AssemblyGoal] = []
         self._measures: list[Measure] = []
         self._prepared: AssemblySystem | None = None
@@ -102,7 +102,7 @@ class Assembly(AssemblyJoints):
         return copy.deepcopy(self)
 
     @property
-    def metric(self) -> Metric:
+    def metric(self) -> str:
         """What the least motion is measured by."""
         return self._metric
 

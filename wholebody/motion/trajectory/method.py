@@ -168,14 +168,18 @@ def _in_parts(
     """
     length, shared = run.frames(LONG, 2), run.frames(LONG / 4.0, 1)
     q, first = np.array(reference), window.first
+
+    def part_told(done: float) -> bool:
+        return told((first - window.first + done * (length - shared)) / len(window))
+
     while window.end - first > 2 * length:
         part = Window(first, first + length)
-        freed = windows.window(part, faults, told, around=q, whole=False)
+        freed = windows.window(part, faults, part_told, around=q, whole=False)
         if freed.missed or run.ended:
             return windows.window(window, faults, told)
         q[part.first : part.end] = freed.q
         first = part.end - shared
-    freed = windows.window(Window(first, window.end), faults, told, around=q)
+    freed = windows.window(Window(first, window.end), faults, part_told, around=q)
     if freed.missed and first > window.first:
         return windows.window(window, faults, told)
     q[first : window.end] = freed.q
