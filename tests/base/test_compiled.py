@@ -278,3 +278,21 @@ def test_what_a_process_leaves_is_compiled_by_this_one(run: object, tmp_path: Pa
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["True"]
     assert len(list((tmp_path / "kept").rglob("*.twice-*.nbc"))) == 2
+
+
+def test_another_process_compiles_the_longest_loop_where_there_are_cores(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[list[str]] = []
+
+    class Child:
+        def __init__(self, command: list[str], **_: object) -> None:
+            asked.append(command)
+
+        def kill(self) -> None: ...
+
+    monkeypatch.setattr(subprocess, "Popen", Child)
+    monkeypatch.setattr("wholebody.base.compiled.parent_process", lambda: None)  # a worker of pytest-xdist has one
+    for cores, count in ((1, 0), (2, 1)):
+        monkeypatch.setattr("wholebody.base.compiled.usable_cores", lambda cores=cores: cores)
+        importlib.import_module("wholebody.base.compiled").compile_beside()
+        assert len(asked) == count
+    assert asked[0][1:] == ["-m", "wholebody.base.compiled", "wholebody.terms.linearisation"]

@@ -5,15 +5,19 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
 import logging
 import os
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import lru_cache
 from importlib import import_module
 from itertools import zip_longest
+from multiprocessing import parent_process
 from typing import Any, TypeVar
 
 TOGETHER = (
@@ -46,11 +50,14 @@ TOGETHER = (
 Each module has a function `compiled_kernel`, which compiles or loads its loops.
 """
 
+LONGEST = "wholebody.terms.linearisation"
+"""Half of what a first solve compiles, and the last."""
+
 LOOPS = tuple(name for names in TOGETHER for name in names)
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_compiling = {"depth": 0, "since": 0.0, "seconds": 0.0, "collects": True}
+_compiling = {"depth": 0, "since": 0.0, "seconds": 0.0, "collects": True, "alone": False}
 
 
 def compiled(*, inner: bool = False, **options: Any) -> Callable[[F], F]:
@@ -103,6 +110,26 @@ def compile_in_processes(processes: int, groups: Sequence[Sequence[str]] = TOGET
         groups = [names for names, task in zip_longest(groups, tasks) if task is None or task.exception() is not None]
     for names in groups:
         compile_all(names)
+
+
+def compile_beside() -> None:
+    """Let another process compile the longest loop, unless there is one core or this process is itself another's.
+
+    A first solve needs it last, after 20 s of compilation of its own.
+    """
+    if _compiling["alone"] or usable_cores() < 2 or parent_process() is not None:
+        return
+    with suppress(OSError):  # no process may be started here
+        nothing = subprocess.DEVNULL
+        child = subprocess.Popen(
+            [sys.executable, "-m", __name__, LONGEST], stdin=nothing, stdout=nothing, stderr=nothing
+        )
+        atexit.register(child.kill)
+
+
+def usable_cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def compile_seconds() -> float:
@@ -178,6 +205,7 @@ def _watch() -> None:
             if not self.told and event.data["dispatcher"].__module__.startswith("wholebody."):
                 self.told = True
                 logging.getLogger(__name__).info("compiling the inner loops: up to a minute, once on a machine")
+                compile_beside()
 
         def on_end(self, event: Any) -> None:
             _compiling["depth"] -= 1
@@ -191,5 +219,9 @@ def _watch() -> None:
 
 if __name__ == "__main__":
     logging.basicConfig(level=logging.INFO, format="%(message)s")
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    compile_in_processes(min(cores, len(TOGETHER)))
+    shared = import_module("wholebody.base.compiled")  # which the loops know; this module is another one
+    shared._compiling["alone"] = True
+    if sys.argv[1:]:
+        shared.compile_all(sys.argv[1:])
+    else:
+        shared.compile_in_processes(min(usable_cores(), len(TOGETHER)))
