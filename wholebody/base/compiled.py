@@ -127,6 +127,11 @@ def compile_beside() -> None:
         atexit.register(child.kill)
 
 
+def compile_alone() -> None:
+    """Start no process beside this one, whose work it is to compile."""
+    _compiling["alone"] = True
+
+
 def usable_cores() -> int:
     """How many cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -220,7 +225,7 @@ def _watch() -> None:
 if __name__ == "__main__":
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     shared = import_module("wholebody.base.compiled")  # which the loops know; this module is another one
-    shared._compiling["alone"] = True
+    shared.compile_alone()
     if sys.argv[1:]:
         shared.compile_all(sys.argv[1:])
     else:
