@@ -233,6 +233,17 @@ def test_a_robot_has_the_ends_of_its_chains_in_an_assembly_and_beside_a_person(r
     np.testing.assert_allclose(alone.place("arm/grip"), before + (0.0, 0.02, 0.0), atol=2e-3)
 
 
+def test_what_is_dragged_moves_on_a_machine_that_is_slow(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A frame's time is a seventh: no step is complete in it."""
+    monkeypatch.setattr("wholebody.tracking.live_subjects.BUDGET", 1e-3)
+    drag = LiveDrag(wb.Assembly().figure("arm", wb.load(root / "examples" / "tasks" / "arm.urdf")))
+    drag.take("arm/grip")
+    before = drag.place("arm/grip")
+    for _ in range(40):
+        drag.move(before + (0.0, 0.02, 0.0))
+    np.testing.assert_allclose(drag.place("arm/grip"), before + (0.0, 0.02, 0.0), atol=2e-3)
+
+
 @pytest.mark.parametrize("given", [wb.Assembly(), wb.Assembly().body("block", (0, 0, 0))], ids=["empty", "no shapes"])
 def test_an_assembly_without_bodies_is_refused_and_one_without_shapes_is_dragged(given: wb.Assembly) -> None:
     if not given.bodies:

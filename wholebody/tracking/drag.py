@@ -21,6 +21,7 @@ from wholebody.methods.base import Method, Step, Tracker, goal_error, judged
 from wholebody.methods.control import BUDGET, budget_for_sweep, within_budget
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.assembly_solution import AssemblySolution
+from wholebody.methods.newton.settings import FRAMES
 from wholebody.methods.solve import method_for_motions
 from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import Collision, FrameMotion
@@ -53,8 +54,16 @@ class DragFrame(NamedTuple):
 class GoalMoves:
     """How far the goal moves in a frame: all the way, or as far as its budget was enough for lately."""
 
-    def __init__(self) -> None:
-        self._most, self._error = np.inf, 0.0
+    def __init__(self, seconds: float) -> None:
+        self._seconds, self._most, self._error, self._starved = seconds, np.inf, 0.0, 0
+
+    @property
+    def budget(self) -> float:
+        """Seconds of the next frame: twice as many after each three in a row that were cut off.
+
+        On a slow machine no step would be complete otherwise, and what is dragged would stay for ever.
+        """
+        return float(self._seconds * 2.0 ** min(self._starved // 3, 4))
 
     def shares(self, error: float) -> Iterator[float]:
         """Shares of the way to a goal that is `error` m or rad away, tried until a motion is free or time is up."""
@@ -64,9 +73,16 @@ class GoalMoves:
             if turn == 0 or (move < error and BUDGET.spent < 1.0):
                 yield min(1.0, move / error) if error else 1.0
 
-    def end(self, error: float) -> None:
-        """End a frame that left an error: the next goes twice as far, or half as far if the budget was not enough."""
+    def end(self, error: float, *, cut: bool = False) -> None:
+        """End a frame that left an error: the next goes twice as far, or half as far if the budget was not enough.
+
+        A frame that was `cut` off made no step, since joints and contacts did not hold yet when its time was over.
+        """
         asked = min(self._most, self._error)
+        if cut:
+            self._starved += 1
+        elif BUDGET.spent < 0.25:
+            self._starved = 0
         if BUDGET.spent < 0.5 or self._error - error > 0.5 * asked:
             self._most *= 2.0
         elif BUDGET.spent > 1.0:
@@ -89,14 +105,14 @@ class ProblemDrag:
         self._workspace = self.tracker.workspace
         self._alone = OneAtATime("drag")
         moving_goal(problem, goal)
-        self._number, self._seconds, self._moves = goal, budget, GoalMoves()
+        self._number, self._seconds, self._moves = goal, budget, GoalMoves(budget)
         self._motion: FrameMotion | None = None
         self.q: Array = problem.scene.figure.clamp(problem.start)
 
     def to(self, target: Any) -> DragFrame:
         """See `Drag.to`."""
         began = time.perf_counter()
-        with self._alone, within_budget(self._seconds):
+        with self._alone, within_budget(self._moves.budget):
             retarget(self.problem, self._number, target)
             self._workspace.refresh()
             collisions, path = tuple[Collision, ...](), tuple[tuple[float, Array], ...]()
@@ -197,7 +213,7 @@ class AssemblyDrag:
     """
 
     def __init__(self, assembly: Assembly, goal: int, seconds: float) -> None:
-        self._goal, self._seconds, self._moves = assembly.goal_index(goal), seconds, GoalMoves()
+        self._goal, self._moves = assembly.goal_index(goal), GoalMoves(seconds)
         self.assembly = assembly.prepare()
 
     @property
@@ -211,9 +227,9 @@ class AssemblyDrag:
         path: tuple[tuple[float, Array], ...] = ()
         made, goal = self.assembly, self._goal
         made.retarget(goal, target)
-        error = made.goal_error(goal)
-        try:
-            with within_budget(self._seconds):
+        error, before = made.goal_error(goal), made.variables()
+        with within_budget(self._moves.budget):
+            try:
                 for share in self._moves.shares(error):
                     if share < 1.0:
                         made.interpolate_goal(goal, share, target)
@@ -222,9 +238,10 @@ class AssemblyDrag:
                     path = step.path or path
                     if step.taken:
                         break
-                self._moves.end(made.goal_error(goal))
-        finally:
-            made.retarget(goal, target)
+            finally:
+                made.retarget(goal, target)
+            cut = BUDGET.spent > FRAMES.time_share and step.taken and np.array_equal(before, made.variables())
+            self._moves.end(made.goal_error(goal), cut=cut)
         left = max(made.goal_error(number) for number in range(len(made.goals)))
         if path and not np.array_equal(path[-1][1], made.q):
             path = (*path, (1.0, made.q))
