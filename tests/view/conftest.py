@@ -28,6 +28,7 @@ class Exhibit:
         self.piece_owner = [piece.name for piece in self.geometry.geometryObjects]
         self.objects: dict[str, Any] = {}
         self.revision = 0
+        self.built = SimpleNamespace(known=lambda key, make: make(), moves=0)
         points = coal.StdVec_Vec3s()
         points.extend(list(np.random.default_rng(1).normal(size=(30, 3)) * 0.1))
         self.add("table", coal.Box(0.6, 0.8, 0.04), (0.9, 0.1, 0.0), color=(0.2, 0.3, 0.8, 1.0))

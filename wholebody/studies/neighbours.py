@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Indices
 from wholebody.studies.records import SolveRecord
 from wholebody.studies.solving import Case, most_turned, solve_from
 
@@ -37,8 +37,15 @@ def solve_from_neighbours(family: Family) -> bool:
     """Try answers of solved cases as starts of neighbours until nothing new is solved; whether the caller ended it."""
     order, done, compute, keep = family
     tried: dict[int, dict[int, int]] = {k: {} for k, one in done.items() if one.q is not None and not one.solved}
+    places = np.array([case.place for case in order], dtype=np.intp)
     while True:
-        work = {k: near for k in tried if not done[k].solved and (near := _nearest(k, order, done, tried[k]))}
+        solved = np.array(sorted(j for j, one in done.items() if one.solved and one.q is not None), dtype=np.intp)
+        sizes = np.array([len(done[j].q) for j in solved.tolist()], dtype=np.intp)  # type: ignore[arg-type]
+        work = {}
+        for k in (k for k in tried if not done[k].solved):
+            alike = solved[sizes == len(done[k].q)]  # type: ignore[arg-type]
+            if near := _nearest(alike, np.abs(places[alike] - places[k]).sum(axis=1), tried[k]):
+                work[k] = near
         found = compute(solve_from, {k: (k, done[j].q) for k, (j, _) in work.items()})
         for k, (j, distance) in work.items():
             tried[k][j] = distance
@@ -48,20 +55,16 @@ def solve_from_neighbours(family: Family) -> bool:
             return False
 
 
-def _nearest(
-    k: int, order: Sequence[Case], done: Mapping[int, SolveRecord], tried: Mapping[int, int]
-) -> tuple[int, int] | None:
-    """The nearest solved case that was not tried for a case, and how far it is; None where enough were tried.
+def _nearest(solved: Indices, distances: Indices, tried: Mapping[int, int]) -> tuple[int, int] | None:
+    """The nearest of some solved cases that was not tried, and how far it is; None where enough were tried.
 
     After `NEIGHBOURS` only those count that are nearer than all before: an answer spreads from neighbour to neighbour.
     """
-    q, found = done[k].q, []
-    for j, one in done.items():
-        if one.solved and j not in tried and one.q is not None and q is not None and one.q.shape == q.shape:
-            found.append((sum(abs(a - b) for a, b in zip(order[k].place, order[j].place, strict=True)), j))
-    if not found:
+    left = ~np.isin(solved, [*tried])
+    if not left.any():
         return None
-    distance, j = min(found)
+    distance = int(distances[left].min())
+    j = int(solved[left & (distances == distance)][0])
     return (j, distance) if len(tried) < NEIGHBOURS or distance < min(tried.values()) else None
 
 
