@@ -12,6 +12,7 @@ from wholebody.base.checks import instance
 from wholebody.base.errors import InputError
 from wholebody.methods.newton.batches import OBJECTIVE, Angle, Batch
 from wholebody.methods.newton.figure_bodies import FigureBodies
+from wholebody.methods.newton.own_rows import quadratic_model
 from wholebody.methods.newton.settings import REFINEMENT
 from wholebody.methods.newton.system import System
 from wholebody.methods.newton.task_batches import RootMotion
@@ -67,10 +68,7 @@ class AssemblyObjective:
     def renew(self, q: Array) -> None:
         """Model the measures at a posture (nq,) of the assembly's scene."""
         state = self._state.update(q)
-        gradient, curvature = np.zeros(state.model.nv), np.zeros(state.model.nv)
-        for term in self._measures:
-            gradient += term.weight * term.gradient(state)
-            curvature += term.weight * term.curvature(state)
+        gradient, curvature = quadratic_model(self._measures, state)
         half = np.maximum(0.5 * curvature, REFINEMENT.least_stiffness)
         way = -0.5 * gradient / half
         for motion, at, v in self._free:

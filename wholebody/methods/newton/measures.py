@@ -28,7 +28,7 @@ from wholebody.methods.newton.batches import OBJECTIVE, Batch
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.iteration import Iteration
 from wholebody.methods.newton.linear_algebra import SingularSystemError
-from wholebody.methods.newton.own_rows import TangentRows, square_rows
+from wholebody.methods.newton.own_rows import TangentRows, quadratic_model, square_rows
 from wholebody.methods.newton.settings import REFINEMENT
 from wholebody.methods.newton.system import ActiveSystem, System
 from wholebody.methods.newton.task_batches import RootMotion
@@ -112,10 +112,7 @@ class Objective:
 
     def _model_at(self, q: Array) -> None:
         state = self._state.update(q)
-        gradient, curvature = np.zeros(state.model.nv), np.zeros(state.model.nv)
-        for term in self._curved:
-            gradient += term.weight * term.gradient(state)
-            curvature += term.weight * term.curvature(state)
+        gradient, curvature = quadratic_model(self._curved, state)
         half = np.maximum(0.5 * curvature[self._tangent], REFINEMENT.least_stiffness)
         self._aim(q, -0.5 * gradient[self._tangent] / half)
         self.stiffness = REFINEMENT.stiffness * half

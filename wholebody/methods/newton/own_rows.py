@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -245,3 +245,12 @@ def _finite(found: Array, shape: tuple[int, ...], label: str, what: str) -> Arra
     if not np.isfinite(found).all():
         raise InputError(f"{label}: {what} is not finite; return finite numbers near the bodies' placements too")
     return found
+
+
+def quadratic_model(measures: Iterable[Measure], state: State) -> tuple[Array, Array]:
+    """Gradient (nv,) and diagonal curvature (nv,) of the sum of measures with their weights."""
+    gradient, curvature = np.zeros(state.model.nv), np.zeros(state.model.nv)
+    for term in measures:
+        gradient += term.weight * term.gradient(state)
+        curvature += term.weight * term.curvature(state)
+    return gradient, curvature
