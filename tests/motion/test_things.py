@@ -101,10 +101,12 @@ def test_hands_stay_on_a_table_that_stands() -> None:
     figure = wb.load("human", stature=1.65)
     scene = among(figure, track[0])
     held = wb.retarget(motion, figure, scene)
-    off = gaps(wb.Clip(figure, held.q, held.dt, things={"box": [track[0]] * 20}), "right")
+    off = gaps(wb.Clip(figure, held.q, held.dt, things={"box": np.tile(pin.SE3ToXYZQUAT(track[0]), (20, 1))}), "right")
     assert np.abs(off[:, 0]).max() < 2e-3
     loose = wb.retarget(motion, figure, scene, ground=None)  # holds nothing, and is free all the same
-    off = gaps(wb.Clip(figure, loose.q, loose.dt, things={"box": [track[0]] * 20}), "right")
+    off = gaps(
+        wb.Clip(figure, loose.q, loose.dt, things={"box": np.tile(pin.SE3ToXYZQUAT(track[0]), (20, 1))}), "right"
+    )
     assert off[:, 0].min() > 5e-3
 
 
@@ -113,7 +115,7 @@ def test_check_moves_the_things_of_a_clip() -> None:
     q = np.tile(figure.posture("standing"), (3, 1))
     scene = wb.Scene(figure).add(wb.Sphere(0.1), name="ball", at=(3.0, 0.0, 1.2))
     assert wb.check(wb.Clip(figure, q, 0.1), scene).free
-    through = wb.Clip(figure, q, 0.1, things={"ball": [(3.0, 0.0, 1.2), (1.0, 0.0, 1.2), (-1.0, 0.0, 1.2)]})
+    through = wb.Clip(figure, q, 0.1, things={"ball": np.array([(3.0, 0.0, 1.2), (1.0, 0.0, 1.2), (-1.0, 0.0, 1.2)])})
     found = wb.check(through, scene)
     assert found.colliding == 0
     assert found.deepest_between > 0.1
@@ -125,8 +127,10 @@ def test_check_moves_the_things_of_a_clip() -> None:
 def test_things_go_with_their_clips(tmp_path: Path) -> None:
     figure = wb.load("human")
     q = np.tile(figure.posture("standing"), (3, 1))
-    turned = pin.SE3ToXYZQUAT(pin.SE3(pin.utils.rotate("z", 1.0), np.array([1.0, 0.5, 0.0])))
-    clip = wb.Clip(figure, q, 0.1, "with a ball", {"ball": [(0.0, 0.0, 1.0), (1.0, 0.0, 1.0), turned]})
+    places = np.tile([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], (3, 1))
+    places[1, 0] = 1.0
+    places[2] = pin.SE3ToXYZQUAT(pin.SE3(pin.utils.rotate("z", 1.0), np.array([1.0, 0.5, 0.0])))
+    clip = wb.Clip(figure, q, 0.1, "with a ball", {"ball": places})
     half = clip.resampled(0.05).things["ball"]
     assert half[1] == pytest.approx([0.5, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])
     assert half[3] == pytest.approx([1.0, 0.25, 0.5, 0.0, 0.0, np.sin(0.25), np.cos(0.25)])

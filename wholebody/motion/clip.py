@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,93 +12,18 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array
 from wholebody.base.charts import Shown, new_chart, plain
 from wholebody.base.checks import array, instance, listed, number, shown, text, time_step
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.figures.joined import one_figure
 from wholebody.figures.state import UNIT_TOLERANCE
+from wholebody.motion.mirroring import mirrored
 from wholebody.motion.thing_tracks import MIRROR as THING_MIRROR
 from wholebody.motion.thing_tracks import between, thing_tracks
 from wholebody.tracking.tracks import MOST_FRAMES, Track, check_figure, check_frames
 
 DRAWN = 8  # joints of `Clip.plot`
-MIRROR = np.diag([1.0, -1.0, 1.0])
-"""Reflection at the plane y = 0."""
-
-SIDES = (
-    ("left", "right"),
-    ("Left", "Right"),
-    ("LEFT", "RIGHT"),
-    (r"(?<![A-Za-z])l(?![A-Za-z])", r"(?<![A-Za-z])r(?![A-Za-z])"),
-    (r"(?<![A-Za-z])L(?![A-Za-z])", r"(?<![A-Za-z])R(?![A-Za-z])"),
-    (r"(?<![A-Za-z])[lL](?=[A-Z])", r"(?<![A-Za-z])[rR](?=[A-Z])"),
-)
-"""How names say their side; the patterns of single letters need a letter that stands alone or before a capital."""
-
-
-def other_side(name: str) -> str:
-    """The name of the same part on the other side; the name itself if it names no side."""
-    words = {"left": "right", "Left": "Right", "LEFT": "RIGHT", "l": "r", "L": "R"}
-    words |= {right: left for left, right in words.items()}
-    for left, right in SIDES:
-        both = re.compile(f"{left}|{right}")
-        if both.search(name):
-            return both.sub(lambda found: words[found.group()], name, count=1)
-    return name
-
-
-def mirrored(figure: Figure, q: Array) -> Array:
-    """Postures (n, nq) with left and right exchanged, mirrored at the plane y = 0 of the world.
-
-    Raises:
-        InputError: the figure is not symmetric to y = 0 of its root, or has joints of more than one degree of freedom.
-    """
-    source, sign = _exchange(one_figure(figure, "mirrored: the clip's figure"))
-    found: Array = q[:, source] * sign
-    if figure.root == "free":  # (x, -y, z), and the rotation M R M: the axis's x and z change their signs
-        found[:, :7] = q[:, :7] * (1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0)
-    return found
-
-
-def _exchange(figure: Figure) -> tuple[Indices, Array]:
-    """For each value of a posture: the value of which it takes the place, and the sign that it gets."""
-    model = figure.model
-    data = model.createData()
-    q = pin.neutral(model)
-    pin.computeJointJacobians(model, data, q)
-    source, sign = np.arange(model.nq), np.ones(model.nq)
-    for name in figure.joints:
-        joint = model.joints[figure.joint_id(name)]
-        if name in figure.followers:
-            continue
-        partner = other_side(name)
-        if partner not in figure.joints:
-            raise InputError(f"{figure.name} cannot be mirrored: {name!r} has no partner {partner!r}")
-        other = model.joints[figure.joint_id(partner)]
-        if joint.nv != 1 or joint.nq != other.nq:
-            raise InputError(f"{figure.name} cannot be mirrored: {name!r} is no joint of one degree of freedom")
-        here = MIRROR @ data.oMi[joint.id].translation
-        apart = np.linalg.norm(here - data.oMi[other.id].translation)
-        if apart > 0.01:  # m: descriptions of robots have their digits cut off
-            raise InputError(f"{figure.name} cannot be mirrored: {name!r} and {partner!r} are not symmetric to y = 0")
-        along = _along(data.J[:, joint.idx_v], data.J[:, other.idx_v])
-        if abs(along) < np.cos(0.05):
-            raise InputError(f"{figure.name} cannot be mirrored: {name!r} and {partner!r} turn about other axes")
-        for k in range(joint.nq):  # an unlimited joint holds cosine and sine; the sine alone changes its sign
-            source[joint.idx_q + k] = other.idx_q + k
-            sign[joint.idx_q + k] = np.sign(along) if k == joint.nq - 1 else 1.0
-    return source, sign
-
-
-def _along(own: Array, other: Array) -> float:
-    """Cosine between a joint's mirrored axis and its partner's, of their columns (6,); axes of rotation turn round."""
-    if np.linalg.norm(own[3:]) > 0.5:
-        return float(-(MIRROR @ own[3:]) @ other[3:])
-    return float((MIRROR @ own[:3]) @ other[:3]) if np.linalg.norm(other[3:]) < 0.5 else 0.0
-
-
 ROUNDING = 1e-9
 """Share of a time step by which a time may be outside of a clip: the rounding of sums of steps."""
 
@@ -264,7 +188,7 @@ class Clip(Shown):
         if frames > MOST_FRAMES:
             raise InputError(f"{self.name}: dt of {dt:g} s makes {frames} frames; give a longer one")
         places = [k * dt / self.dt for k in range(frames)]
-        things = {name: [between(track, place) for place in places] for name, track in self.things.items()}
+        things = {name: np.array([between(track, place) for place in places]) for name, track in self.things.items()}
         return Clip(self.figure, np.array([self._between(place) for place in places]), dt, self.name, things)
 
     def mirrored(self) -> Clip:

@@ -42,9 +42,8 @@ class ThingContact(NamedTuple):
 
 def still_things(scene: Scene) -> list[str]:
     """Things of a scene that stand in the world, without floors."""
-    return [
-        name for name, each in scene.objects.items() if each.segment is None and not isinstance(each.shape, HalfSpace)
-    ]
+    standing = (name for name, each in scene.objects.items() if each.segment is None)
+    return [name for name in standing if not isinstance(scene.objects[name].shape, HalfSpace)]
 
 
 class Piece(NamedTuple):

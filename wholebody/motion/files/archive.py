@@ -8,7 +8,7 @@ import tokenize
 import zipfile
 import zlib
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,9 @@ def write(motion: Motion, path: Path) -> Path:
     Of things that move it has names, `things` (k,), and placements, `thing_placements` (k, n, 7).
     """
     data = io.BytesIO()
-    moving = {"things": list(motion.things), "thing_placements": list(motion.things.values())} if motion.things else {}
+    moving: dict[str, Any] = {}
+    if motion.things:
+        moving = {"things": np.array(list(motion.things)), "thing_placements": np.array(list(motion.things.values()))}
     np.savez_compressed(
         data,
         wholebody_clip=np.array(VERSION),
@@ -39,7 +41,7 @@ def write(motion: Motion, path: Path) -> Path:
         name=np.array(motion.name),
         joints=np.array(motion.figure.joints, dtype=np.str_),
         figure=np.array(motion.figure.name),
-        **{name: np.array(value) for name, value in moving.items()},
+        **moving,
         **robot_arrays(motion),
     )
     return write_file(path, data.getvalue())
