@@ -149,6 +149,8 @@ class Clip(Shown):
         There may be any number of them; things that move go on only beside as many as before.
         """
         postures = array(q, f"{self.name}: q", "postures, shape (frames, nq)")
+        if postures.ndim != 2:
+            raise InputError(f"{self.name}: q has shape {postures.shape}; give postures, shape (frames, nq)")
         things = self.things if len(postures) == len(self) else {}
         return Clip(self.figure, postures, self.dt, self.name if name is None else name, things)
 
