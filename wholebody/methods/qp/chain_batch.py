@@ -78,10 +78,7 @@ def batches(problems: Sequence[Problem], budget: Budget, largest: int) -> list[B
 
 
 def _form(problem: Problem, known: dict[Hashable, PlainChain | None]) -> tuple[Hashable, Array] | None:
-    """What problems of a batch have in common, and the floats (e, 36) of a problem's goals; None without a chain.
-
-    `known` has the chains that were looked up before.
-    """
+    """What problems of a batch have in common, and the floats (e, 36) of a problem's goals; None without a chain."""
     entries = goal_entries(problem)
     if entries is None or problem.left_out:
         return None
