@@ -1,7 +1,4 @@
-"""Many jobs beside each other, in child processes of this machine or, through joblib, on a dask cluster.
-
-A job that crashes ends only its own process. Processes of this machine are kept from call to call.
-"""
+"""Many jobs beside each other: in child processes, which are kept from call to call, or on a dask cluster."""
 
 from __future__ import annotations
 

@@ -47,11 +47,7 @@ class ContactRows(NamedTuple):
 
 
 class ContactRowBuilder:
-    """Builds contact rows for all near pairs at once. It remembers no posture, so any number of runs may share one.
-
-    Attributes:
-        arrays: of the pieces, as compiled loops take them; see `patch_kernel.TableArrays`.
-    """
+    """Builds contact rows for all near pairs at once, for any number of runs; `arrays` are those of the pieces."""
 
     def __init__(self, table: PairTable, most_ends: int = MOST_ENDS, same_normal: float = SAME_NORMAL) -> None:
         """Take the pieces and pairs; `same_normal`: least cosine between coal's normal and a face's that it means."""

@@ -94,11 +94,7 @@ def _sole(figure: Figure, data: pin.Data, side: str, ankle: str) -> list[tuple[i
 
 
 class Holds:
-    """Where each point is to be in each frame, and with which weight.
-
-    Attributes:
-        points: the points.
-    """
+    """Where each of `points` is to be in each frame, and with which weight."""
 
     def __init__(
         self,

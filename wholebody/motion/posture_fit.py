@@ -54,11 +54,7 @@ class Layout(NamedTuple):
 
 
 class Fitter:
-    """Fits postures of a figure in a workspace, which is its own; so each thread needs one.
-
-    Attributes:
-        figure: the figure.
-    """
+    """Fits postures of a figure in a workspace of its own, so each thread needs one."""
 
     def __init__(self, figure: Figure, layout: Layout, workspace: Workspace) -> None:
         """Choose what goals are of."""

@@ -1,8 +1,4 @@
-"""The one thing a method asks of a problem at a posture: everything that counts, to first order.
-
-One pass of Pinocchio, one cull, coal for the pairs that survive, and one compiled pass over all built-in terms and
-contacts. Terms of other classes join through their own methods, and cost only themselves.
-"""
+"""Everything that counts at a posture, to first order: the one thing a method asks of a problem."""
 
 from __future__ import annotations
 

@@ -18,10 +18,7 @@ from wholebody.scene.workspace import Workspace
 
 
 class Entanglement:
-    """Looks whether two limbs hold each other, and which of them gives way.
-
-    `largest_motion` (nv,) is that of each degree of freedom in a frame, radians and metres.
-    """
+    """Looks whether two limbs hold each other, and which gives way; `largest_motion` (nv,) in a frame."""
 
     def __init__(self, scene: Scene, workspace: Workspace, largest_motion: Array) -> None:
         self._model, self._workspace, self._largest_motion = scene.model, workspace, largest_motion

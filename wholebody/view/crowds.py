@@ -1,7 +1,4 @@
-"""Many things that stand in the world: those of one form are drawn together, as instances of one mesh.
-
-A page takes milliseconds for each node of its tree, so thousands of things with a node each take minutes.
-"""
+"""Many things that stand in the world: those of one form are one mesh, as each node costs milliseconds."""
 
 from __future__ import annotations
 

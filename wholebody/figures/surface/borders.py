@@ -1,7 +1,4 @@
-"""A surface divided among the segments that move it, along lines on which two of them move it alike.
-
-Triangles that such a line passes are cut, so that a border is as smooth as the weights, however large the triangles.
-"""
+"""A surface divided among the segments that move it, its triangles cut where two of them move it alike."""
 
 from __future__ import annotations
 

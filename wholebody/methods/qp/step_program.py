@@ -1,7 +1,4 @@
-"""The program of a tracking step: built and solved by one compiled call, in arrays made once.
-
-What the compiled call does not settle, and what other solvers are to solve, goes to the working set as any program.
-"""
+"""The program of a tracking step: built and solved by one compiled call, in arrays made once."""
 
 from __future__ import annotations
 
@@ -49,11 +46,7 @@ class Answer(NamedTuple):
 
 
 class StepProgram:
-    """Builds and solves the programs of one tracker.
-
-    Attributes:
-        goals: number of the goals' rows.
-    """
+    """Builds and solves the programs of one tracker; `goals` is the number of the goals' rows."""
 
     def __init__(self, problem: Problem, workspace: Workspace, working_set: WorkingSet, dt: float) -> None:
         """Take the terms of a problem, for steps of `dt` s; `working_set` solves what the compiled call does not."""

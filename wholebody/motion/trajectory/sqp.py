@@ -137,11 +137,7 @@ class _Filter:
 
 
 class WindowProgram:
-    """One window: what is minimised, what holds, and the iterations.
-
-    Attributes:
-        nodes: where rows hold: every frame, and places between frames; more may be added before another `run`.
-    """
+    """One window: what is minimised, the `nodes` where rows hold, to which more may be added, and the iterations."""
 
     def __init__(self, evaluator: NodeEvaluator, objective: Objective, limits: Limits, iterations: int) -> None:
         """Take what is needed; a run has at most so many steps, of one to three programs each."""
