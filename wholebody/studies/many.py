@@ -11,8 +11,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from wholebody.base import checks
 from wholebody.base.arrays import brief
-from wholebody.base.batches import fingerprint, run_batch, shared
-from wholebody.base.progress import reporter
+from wholebody.base.batches import fingerprint, reporter, run_batch, shared
 from wholebody.base.runner import EndedError, Job
 from wholebody.methods.base import Method
 from wholebody.methods.control import ctrl_c_ends_all

@@ -24,8 +24,7 @@ from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.base import Constraint
-from wholebody.terms.constraint_values import ConstraintValues
-from wholebody.terms.linearisation import PackedLinearisation
+from wholebody.terms.linearisation import ConstraintValues, PackedLinearisation
 
 
 class Answer(NamedTuple):
