@@ -250,7 +250,7 @@ def compiled_kernel() -> Any:
 
 
 class QuasiDefinite:
-    """L D L' of [H, -J'; -J, -M] with AMD ordering (Vanderbei 1995, "Symmetric quasi-definite matrices")."""
+    """L D L' of [H, -J'; -J, -M], H diagonal or sparse, with AMD ordering (Vanderbei 1995, quasi-definite matrices)."""
 
     name = "kkt/ldlt"
 

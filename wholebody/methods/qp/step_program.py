@@ -1,8 +1,8 @@
-"""The program of a tracking step: built and solved by one compiled call, in arrays made once."""
+"""The program of a tracking step, built and solved by one compiled call in arrays made once, and its answers."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from math import sqrt
 from typing import Any, NamedTuple
@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array, with_values
+from wholebody.base.arrays import Array, brief, with_values
 from wholebody.figures.state import State
 from wholebody.methods.qp.quadratic_program import QuadraticProgram, work_size
 from wholebody.methods.qp.rows import NUMBERS, Rows, StepParts, StepRoom, StepSize, Terms
@@ -22,6 +22,7 @@ from wholebody.methods.qp.turning import Turning
 from wholebody.methods.qp.turning import compiled_kernel as compiled_turning
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
+from wholebody.scene.moving_obstacles import Collision
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.base import Constraint
 from wholebody.terms.linearisation import ConstraintValues, PackedLinearisation
@@ -258,3 +259,37 @@ def compiled_kernel() -> Any:
     )  # fmt: skip
     tracking_kernel.run_ahead(none, none, 0, none, STEP, np.zeros(2))
     return tracking_kernel
+
+
+class QPStep(NamedTuple):
+    """Answer of one step."""
+
+    q: Array  # (nq,) the next posture
+    displacement: Array  # (nv,) tangent displacement to it, radians and metres
+    velocity: Array  # (nv,) displacement / dt
+    contacts: int  # how many pairs had rows
+    rows: int  # how many contact rows
+    exact: bool  # whether the program was solved to rounding
+    iterations: int  # iterations of the QP solver
+    by: str  # what closed the last program, see `QPSolution`
+    programs: Mapping[str, int]  # how many programs each closed: one a step, and more where it was looked at twice
+    # how much of the program's displacement was gone: less than 1 where it was longer than what was looked at
+    share: float
+    # what things that move (`Scene.move` with `over`) passed through, or are inside of; empty if nothing.
+    collisions: tuple[Collision, ...] = ()
+    # shares of the step, from 0 to 1, and the postures (nq,) there, if things moved; otherwise empty
+    path: tuple[tuple[float, Array], ...] = ()
+    # which term of one's own is not finite where the step would have ended, so that it was cut; else empty
+    note: str = ""
+
+    def __repr__(self) -> str:
+        return brief(self)
+
+
+class FrameStep(NamedTuple):
+    """Answer of one frame."""
+
+    q: Array  # (nq,) the next posture
+    iterations: int  # programs
+    collisions: tuple[Collision, ...] = ()  # see `QPStep`
+    path: tuple[tuple[float, Array], ...] = ()

@@ -95,7 +95,7 @@ Built = TypeVar("Built")
 
 
 class Outside(SolvesAnew, ABC, Generic[Built]):
-    """What a job sent before its answer, and what its function returned, or `error`: how the process ended."""
+    """A tool as a method: refuses terms other than `kinds`, and keeps what it builds while that is right."""
 
     name: ClassVar[str]
     kinds: ClassVar[tuple[type, ...]]
