@@ -166,11 +166,7 @@ def thickness(pieces: Sequence[pin.GeometryObject], start: Array, along: Array) 
 
 
 class Holds:
-    """Where each point is to be in each frame, and with which weight.
-
-    Attributes:
-        points: the points.
-    """
+    """Where each of `points` is to be in each frame, and with which weight."""
 
     def __init__(
         self,
@@ -243,11 +239,7 @@ class Holds:
         self._free = free
 
     def goals(self, frame: int, paths: Array, shift: Array, again: bool = False) -> tuple[Array, Array]:
-        """Goals (h, 3) and weights (h, 3) of a frame.
-
-        Without holds the points would be on `paths` (n, h, 3); the body is beside its free fit by a shift (3,),
-        metres. `again` says that it is known where points come down.
-        """
+        """Goals (h, 3) and weights (h, 3) of a frame; `paths` (n, h, 3) without holds, `shift` (3,) of the body."""
         if self._down is None:
             self._down = self._facing_down(paths)
         goals, weights = np.array(paths[frame]), np.zeros((len(self.points), 3))

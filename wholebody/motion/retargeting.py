@@ -17,10 +17,9 @@ from wholebody.geometry.shapes import HalfSpace
 from wholebody.motion.clip import Clip
 from wholebody.motion.held_points import Holds, Touched, held_points, surface_of, touching_points
 from wholebody.motion.retarget_run import Run
-from wholebody.motion.retarget_targets import LIMBS, known_bones, standing_places, targets
+from wholebody.motion.retarget_targets import LIMBS, known_bones, soled, standing_places, targets
 from wholebody.motion.roles import Roles, matched, skeleton_roles
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
-from wholebody.motion.soles import soled
 from wholebody.motion.stance import paths
 from wholebody.motion.standing_ground import NOTHING, Ground
 from wholebody.motion.standing_ground import ground as find_ground
