@@ -104,11 +104,8 @@ class Holds:
         dt: float,
         surface: Callable[[Array], float | None] | None,
     ) -> None:
-        """Take the points that rest at some time, the ground that says when, and the seconds of a frame.
-
-        `scale` are metres of the figure for each metre of height of the recording's ground; `surface` is the height of
-        the highest surface below a place (3,), metres, None for that of the recording.
-        """
+        """Take the points that rest at some time, and the ground that says when, in metres of the figure by `scale`."""
+        # `surface` is the height of the highest surface below a place (3,); None for the recording's ground.
         self.points, self._scale, self._surface = points, scale, surface
         self.over = max(1, round(OVER / dt))
         self._stands = [[each for each in ground.footholds if each.role == point.role] for point in points]
