@@ -75,13 +75,51 @@ class AllPairs:
             self.ask(max(0.0, float(self._found[:, 0].min())))
         self.least = float(self._found[:, 0].min(initial=np.inf))
 
+    def shortfalls(self, q: Array, clearances: Array) -> tuple[Array, Array, Array]:
+        """What `move` and `ask` tell of postures q (k, nq) and the clearances (k, pairs) of each, metres.
+
+        Coal is asked for pairs alone that neither balls nor boxes about their pieces keep apart.
+
+        Returns:
+            Placements of the joints (k, njoints, 4, 3), the deepest overlap (k,) and the largest shortfall (k,).
+
+        Raises:
+            InputError: see `move`.
+        """
+        table, distances, depth, short = self._built.table, self._distances, *np.zeros((2, len(q)))
+        joints = np.empty((len(q), self._built.model.njoints, 4, 3))
+        placed = np.empty((len(q), *distances.placed.shape))
+        for k, posture in enumerate(q):
+            self.state.update(posture)
+            with self._built.lock:
+                distances.place(self._built.model, self.state.data)
+            joints[k], placed[k] = self.state.joints, distances.placed
+        first, second = table.pairs.T
+        within = np.maximum(clearances, 0.0)
+        away = placed[:, second, 3] - placed[:, first, 3]
+        apart = np.sqrt(np.einsum("kpi,kpi->kp", away, away)) - table.reach[table.pairs].sum(axis=1) >= within
+        row, number = np.nonzero(~apart)  # those whose bound is not a number too
+        pair = table.pairs[number]
+        near = ~(_between_boxes(placed[row[:, None], pair], table.half[pair]) >= within[row, number])
+        row, number = row[near], number[near]
+        for k in np.unique(row).tolist():
+            asked = number[row == k]
+            distances.put(placed[k])
+            distances.reset()
+            found = _numbers(distances.measured(asked))[:, 0]
+            depth[k], short[k] = max(0.0, -found.min()), max(0.0, (clearances[k, asked] - found).max())
+        return joints, depth, short
+
     def ask(self, within: Array | float) -> None:
         """Let `distance` be exact for all pairs that are nearer than `within` metres, (pairs,) or one for all."""
         if self._bounds is None:
             return
         number = self._below(within)
         number = number[self._row[number] < 0]
-        self.distance[number] = np.maximum(self.distance[number], self._between_boxes(number))
+        table = self._built.table
+        pair = table.pairs[number]
+        between = _between_boxes(self._distances.placed[pair], table.half[pair])
+        self.distance[number] = np.maximum(self.distance[number], between)
         self._ask(number[~(self.distance[number] >= np.broadcast_to(within, self.distance.shape)[number])])
 
     def _below(self, within: Array | float) -> Indices:
@@ -95,13 +133,6 @@ class AllPairs:
         self.distance[number], self._row[number] = found[:, 0], len(self._found) + np.arange(len(number))
         self._found = np.concatenate([self._found, found])
 
-    def _between_boxes(self, number: Indices) -> Array:
-        """Greatest gap (k,) along a world's axis between boxes about the pieces of pairs (k,)."""
-        pair, placed, half = self._built.table.pairs[number], self._distances.placed, self._built.table.half
-        extent = np.einsum("ksji,ksj->ki", np.abs(placed[pair, :3]), half[pair])
-        gaps: Array = (np.abs(placed[pair[:, 1], 3] - placed[pair[:, 0], 3]) - extent).max(axis=1)
-        return gaps
-
     def nearer(self, within: Array) -> NearPairs:
         """What there is to know of pairs nearer than `within` (pairs,), metres; it outlives the next `move`."""
         self.ask(within)
@@ -109,6 +140,13 @@ class AllPairs:
         rows = number if self._bounds is None else self._row[number]
         pair = self._built.table.pairs[number]
         return NearPairs(self._built, number, pair, self._found[rows], self._distances.placed[pair])
+
+
+def _between_boxes(placed: Array, half: Array) -> Array:
+    """Greatest gap (k,) along a world's axis between boxes of half sizes (k, 2, 3) at placements (k, 2, 4, 3)."""
+    extent = np.einsum("ksji,ksj->ki", np.abs(placed[:, :, :3]), half)
+    gaps: Array = (np.abs(placed[:, 1, 3] - placed[:, 0, 3]) - extent).max(axis=1)
+    return gaps
 
 
 class _Balls:
