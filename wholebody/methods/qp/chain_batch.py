@@ -175,7 +175,7 @@ class _First(NamedTuple):
         return cls(batch, chain, goals, rule, at, nearest, ends, found, np.maximum(counts, 0))
 
     def ends(self) -> tuple[Array, Indices, Mask]:
-        """Postures (k, nq) at the ends of least effort, descents (k,), and where (k,) these meet goals and are stationary."""
+        """Postures (k, nq) at ends of least effort, descents (k,), and whether (k,) goals are met there for good."""
         rows, taken = np.arange(len(self.at)), np.arange(self.known.shape[1]) < self.counts[:, None]
         effort = np.where(taken, self.known[:, :, 1], np.inf)
         least = effort.argmin(axis=1)
