@@ -23,6 +23,8 @@ from wholebody.scene.geometry_model import SceneGeometry
 
 MANY = 3000  # pairs from which on they are bounded first; coal takes 0.4 us for each, a bound 0.02 us
 
+NEAR = 8  # first pieces whose distances to all second ones, 0.3 MB of 5,000, stay in the processor's own memory
+
 NOT_A_NUMBER = "a distance is not a number; an object's placement or shape is broken"
 
 Label = tuple[Literal["contact", "limit", "bound", "constraint"], tuple[str, ...]]
@@ -156,18 +158,22 @@ class _Balls:
         (self._first, row), (self._second, column) = (np.unique(side, return_inverse=True) for side in pairs.T)
         self._cell, self._reach = row * len(self._second) + column, reach[pairs].sum(axis=1)
         # room: to ask the system for megabytes takes longer than to fill them
-        self._away, self._square = np.empty((2, len(self._first), len(self._second)))
+        self._away, self._square = np.empty((NEAR, len(self._second))), np.empty((len(self._first), len(self._second)))
         self._apart = np.empty(len(pairs))
 
     def gaps(self, centre: Array) -> Array:
         """(pairs,) metres, of pieces with these centres (n, 3); overwritten by the next call."""
-        first, second, away, square = centre[self._first], centre[self._second], self._away, self._square
-        square[:] = 0.0
-        for k in range(3):
-            np.subtract(first[:, None, k], second[:, k], out=away)
-            np.multiply(away, away, out=away)
-            np.add(square, away, out=square)
-        np.take(np.sqrt(square, out=square).ravel(), self._cell, out=self._apart, mode="clip")
+        first, second = centre[self._first], np.ascontiguousarray(centre[self._second].T)
+        for row in range(0, len(first), NEAR):
+            some, square = first[row : row + NEAR], self._square[row : row + NEAR]
+            away = self._away[: len(some)]
+            for k in range(3):
+                np.subtract(some[:, None, k], second[k], out=away)
+                np.multiply(away, away, out=away if k else square)
+                if k:
+                    np.add(square, away, out=square)
+            np.sqrt(square, out=square)
+        np.take(self._square.ravel(), self._cell, out=self._apart, mode="clip")
         self._apart -= self._reach
         return self._apart
 
