@@ -53,11 +53,7 @@ class AllPairs:
         self.distance, self.least = np.zeros(0), float("inf")
 
     def move(self, q: Array) -> None:
-        """Measure all pairs at the posture q (nq,).
-
-        Raises:
-            InputError: q has the wrong shape or a value that is not finite, or a distance is not a number.
-        """
+        """Measure all pairs at the posture q (nq,); InputError for a q or a distance that is no finite number."""
         distances = self._distances
         self.state.update(q)
         with self._built.lock:  # not while a thing is moved, one piece after the other
@@ -78,15 +74,9 @@ class AllPairs:
         self.least = float(self._found[:, 0].min(initial=np.inf))
 
     def shortfalls(self, q: Array, clearances: Array) -> tuple[Array, Array, Array]:
-        """What `move` and `ask` tell of postures q (k, nq) and the clearances (k, pairs) of each, metres.
+        """Joints (k, njoints, 4, 3), deepest overlap and shortfall (k,) at q (k, nq), for clearances (k, pairs).
 
-        Coal is asked for pairs alone that neither balls nor boxes about their pieces keep apart.
-
-        Returns:
-            Placements of the joints (k, njoints, 4, 3), the deepest overlap (k,) and the largest shortfall (k,).
-
-        Raises:
-            InputError: see `move`.
+        As `move` and `ask` tell them; coal is asked for pairs alone that neither balls nor boxes keep apart.
         """
         table, distances, depth, short = self._built.table, self._distances, *np.zeros((2, len(q)))
         joints = np.empty((len(q), self._built.model.njoints, 4, 3))

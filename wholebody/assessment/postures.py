@@ -57,16 +57,7 @@ class Judged(NamedTuple):
 
 
 def judged(problem: Problem, numbers: Numbers, q: Array) -> Judged:
-    """Judge postures q (k, nq), each for its own problem.
-
-    Args:
-        problem: one of them: without constraints and bounds, its measure a squared distance.
-        numbers: of all of them.
-        q: the postures.
-
-    Raises:
-        InputError: q has a value that is not finite.
-    """
+    """Judge postures q (k, nq), each with its own numbers of one problem without constraints and bounds."""
     model, built, figure = problem.scene.model, problem.scene.built, problem.scene.figure
     with all_pairs(built).borrow() as pairs:
         step = max(1, TOGETHER // max(1, len(built.table.pairs)))

@@ -146,10 +146,7 @@ def _children(count: int) -> Iterator[list[Child]]:
 def spread(
     function: Callable[[Any], Any], arguments: Iterable[Any], jobs: int, cluster: str | None = None
 ) -> Iterator[Any]:
-    """Call a function with each argument in as many processes, or threads of a cluster, as there are jobs at a time.
-
-    Its answers are given as they come. See `run_batch` for the arguments and the errors.
-    """
+    """Call a function with each argument in `jobs` processes, or threads of a cluster; answers come as they end."""
     import joblib
 
     try:
@@ -199,11 +196,7 @@ def _in_own_child(sent: _Sent) -> tuple[int, Any, tuple[int, str] | None]:
 
 
 def fingerprint(*asked: Any) -> str:
-    """Fingerprint of a request.
-
-    Raises:
-        InputError: it cannot be sent to another process.
-    """
+    """Fingerprint of a request; InputError if it cannot be sent to another process."""
     import joblib
 
     try:

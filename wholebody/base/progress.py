@@ -11,15 +11,7 @@ from wholebody.base import checks
 
 
 def reporter(value: Callable[..., Any] | bool | None, what: str) -> Callable[..., Any] | None:
-    """The function that is called with the number done and the number of all, as numbers or the first of a tuple.
-
-    Args:
-        value: a function, True for a line on the error output, False or None for neither.
-        what: names it in messages.
-
-    Raises:
-        InputError: it is something else.
-    """
+    """The function to call with the number done and of all: a given one, a line on the error output, or None."""
     return checks.function({True: _Line(), False: None}[value] if isinstance(value, bool) else value, what)
 
 

@@ -108,11 +108,7 @@ def check_overlaps(chosen: Iterable[str]) -> None:
 
 
 def scene_names(arguments: argparse.Namespace, scenes: Mapping[str, str], command: str, *, files: bool) -> list[str]:
-    """Names of the scenes to run; none if the list was asked for, which is printed.
-
-    `scenes` says what each shows; a task file may stand for a scene if `files`. Raises InputError for no scene or a
-    negative seed, UnknownNameError where there is no such scene.
-    """
+    """Names of the scenes to run, or of task files if `files`; none if the list was asked for, which is printed."""
     if arguments.list:
         for name, about in scenes.items():
             print(f"{name:20} {about}")

@@ -95,10 +95,7 @@ class Coupling:
         return np.asarray(pin.integrate(model, tracked, xx * apart + xv * relative))
 
     def stopped(self, shown: Array, wanted: Array, dt: float) -> None:
-        """Take the posture (nq,) that contact allowed in place of the one (nq,) that the spring wanted.
-
-        Where they differ, the velocity becomes that of what was done in the `dt` seconds of the frame.
-        """
+        """Take the posture (nq,) that contact allowed for the wanted one; the velocity becomes that of a frame."""
         model = self._model
         missed = np.abs(pin.difference(model, wanted, shown))
         done = pin.difference(model, self._shown, shown) / dt
@@ -157,13 +154,10 @@ class PushedContacts:
 
 
 def contact_impulse(relative: Array, normal: Array, mobility: Array, surface: Surface) -> Array | None:
-    """Impulse (3,) on body B of a contact, N s: equation 9, with friction of equation 10; None if they do not approach.
+    """Impulse (3,) on body B, N s: equation 9, with friction of equation 10; None if A and B do not approach.
 
-    Args:
-        relative: (3,) velocity of B's point relative to A's.
-        normal: (3,) from A to B.
-        mobility: (3, 3) change of that velocity by an impulse on B, and its opposite on A.
-        surface: restitution and friction.
+    `relative` (3,) is the velocity of B's point relative to A's, `normal` (3,) from A to B, and `mobility` (3, 3) the
+    change of that velocity by an impulse on B, and its opposite on A.
     """
     approach, least = -float(normal @ relative), 1e-6  # m/s
     if approach <= least:

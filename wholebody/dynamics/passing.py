@@ -68,8 +68,7 @@ def check_passing(
 ) -> PassingCheck:
     """Whether pieces can have been deeper than `PASSING` in each other on the way of a step, and where.
 
-    The step took `time` seconds. Pairs `after` it are within margins (n,) of both bodies, metres; no point of a body
-    has moved farther than its travel (n,).
+    Pairs `after` it are within margins (n,) of both bodies, metres; no point of a body moved more than its travel (n,).
     """
     before.widen(travel)
     pieces, near = state.pieces, before.near

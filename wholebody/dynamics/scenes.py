@@ -27,11 +27,7 @@ build_world_scene = _FILE.build
 
 
 def standing_scene(name: str, scene: Scene, q: Array, *, frames: int, dt: float = FRAME) -> InteractionScene:
-    """A scene of one's own, in which the figure keeps the posture q (nq,) for a number of frames.
-
-    Raises:
-        InputError: nothing in the scene moves by itself, or a value of the wrong kind, shape or range.
-    """
+    """A scene of one's own, in which the figure keeps the posture q (nq,) for a number of frames."""
     frames = whole(frames, "frames", 1, MOST_FRAMES)
     if not any(thing.body is not None for thing in scene.objects.values()):
         raise InputError(f"{name}: nothing moves by itself; give an object a density or a mass")

@@ -14,10 +14,7 @@ from wholebody.figures.postures import support
 
 
 def grounded(model: pin.Model, segments: tuple[str, ...], q: Array, scene: Any, height: int) -> Array:
-    """Copy (nq,) of a posture of a model with a free root; see `Figure.grounded`.
-
-    `segments` are those that the root carries, and `height` is the place of the root's height in the posture.
-    """
+    """Copy (nq,) of a posture with the root's `height` such that its `segments` stand; see `Figure.grounded`."""
     data = model.createData()
     pin.forwardKinematics(model, data, q)
     own, around = set(segments), set(scene.objects)

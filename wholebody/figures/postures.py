@@ -17,11 +17,7 @@ GAP = 0.004
 
 
 def stand(figure: Articulated, degrees: Mapping[str, float]) -> Array:
-    """Return the posture (nq,) of a row of `named_angles`: pelvis above the origin, lowest piece on z = 0, no overlap.
-
-    Very stout builds (body mass index above about 45) cannot squat: their thighs, spread to the limit,
-    overlap the belly.
-    """
+    """Posture (nq,) of a row of `named_angles`: pelvis above the origin, lowest piece on z = 0, no overlap."""
     q = pin.neutral(figure.model)
     values: dict[str, float] = {}
     for name, angle in degrees.items():

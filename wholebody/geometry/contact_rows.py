@@ -54,10 +54,7 @@ class ContactRowBuilder:
     """
 
     def __init__(self, table: PairTable, most_ends: int = MOST_ENDS, same_normal: float = SAME_NORMAL) -> None:
-        """Take the pieces and pairs, and how many rows a contact has at most beside its witness row.
-
-        `same_normal` is the cosine of the angle to a face's normal within which coal's may be meant to be it.
-        """
+        """Take the pieces and pairs; `same_normal`: least cosine between coal's normal and a face's that it means."""
         self.table, self.most_ends = table, most_ends
         lengths = LENGTHS.copy()
         lengths[4], lengths[7] = same_normal, most_ends

@@ -120,11 +120,7 @@ class Holds:
         self._places: dict[tuple[int, int], Array] = {}
 
     def goals(self, frame: int, paths: Array, shift: Array, again: bool = False) -> tuple[Array, Array]:
-        """Goals (h, 3) and weights (h, 3) of a frame.
-
-        Without holds the points would be on `paths` (n, h, 3); the body is beside its free fit by a shift (3,),
-        metres. `again` says that it is known where points come down.
-        """
+        """Goals (h, 3) and weights (h, 3) of a frame; `paths` (n, h, 3) without holds, `shift` (3,) of the body."""
         if self._down is None:
             self._down = self._facing_down(paths)
         goals, weights = np.array(paths[frame]), np.zeros((len(self.points), 3))
@@ -151,10 +147,7 @@ class Holds:
     def _swing(
         self, number: int, frame: int, around: list[Foothold], places: list[Array], paths: Array
     ) -> tuple[Array, float]:
-        """Where a point (3,) is to be between rests, and how near in time it is to one, from 0 to 1.
-
-        Its way is led from one rest to the next; it comes to rest, and starts, slowly.
-        """
+        """Where a point (3,) is to be between rests, and how near in time it is to one, from 0 to 1."""
         nearest = [min(max(frame, stand.first), stand.end - 1) for stand in around]
         beside = [place - paths[near][number] for place, near in zip(places, nearest, strict=True)]
         gone = 0.0

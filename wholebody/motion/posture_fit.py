@@ -115,11 +115,7 @@ class Fitter:
     def step(
         self, q: Array, goals: Goals, *, damping: float = DAMPING, among: bool = True, most: Array | None = None
     ) -> Array:
-        """The posture (nq,) after one program from q (nq,), which is within the limits.
-
-        `damping` is that of every joint, m²/rad²; contacts count if `among`; `most` (2, nv) are the least and greatest
-        displacement.
-        """
+        """The posture (nq,) after one program from q (nq,); `most` (2, nv) displacements, contacts only if `among`."""
         near = self._workspace.near(q, WITHIN) if among else None
         self._state.update(q)
         rows, errors = self._rows(goals), self._errors(q, goals)

@@ -263,10 +263,7 @@ def _layout(points: list[str], turns: list[str], roles: Roles, figure: Figure, h
 
 
 def smoothed(values: Array, dt: float, time: float) -> Array:
-    """Values (n, m) of least sum of squared changes and accelerations.
-
-    Whittaker, On a New Method of Graduation, 1923; `time` is that in seconds over which values are smoothed.
-    """
+    """Values (n, m) of least squared changes and accelerations over a time [s] (Whittaker 1923, graduation)."""
     count, weight = len(values), (time / dt) ** 4
     if count < 3:
         return values
@@ -280,10 +277,8 @@ def smoothed(values: Array, dt: float, time: float) -> Array:
 
 
 def slowed(values: Array, most: Array) -> Array:
-    """Values (n, m) nearest to given ones that change by at most `most` (m,) from row to row, but for rounding.
-
-    Alternating direction method of multipliers: Boyd and others, Foundations and Trends in Machine Learning 3(1), 2011.
-    """
+    """Values (n, m) nearest to given ones that change by at most `most` (m,) from row to row, but for rounding."""
+    # ADMM: Boyd and others, Foundations and Trends in Machine Learning 3(1), 2011.
     changes = np.diff(values, axis=0)
     if not (np.abs(changes) > most).any():
         return values

@@ -180,10 +180,7 @@ def known_bones(limb: tuple[str, ...], side: str, roles: Collection[str]) -> lis
 
 
 def _points(own: _Body, source: _Body, hips: Array, anchored: bool) -> dict[str, Array]:
-    """Places (n, 3) of the roles: from the hips up to the shoulders and the head, and outwards along the limbs.
-
-    Limbs of which nothing nearer to the trunk is known begin where the figure's do, if they are `anchored`.
-    """
+    """Places (n, 3) of the roles: from the hips up to the shoulders and the head, and outwards along the limbs."""
     points, top = _girdles(own, source, hips)
     limbs = [(limb, known_bones(limb, side, own.places.keys())) for limb in LIMBS for side in ("left", "right")]
     rigid = {
@@ -221,10 +218,7 @@ def _girdles(own: _Body, source: _Body, hips: Array) -> tuple[dict[str, Array], 
 
 
 def _pelvis(source: _Body, motion: SkeletonMotion) -> Array:
-    """Orientation of the pelvis (n, 3, 3) from places alone: y from right to left, z towards the shoulders.
-
-    Without hips and shoulders it is that of the skeleton's root.
-    """
+    """Orientation of the pelvis (n, 3, 3) from places: y from right to left, z towards the shoulders; or the root's."""
     pair = next((part for part in ("hip", "shoulder") if source.has(f"left_{part}", f"right_{part}")), None)
     if pair is None:
         return np.array(motion.rotations[:, 0])

@@ -282,12 +282,7 @@ def dressed(figure: Figure, worn: Worn) -> Scene:
 
 
 def put_on(scene: Scene, worn: Worn) -> Scene:
-    """The scene, which is changed, with something attached to its figure.
-
-    Raises:
-        UnknownNameError: there is no such equipment.
-        WholebodyError: a mesh that cannot be read, or a figure that the equipment does not fit.
-    """
+    """The scene, which is changed, with something attached to its figure."""
     if isinstance(worn, tuple):
         for one in worn:
             put_on(scene, one)

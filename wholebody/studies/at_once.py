@@ -16,11 +16,7 @@ LARGEST = 256  # problems of a batch. More: fewer calls; less: progress is told 
 
 
 def at_once(problems: Sequence[Problem], method: Any, jobs: int) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Solve those problems that a method with `batches` answers many of at a time.
-
-    Returns:
-        The place of each that is solved, and what its record says; the others are left to solves of their own.
-    """
+    """Solve those problems that a method with `batches` answers many of at a time: place and record of each solved."""
     sender = Sender()
 
     def there(batches: list[Any], full: bool) -> Job:

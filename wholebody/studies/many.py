@@ -67,12 +67,7 @@ class Running:
     def checked(
         cls, what: str, method: object, jobs: object, cluster: object, seconds: object, progress: Any
     ) -> Running:
-        """Check the arguments of a function that runs cases.
-
-        Raises:
-            InputError: one is of the wrong kind or range.
-            UnknownNameError: there is no such method.
-        """
+        """Check the arguments of a function that runs cases."""
         return cls(
             as_method(method),
             checks.whole(jobs, f"{what}: jobs", 1, MOST_JOBS),
@@ -225,10 +220,7 @@ def _run(
     work: Sequence[Sequence[int]], order: Sequence[Case], running: Running, keep: Callable[[int, SolveRecord], bool],
     alone: list[Sequence[int]], begun: Mapping[int, Any],
 ) -> bool:  # fmt: skip
-    """Do runs; whether the caller ended them. Runs of several cases whose process ended are left in `alone`.
-
-    `begun` has the posture (nq,), or None, from which the first case of a run is tried before its own start.
-    """
+    """Do runs; whether the caller ended them. Those of several cases whose process ended are left in `alone`."""
     sender = Sender()
 
     def made(run: Sequence[int]) -> Run:
@@ -257,10 +249,7 @@ def _done(
     work: Sequence[T], cases: Iterable[Case], running: Running,
     ways: tuple[Callable[[T], Any], Callable[[list[T], bool], Job]],
 ) -> Generator[tuple[T, Any, EndedError | None], None, None]:  # fmt: skip
-    """Do work, in this process too where nobody else's code in its cases can end it or go on for ever.
-
-    `ways` are how a part is done here, and the job that does parts elsewhere; see `shared`.
-    """
+    """Do work, in this process too where nobody else's code can end it; `ways`: here, and as jobs of `shared`."""
     here, there = ways
     if _is_quick(cases, running):
         yield from shared(work, running.jobs, here, there)

@@ -66,10 +66,7 @@ def _solved(make: Make, method: Method, q: Array | None) -> dict[str, Any]:
 
 
 def _warm_answer(problem: Problem, method: Method, q: Array) -> dict[str, Any] | None:
-    """What a record says of a problem solved from another's answer (nq,); None where it is not solved, or refused.
-
-    A start may be refused that is another's answer where the problem's own is not: a hold elsewhere at the start.
-    """
+    """What a record says of a problem solved from another's answer (nq,); None where not solved, or refused."""
     try:
         solution = warmed(method).solve(begun_at(problem, q))
     except WholebodyError:
@@ -90,10 +87,7 @@ def solve_from(given: Sequence[Start], method: Method) -> list[dict[str, Any] | 
 
 
 def most_turned(given: Sequence[tuple[Make, Array, Array]], _method: Method) -> list[tuple[str, float]]:
-    """Of each problem, the joint that turns most between two postures (nq,), and the angle in radians.
-
-    Joints that shift, and the root, are left out; ("", 0.0) where there is no other.
-    """
+    """Of each problem, the joint that turns most between two postures (nq,), and the angle, radians."""
     found = []
     for make, one, other in given:
         model = make().scene.model

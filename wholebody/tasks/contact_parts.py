@@ -336,11 +336,8 @@ def has_face(term: Any) -> bool:
 
 
 def approached(term: _T, distance: float) -> _T:
-    """A resolved term whose surfaces are to be in front of the planes of their faces by a distance [m].
-
-    The signed distance of two surfaces does not tell on which side of a thing a surface is: a foot under a pedal is
-    pushed down out of it, never up through it. Towards the plane of its face the distance leads to the open side.
-    """
+    """A resolved term whose surfaces are to be in front of the planes of their faces by a distance [m]."""
+    # The signed distance does not tell the side: a foot under a pedal is pushed down out of it, never up through it.
     if not has_face(term):
         return term
     return filled(term, parts=tuple(_approached(part, distance) for part in getattr(term, "parts", ())))

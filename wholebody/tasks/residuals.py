@@ -24,10 +24,7 @@ _FORCES: Array = np.eye(3, 6)
 
 
 def point_rows(point: Array) -> Array:
-    """Wrenches (3, 6) whose rows are the velocity of a moving point in the world's axes.
-
-    Written out because numpy's cross product costs twenty times as much on three rows.
-    """
+    """Wrenches (3, 6) of a moving point's velocity; written out, as numpy's cross product costs 20 times as much."""
     rows: Array = _FORCES.copy()
     fill_point_rows(rows, point)
     return rows

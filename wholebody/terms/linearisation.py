@@ -133,11 +133,7 @@ class Lineariser:
         dt: float | None = None,
         plan: TermPlan | None = None,
     ) -> None:
-        """Take the resolved terms of a problem, and a workspace of this run alone.
-
-        Clearances (pairs,) are asked of every collision pair, metres; `dt` is the step in seconds for bounds that need
-        one. The plan is of the same constraints, bounds, measures and step, and of any goals; None to make it here.
-        """
+        """Take resolved terms, clearances (pairs,) [m], a workspace, a step `dt` [s], and a plan or None to make it."""
         self.workspace, self.state, self._limits = workspace, workspace.state, limits
         self.goals, self.constraints, self.bounds, self.measures = terms
         self.dt = dt
@@ -153,11 +149,7 @@ class Lineariser:
         self.take(self.goals, clearances)
 
     def take(self, goals: Sequence[Goal], clearances: Array, constraints: Sequence[Constraint] | None = None) -> bool:
-        """Put other goals and clearances in the place of the present ones, and constraints where they are given.
-
-        Returns:
-            Whether clearances are others than before.
-        """
+        """Take other goals and clearances, and constraints where given; whether clearances are others than before."""
         if clearances.shape != (len(self.workspace.table.pairs),):
             count = len(self.workspace.table.pairs)
             raise InputError(f"clearances have shape {clearances.shape}; give one for each of the {count} pairs")
@@ -239,10 +231,7 @@ class Lineariser:
         )  # fmt: skip
 
     def _pass(self, q: Array, within: float, room: tuple[Array, Array, Array, Array]) -> tuple[Contacts, int]:
-        """Contacts at a posture, and how many rows they have; both, and the Jacobian, are overwritten by the next call.
-
-        Values of the terms, bounds, measures and squares of measures are written into `room`.
-        """
+        """Contacts at a posture, and how many rows; both are overwritten by the next call, `room` takes values."""
         state, plan, near, within = self.state.update(q), self._plan, self.workspace.proximity, within + self._largest
         index, placed = near.ask(state.data, within, self._clearances[1])
         if len(index) > self._near.size:

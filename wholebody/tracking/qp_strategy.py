@@ -131,11 +131,7 @@ class QPStrategy:
 
 
 def weights(scene: Scene, rigid: bool) -> Array:
-    """Weights (nv,) of the attraction, 1/m^2 and 1/rad^2.
-
-    Limbs give way before the whole body. Of a rigid figure the root's position gives way: a finger 8 cm long then takes
-    a ten-thousandth of a displacement.
-    """
+    """Weights (nv,) of the attraction, 1/m^2 and 1/rad^2: limbs give way before the body, a rigid root first."""
     result = np.full(scene.model.nv, 100.0 if rigid else 1.0)
     for root in scene.figure.roots.values():
         first = int(scene.model.joints[root].idx_v)

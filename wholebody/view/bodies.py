@@ -337,10 +337,7 @@ def node(name: str) -> str:
 
 
 def scene_glb(scene: ViewedScene, bodies: Bodies, postures: Array, dt: float, title: str) -> bytes:
-    """What `bodies` draw of a scene at postures (n, nq), `dt` seconds apart: y up, z forward, metres.
-
-    A node `joint NAME` is each joint, a node `piece NAME` each piece; of half-spaces a square is written.
-    """
+    """What `bodies` draw at postures (n, nq), `dt` seconds apart: y up, z forward; nodes `joint NAME`, `piece NAME`."""
     from wholebody.motion.files.gltf import JointTree
 
     tree = JointTree(scene.model, postures, dt)

@@ -109,10 +109,7 @@ class Composition:
             self.bodies.ghost(self._graph, number, self._state.update(q).data, color)
 
     def moving_ghost(self, keyframes: Sequence[Keyframe], postures: Any, color: Color, played: Timed) -> list[Array]:
-        """Add a moving ghost, one posture a frame, to a motion's keyframes; return its first posture.
-
-        Raises InputError where there are not as many postures as frames, or one is none.
-        """
+        """Add a moving ghost, one posture a frame, to a motion's keyframes; return its first posture."""
         checked, count = [self.checked(q) for q in postures], played.frames[-1] + 1
         if len(checked) != count:
             raise InputError(f"the ghost has {len(checked)} postures and the motion {count}; give as many")

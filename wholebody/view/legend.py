@@ -39,10 +39,7 @@ def legend(keyframes: Sequence[Keyframe]) -> list[tuple[str, Any]]:
 
 
 def status(keyframes: Sequence[Keyframe], count: int, dt: float, found: Assessment | None) -> str:
-    """One line about what is shown: `count` postures `dt` seconds apart, and the ways between them, as keyframes.
-
-    `found` is the assessment of the only posture, where a problem is shown.
-    """
+    """One line about what is shown: postures `dt` s apart, their ways as keyframes, or the only one's fit."""
     said = [f"{count} postures, {(count - 1) * dt:.2f} s"] if count > 1 else []
     if found is not None and found.goal_errors:
         # radians: smaller angles are not told

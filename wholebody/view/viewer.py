@@ -311,10 +311,7 @@ class Viewer:
         return f"Viewer({self.title!r}), which shows {len(self._seen)} postures"
 
     def _repr_html_(self) -> str:
-        """The scene in a notebook: a frame with the page that `save` writes; a sentence if nothing is shown yet.
-
-        The player is in the first one of a notebook.
-        """
+        """The scene as a frame in a notebook; a sentence if nothing is shown yet."""
         if not self._seen:
             return "<p>nothing is shown yet; call show(q) or play(motion) first</p>"
         return notebook_frame(self._commands(), self.title)

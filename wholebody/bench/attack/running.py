@@ -78,10 +78,7 @@ def _attacked(case: Case, deadline: float) -> Verdict:
 
 
 def run(case: Case, folder: Path) -> Verdict:
-    """Run a case in a folder; "wrong" for an error that is none of ours, and where anything reaches standard output.
-
-    Raises UnknownNameError where there is no such kind.
-    """
+    """Run a case in a folder; "wrong" for an error that is none of ours, or anything on the standard output."""
     if case.kind not in CASES:
         raise UnknownNameError("kind of case", case.kind, KINDS)
     with _printed(folder) as lines:

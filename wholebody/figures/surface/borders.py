@@ -46,13 +46,8 @@ def strongest(weights: Array) -> tuple[NDArray[np.uint8], Array]:
 
 
 def divided(bound: Bound, faces: NDArray[np.int64]) -> tuple[Bound, NDArray[np.int64], NDArray[np.int64]]:
-    """Cut the triangles (m, 3) between segments.
-
-    An edge whose ends are moved most by two different segments is cut where both move it alike, so that no crack opens.
-
-    Returns:
-        The vertices, with those of the cuts; (k, 3) the triangles; and (k,) the segment of each.
-    """
+    """Cut the triangles (m, 3) between segments: vertices, (k, 3) triangles, and (k,) the segment of each."""
+    # An edge whose ends two segments move most is cut where both move it alike, so that no crack opens.
     owner = bound.strength.argmax(axis=1)
     theirs = owner[faces]
     after = np.roll(theirs, -1, axis=1)

@@ -84,10 +84,7 @@ class AssemblyObjective:
 
 
 def checked(measure: Measure, scene: Scene, q: Array) -> Measure:
-    """A measure of one's own whose gradient agrees with a central difference at a posture (nq,) of a scene.
-
-    Raises InputError where it is none, or its gradient does not agree.
-    """
+    """A measure of one's own whose gradient agrees with a central difference at a posture (nq,) of a scene."""
     instance(measure, Measure, "minimise: measure", "give an object of a subclass of wb.Measure")
     label = type(measure).__name__
     if not is_own(measure):

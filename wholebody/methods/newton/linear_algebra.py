@@ -201,12 +201,7 @@ def _sorted(keys: Places, order: Places, count: int) -> tuple[Places, Places]:
 
 @compiled()
 def _laid_products(products: Products, rows: Places) -> tuple[Places, Places, Places]:
-    """Lay out the lower triangle of J J' with its diagonal, by columns; `rows` (nnz,) are those of the entries.
-
-    Returns:
-        The place (pairs,) of each product in the triangle; the rows of the triangle's entries, ascending in each
-        column; and (height + 1,) where the columns begin.
-    """
+    """Lower triangle of J J' by columns: places (pairs,) of products, rows ascending, and where columns begin."""
     by_row, row_start, by_column, place, column_end = products
     height, pairs = len(row_start) - 1, 0
     for k in range(len(place)):  # a sum of an array would load scipy.linalg with the kept loop
@@ -334,10 +329,8 @@ def dense_columns(pattern: Pattern) -> Indices:
 
 
 def linear_algebra(pattern: Pattern, name: str = "auto") -> LinearAlgebra:
-    """The factorisation of this name for a pattern; "auto" splits off up to fifty dense columns.
-
-    With hundreds of them, as of a body near everything, the small dense systems of a step took 2 s.
-    """
+    """The factorisation of this name for a pattern; "auto" splits off up to fifty dense columns."""
+    # With hundreds of them, as of a body near everything, the small dense systems of a step took 2 s.
     known(name, NAMES, "linear algebra")
     dense = dense_columns(pattern)
     if name == "schur" or (name == "auto" and 0 < len(dense) <= 50):

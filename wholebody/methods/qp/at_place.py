@@ -25,11 +25,8 @@ from wholebody.tasks.surfaces import nearest
 
 
 def at_its_place(problem: Problem, state: State) -> Problem | None:
-    """The problem that asks for the places of its contacts at a state; None where fingers close around a thing.
-
-    A contact that turns a frame becomes a goal for that frame, another one a goal for the point that touches. What else
-    a constraint asks for, such as balance, stays; of a goal it is left to the descent that follows.
-    """
+    """The problem that asks for the places of its contacts at a state; None where fingers close around a thing."""
+    # A contact that turns a frame becomes its goal, another one a point's; other constraints stay.
     terms: list[Any] = [term for term in (*problem.goals, *problem.constraints) if _slides(term)]
     if not terms or any(isinstance(part, Opposing) for term in terms for part in term.parts):
         return None

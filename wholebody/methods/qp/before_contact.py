@@ -30,19 +30,8 @@ IN_FRONT = 0.01  # m: how far surfaces are in front of faces; more: reached by f
 def before_contact(
     problem: Problem, shared: Run, seed: int, most: int, *, grips: bool = False
 ) -> Iterator[LocalSolution]:
-    """Descents through everything to where surfaces are in front of their faces; none where no term has a face.
-
-    Or, if asked for, to where bars are in front of palms, in problems without faces.
-
-    The measures count: as nothing is in the way, all that the terms leave open is as the figure likes it.
-
-    Args:
-        problem: to be solved.
-        shared: of the search.
-        seed: of the starts.
-        most: entries of the trace with which no further descent begins.
-        grips: whether hands that close around bars are meant.
-    """
+    """Descents through everything to where surfaces are in front of their faces, or bars of palms with `grips`."""
+    # The measures count: nothing is in the way, so what the terms leave open is as the figure likes it.
     terms = (*problem.goals, *problem.constraints)
     faces = any(has_face(term) for term in terms)
     if faces == grips or (grips and not any(takes_bar(term) for term in terms)):

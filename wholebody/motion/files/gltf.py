@@ -159,11 +159,8 @@ class JointTree:
         self.builder.node(f"body {name}", mesh=mesh, skin=skin)
 
     def _bound(self, known: Mapping[int, Array]) -> list[Array]:
-        """Placements (4, 4) of the joints where a skin is bound: as they carry bones, others as in the first frame.
-
-        No vertex follows a joint itself. But Blender takes the posture of rest from the parts that a skin names, and
-        moves the vertices where a parent is not among them.
-        """
+        """Placements (4, 4) of the joints where a skin is bound: as they carry bones, others as in the first frame."""
+        # Blender takes the rest posture from the parts that a skin names, and moves vertices where one is missing.
         found = [np.eye(4)]
         for joint in range(1, self._model.njoints):
             above = found[self._model.parents[joint]]

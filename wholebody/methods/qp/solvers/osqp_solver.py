@@ -188,10 +188,7 @@ def _structure(n: int, m: int, slots: int, pattern: bytes) -> tuple[Any, Any, ND
 
 @lru_cache(maxsize=1)
 def extension() -> Any:
-    """OSQP's compiled module, without the package around it, which loads jinja2 and asyncio to write C code.
-
-    The package's Python class takes five times as long as 25 iterations.
-    """
+    """OSQP's compiled module, without the package, which loads jinja2 and asyncio; its class is five times as slow."""
     package = find_spec("osqp")
     found = None if package is None else PathFinder.find_spec(EXTENSION, package.submodule_search_locations)
     if EXTENSION in sys.modules or found is None or found.loader is None:

@@ -24,17 +24,7 @@ def solver_names() -> tuple[str, ...]:
 
 
 def make_solver(name: str, hot_start: bool = True) -> QPSolver:
-    """A QP solver by name, for the programs of one run.
-
-    Args:
-        name: one of `solver_names`; all but the first two are those of qpsolvers.
-        hot_start: see `QPSolver`.
-
-    Raises:
-        InputError: not a text.
-        UnknownNameError: no installed solver has this name.
-        MissingPackageError: it exists but its package is not installed.
-    """
+    """A QP solver by name, for the programs of one run; all but the first two are those of qpsolvers."""
     compiled_kernel()  # not in the middle of a solve
     if not isinstance(name, str):
         raise InputError(f"solver is {shown(name)}; give the name of a QP solver, such as 'osqp'")
