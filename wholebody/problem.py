@@ -33,6 +33,7 @@ from wholebody.terms.plan import TermPlan, Terms, make_plan
 
 CLEARANCE = Range(0.0, 0.5, "m")  # more is refused as a wrong unit
 _TermError = TypeVar("_TermError", bound=TermError)
+_State = Callable[[], State]
 _Planned = tuple[tuple[Constraint, ...], tuple[Bound, ...], tuple[Measure, ...]]
 
 
@@ -138,24 +139,20 @@ class Problem(checks.FixedAttributes):
 
     def _resolved(self, terms: Sequence[Constraint]) -> tuple[Constraint, ...]:
         """Constraints that were stated, resolved; the same ones in the same scene at the same start are known."""
-        if not terms:
-            return ()
         found = (term.resolve(self.scene, self.start) for term in terms)
         key = self.start.tobytes(), *((type(term), *vars(term).values()) for term in terms)
         try:
             hash(key)
         except TypeError:  # arrays and placements
             return tuple(found)
-        return tuple(found) if any(map(is_own, terms)) else once(self.scene, key, partial(tuple, found))
+        return tuple(found) if not terms or any(map(is_own, terms)) else once(self.scene, key, partial(tuple, found))
 
     def _usual_measures(self, stated: Sequence[Constraint]) -> tuple[Measure, ...]:
         scene, start, ranges = self.scene, self.start, self.range_of_motion
         make = partial(default_measures, scene, start, feet := stances(scene, start, stated), ranges=ranges)
         return scene.built.known(("measures", ranges, feet, start.tobytes()), make)
 
-    def _usual_constraints(
-        self, at: Callable[[], State], stated: Sequence[Constraint]
-    ) -> tuple[tuple[Constraint, ...], str]:
+    def _usual_constraints(self, at: _State, stated: Sequence[Constraint]) -> tuple[tuple[Constraint, ...], str]:
         scene, start, ranges = self.scene, self.start, self.range_of_motion
         if not (scene.figure.ranges or self.balance):
             return (), ""  # no person
@@ -331,10 +328,8 @@ class Problem(checks.FixedAttributes):
             wrong = np.flatnonzero((high < least) | (low > most))
             if len(wrong):
                 joint = next(j for j in self.scene.model.joints if j.idx_v <= wrong[0] < j.idx_v + j.nv)
-                name = self.scene.model.names[joint.id]
-                raise InputError(
-                    f"{type(bound).__name__} keeps {name} where it starts, out of its limits; start it within them"
-                )
+                told = f"{type(bound).__name__} keeps {self.scene.model.names[joint.id]} where it starts"
+                raise InputError(f"{told}, out of its limits; start it within them")
 
     def _check_terms(self, state: State) -> None:
         """Evaluate terms of one's own at the start; those of the package find mistakes when they are resolved."""
@@ -354,8 +349,7 @@ class Problem(checks.FixedAttributes):
             asked[built.known(("touching", allowed), partial(_between, built, allowed))] = 0.0
         key = "resting", self.clearance, built.moves, self.start.tobytes()
         number, kept = built.known(key, partial(self._resting, workspace))
-        if len(number):
-            asked[number] = np.minimum(asked[number], kept)
+        asked[number] = np.minimum(asked[number], kept)
         return asked
 
     def _resting(self, workspace: Workspace) -> tuple[Indices, Array]:
