@@ -73,7 +73,7 @@ def beside(motion: SkeletonMotion | None, clips: Mapping[str, Clip], scene: Scen
     dt = next(iter(clips.values())).dt
     viewer = Viewer(viewed, title=title, contact_distance=-1e-4)  # overlaps alone are shown
     middle = np.mean([clip.q[:, :3] for clip in clips.values()], axis=(0, 1))
-    away = 1.2 + 0.9 * wide * count
+    away = 1.2 + 1.1 * wide * count
     viewer.look(tuple(middle + away * np.array([0.9, 0.1, 0.25])), tuple(middle))
     viewer.play(postures, dt)
     return viewer
