@@ -61,7 +61,7 @@ class Multistart:
         self._minima = Minima()  # where relaxed probes ended after the true clearances were required
         self._relaxed_minima = Minima()  # where the others ended
         self._through: list[Array] = []  # where a descent without contacts from another start reached the goals
-        self._in_reach = False  # which a relaxed probe has shown: it reached the goals, if through things
+        self._nearest_through = np.inf  # least violation of a relaxed probe: so near come the goals, if through things
         self._out_of_reach = False  # which is known
         self._best: LocalSolution | None = None
 
@@ -185,12 +185,12 @@ class Multistart:
         """
         tolerance = self.budget.tolerance
         relaxed = self._probe(start, SEARCH.relaxation_depth)
+        self._nearest_through = min(self._nearest_through, relaxed.violation.total)
         nearer = relaxed.violation.left < (1.0 - SEARCH.nearer) * self.best.violation.left
         self._without_gain = 0 if nearer else self._without_gain + 1
         if relaxed.violation.worst > SEARCH.reached * tolerance:
             self._relaxed_minima.add(relaxed.violation.total, relaxed.converged)
             return None
-        self._in_reach = True
         probe = self._probe(relaxed.q, 0.0)
         if not held(probe, tolerance) and not held(self.best, tolerance):
             probe = self._probe(start, 0.0)  # nothing leads out from there; to be outside comes before the goals
@@ -302,7 +302,8 @@ class Multistart:
         """Whether the goals are out of reach: from a posture (nq,) and other starts, even through everything.
 
         Where several descents without contacts, from postures all over the limits, come to rest at the same distance
-        and none comes nearer, it is the least that limits and constraints allow. Local minima differ.
+        and none comes nearer, nor did a relaxed probe, it is the least that limits and constraints allow. Local minima
+        differ.
         """
         if not (self.problem.goals and self.problem.scene.model.nv):
             return False
@@ -323,9 +324,10 @@ class Multistart:
             if local.violation.hold > SEARCH.held * local.violation.left:
                 continue  # from there the constraints alone are too far
             ends.append(local)
-            most = SEARCH.agree * min(end.violation.total for end in ends) + tolerance
+            least = min(self._nearest_through, *(end.violation.total for end in ends))
+            most = SEARCH.agree * least + tolerance
             if sum(end.violation.total <= most for end in ends) == agreeing:
-                return not self._in_reach
+                return True
         near = (1.0 - SEARCH.nearer) * self.best.violation.left
         self._without_gain = sum(end.violation.left >= near for end in ends)  # as relaxed probes count
         return False
