@@ -178,7 +178,7 @@ class Holds:
         touched: Touched | None = None,
     ) -> None:
         """Take the points that rest at some time, and the ground that says when, in metres of the figure by `scale`."""
-        # `surface` is the height of the highest surface below a place (3,); None for the recording's ground; `touched`: what is touched.
+        # `surface` is the height of the highest surface below a place (3,); None for the recording's ground.
         self.points, self._scale, self._surface, self._touched = points, scale, surface, touched
         self.over = max(1, round(OVER / dt))
         contacts = () if touched is None else touched.contacts
