@@ -105,20 +105,23 @@ def chromium() -> str:
     return found
 
 
-_RARELY = "window.requestAnimationFrame = draw => setTimeout(() => draw(performance.now()), 100)"
-
-
 @pytest.fixture(scope="session")
-def draw_rarely() -> Callable[[Browser], None]:
-    """Return a function: pages that a browser opens from now on draw ten times a second.
+def draw_rarely() -> Callable[..., str]:
+    """Return a function: pages that a browser opens from now on draw each so many milliseconds, ten times a second.
 
-    Without a GPU sixty times keep a core busy, and no test asks for them.
+    Without a GPU sixty times keep a core busy, and no test asks for them. It returns the number of the script that
+    says so.
     """
-    return lambda browser: browser._call("Page.addScriptToEvaluateOnNewDocument", source=_RARELY) and None
+
+    def draw(browser: Browser, pause: int = 100) -> str:
+        source = f"window.requestAnimationFrame = draw => setTimeout(() => draw(performance.now()), {pause})"
+        return str(browser._call("Page.addScriptToEvaluateOnNewDocument", source=source)["identifier"])
+
+    return draw
 
 
 @pytest.fixture(scope="session")
-def _browser(chromium: str, draw_rarely: Callable[[Browser], None]) -> Iterator[Browser]:
+def _browser(chromium: str, draw_rarely: Callable[..., str]) -> Iterator[Browser]:
     with screenshot.Browser() as browser:  # one that drew pictures before, if there is one
         draw_rarely(browser)
         yield browser
