@@ -107,14 +107,17 @@ def chromium() -> str:
 
 @pytest.fixture(scope="session")
 def draw_rarely() -> Callable[..., str]:
-    """Return a function: pages that a browser opens from now on draw each so many milliseconds, ten times a second.
+    """Return a function: pages that a browser opens from now on have a frame each so many milliseconds, ten a second.
 
-    Without a GPU sixty times keep a core busy, and no test asks for them. It returns the number of the script that
-    says so.
+    Without a GPU sixty keep a core busy, and a first drawing takes half a second: the pages of a `Viewer` move what
+    they show in a frame, and draw it where a test captures it. The function returns the number of the script.
     """
 
     def draw(browser: Browser, pause: int = 100) -> str:
-        source = f"window.requestAnimationFrame = draw => setTimeout(() => draw(performance.now()), {pause})"
+        source = f"""window.requestAnimationFrame = draw => setTimeout(() => {{
+          if (window.viewer) Object.assign(viewer, {{ needs_render: false, set_dirty: () => {{}} }});
+          draw(performance.now());
+        }}, {pause})"""
         return str(browser._call("Page.addScriptToEvaluateOnNewDocument", source=source)["identifier"])
 
     return draw
