@@ -33,8 +33,8 @@ def page(tmp_path: Path) -> Iterator[LivePage]:
 
 @pytest.fixture(autouse=True)
 def drawn_more_rarely(browser: Browser, draw_rarely: Callable[[Browser, int], str]) -> Iterator[None]:
-    """Pages draw three times a second: a frame of all the meshes keeps a core busy for longer than one of the viewer's."""
-    script = draw_rarely(browser, 300)
+    """Pages draw twice a second: a frame of all the meshes takes a core a third of a second without a GPU."""
+    script = draw_rarely(browser, 600)
     yield
     browser._call("Page.removeScriptToEvaluateOnNewDocument", identifier=script)
 
