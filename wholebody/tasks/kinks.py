@@ -32,11 +32,7 @@ class FacePlane(NamedTuple):
 def faces_met(
     first: Surface, second: Surface, pieces: tuple[int, int], state: State, edges: Array = NO_EDGES
 ) -> list[FacePlane]:
-    """The faces of the nearest piece of the second surface, as the nearest piece of the first meets them.
-
-    Faces beyond which another piece of the second surface goes on where it is touched are no end of it, and are left
-    out.
-    """
+    """The faces of the second surface's nearest piece, as the first's meets them; inner ones are left out."""
     i, j = pieces
     swept = second.swept[j]
     if swept.radius or len(swept.faces) < 2 or not np.isfinite(first.reach[i]):
@@ -64,12 +60,8 @@ def faces_met(
 
 
 def crossed_edges(first: Surface, second: Surface, near: Nearest, state: State) -> Array:
-    """Normals and points (k, 2, 3) of edges that cross where the pieces slide along each other.
-
-    Of sharp pieces that touch: where two edges cross, the least depth is along the normal of both, which no face has,
-    and at the point of the first piece where they cross, which no corner is. A normal is from the second surface to the
-    first. There are none of round pieces, whose normal turns steadily, and of a point, which meets faces alone.
-    """
+    """Normals, from the second surface, and points (k, 2, 3) of edges that cross where sharp pieces slide."""
+    # The least depth of crossing edges is along the normal of both, which no face has; round pieces have none.
     i, j = near.pieces
     sharp = first.fixed is None and second.fixed is None and not _roundness(first, i) + _roundness(second, j)
     if not sharp or abs(near.distance) > STEP:
@@ -86,11 +78,7 @@ def crossed_edges(first: Surface, second: Surface, near: Nearest, state: State) 
 
 
 def bends(first: Surface, second: Surface, near: Nearest, state: State, radius: float = 0.0) -> Array:
-    """Directions (b, 3), each times the root of the distance's second derivative when the pieces slide along it.
-
-    Of pieces that are round where they meet: the normal turns as they slide. Where both are sharp there are none. A
-    first surface that is the middle of a round piece has the radius of that.
-    """
+    """Directions (b, 3), each times the root of the distance's second derivative when round pieces slide along it."""
     i, j = near.pieces
     a, b = first.placed(i, state), second.placed(j, state)
     round_by = max(_roundness(first, i), radius) + _roundness(second, j)
