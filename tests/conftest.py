@@ -84,7 +84,7 @@ def pytest_collect_directory(path: Path, parent: pytest.Collector) -> pytest.Col
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the tests of the files that take longest, over four seconds each, before the others: workers end together.
+    """Put the tests of the files that take longest, over three seconds each, before the others: workers end together.
 
     pytest-xdist keeps this order with `--no-loadscope-reorder`; by itself it would begin with the files of most tests.
     All workers must have one order, whichever they collected in.
