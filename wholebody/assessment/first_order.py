@@ -69,13 +69,7 @@ class _Asked(NamedTuple):
 
 
 class FirstOrder:
-    """Optimality and blockers of a judged posture: each is computed when it is first asked for, as things were then.
-
-    Both raise a `TermError` where a term of one's own has no finite derivative at the posture.
-
-    Attributes:
-        fits: whether goals are met and everything holds, so that nothing is in the way.
-    """
+    """Optimality and blockers of a judged posture, computed when first asked for; `fits`: nothing is in the way."""
 
     def __init__(self, problem: Problem, pairs: AllPairs, fits: bool) -> None:
         self.fits = fits

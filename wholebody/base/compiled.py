@@ -1,7 +1,4 @@
-"""Compilation by numba: compiled code is cached, the first compilation is logged, and its time is counted.
-
-``python -m wholebody.base.compiled`` compiles all loops, on as many cores as there are, so that no solve has to.
-"""
+"""Compilation by numba, cached, logged and timed; ``python -m wholebody.base.compiled`` compiles all loops."""
 
 from __future__ import annotations
 

@@ -17,10 +17,7 @@ JOINED = "X,Y,Z"
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose messages about unknown commands and options name the nearest known ones.
-
-    A word such as -0.3,0.5,1.2 is a value, as a negative number is for `argparse`.
-    """
+    """A parser whose messages name the nearest known commands and options; -0.3,0.5,1.2 is a value."""
 
     def __init__(self, *given: Any, **settings: Any) -> None:
         super().__init__(*given, **settings)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.dynamics import impulse_kernel
-from wholebody.dynamics.actuated import Actuated
+from wholebody.dynamics.coupling import Actuated
 from wholebody.dynamics.frame import EngineFrame
 from wholebody.dynamics.pieces import HUMAN
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies

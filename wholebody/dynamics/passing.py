@@ -39,11 +39,7 @@ class StepStart:
 
 
 class PassingCheck(NamedTuple):
-    """Whether no pieces can have been deeper than `PASSING` in each other on the way of a step.
-
-    Else `meetings` are shares of the step, at least 0.1, at which pieces meet or may meet; none where there are too
-    many doubts.
-    """
+    """Whether no pieces can have been deeper than `PASSING` on the way, else shares `meetings` where they may meet."""
 
     free: bool
     meetings: tuple[float, ...] = ()

@@ -28,17 +28,10 @@ _UPRIGHT = np.eye(3)
 
 
 def placement(at: PlacementLike, what: str = "placement") -> pin.SE3:
-    """Read a placement, metres, as a fresh SE3 whose rotation is orthonormal to machine precision.
+    """Read a placement [m] as a fresh SE3 whose rotation is orthonormal to machine precision, or raise an InputError.
 
-    coal treats a NaN placement as touching and accepts any matrix as a rotation, so both are refused here.
-
-    Args:
-        at: (3,) position, (7,) position and unit quaternion x, y, z, w, (4, 4) homogeneous matrix, or ``pin.SE3``.
-        what: name of the placed object, for messages.
-
-    Raises:
-        InputError: another shape, a value that is not finite, a quaternion that is not of unit length, a matrix that is
-            not a rigid motion.
+    `at`: (3,) position, (7,) position and unit quaternion x, y, z, w, (4, 4) matrix, or ``pin.SE3``. coal treats NaN as
+    touching and accepts any matrix as a rotation, so both are refused here.
     """
     if isinstance(at, pin.SE3):
         return _rigid(np.asarray(at.rotation), np.asarray(at.translation), what)

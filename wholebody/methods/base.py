@@ -1,7 +1,4 @@
-"""The protocols of methods, trackers and steps, and functions that several methods share.
-
-Comparisons, drags and paths use methods only through these protocols, so they work with your own methods too.
-"""
+"""The protocols of methods, trackers and steps, and functions that several methods share."""
 
 from __future__ import annotations
 

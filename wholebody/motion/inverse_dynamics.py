@@ -76,12 +76,8 @@ class GroundForces(NamedTuple):
 
 
 def ground_forces(wrench: Array, about: Array, points: Array, friction: float) -> GroundForces:
-    """Forces at points (p, 3) of soles, within their cones of friction, that give a wrench (6,) as nearly as can be.
-
-    Minimises |sum of the forces' wrenches - wrench|^2 + (e |forces|)^2 over combinations with coefficients >= 0 of the
-    edges of each point's friction pyramid (non-negative least squares, Lawson and Hanson 1974, chapter 23). Moments
-    are about a point (3,).
-    """
+    """Forces at points (p, 3) of soles, within cones of friction, that give a wrench (6,) about a point as nearly."""
+    # Least |wrench's error|^2 + (e |forces|)^2 over edges of pyramids (Lawson and Hanson 1974, chapter 23).
     if len(points) == 0:
         return GroundForces(np.zeros((0, 3)), wrench.copy(), np.zeros((0, 6)))
     from scipy.optimize import nnls

@@ -11,6 +11,7 @@ pairs that are near, relaxed at a high price. Joint limits hold exactly, cones t
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import daqp
@@ -54,11 +55,7 @@ class Layout(NamedTuple):
 
 
 class Fitter:
-    """Fits postures of a figure in a workspace, which is its own; so each thread needs one.
-
-    Attributes:
-        figure: the figure.
-    """
+    """Fits postures of a figure in a workspace of its own, so each thread needs one."""
 
     def __init__(self, figure: Figure, layout: Layout, workspace: Workspace) -> None:
         """Choose what goals are of."""
@@ -90,6 +87,10 @@ class Fitter:
         found = [self.model.frames[self.figure.frame_id(name)] for name in frames]
         parts = [np.vstack([frame.placement.rotation, frame.placement.translation]) for frame in found]
         return np.array([frame.parentJoint for frame in found], dtype=np.intp), np.array(parts).reshape(-1, 4, 3)
+
+    def see(self, things: Mapping[str, pin.SE3]) -> None:
+        """See things at these placements from now on."""
+        self._workspace.place(things)
 
     def held(self, q: Array) -> Array:
         """(h, 3) where the points are at a posture (nq,) that may be held."""

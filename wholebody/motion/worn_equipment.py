@@ -1,8 +1,4 @@
-"""Equipment: what a figure wears on its segments, and ready-made pieces for people.
-
-A piece is exact, or filled with spheres that join a collision group. Ready-made pieces are parametric meshes and solids
-of the sizes of common gear; their places follow from the figure's pieces.
-"""
+"""Equipment: what a figure wears on its segments, exact or as spheres, and ready-made pieces for people."""
 
 from __future__ import annotations
 

@@ -11,19 +11,17 @@ from typing import Any, NamedTuple, TypeVar
 
 from wholebody.base import checks
 from wholebody.base.arrays import brief
-from wholebody.base.batches import fingerprint, run_batch, shared
-from wholebody.base.progress import reporter
+from wholebody.base.batches import fingerprint, reporter, run_batch, shared
 from wholebody.base.runner import EndedError, Job
 from wholebody.methods.base import Method
 from wholebody.methods.control import ctrl_c_ends_all
 from wholebody.methods.inputs import check_problem
 from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
-from wholebody.studies.at_once import at_once
 from wholebody.studies.neighbours import Family, Work, lower, name_changes, solve_from_neighbours
 from wholebody.studies.records import ENDED, Records, RecordStore, SolveRecord
 from wholebody.studies.sending import Sender, sent_to
-from wholebody.studies.solving import Case, Run, solve_runs
+from wholebody.studies.solving import Case, Run, at_once, solve_runs
 from wholebody.tasks.answers import is_own
 
 MOST_JOBS = 4096

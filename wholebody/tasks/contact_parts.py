@@ -135,10 +135,7 @@ class Gap(NamedTuple):
 
 
 class Meeting(NamedTuple):
-    """Two points that meet: three rows, what is between them along the axes of the world [m].
-
-    Their distance would not do: where it vanishes it has no derivative, and steps to it swing.
-    """
+    """Two points that meet: three rows along the world's axes [m], as a distance has no derivative where it is zero."""
 
     first: Surface  # the points
     second: Surface
@@ -173,10 +170,7 @@ class Near(NamedTuple):
 
 
 class Facing(NamedTuple):
-    """An axis of a frame along a direction that goes with a face: two rows, the angle between them [rad].
-
-    The same azimuthal equidistant rows as those of `Axis`, see there.
-    """
+    """An axis of a frame along a direction that goes with a face: the two rows of `Axis`, angle between them [rad]."""
 
     place: Place  # the frame and its joint
     basis: Array  # (3, 3) rows in the frame: two directions across the axis, and the axis

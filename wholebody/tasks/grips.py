@@ -191,10 +191,7 @@ class Looking(NamedTuple):
 
 
 class Opposing(NamedTuple):
-    """The normals of one contact and of several others on a thing within an angle of opposite: one row.
-
-    The row is the angle beyond it, zero within it, times a lever.
-    """
+    """The normals of one contact and of several others within an angle of opposite: the angle beyond, times a lever."""
 
     first: Surface  # surface on one side, such as a thumb
     others: tuple[Surface, ...]  # surfaces on the other, such as fingers

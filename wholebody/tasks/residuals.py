@@ -46,10 +46,7 @@ _angular.flags.writeable = False
 
 
 class PlacementResidual(NamedTuple):
-    """Difference between the placement of one frame relative to another and its target, in the axes of the other frame.
-
-    Rows: position (3, metres) if `position`, then rotation vector (3, radians) if `orientation`.
-    """
+    """Placement of a frame relative to another less its target: position [m], then rotation vector [rad]."""
 
     place: Place  # the frame that moves
     base: Place  # the reference frame; the world by default

@@ -1,7 +1,4 @@
-"""Errors of frames, planes, axes, reach cones and twists with their wrenches, as compiled loops: see `plan`.
-
-Each function fills the rows of its table in `wrench` (rows, 6) and `value` (rows,), which are zero before.
-"""
+"""Errors of frames, planes, axes, reach cones and twists with their wrenches, as compiled loops: see `plan`."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""Dragging with any method: following a moving goal frame by frame.
-
-After Choi and Cremer 1999, section 3: a stream of nearby goals, each met with moderate accuracy and the last one with
-high.
-"""
+"""Dragging with any method: a stream of nearby goals, frame by frame (Choi and Cremer 1999, section 3)."""
 
 from __future__ import annotations
 

@@ -15,8 +15,7 @@ from wholebody.figures.link_visuals import drawn_of
 from wholebody.figures.surface import surface_of
 from wholebody.geometry.pieces import box_corners
 from wholebody.view import drawing, style
-from wholebody.view.crowds import crowds
-from wholebody.view.scene_graph import Keyframe, SceneGraph
+from wholebody.view.scene_graph import Keyframe, SceneGraph, crowds
 from wholebody.view.skin import Skin, Skinned
 from wholebody.view.style import LOOK, Color
 from wholebody.view.viewed_scene import ViewedAssembly, ViewedScene

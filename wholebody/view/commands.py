@@ -43,13 +43,8 @@ def set_skeleton(
 ) -> Command:
     """Put a skeleton at a node: bones that follow other nodes, and bend the skins that name it.
 
-    Args:
-        path: the node.
-        carriers: for each of n bones the node that it follows.
-        offsets: (n, 4, 4) placement of each bone relative to its carrier.
-        inverses: (n, 4, 4) inverse of each bone's placement where the skin was bound to it.
-        halves: bones that turn half way between two others: index of the bone, of the first and of the second, at
-            whose origin it is.
+    Each of n bones has its carrier, `offsets` (n, 4, 4) from it, and `inverses` (n, 4, 4) where the skin was bound;
+    `halves` turn half way between two others: index of the bone, of the first and of the second, its origin.
     """
     message = {
         "type": "skeleton",

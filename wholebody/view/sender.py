@@ -33,11 +33,7 @@ class ViewerClosedError(WholebodyError):
 
 
 class Sender:
-    """The program's side of a server process. Commands go through a pipe, so no other process can send any.
-
-    Attributes:
-        url: address of the page.
-    """
+    """The program's side of a server process at `url`; commands go through a pipe, so nobody else can send any."""
 
     def __init__(self, page: str, host: str = "127.0.0.1", port: int = 0) -> None:
         """Serve the HTML of a page at a name or address of this machine; port 0 is the first free one."""

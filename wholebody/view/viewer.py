@@ -22,9 +22,8 @@ from wholebody.geometry.placement import FARTHEST
 from wholebody.problem import Problem
 from wholebody.view import commands
 from wholebody.view.bodies import scene_glb
-from wholebody.view.composition import Composition
+from wholebody.view.composition import Composition, panel
 from wholebody.view.contact_markers import checked_overlaps
-from wholebody.view.legend import panel
 from wholebody.view.movie import check_movie, counted, frame_times, movie
 from wholebody.view.page import live_page, notebook_frame, static_page
 from wholebody.view.scene_graph import SceneGraph

@@ -137,10 +137,7 @@ class NormalEquations:
 
 
 class Products(NamedTuple):
-    """Pairs of entries of J that share a column, one row of the Jacobian after the other.
-
-    An entry (row, column) is paired with the entries of its column from itself on, by row.
-    """
+    """Pairs of entries of J that share a column, from an entry on, one row of the Jacobian after the other."""
 
     by_row: Places  # (nnz,) the entries, row after row and in each row by column
     row_start: Places  # (height + 1,) where those of each row begin
@@ -253,10 +250,7 @@ def compiled_kernel() -> Any:
 
 
 class QuasiDefinite:
-    """L D L' of [H, -J'; -J, -M] with AMD ordering (Vanderbei 1995, "Symmetric quasi-definite matrices").
-
-    H is the diagonal D, or D plus a sparse matrix of second derivatives.
-    """
+    """L D L' of [H, -J'; -J, -M], H diagonal or sparse, with AMD ordering (Vanderbei 1995, quasi-definite matrices)."""
 
     name = "kkt/ldlt"
 

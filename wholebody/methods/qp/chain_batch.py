@@ -1,7 +1,4 @@
-"""Many problems of one chain at once: the first descents of all are one compiled loop.
-
-What it answers is what `chain.from_seeds` leads to for each problem alone. All others are left to a solve of their own.
-"""
+"""Many problems of one chain at once, the first descents in one compiled loop; others are left to solves."""
 
 from __future__ import annotations
 

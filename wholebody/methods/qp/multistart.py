@@ -13,8 +13,7 @@ from wholebody.assessment.posture import assess
 from wholebody.base.arrays import Array, with_values
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
 from wholebody.methods.control import Control
-from wholebody.methods.qp.at_place import at_its_place
-from wholebody.methods.qp.before_contact import before_contact
+from wholebody.methods.qp.before_contact import at_its_place, before_contact
 from wholebody.methods.qp.cancelling import posture_apart
 from wholebody.methods.qp.closest import ENDLESS, Closest
 from wholebody.methods.qp.feasibility import Feasibility

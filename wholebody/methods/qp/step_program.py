@@ -1,11 +1,8 @@
-"""The program of a tracking step: built and solved by one compiled call, in arrays made once.
-
-What the compiled call does not settle, and what other solvers are to solve, goes to the working set as any program.
-"""
+"""The program of a tracking step, built and solved by one compiled call in arrays made once, and its answers."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from math import sqrt
 from typing import Any, NamedTuple
@@ -14,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array, with_values
+from wholebody.base.arrays import Array, brief, with_values
 from wholebody.figures.state import State
 from wholebody.methods.qp.quadratic_program import QuadraticProgram, work_size
 from wholebody.methods.qp.rows import NUMBERS, Rows, StepParts, StepRoom, StepSize, Terms
@@ -25,10 +22,10 @@ from wholebody.methods.qp.turning import Turning
 from wholebody.methods.qp.turning import compiled_kernel as compiled_turning
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
+from wholebody.scene.moving_obstacles import Collision
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.base import Constraint
-from wholebody.terms.constraint_values import ConstraintValues
-from wholebody.terms.linearisation import PackedLinearisation
+from wholebody.terms.linearisation import ConstraintValues, PackedLinearisation
 
 
 class Answer(NamedTuple):
@@ -49,11 +46,7 @@ class Answer(NamedTuple):
 
 
 class StepProgram:
-    """Builds and solves the programs of one tracker.
-
-    Attributes:
-        goals: number of the goals' rows.
-    """
+    """Builds and solves the programs of one tracker; `goals` is the number of the goals' rows."""
 
     def __init__(self, problem: Problem, workspace: Workspace, working_set: WorkingSet, dt: float) -> None:
         """Take the terms of a problem, for steps of `dt` s; `working_set` solves what the compiled call does not."""
@@ -240,12 +233,7 @@ def _holding(problem: Problem, state: State, held: NDArray[np.intp]) -> tuple[li
 
 
 def numbers_of(scale: float) -> Array:
-    """The numbers of a tracker's programs, (29,).
-
-    They are those of `StepSize`, in which a step replaces its damping and whether measures count, of `ProgramNumbers`,
-    `Corrections` and `Weights`; the scale of the measures; damping of the pull of goals out of reach; error below which
-    a goal rests; and how far what is held is run ahead of at most.
-    """
+    """The numbers of a tracker's programs, (29,), in the order in which `tracking_kernel` reads them."""
     size = StepSize(STEP.radius, PROGRAM.error_clamp * STEP.radius, 0.0, True)
     return np.concatenate([
         size, PROGRAM, CORRECTIONS, WEIGHTS, (scale, STEP.damping, STEP.resting, STEP.curved),
@@ -266,3 +254,37 @@ def compiled_kernel() -> Any:
     )  # fmt: skip
     tracking_kernel.run_ahead(none, none, 0, none, STEP, np.zeros(2))
     return tracking_kernel
+
+
+class QPStep(NamedTuple):
+    """Answer of one step."""
+
+    q: Array  # (nq,) the next posture
+    displacement: Array  # (nv,) tangent displacement to it, radians and metres
+    velocity: Array  # (nv,) displacement / dt
+    contacts: int  # how many pairs had rows
+    rows: int  # how many contact rows
+    exact: bool  # whether the program was solved to rounding
+    iterations: int  # iterations of the QP solver
+    by: str  # what closed the last program, see `QPSolution`
+    programs: Mapping[str, int]  # how many programs each closed: one a step, and more where it was looked at twice
+    # how much of the program's displacement was gone: less than 1 where it was longer than what was looked at
+    share: float
+    # what things that move (`Scene.move` with `over`) passed through, or are inside of; empty if nothing.
+    collisions: tuple[Collision, ...] = ()
+    # shares of the step, from 0 to 1, and the postures (nq,) there, if things moved; otherwise empty
+    path: tuple[tuple[float, Array], ...] = ()
+    # which term of one's own is not finite where the step would have ended, so that it was cut; else empty
+    note: str = ""
+
+    def __repr__(self) -> str:
+        return brief(self)
+
+
+class FrameStep(NamedTuple):
+    """Answer of one frame."""
+
+    q: Array  # (nq,) the next posture
+    iterations: int  # programs
+    collisions: tuple[Collision, ...] = ()  # see `QPStep`
+    path: tuple[tuple[float, Array], ...] = ()

@@ -20,8 +20,7 @@ from wholebody.methods.qp.escaping import ProjectionRows, free_end, projection_r
 from wholebody.methods.qp.escaping import compiled_kernel as compiled_escape
 from wholebody.methods.qp.settings import ESCAPE, TRACKING
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.step_program import StepProgram
-from wholebody.methods.qp.steps import FrameStep, QPStep
+from wholebody.methods.qp.step_program import FrameStep, QPStep, StepProgram
 from wholebody.methods.qp.turning import least_unseen, predicted_distances, unseen_by_rows
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem

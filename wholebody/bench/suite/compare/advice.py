@@ -1,8 +1,4 @@
-"""Which method to choose when, from the figures alone.
-
-Methods are compared on the problems that both were given, by the ratio of two figures with its interval; a ratio whose
-interval holds 1 names no winner.
-"""
+"""Which method to choose when: ratios of figures on problems that both were given, with their intervals."""
 
 from __future__ import annotations
 

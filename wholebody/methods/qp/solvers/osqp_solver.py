@@ -1,7 +1,4 @@
-"""OSQP with a workspace that lives on: set up once for a sparsity, warm from program to program, finished exactly.
-
-A second solver asks it only where active sets, corrected from the violated rows, are not right after many corrections.
-"""
+"""OSQP with a workspace that lives on: set up once for a sparsity, warm from program to program."""
 
 from __future__ import annotations
 
