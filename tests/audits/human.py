@@ -7,8 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from tests.audits import human_contacts, human_sizes, human_tasks
+from tests.audits import human_contacts, human_postures, human_sizes, human_tasks
 from tests.audits.human_contacts import ContactRow
+from tests.audits.human_postures import PostureRow
 from tests.audits.human_sizes import DimensionRow, RangeRow
 from tests.audits.human_tasks import TaskRow
 from tests.audits.templates import TEMPLATES
@@ -27,12 +28,14 @@ class Measured:
         ranges: of motion, of the median man.
         contacts: of the median man with himself.
         tasks: of the median man.
+        postures: of the median man, beside those of people.
     """
 
     dimensions: Sequence[DimensionRow]
     ranges: Sequence[RangeRow]
     contacts: Sequence[ContactRow]
     tasks: Sequence[TaskRow]
+    postures: Sequence[PostureRow]
 
     @property
     def largest(self) -> DimensionRow:
@@ -62,7 +65,9 @@ def measure(pictures: Path | None, *, quick: bool) -> Iterator[str | Measured]:
         row, _ = human_tasks.solve_task(name, made[name](), pictures)
         rows.append(row)
         yield f"{name}: {row.status} in {row.seconds:.2f} s"
-    yield Measured(sizes, ranges, contacts, rows)
+    postures = list(human_postures.measure(human_postures.median_man(), "fit" if quick else None))
+    yield human_postures.summary(postures)
+    yield Measured(sizes, ranges, contacts, rows, postures)
 
 
 def page(found: Measured, facts: Mapping[str, str], *, pictures: bool) -> str:
@@ -75,6 +80,7 @@ def page(found: Measured, facts: Mapping[str, str], *, pictures: bool) -> str:
             found=found,
             facts=facts,
             by_name=by_name,
+            summary=human_postures.summary(found.postures),
             pictures=pictures,
         )
         + "\n"
