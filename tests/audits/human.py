@@ -81,6 +81,7 @@ def page(found: Measured, facts: Mapping[str, str], *, pictures: bool) -> str:
             facts=facts,
             by_name=by_name,
             summary=human_postures.summary(found.postures),
+            sources=list(dict.fromkeys(row.source for row in found.postures)),
             pictures=pictures,
         )
         + "\n"
@@ -95,5 +96,6 @@ def figures(found: Measured, facts: Mapping[str, str]) -> str:
         "ranges": [asdict(row) for row in found.ranges],
         "contacts": [asdict(row) | {"reached": row.reached} for row in found.contacts],
         "tasks": [asdict(row) | {"plausible": row.plausible} for row in found.tasks],
+        "postures": [asdict(row) | {"off": row.off} for row in found.postures],
     }
     return json.dumps(told, indent=1) + "\n"

@@ -40,12 +40,14 @@ def test_published_postures_are_numbers_with_sources() -> None:
     assert len(human_postures.TASKS) >= 8
     assert {row["half"] for row in rows} == {"fit", "kept"}
     for row in rows:
-        assert float(row["sd"]) > 0.0 and -180.0 < float(row["mean"]) < 180.0 and row["source"], row
+        assert float(row["sd"]) > 0.0, row
+        assert 0.0 < float(row["mean"]) < 180.0, row
+        assert row["source"], row
         assert row["spread"] in ("sd", "range"), row
 
 
 def test_typing_wrists_turn_as_those_of_90_typists_do() -> None:
-    """They are extended and turned to the little finger (Simoneau et al. 1999); unfitted they were 20 degrees radial."""
+    """They are extended and turned to the little finger (Simoneau et al. 1999); they were 20 degrees radial."""
     man = {"fingers": human_postures.median_man()["fingers"]}
     problem = human_postures.typing(man["fingers"])
     q = wb.solve(problem).q
