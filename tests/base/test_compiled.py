@@ -295,4 +295,4 @@ def test_another_process_compiles_the_longest_loop_where_there_are_cores(monkeyp
         monkeypatch.setattr("wholebody.base.compiled.usable_cores", lambda cores=cores: cores)
         importlib.import_module("wholebody.base.compiled").compile_beside()
         assert len(asked) == count
-    assert asked[0][1:] == ["-m", "wholebody.base.compiled", "wholebody.terms.linearisation"]
+    assert asked[0][1:] == ["-m", "wholebody.base.compiled", *compiled.BESIDE]

@@ -50,14 +50,18 @@ TOGETHER = (
 Each module has a function `compiled_kernel`, which compiles or loads its loops.
 """
 
-LONGEST = "wholebody.terms.linearisation"
-"""Half of what a first solve compiles, and the last."""
+BESIDE = {
+    "wholebody.terms.linearisation": "wholebody.terms.kernel",
+    "wholebody.methods.qp.subproblem": "wholebody.methods.qp.subproblem_kernel",
+}
+"""What a first solve needs last, half of what it compiles: modules of `TOGETHER`, and where their loops are."""
 
 LOOPS = tuple(name for names in TOGETHER for name in names)
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 _compiling = {"depth": 0, "since": 0.0, "seconds": 0.0, "collects": True, "alone": False}
+_beside: list[subprocess.Popen[bytes]] = []
 
 
 def compiled(*, inner: bool = False, **options: Any) -> Callable[[F], F]:
@@ -78,7 +82,8 @@ def compiled(*, inner: bool = False, **options: Any) -> Callable[[F], F]:
             "no_cpython_wrapper": inner,
             **options,
         }
-        loop: F = loop_type(function, targetoptions=target)
+        pipeline = {"pipeline_class": _inner_compiler()} if inner else {}
+        loop: F = loop_type(function, targetoptions=target, **pipeline)
         with suppress(RuntimeError):  # numba: cannot cache function, no locator available
             loop.enable_caching()  # type: ignore[attr-defined]
         return loop
@@ -113,17 +118,15 @@ def compile_in_processes(processes: int, groups: Sequence[Sequence[str]] = TOGET
 
 
 def compile_beside() -> None:
-    """Let another process compile the longest loop, unless there is one core or this process is itself another's.
-
-    A first solve needs it last, after 20 s of compilation of its own.
-    """
+    """Let another process compile what is needed last, unless there is one core or this process is itself another's."""
     if _compiling["alone"] or usable_cores() < 2 or parent_process() is not None:
         return
     with suppress(OSError):  # no process may be started here
         nothing = subprocess.DEVNULL
         child = subprocess.Popen(
-            [sys.executable, "-m", __name__, LONGEST], stdin=nothing, stdout=nothing, stderr=nothing
+            [sys.executable, "-m", __name__, *BESIDE], stdin=nothing, stdout=nothing, stderr=nothing
         )
+        _beside.append(child)
         atexit.register(child.kill)
 
 
@@ -175,6 +178,13 @@ def _loop_type() -> Any:
         def enable_caching(self) -> None:
             self._cache = Kept(self.py_func)
 
+        def compile(self, sig: Any) -> Any:
+            if _beside and self.__module__ in BESIDE.values() and isinstance(self._cache, Kept):
+                # another process compiles it: what it keeps is read, sooner than compiling it here too would end
+                while _beside[0].poll() is None and self._cache.load_overload(sig, self.targetctx) is None:
+                    time.sleep(0.05)
+            return super().compile(sig)
+
         def get_call_template(self, args: Any, kws: Any) -> Any:
             args = tuple(unliteral(kind) for kind in args)
             return super().get_call_template(args, {name: unliteral(kind) for name, kind in kws.items()})
@@ -184,13 +194,31 @@ def _loop_type() -> Any:
 
 @lru_cache(maxsize=1)
 def _inner_type() -> Any:
-    """A compiled function that Python cannot call: what numba would compile to unpack its arguments is left out."""
+    """A compiled function that Python cannot call: what numba would compile to unpack its arguments is left out.
+
+    LLVM optimises it where it is called from, as a part of its caller; by itself it is never run.
+    """
 
     class Inner(_loop_type()):  # type: ignore[misc]
         def __call__(self, *args: Any, **named: Any) -> Any:
             raise TypeError(f"{self.py_func.__name__} is compiled for calls from compiled functions only")
 
     return Inner
+
+
+@lru_cache(maxsize=1)
+def _inner_compiler() -> Any:
+    from numba.core.compiler import Compiler
+
+    class InnerCompiler(Compiler):  # type: ignore[misc]
+        def compile_extra(self, func: Any) -> Any:
+            library = self.state.targetctx.codegen().create_library(func.__qualname__)
+            library.enable_object_caching()
+            library._optimize_final_module = lambda: None
+            self.state.library = library
+            return super().compile_extra(func)
+
+    return InnerCompiler
 
 
 @lru_cache(maxsize=1)
