@@ -55,6 +55,9 @@ def test_names_with_dollars_are_no_formulas() -> None:
     scene = wb.Scene(figure).add(wb.Sphere(0.2), name=r"$\ball$", at=(0.0, 0.0, 0.0))
     found = wb.check(wb.Clip(figure, np.array([figure.neutral] * 2), 0.02), scene)
     assert any("ball" in each.names for each in found.contacts)
+    inside = lines_of(found)[r"thumb and \$\ball\$".replace("thumb", found.contacts[0].first)]
+    assert len(inside) == 3  # two frames, and what is between them
+    assert inside == pytest.approx(np.full(3, 1e3 * found.contacts[0].deepest))  # nothing moves
     assert "<svg" in found._repr_html_()
 
 
