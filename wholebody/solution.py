@@ -89,7 +89,9 @@ class Solution(Shown):
         for axis in axes[0]:
             axis.set_xlabel("entry of the trace")
             axis.xaxis.get_major_locator().set_params(integer=True)
-        chart.legend(*missed.get_legend_handles_labels(), loc="outside upper left", fontsize="small", ncols=2, markerscale=2)
+        chart.legend(
+            *missed.get_legend_handles_labels(), loc="outside upper left", fontsize="small", ncols=2, markerscale=2
+        )
         return chart
 
     def __repr__(self) -> str:

@@ -57,7 +57,7 @@ def test_names_with_dollars_are_no_formulas() -> None:
     assert any("ball" in each.names for each in found.contacts)
     inside = lines_of(found)[r"thumb and \$\ball\$".replace("thumb", found.contacts[0].first)]
     assert len(inside) == 3  # two frames, and what is between them
-    assert inside == pytest.approx(np.full(3, 1e3 * found.contacts[0].deepest))  # nothing moves
+    assert inside == pytest.approx(np.full(3, 1e3 * found.contacts[0].deepest), abs=0.01)  # nothing moves
     assert "<svg" in found._repr_html_()
 
 

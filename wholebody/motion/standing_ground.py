@@ -126,7 +126,9 @@ class Ground:
         heights = [each.height for each in self.footholds] or [0.0]
         seen.set(xlabel="x [m]", ylabel="y [m]", title="footholds from above")
         seen.set_aspect("equal", adjustable="datalim")
-        timed.set(xlabel="time [s]", ylabel="height of the ground [m]", title="when each part rests, and at what height")
+        timed.set(
+            xlabel="time [s]", ylabel="height of the ground [m]", title="when each part rests, and at what height"
+        )
         timed.set_ylim(min(heights) - 0.1, max(heights) + 0.1)  # lines that are moved count for no limits
         timed.set_xlim(0.0, self.dt * max([1, *(each.end for each in self.footholds)]))
         if self.footholds:
