@@ -332,10 +332,7 @@ class Problem(checks.FixedAttributes):
                 )
 
     def _check_terms(self, state: State) -> None:
-        """Evaluate terms of one's own at the start, so that a wrong one is named before anything is computed.
-
-        Those of the package find every mistake when they are made and resolved.
-        """
+        """Evaluate terms of one's own at the start; those of the package find mistakes when they are resolved."""
         for number, constraint in enumerate(self.constraints):
             if is_own(constraint):
                 check_rows(f"constraints[{number}]", constraint, constraint.value, state)

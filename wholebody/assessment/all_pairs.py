@@ -51,11 +51,7 @@ class AllPairs:
         self.distance, self.least = np.zeros(0), float("inf")
 
     def move(self, q: Array) -> None:
-        """Measure all pairs at the posture q (nq,).
-
-        Raises:
-            InputError: q has the wrong shape or a value that is not finite, or a distance is not a number.
-        """
+        """Measure all pairs at the posture q (nq,); InputError for a q or a distance that is no finite number."""
         distances = self._distances
         self.state.update(q)
         with self._built.lock:  # not while a thing is moved, one piece after the other

@@ -52,16 +52,7 @@ class Judged(NamedTuple):
 
 
 def judged(problem: Problem, numbers: Numbers, q: Array) -> Judged:
-    """Judge postures q (k, nq), each for its own problem.
-
-    Args:
-        problem: one of them: without constraints and bounds, its measure a squared distance.
-        numbers: of all of them.
-        q: the postures.
-
-    Raises:
-        InputError: q has a value that is not finite.
-    """
+    """Judge postures q (k, nq), each with its own numbers of one problem without constraints and bounds."""
     model, built, figure = problem.scene.model, problem.scene.built, problem.scene.figure
     joints, least, short = np.empty((len(q), model.njoints, 4, 3)), np.empty(len(q)), np.empty(len(q))
     with all_pairs(built).borrow() as pairs:

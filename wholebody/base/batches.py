@@ -1,19 +1,19 @@
-"""Many jobs beside each other, in child processes of this machine or, through joblib, on a dask cluster.
-
-A job that crashes ends only its own process. Processes of this machine are kept from call to call.
-"""
+"""Many jobs beside each other: in child processes, which are kept from call to call, or on a dask cluster."""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
+import sys
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from multiprocessing.connection import wait
 from typing import Any, TypeVar
 
+from wholebody.base import checks
 from wholebody.base.arrays import with_values
 from wholebody.base.errors import InputError, MissingPackageError, WholebodyError, one_line
 from wholebody.base.runner import ONE_THREAD, Child, EndedError, Job, Outcome, end_with, interrupt_ignored, run_jobs
@@ -146,10 +146,7 @@ def _children(count: int) -> Iterator[list[Child]]:
 def spread(
     function: Callable[[Any], Any], arguments: Iterable[Any], jobs: int, cluster: str | None = None
 ) -> Iterator[Any]:
-    """Call a function with each argument in as many processes, or threads of a cluster, as there are jobs at a time.
-
-    Its answers are given as they come. See `run_batch` for the arguments and the errors.
-    """
+    """Call a function with each argument in `jobs` processes, or threads of a cluster; answers come as they end."""
     import joblib
 
     try:
@@ -199,11 +196,7 @@ def _in_own_child(sent: _Sent) -> tuple[int, Any, tuple[int, str] | None]:
 
 
 def fingerprint(*asked: Any) -> str:
-    """Fingerprint of a request.
-
-    Raises:
-        InputError: it cannot be sent to another process.
-    """
+    """Fingerprint of a request; InputError if it cannot be sent to another process."""
     import joblib
 
     try:
@@ -233,3 +226,27 @@ def _client(address: str) -> AbstractContextManager[Any]:
     except (OSError, ValueError) as error:
         raise WholebodyError(f"no dask scheduler answers at {address} ({error}); start one: dask scheduler") from None
     return client
+
+
+def reporter(value: Callable[..., Any] | bool | None, what: str) -> Callable[..., Any] | None:
+    """The function to call with the number done and of all: a given one, a line on the error output, or None."""
+    return checks.function({True: _Line(), False: None}[value] if isinstance(value, bool) else value, what)
+
+
+class _Line:
+    """A line that is written anew from its beginning, at most ten times a second."""
+
+    def __init__(self) -> None:
+        self._began, self._told = time.perf_counter(), 0.0
+
+    def __call__(self, *given: Any) -> None:
+        done, total = (given[0] if isinstance(given[0], tuple) else given)[:2]
+        now = time.perf_counter()
+        if done < total and now - self._told < 0.1:
+            return
+        self._told, spent = now, now - self._began
+        rest = f", {spent / done * (total - done):.0f} s to go" if 0 < done < total else ""
+        bar, end = "#" * int(20 * done / max(total, 1)), "\n" if done >= total else ""
+        if sys.stderr is not None:
+            sys.stderr.write(f"\r{bar:.<20} {done} of {total}, {spent:.0f} s{rest}   {end}")
+            sys.stderr.flush()

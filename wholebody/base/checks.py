@@ -234,10 +234,7 @@ def path(value: object, what: str) -> Path:
 
 
 def array(value: object, what: str, wanted: str) -> Array:
-    """Real numbers as an array of any shape, infinite ones and NaN too; an array of floats is returned without a copy.
-
-    `wanted` says what is accepted, such as "corners, shape (k, 3), metres".
-    """
+    """Real numbers as an array, infinite ones and NaN too; `wanted`: "corners, shape (k, 3), metres"."""
     if type(value) is np.ndarray and value.dtype == np.float64:
         return value
     if isinstance(value, np.ma.MaskedArray) and value.dtype.kind in NUMERIC:
@@ -280,10 +277,7 @@ def posture(value: object, size: int, what: str = "a posture") -> Array:
 
 
 def color(value: object, what: str) -> tuple[float, float, float, float]:
-    """Red, green, blue and alpha, each from 0 to 1, of three or four such numbers, a name of CSS, or "#rrggbb(aa)".
-
-    Alpha is 1 if it is missing.
-    """
+    """Red, green, blue and alpha from 0 to 1, of three or four such numbers, a name of CSS, or "#rrggbb(aa)"."""
     wanted = "red, green, blue and, if wanted, alpha, each from 0 to 1, such as (1.0, 0.0, 0.0), a name or '#rrggbb'"
     if isinstance(value, str):
         from PIL import ImageColor  # the names of CSS

@@ -269,13 +269,7 @@ def checked_target(
 
 
 def checked_ending(path: object, what: str, content: str, endings: Collection[str]) -> Path:
-    """The path of a file to write in the format that its ending says, one of `endings`: in lower case, with the dot.
-
-    `what` names the path in messages, `content` what the file has: "a scene".
-
-    Raises:
-        InputError: no path, or the ending of its name is no such format.
-    """
+    """The path of a file of some `content`, whose ending is one of `endings`, lower case with the dot."""
     place = checks.path(path, what)
     if place.suffix.lower() not in endings:
         given = one_line(place.suffix) or "a file without ending"

@@ -200,10 +200,7 @@ class Child:
 
 
 def start_process(environment: Mapping[str, str]) -> Started:
-    """Start an interpreter that reads jobs, with these variables and no others.
-
-    It ignores Ctrl-C from its beginning, and prints no traceback: who began it ends it.
-    """
+    """Start an interpreter that reads jobs, with these variables and no others; it ignores Ctrl-C."""
     import wholebody
 
     ours, theirs = socket.socketpair()
@@ -260,29 +257,19 @@ def run_jobs(next_job: Callable[[], Job | None], children: Sequence[Child]) -> I
 
 
 def allow(seconds: float, processor: float = 0.0) -> None:
-    """Move the deadline of the running job to so many seconds from now; 0 for none. It does nothing outside a job.
-
-    `processor` are seconds of the processor's time, which passes slowly where others use it too.
-    """
+    """Move the deadline of the running job to so many seconds from now, by the clock and the processor; 0 for none."""
     if _parent is not None:
         signal.setitimer(signal.ITIMER_REAL, seconds)
         signal.setitimer(signal.ITIMER_PROF, processor)
 
 
 def allow_processor(seconds: float) -> None:
-    """Move the deadline of the running job to so many seconds of the processor's time from now.
-
-    Others' work on the machine does not shorten that. By the clock it is `BY_THE_CLOCK` times as far, for a job that
-    waits for ever.
-    """
+    """Move the deadline to so many seconds of the processor's, by the clock `BY_THE_CLOCK` times as many."""
     allow(BY_THE_CLOCK * seconds, seconds)
 
 
 def processor_time() -> float:
-    """Processor's time of all threads of this process, seconds from an arbitrary zero.
-
-    `time.process_time` goes by ticks of 4 ms while a deadline of the processor's time runs; this does not.
-    """
+    """Processor's time of this process, seconds; `time.process_time` ticks by 4 ms while a deadline runs."""
     usage = resource.getrusage(resource.RUSAGE_SELF)
     return usage.ru_utime + usage.ru_stime
 
@@ -294,10 +281,7 @@ def tell(note: Any) -> None:
 
 
 def end_with(parent: int) -> None:
-    """End this process when its parent has ended, also in the middle of a job, and where it had ended before this call.
-
-    Whoever began this process says the parent's id, for an orphan's parent is another process.
-    """
+    """End this process when its parent, a process id, has ended or had ended before this call."""
     threading.Thread(target=_end_after, args=(parent,), daemon=True).start()
 
 
@@ -308,10 +292,7 @@ def _end_after(parent: int) -> None:
 
 
 def serve(descriptor: int, parent: int) -> None:
-    """Do jobs until the parent, a process id, has ended; the main loop of a process of `Child`.
-
-    Ctrl-C reaches all processes of a terminal; the parent decides what it ends.
-    """
+    """Do jobs until the parent, a process id, has ended; the main loop of a process of `Child`."""
     global _parent
     _parent = Connection(descriptor)
     _end_at_alarms()

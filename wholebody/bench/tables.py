@@ -77,10 +77,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_rows(path: Path, facts: Mapping[str, str], rows: Sequence[Any]) -> None:
-    """Write dataclass instances of one kind, one a line, under their field names; the facts stand above as comments.
-
-    An interval has three columns, of which the ends are called NAME_low and NAME_high; a mapping has a column a key.
-    """
+    """Write dataclass instances, one a line, an interval in three columns; the facts stand above as comments."""
     text = io.StringIO()
     for name, value in facts.items():
         text.write(f"# {name}: {value}\n")

@@ -139,11 +139,8 @@ class Population:
         return [self.values(one) for one in deviates]
 
     def boundary(self, dimensions: Sequence[str], confidence: float) -> list[dict[str, float]]:
-        """Return people on the boundary of a share of all people, in the space of some dimensions, and their middle.
-
-        Bittner's (2000) A-CADRE in the principal components of the dimensions that have nine tenths of their variance,
-        four at most: the ends of the axes, and the middle of each orthant, of the ellipsoid that holds the share.
-        """
+        """Return people on the boundary of a share of all people, in the space of some dimensions, and their middle."""
+        # Bittner's (2000) A-CADRE in the principal components with nine tenths of the variance, four at most.
         from itertools import product
 
         from scipy.special import chdtri

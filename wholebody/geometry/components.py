@@ -126,11 +126,7 @@ FLAT = 1e-6  # share of a mesh's size: triangles nearer to the hull's surface ar
 
 
 def is_convex(vertices: Array, faces: NDArray[np.int64]) -> bool:
-    """Whether the triangles (m, 3) of vertices (n, 3) lie on the surface of their convex hull, and cover it.
-
-    Order, orientation and repetition of vertices and triangles do not matter. False where the mesh is flat, or so
-    large that this is not found quickly.
-    """
+    """Whether the triangles (m, 3) of vertices (n, 3), in any order, lie on and cover their hull."""
     from scipy.spatial import ConvexHull, QhullError
 
     corners = vertices[faces]

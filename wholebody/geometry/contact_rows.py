@@ -47,17 +47,10 @@ class ContactRows(NamedTuple):
 
 
 class ContactRowBuilder:
-    """Builds contact rows for all near pairs at once. It remembers no posture, so any number of runs may share one.
-
-    Attributes:
-        arrays: of the pieces, as compiled loops take them; see `patch_kernel.TableArrays`.
-    """
+    """Builds contact rows for all near pairs at once, for any number of runs; `arrays` are those of the pieces."""
 
     def __init__(self, table: PairTable, most_ends: int = MOST_ENDS, same_normal: float = SAME_NORMAL) -> None:
-        """Take the pieces and pairs, and how many rows a contact has at most beside its witness row.
-
-        `same_normal` is the cosine of the angle to a face's normal within which coal's may be meant to be it.
-        """
+        """Take the pieces and pairs; `same_normal`: least cosine between coal's normal and a face's that it means."""
         self.table, self.most_ends = table, most_ends
         lengths = LENGTHS.copy()
         lengths[4], lengths[7] = same_normal, most_ends

@@ -266,11 +266,8 @@ def limited(function: Callable[..., list[Array]], seconds: float, *arguments: An
 
 
 def run_coacd(vertices: Array, faces: NDArray[np.int32], threshold: float) -> list[Array]:
-    """Corners of the convex parts that CoACD finds, each (k, 3); for a child process.
-
-    Self-intersecting meshes make it crash or run for ever. Its own cap on vertices (decimate) leaves parts of the
-    surface outside; its re-meshing (preprocess) inflates thin parts by half, and a closed manifold does not need it.
-    """
+    """Corners of the convex parts that CoACD finds, each (k, 3); for a child process, as bad meshes make it crash."""
+    # Its cap on vertices (decimate) leaves surface outside; its re-meshing (preprocess) inflates thin parts by half.
     import coacd
 
     coacd.set_log_level("error")

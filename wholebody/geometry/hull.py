@@ -130,11 +130,7 @@ def _solid_hull(cloud: Array, what: str) -> Any:
 
 
 def enclosing_ball(points: Array) -> tuple[Array, float]:
-    """Smallest ball that contains points (n, 3): centre (3,) and radius.
-
-    Exchange of bases: the farthest point outside enlarges the ball of at most four points on its surface until
-    no point is outside. The radius grows with each exchange, so this terminates (a pivoting form of Welzl 1991).
-    """
+    """Centre (3,) and radius of the smallest ball around points (n, 3): exchange of bases, after Welzl 1991."""
     scale = float(np.ptp(points, axis=0).max()) or 1.0
     basis = [int(((points - points.mean(axis=0)) ** 2).sum(axis=1).argmax())]
     centre, radius = points[basis[0]], 0.0

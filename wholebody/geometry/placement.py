@@ -88,11 +88,8 @@ def unit_vector(value: object, what: str) -> tuple[float, float, float]:
 
 
 def quaternions(rotations: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit quaternions (n, 4) as x, y, z, w of rotations (n, 3, 3).
-
-    Each is a row of the matrix 4 q q^T, which is linear in the rotation; the row with the largest diagonal is well
-    conditioned (Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1(3), 1978).
-    """
+    """Unit quaternions (n, 4) as x, y, z, w of rotations (n, 3, 3)."""
+    # A row of 4 q q^T (Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1(3), 1978).
     r, n = rotations, np.arange(len(rotations))
     xx, yy, zz = r[:, 0, 0], r[:, 1, 1], r[:, 2, 2]
     outer = np.empty((len(r), 4, 4))

@@ -62,12 +62,7 @@ def imported(name: str) -> Callable[..., Method]:
 
 
 def as_method(given: object) -> Method:
-    """A method from its name, or a configured one as it is.
-
-    Raises:
-        UnknownNameError: there is no such method.
-        InputError: it is neither.
-    """
+    """A method from its name, or a configured one as it is; InputError if it is neither."""
     if isinstance(given, str):
         return method_named(given)
     parts = (getattr(given, name, None) for name in PROTOCOL)

@@ -56,10 +56,7 @@ def dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, list[
 
 
 def sampled_dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> list[tuple[int, float]]:
-    """Places between frames that overlap, or nearly so, if some of them dip; a few of each gap are looked at.
-
-    What nearly overlaps is told too, because what pushes one gap out pushes its neighbours in.
-    """
+    """Places between frames that overlap, or nearly so, if some of them dip; a few of each gap are looked at."""
     near, dipping = [], False
     for gap in gaps:
         depths = _depths(workspace, q[gap], q[gap + 1], FEW, 2e-4)
@@ -71,10 +68,8 @@ def sampled_dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> list[tu
 
 
 def _deepest(workspace: Workspace, before: Array, after: Array, numbers: Sequence[int]) -> list[float]:
-    """Shares of the way between two postures (nq,) at which pairs are nearest, by their numbers.
-
-    A corner dips in a hundredth of a gap, so many places are looked at, and between the nearest ones by golden section.
-    """
+    """Shares of the way between two postures (nq,) at which pairs are nearest, by their numbers."""
+    # A corner dips in a hundredth of a gap: between the nearest of many places golden sections look.
     model, data = workspace.model, workspace.model.createData()
     request, result = coal.DistanceRequest(), coal.DistanceResult()
     pairs = [[workspace.geometry.geometryObjects[int(piece)] for piece in workspace.table.pairs[k]] for k in numbers]

@@ -197,10 +197,8 @@ class InverseDynamics:
         return np.array(pin.rnea(self._model, self._data, q, v, a))
 
     def grounded(self, q: Array, torques: Array, shares: Array, stand: Stand) -> tuple[Array, Array]:
-        """Parts of torques (k, nv) in the air, after the ground's forces, and the wrenches (k, 6) of the parts.
-
-        The forces are linear in the parts while the same edges of friction bear: those at the sum with shares (k,).
-        """
+        """Parts of torques (k, nv) in the air, after the ground's forces, and the wrenches (k, 6) of the parts."""
+        # The forces are linear while the same edges of friction bear: those at the sum with shares (k,).
         model, data = self._model, self._data
         if not self.free:
             return torques, np.zeros((len(torques), 6))
@@ -310,10 +308,8 @@ def foot_wrenches(forces: Array, stand: Stand, soles: Soles) -> list[Array]:
 
 
 def zero_moment_point(wrench: Array, height: float) -> Array:
-    """(2,) where the ground gives a wrench (6,), about the world's origin, without a horizontal moment; metres.
-
-    Vukobratovic and Borovac 2004, "Zero-moment point - thirty five years of its life". The vertical force is not zero.
-    """
+    """(2,) where the ground gives a wrench (6,) without a horizontal moment, metres; its vertical force is not zero."""
+    # Vukobratovic and Borovac 2004, "Zero-moment point - thirty five years of its life"
     force, turning = wrench[:3], wrench[3:]
     found: Array = np.array([-turning[1] + height * force[0], turning[0] + height * force[1]]) / force[2]
     return found

@@ -93,10 +93,7 @@ def kept_beside(run: Run, window: Window, q: Array, gaps: Iterable[int]) -> Arra
 
 
 def followed(run: Run, window: Window, middle: int) -> Array:
-    """Postures (n, nq) of a window, followed from the freed posture of one of its frames to both ends.
-
-    Iterations keep the side on which they begin. Following ends on a side where it is calm for 0.25 s.
-    """
+    """Postures (n, nq) of a window, followed from the freed posture of one of its frames until calm for 0.25 s."""
     terms = run.terms
     q = np.array(terms.q[window.first : window.end])
     q[middle - window.first] = run.follower.freed(middle, terms.q[middle])

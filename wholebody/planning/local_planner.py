@@ -40,10 +40,7 @@ class LocalPlanner(Protocol):
         """Let motions be as near to things as the posture q (nq,) is, which is an end of the whole motion."""
 
     def towards(self, q: Array, target: Array, most: float = np.inf) -> tuple[list[Array], bool]:
-        """Postures (nq,) of the motion from q to a target (nq,), without q, and whether it comes to the target.
-
-        It ends where it is longer than `most`, radians and metres.
-        """
+        """Postures (nq,) from q to a target, without q, no longer than `most` rad and m, and whether it comes there."""
 
     def settled(self, path: Array) -> tuple[Array, Mask]:
         """Postures (n, nq) near those of a path that keep constraints, and which of the motions between are blocked."""

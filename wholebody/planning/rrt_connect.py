@@ -68,10 +68,7 @@ class RRTConnect:
         self._trees[1].add(end)
 
     def grow(self, sample: Array) -> list[Array] | None:
-        """Extend one tree towards a sample (nq,), and the other one towards what was reached; trees change turns.
-
-        Returns postures from the start to an end if the trees meet.
-        """
+        """Extend trees in turn to a sample (nq,) and to what was reached: postures from start to end if they meet."""
         here, there = self._turn, 1 - self._turn
         self._turn = there
         number, _ = self._extend(self._trees[here], sample)

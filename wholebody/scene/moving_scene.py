@@ -84,10 +84,7 @@ class MovingScene:
                 self.geometry.geometryObjects[index].placement = given.geometryObjects[index].placement
 
     def configuration(self, q: Array, placements: Mapping[str, pin.SE3]) -> Array:
-        """The configuration (nq,) of the figure's posture (figure_nq,) and a placement of each thing that moves.
-
-        Placements are in the world, or in its joint's frame for a carried thing.
-        """
+        """The configuration (nq,) of a posture (figure_nq,) and placements, in the world or a carried thing's joint."""
         parts = [np.asarray(q, dtype=float)]
         for name in self.names:
             place = placements[name]

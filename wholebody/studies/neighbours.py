@@ -56,10 +56,8 @@ def solve_from_neighbours(family: Family) -> bool:
 
 
 def _nearest(solved: Indices, distances: Indices, tried: Mapping[int, int]) -> tuple[int, int] | None:
-    """The nearest of some solved cases that was not tried, and how far it is; None where enough were tried.
-
-    After `NEIGHBOURS` only those count that are nearer than all before: an answer spreads from neighbour to neighbour.
-    """
+    """The nearest solved case that was not tried, and how far it is; None where enough were tried."""
+    # After `NEIGHBOURS` only those nearer than all before: an answer spreads from neighbour to neighbour.
     left = ~np.isin(solved, [*tried])
     if not left.any():
         return None

@@ -32,10 +32,7 @@ _effort = Effort()
 def default_measures(
     scene: Surroundings, start: Array, stances: Sequence[tuple[str, ...]], *, ranges: bool
 ) -> tuple[Measure, ...]:
-    """`Effort`, and for a person `Rhythm` beside it, resolved; and the `Stance` of each pair of feet that may slide.
-
-    Who kneels and does not at the start spares effort from the posture "kneeling" there.
-    """
+    """`Effort`, for a person `Rhythm`, resolved, and the `Stance` of feet that may slide; who kneels spares effort."""
     if not (ranges and scene.figure.ranges and inputs.once(scene, "girdles", lambda: girdles_of(scene.figure))):
         return (_effort.resolve(scene, start),)
     shanks = {side for sides in stances for side in sides if side.endswith("_shank")}
@@ -45,10 +42,7 @@ def default_measures(
 
 
 def stances(scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal]) -> tuple[tuple[str, ...], ...]:
-    """The feet of each that stands and keeps the balance, or is to kneel, but for those who kneel at the start.
-
-    Who sits, leans or holds on puts the feet where they belong.
-    """
+    """The feet of each who stands and balances, or is to kneel, but does not sit, lean or hold on."""
 
     def kneels(stand: Stand) -> bool:
         at_start = stand.value(State(scene.model).update(start))

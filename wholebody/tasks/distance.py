@@ -158,11 +158,8 @@ class BallJoint(NamedTuple):
         return rotation, axes
 
     def residuals(self, q: Array) -> tuple[Array, Array]:
-        """Weighted parts of the rotation vector (3,), and their derivatives (3, 3) by the three angles.
-
-        With v the rotation vector of the rotation from the start, dv = J_l^-1(v) sum_k axis_k dq_k; J_l^-1 is the
-        inverse left Jacobian of SO(3), the transpose of the right one (Chirikjian 2011, section 10.6).
-        """
+        """Weighted parts of the rotation vector (3,), and their derivatives (3, 3) by the three angles."""
+        # dv = J_l^-1(v) sum_k axis_k dq_k; J_l^-1 is the transpose of the right one (Chirikjian 2011, section 10.6).
         rotation, axes = self.turn(q)
         away = rotation @ self.start.T
         share = np.sqrt(self.weights)[:, None] * self.axes

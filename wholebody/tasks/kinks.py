@@ -31,11 +31,7 @@ class FacePlane(NamedTuple):
 def faces_met(
     first: Surface, second: Surface, pieces: tuple[int, int], state: State, edges: Array = NO_EDGES
 ) -> list[FacePlane]:
-    """The faces of the nearest piece of the second surface, as the nearest piece of the first meets them.
-
-    Faces beyond which another piece of the second surface goes on where it is touched are no end of it, and are left
-    out.
-    """
+    """The faces of the second surface's nearest piece, as the first's meets them; inner ones are left out."""
     i, j = pieces
     swept = second.swept[j]
     if swept.radius or len(swept.faces) < 2 or not np.isfinite(first.reach[i]):

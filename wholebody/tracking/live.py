@@ -1,7 +1,4 @@
-"""A figure that is dragged by hand: handles on it and on the things around it, holds, undo, by any method's tracker.
-
-The page that shows it is elsewhere; this is what happens when a handle is taken, moved and let go.
-"""
+"""A figure dragged by hand, without its page: handles on it and on things, holds, undo, by any method's tracker."""
 
 from __future__ import annotations
 

@@ -63,10 +63,7 @@ def set_skeleton(
 
 
 def set_skin(path: str, skeleton: str, patch: Patch, color: tuple[float, ...], unit: float) -> Command:
-    """Put a patch of a body's surface at a node, behind that of its skeleton; positions are rounded to `unit` metres.
-
-    A patch has at most 65,536 vertices and 256 bones.
-    """
+    """Put a patch, of 65,536 vertices and 256 bones at most, at a node behind its skeleton's, rounded to `unit` [m]."""
     weights = np.round(255.0 * patch.weights).astype(int)
     weights[:, 0] += 255 - weights.sum(axis=1)  # the strongest takes the rounding: the page adds them up unscaled
     message = {
@@ -117,10 +114,7 @@ def look_from(eye: Array, target: Array) -> Command:
 
 
 def look_at(points: Array, direction: Sequence[float], margin: float) -> Command:
-    """Turn the camera to the middle of points (n, 3), from a direction (3,) so far away that all are in the picture.
-
-    `margin` is the width of the picture relative to the points; 1 is exact.
-    """
+    """Turn the camera to points (n, 3) from a direction (3,), the picture `margin` times as wide as they are."""
     target = (points.min(axis=0) + points.max(axis=0)) / 2
     return _look(direction=list(direction), target=target.tolist(), points=floats(points), margin=margin)
 

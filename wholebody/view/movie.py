@@ -78,10 +78,8 @@ def _gif(pictures: Iterable[bytes], fps: float) -> bytes:
 
 
 def _swatch(frames: Sequence[Any]) -> NDArray[np.uint8]:
-    """An image (rows, 64, 3) from which a palette is chosen: half are the frames' pixels, half are their colours alike.
-
-    By the pixels alone nearly all colours would go to sky and floor, and a face would be grey.
-    """
+    """An image (rows, 64, 3) from which a palette is chosen: half the frames' pixels, half their colours alike."""
+    # By the pixels alone nearly all colours would go to sky and floor, and a face would be grey.
     # pixels, of which one counts for the palette: all of them take half a second
     pixels = np.concatenate([np.asarray(frame).reshape(-1, 3)[::7] for frame in frames])
     _, first = np.unique(pixels >> 3, axis=0, return_index=True)

@@ -87,10 +87,7 @@ def live_page(title: str = "wholebody") -> str:
 
 
 def static_page(commands: list[Command], title: str = "wholebody") -> str:
-    """HTML of a page that contains its scene, drawn by these commands in order, and makes no network requests.
-
-    Scene and player are compressed, and unpack themselves.
-    """
+    """HTML of a page that contains its scene, compressed, and makes no network requests."""
     return _page(title, player() + _data("scene", _bundled(commands)) + _script(_UNPACK))
 
 

@@ -20,8 +20,7 @@ from wholebody.base.runner import Child
 from wholebody.bench.attack import running
 from wholebody.bench.attack.case import KINDS, PATTERN, Case, Verdict, kind_of
 from wholebody.bench.attack.inputs import mutated
-from wholebody.bench.attack.report import keep, report, row
-from wholebody.bench.attack.running import attack
+from wholebody.bench.attack.running import attack, keep, report, row
 
 FACTS = {"wholebody": "0"}
 

@@ -97,11 +97,7 @@ def _beside(track: Track, tools: Sequence[str], shift: int) -> dict[str, Run]:
 
 
 def least_times(track: Track, runs: Sequence[Run]) -> Array:
-    """(runs, steps) microseconds that a step's postures take in Pinocchio and coal alone, without a program.
-
-    These are joint Jacobians, placements of the pieces, and distances of the pairs that a tool looks at, by calls of
-    C++ from the guesses of the step before.
-    """
+    """(runs, steps) microseconds of joint Jacobians, placements and distances of a step in Pinocchio and coal alone."""
     model, scene = track.scene.model, track.scene
     pairs = PairDistances(scene.geometry, scene.built.table.pairs)
     data, geometry, told = model.createData(), pairs.geometry, pairs.data
@@ -121,10 +117,7 @@ def least_times(track: Track, runs: Sequence[Run]) -> Array:
 
 
 def time_rows(track: Track, runs: Runs) -> list[Row]:
-    """Times of all steps of each tool, and their ratios to the reference's in the same repeat, with intervals.
-
-    The first tool is compared with `least_times` of its own postures too.
-    """
+    """Times of all steps of each tool, and their ratios to the reference's in the same repeat, with intervals."""
     rows, reference, least = list[Row](), runs.get(REFERENCE, []), None
     for name, mine in runs.items():
         figures: dict[str, Figure] = {}

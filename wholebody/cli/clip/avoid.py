@@ -93,10 +93,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _method(name: str, arguments: argparse.Namespace) -> Avoider:
-    """The method, which may slow the motion, and keep to the strength of a person of the sex that was asked for.
-
-    Raises WholebodyError where there is no such method, or it does not slow motions or take dynamics.
-    """
+    """The method, which may slow the motion, and keep to the strength of a person of the sex that was asked for."""
     from wholebody.base.errors import InputError
     from wholebody.motion.avoidance import as_avoider
     from wholebody.motion.avoider import has_setting

@@ -46,11 +46,7 @@ class UrdfFile(NamedTuple):
 
 
 def read_urdf(path: Path, package_dirs: Sequence[Path] = ()) -> UrdfFile:
-    """Read and check a URDF file; `find_mesh` looks in the folders.
-
-    Raises:
-        FileFormatError: one sentence with the place and the correction.
-    """
+    """Read and check a URDF file; `find_mesh` looks in the folders."""
     robot = read_xml(path, "URDF")
     if robot.tag != "robot":
         raise FileFormatError(f"{path}: the outermost element is <{robot.tag}>, not <robot>; give a URDF")

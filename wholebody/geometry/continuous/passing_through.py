@@ -56,10 +56,7 @@ class Queries(Protocol):
 def is_free(
     queries: Queries, before: Array, after: Array, unswept: float, over: Callable[[], bool] = bool
 ) -> bool:  # fmt: skip
-    """Whether a motion between two postures is known to penetrate nothing.
-
-    One shorter than `unswept`, rad and m, is not swept; a sweep ends where its time is `over`.
-    """
+    """Whether a motion is known to penetrate nothing; one shorter than `unswept` is not swept."""
     if np.isinf(unswept) or np.abs(pin.difference(queries.model, before, after)).max(initial=0.0) <= unswept:
         return True
     return queries.sweep.first_contact(before, after, tolerance=GRAZE, over=over) is None
@@ -174,10 +171,7 @@ def _swept_through(queries: Queries, q0: Array, q1: Array, doubtful: Indices, en
 def first_passed(
     queries: Queries, before: QueryResult, after: QueryResult, q0: Array, q1: Array, overlap: float
 ) -> FirstContact | None:
-    """First contact, deeper than `overlap`, of a pair that may have changed sides and is separate after the motion.
-
-    The arguments are those of `passes_through`; None if there is none.
-    """
+    """First contact, deeper than `overlap`, of a pair that may have changed sides and is separate after the motion."""
     table = queries.table
     moved = far_moved(table, before, after)
     doubtful = moved[distances(after, len(table.pairs))[moved] > -overlap]
@@ -192,11 +186,8 @@ def doubtful_pairs(table: PairTable, before: QueryResult, after: QueryResult) ->
 def _passing_by(
     queries: Queries, before: QueryResult, after: QueryResult, q0: Array, q1: Array, pairs: Indices
 ) -> NDArray[np.bool_]:
-    """The pairs whose bounding spheres stay separate during the motion, estimated from its middle.
-
-    The relative path of the centres is approximated by two chords that meet in the middle. For a parabola the deviation
-    from these chords is a quarter of the deviation of the middle from the whole chord; twice that is assumed.
-    """
+    """The pairs whose bounding spheres stay separate during the motion, estimated from its middle."""
+    # The centres' path is taken as two chords; twice the deviation of a parabola from them is allowed for.
     table = queries.table
     halfway = queries.placements(np.asarray(pin.interpolate(queries.model, q0, q1, 0.5)))
     first, second = table.pairs[pairs, 0], table.pairs[pairs, 1]

@@ -180,12 +180,7 @@ class SweptDepth:
 
 
 class _Stack:
-    """Placements of the pieces at times of one motion.
-
-    Attributes:
-        times: of the placements, as shares of the motion.
-        places: (m, n, 4, 3) placements; only as many as there are times are filled.
-    """
+    """Placements `places` (m, n, 4, 3) of the pieces at `times`, shares of one motion; as many as times are filled."""
 
     def __init__(self, before: Array, after: Array) -> None:
         self.times, self.places = [0.0, 1.0], np.empty((16, *before.shape))

@@ -112,11 +112,8 @@ class Attraction:
         return np.asarray(pin.integrate(self._model, q, way)), shares
 
     def keep_gains(self, q: Array, trial: Array, wanted: Array, shares: Array, settled: list[bool]) -> Array:
-        """Undo changes that brought a part no nearer to the wanted posture; move joints of blocked parts one by one.
-
-        If overlap resolution undoes the attraction, single joints may still be free: a shoulder can move the whole arm
-        back, although the wrist cannot straighten yet. A part for which this gains nothing either is settled.
-        """
+        """Undo changes that brought a part no nearer to the wanted posture; move joints of blocked parts one by one."""
+        # A shoulder can move the arm back although the wrist cannot straighten. A part that gains nothing is settled.
         before = np.asarray(pin.difference(self._model, q, wanted))
         after = np.asarray(pin.difference(self._model, trial, wanted))
         turned = self._turned_back(q, trial)
@@ -276,10 +273,7 @@ class FrameResolver:
         return way
 
     def _toward(self, q0: Array, q1: Array) -> Array | None:
-        """The direct motion from q0 towards q1, as far as a frame may move; None if that is not free.
-
-        Each part makes its own share of a motion that is too long, or, if that is not free, all make the least.
-        """
+        """The direct motion from q0 towards q1, by each part's share or the least of them; None if that is not free."""
         way = np.asarray(pin.difference(self._model, q0, q1))
         shares = np.minimum(1.0, self._largest_motion / np.maximum(np.abs(way), 1e-12))
         for dofs, _ in self._parts:

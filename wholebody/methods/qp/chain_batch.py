@@ -1,7 +1,4 @@
-"""Many problems of one chain at once: the first descents of all are one compiled loop.
-
-What it answers is what `chain.from_seeds` leads to for each problem alone. All others are left to a solve of their own.
-"""
+"""Many problems of one chain at once, the first descents in one compiled loop; others are left to solves."""
 
 from __future__ import annotations
 
@@ -78,10 +75,7 @@ def batches(problems: Sequence[Problem], budget: Budget, largest: int) -> list[B
 
 
 def _form(problem: Problem, known: dict[Hashable, PlainChain | None]) -> tuple[Hashable, Array] | None:
-    """What problems of a batch have in common, and the floats (e, 36) of a problem's goals; None without a chain.
-
-    `known` has the chains that were looked up before.
-    """
+    """What problems of a batch have in common, and the floats (e, 36) of a problem's goals; None without a chain."""
     entries = goal_entries(problem)
     if entries is None or problem.left_out:
         return None

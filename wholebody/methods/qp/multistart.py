@@ -13,8 +13,7 @@ from wholebody.assessment.posture import assess
 from wholebody.base.arrays import Array, with_values
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
 from wholebody.methods.control import Control
-from wholebody.methods.qp.at_place import at_its_place
-from wholebody.methods.qp.before_contact import before_contact
+from wholebody.methods.qp.before_contact import at_its_place, before_contact
 from wholebody.methods.qp.cancelling import posture_apart
 from wholebody.methods.qp.closest import ENDLESS, Closest
 from wholebody.methods.qp.feasibility import Feasibility
@@ -182,11 +181,7 @@ class Multistart:
         return self._descend(local.q)
 
     def _relaxed(self, start: Array) -> LocalSolution | None:
-        """A relaxed probe, and a descent from where it reaches the goals.
-
-        It first goes through things, where limbs can change sides, and then is separated from them. Where many in a
-        row, with nothing in their way, came no nearer than the best posture, the goals are out of reach.
-        """
+        """A relaxed probe through things, and a descent from where it reaches the goals; None where out of reach."""
         tolerance = self.budget.tolerance
         relaxed = self._probe(start, SEARCH.relaxation_depth)
         nearer = relaxed.violation.left < (1.0 - SEARCH.nearer) * self.best.violation.left
@@ -219,11 +214,8 @@ class Multistart:
         return self.best.measure < SEARCH.moved * before
 
     def _descend_again(self) -> bool:
-        """Where contacts are met, descend at their place, then from beside a kink; whether the end is no minimum.
-
-        Steps along a curved surface can end early, and at a kink: two points touch at once, and the one that counts as
-        the contact should leave. Beside the kink, along the gradient that nothing balances, the other one is nearest.
-        """
+        """Where contacts are met, descend at their place, then from beside a kink; whether the end is no minimum."""
+        # At a kink two points touch at once, and the one that counts as the contact should leave.
         problem, tolerance = self.problem, self.budget.tolerance
         touches = any(hasattr(term, "touches") for term in (*problem.goals, *problem.constraints))
         if not (touches and self.budget.measures and self.best.violation.worst <= tolerance):
@@ -302,11 +294,8 @@ class Multistart:
         return near and bool(self._least) and held(self.best, self.budget.tolerance)
 
     def _known_out_of_reach(self, q: Array) -> bool:
-        """Whether the goals are out of reach: from a posture (nq,) and other starts, even through everything.
-
-        Where several descents without contacts, from postures all over the limits, come to rest at the same distance
-        and none comes nearer, it is the least that limits and constraints allow. Local minima differ.
-        """
+        """Whether the goals are out of reach of q (nq,): descents through everything all rest at the same distance."""
+        # It is then the least that limits and constraints allow. Local minima differ.
         if not (self.problem.goals and self.problem.scene.model.nv):
             return False
         tolerance, ends = self.budget.tolerance, list[LocalSolution]()

@@ -1,7 +1,4 @@
-"""The numbers of the QP method; what each trades stands at its name.
-
-They are frozen records, one for each part of the method, which compiled loops take as they are.
-"""
+"""The numbers of the QP method, as frozen records; what each trades stands at its name."""
 
 from __future__ import annotations
 

@@ -66,10 +66,7 @@ class Extrapolation:
         self._as_plain = False  # whether the last proposal would have been the program's own step
 
     def propose(self, parts: Parts, program: QuadraticProgram) -> Array | None:
-        """The extrapolated step (n,) within the box of the program.
-
-        None while too little is known, and where it would be the program's own step.
-        """
+        """The extrapolated step (n,) in the program's box; None while too little is known, or where it is its own."""
         plain = parts.tangential
         fast, self._as_plain = self._memory.propose(plain, self._longest), False
         if fast is None:

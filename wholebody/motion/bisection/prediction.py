@@ -22,11 +22,7 @@ from wholebody.tasks.distance import DistanceMeasure, SquaredDistance
 
 
 def path_planes(figure: Figure, q: Array, frame: int, joints: Sequence[str], state: State) -> list[Plane]:
-    """Planes through the places of joints at a frame of q (n, nq), normal to their paths there (eqs. 3.2 and 3.3).
-
-    The normal is the direction from the place at this frame to the next one, at the last frame from the one before.
-    What does not move there has none. The state is moved.
-    """
+    """Planes through the places of joints at a frame of q (n, nq), normal to their paths there (eqs. 3.2 and 3.3)."""
     if len(q) < 2:
         return []
     numbers = [figure.frame_id(joint) for joint in joints]
@@ -112,11 +108,8 @@ class Predictor:
         return Prediction(solution.q, self.good(frame, solution.q))
 
     def _together(self, frame: int) -> Mask:
-        """(pairs,) which pairs are of pieces that are held at each other in a frame, or both in the world.
-
-        No posture has more room between them, so none is asked for: hands at one weapon, a foot on the floor, feet side
-        by side. Otherwise what is held by its place alone may turn, and has its room.
-        """
+        """(pairs,) which pairs are of pieces that are held at each other in a frame, or both in the world."""
+        # No posture has more room between them: hands at one weapon, a foot on the floor.
         number = np.arange(self.run.scene.model.njoints)
         stands = np.zeros(len(number), dtype=bool)
         for term in self.run.terms.held(frame):

@@ -1,8 +1,4 @@
-"""A figure as a tree of nodes that rotate, as files of skeletons hold it, and back.
-
-Joints at one place become one node: the three of a hip are one rotation. All axes of nodes are those of the world where
-the posture is zero, as in BVH.
-"""
+"""A figure as a tree of nodes that rotate about axes of the world at zero; joints at one place are one node."""
 
 from __future__ import annotations
 

@@ -287,22 +287,16 @@ class WindowLoads:
 
 
 def on_filtered(figure: Figure, original: Array, changed: Array, dt: float) -> Array:
-    """(n, nq) postures whose loads are those of changed postures of a recording.
-
-    Differences of a recording amplify its noise, so it is filtered. Filtering what was changed would hide how fast it
-    changes; so the change is taken as it is, on top of the filtered recording.
-    """
+    """(n, nq) postures whose loads are those of changed postures: the change on top of the filtered recording."""
+    # Filtering what was changed would hide how fast it changes.
     model, steady = figure.model, smoothed(Clip(figure, original, dt), CUTOFF).q
     each = zip(steady, original, changed, strict=True)
     return np.array([pin.integrate(model, base, pin.difference(model, was, now)) for base, was, now in each])
 
 
 def standing_frames(places: Array, feet: Array) -> Indices:
-    """(m,) frames of a clip whose standing feet are those at places (m,) between its frames; `feet` (n,) count them.
-
-    A foot stands between two frames if it stands in both: one that leaves the ground after a frame bears nothing a
-    quarter of a frame later. So of two frames it is the one in which fewer feet stand, or else the nearer one.
-    """
+    """(m,) frames of a clip whose standing feet are those at places (m,) between frames; `feet` (n,) count them."""
+    # A foot stands between frames if it stands in both: of two it is the one with fewer feet, or the nearer.
     near, below, above = (np.clip(to(places).astype(int), 0, len(feet) - 1) for to in (np.rint, np.floor, np.ceil))
     fewer = np.where(feet[below] < feet[above], below, above)
     found: Indices = np.where(feet[below] == feet[above], near, fewer)

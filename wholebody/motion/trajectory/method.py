@@ -162,10 +162,7 @@ class Trajectory(Checked):
 def _in_parts(
     run: Run, windows: ClipRun, window: Window, reference: Array, faults: Faults, told: Callable[[float], bool]
 ) -> WindowResult:
-    """A window freed part by part, each from where the one before it is; at once where a part is not freed.
-
-    What is tried again is then a part, and not all of a long window.
-    """
+    """A window freed part by part, each from where the one before it is; at once where a part is not freed."""
     length, shared = run.frames(LONG, 2), run.frames(LONG / 4.0, 1)
     q, first = np.array(reference), window.first
 

@@ -228,11 +228,7 @@ class ClipRun:
         return jerk_ratio(Clip(figure, before, dt), Clip(figure, after, dt))
 
     def _starts(self, own: _Window, depths: Array) -> Iterable[Array]:
-        """Deviations (n, nv) to begin with.
-
-        None; frames kept on one side of what motions between them pass; what following gives from the deepest frame and
-        from both ends.
-        """
+        """Deviations (n, nv) to begin with: none; kept on one side; followed from the deepest frame and both ends."""
         window, none = own.window, np.zeros((len(own.window), self._run.workspace.model.nv))
         yield none
         if not (own.limits.lower < own.limits.upper).any():
@@ -284,10 +280,8 @@ class ClipRun:
         return _Attempt(x, found.worst, dipping, found.objective, between=program.between)
 
     def _dips(self, own: _Window, x: Array, dipped: set[int], met: bool) -> list[Node]:
-        """Places between frames with deviations x (n, nv) where motions dip, and beside; everywhere in gaps `dipped`.
-
-        Those that dip now join these. Where nothing is missed in frames (`met`) what nearly dips is told too.
-        """
+        """Places between frames with deviations x (n, nv) where motions dip, and beside; all in gaps `dipped`."""
+        # Those that dip now join these. Where nothing is missed in frames (`met`) what nearly dips is told too.
         q, gaps = own.chart.postures(x), own.moved(x)
         swept = dips(self._run.workspace, q, gaps)
         places = [(gap, at + side) for gap, shares in swept.items() for at in shares for side in (0.0, -0.005, 0.005)]

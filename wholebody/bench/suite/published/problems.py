@@ -24,11 +24,7 @@ def problem_name(family: str, number: int) -> str:
 
 
 def problem_content(case: Case, body: BodyFiles, far: Array, meshes: Meshes) -> dict[str, Any]:
-    """A case as the content of its file, with the far seed (nq,); hulls of things go to the meshes.
-
-    Of the measures that a problem has by default the effort is published. Raises InputError where the case asks for
-    something that the files have no word for.
-    """
+    """A case as the content of its file, with the far seed (nq,); hulls of things go to the meshes."""
     problem, name = case.problem, problem_name(case.set, case.number)
     if problem.bounds or problem.measures_given:
         raise InputError(f"{name}: only problems without bounds and measures of their own are published")
@@ -88,10 +84,7 @@ def _balance(term: wb.Balance) -> dict[str, Any]:
 
 
 def _things(case: Case, body: BodyFiles, meshes: Meshes) -> tuple[list[dict[str, Any]], list[list[str]]]:
-    """Pieces of all things, and the pairs that are not tested although the rule would.
-
-    The rule: every piece of a thing against every piece of the body, and carried things against those in the world.
-    """
+    """Pieces of all things, and the pairs not tested although the rule would: thing and body, carried and world."""
     geometry = case.problem.scene.geometry
     own = case.problem.scene.figure.geometry.ngeoms
     pieces = list(geometry.geometryObjects)
