@@ -79,8 +79,7 @@ def compiled(*, inner: bool = False, **options: Any) -> Callable[[F], F]:
             "no_cpython_wrapper": inner,
             **options,
         }
-        pipeline = {"pipeline_class": _inner_compiler()} if inner else {}
-        loop: F = loop_type(function, targetoptions=target, **pipeline)
+        loop: F = loop_type(function, targetoptions=target)
         with suppress(RuntimeError):  # numba: cannot cache function, no locator available
             loop.enable_caching()  # type: ignore[attr-defined]
         return loop
@@ -188,31 +187,13 @@ def _loop_type() -> Any:
 
 @lru_cache(maxsize=1)
 def _inner_type() -> Any:
-    """A compiled function that Python cannot call: what numba would compile to unpack its arguments is left out.
-
-    LLVM optimises it where it is called from, as a part of its caller; by itself it is never run.
-    """
+    """A compiled function that Python cannot call: what numba would compile to unpack its arguments is left out."""
 
     class Inner(_loop_type()):  # type: ignore[misc]
         def __call__(self, *args: Any, **named: Any) -> Any:
             raise TypeError(f"{self.py_func.__name__} is compiled for calls from compiled functions only")
 
     return Inner
-
-
-@lru_cache(maxsize=1)
-def _inner_compiler() -> Any:
-    from numba.core.compiler import Compiler
-
-    class InnerCompiler(Compiler):  # type: ignore[misc]
-        def compile_extra(self, func: Any) -> Any:
-            library = self.state.targetctx.codegen().create_library(func.__qualname__)
-            library.enable_object_caching()
-            library._optimize_final_module = lambda: None
-            self.state.library = library
-            return super().compile_extra(func)
-
-    return InnerCompiler
 
 
 @lru_cache(maxsize=1)
