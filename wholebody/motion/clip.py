@@ -301,7 +301,7 @@ class Clip(Shown):
                 axes[0, 0].plot(
                     self.times, self.q[:, one.idx_q + k], label=plain(name if one.nq == 1 else f"{name}[{k}]")
                 )
-        axes[0, 0].set(xlabel="time [s]", ylabel="joint [rad, m]", title=plain(self.name))
+        axes[0, 0].set(xlabel="time [s]", ylabel="value [rad, m]", title=plain(self.name))
         chart.legend(loc="outside right upper", fontsize="x-small")
         return chart
 
