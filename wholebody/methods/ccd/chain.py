@@ -115,9 +115,6 @@ class ChainResolver:
         if there is not None:
             self._translate(link, push, inner, there)
             return link.nodes
-        beyond = None if tracked is None else self._beyond(link, push, tracked)
-        if beyond is not None:
-            return beyond
         self.translated.difference_update(self.limbs.joints[node] for node in link.nodes)
         self._reach_out(link.node, link.nodes, link.effector, push)
         return link.nodes
@@ -151,25 +148,6 @@ class ChainResolver:
                 self.translated.update(self.limbs.joints[node] for node in link.nodes)
                 return wanted
         return there if _parallel(bone, push, PARALLEL) else None
-
-    def _beyond(self, link: Link, push: Vector, tracked: Tracked) -> tuple[int, ...] | None:
-        """Move a link out by the joint of the next one, if that is held aside, which would turn; the nodes, or None."""
-        node = next((each for each in self._bearing if each > link.node), None)
-        if node is None or link.node not in self.limbs.paths[node]:
-            return None
-        there, wanted = self.limbs.frames[node], tracked.placed[self.limbs.joints[node]].rotation.T
-        nodes = tuple(each for each in self.limbs.paths[node] if each >= link.nodes[0])
-        bone, arm = self._bone(link), np.subtract(link.effector, self.limbs.frame(link.node)[9:])
-        share = float(arm @ bone) / max(float(bone @ bone), SHORT * SHORT)
-        following = link._replace(node=node, nodes=nodes)
-        near = float(np.abs(wanted - _columns(there)).max()) < PARALLEL
-        # of the bone: a thing nearer to the link's own joint than this asks for too long a way of the next one
-        if share < 0.2 or not near or not self._held(following, tracked):
-            return None
-        self.translated.update(self.limbs.joints[each] for each in nodes)
-        x, y, z = push
-        self._translate(following, (x / share, y / share, z / share), link.nodes, np.ascontiguousarray(wanted))
-        return nodes
 
     def _held(self, link: Link, tracked: Tracked) -> bool:
         """Whether a link was moved out by translation before, in this step or as shown; it stays so at any angle."""
