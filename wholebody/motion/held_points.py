@@ -178,8 +178,8 @@ class Holds:
         touched: Touched | None = None,
     ) -> None:
         """Take the points that rest at some time, the ground that says when, and what is touched."""
-        # `scale` are metres of the figure for each metre of height of the recording's ground; `surface` is the height of
-        # the highest surface below a place (3,), None for the recording's ground.
+        # `scale` are metres of the figure for each metre of height of the recording's ground; `surface` is the height
+        # of the highest surface below a place (3,), None for the recording's ground.
         self.points, self._scale, self._surface, self._touched = points, scale, surface, touched
         self.over = max(1, round(OVER / dt))
         contacts = () if touched is None else touched.contacts

@@ -104,23 +104,15 @@ def ground_forces(wrench: Array, about: Array, points: Array, friction: float) -
 
 
 class Stand(NamedTuple):
-    """Where a frame stands.
+    """Where a frame stands."""
 
-    Attributes:
-        points: (p, 3) points of the soles that bear force, metres.
-        owner: (p,) number of the foot of each.
-        corners: (c, 2) of the support polygon, anticlockwise; both ends where the points lie on a line; none in flight.
-        normals: (e, 2) inward normals of its edges; of a line of both sides and both ends.
-        offsets: (e,) inside, ``normals @ place >= offsets``, metres.
-        height: of the ground, metres.
-    """
-
-    points: Array
-    owner: Indices
+    points: Array  # (p, 3) points of the soles that bear force, metres
+    owner: Indices  # (p,) number of the foot of each
+    # (c, 2) of the support polygon, anticlockwise; both ends where the points lie on a line; none in flight
     corners: Array
-    normals: Array
-    offsets: Array
-    height: float
+    normals: Array  # (e, 2) inward normals of its edges; of a line of both sides and both ends
+    offsets: Array  # (e,) inside, ``normals @ place >= offsets``, metres
+    height: float  # of the ground, metres
 
     def shifted(self, shifts: Sequence[Array]) -> Stand:
         """The same with each foot (3,) farther, metres."""

@@ -119,21 +119,13 @@ def _look(**how: Any) -> Command:
 
 
 class Track(NamedTuple):
-    """Values of one property of one node over time.
+    """Values of one property of one node over time."""
 
-    Attributes:
-        path: the node.
-        name: the property, as three.js names it: "position", "material.color".
-        kind: "vector3", "quaternion", "color", "number" or "bool".
-        values: (n, size) one row a frame; n booleans for "bool".
-        steps: whether the value jumps at each frame instead of being interpolated.
-    """
-
-    path: str
-    name: str
-    kind: str
-    values: Any
-    steps: bool = False
+    path: str  # the node
+    name: str  # the property, as three.js names it: "position", "material.color"
+    kind: str  # "vector3", "quaternion", "color", "number" or "bool"
+    values: Any  # (n, size) one row a frame; n booleans for "bool"
+    steps: bool = False  # whether the value jumps at each frame instead of being interpolated
 
     def lower(self, times: Array) -> dict[str, Any]:
         """Return the track in the format of three.js."""

@@ -21,9 +21,8 @@ from wholebody.figures.figure import Figure
 from wholebody.methods.control import Control
 from wholebody.methods.qp.chain_kernel import Goals
 from wholebody.methods.qp.closed_form import Branches
-from wholebody.methods.qp.multistart import Budget
 from wholebody.methods.qp.plain_chain import FIRST, NEARBY, Chains, PlainChain
-from wholebody.methods.qp.settings import SEEDS
+from wholebody.methods.qp.settings import SEEDS, Budget
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry

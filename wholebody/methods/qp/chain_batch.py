@@ -15,8 +15,8 @@ from wholebody.methods.conclusion import assessed_tolerance
 from wholebody.methods.control import Control
 from wholebody.methods.qp.chain import Asked, Descents, Rule, chains_of, distance_of, goal_entries, how_far
 from wholebody.methods.qp.chain_kernel import Goals
-from wholebody.methods.qp.multistart import Budget
 from wholebody.methods.qp.plain_chain import FIRST, PlainChain
+from wholebody.methods.qp.settings import Budget
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.distance import Displacement, Effort
