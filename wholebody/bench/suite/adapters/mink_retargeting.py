@@ -116,6 +116,10 @@ def _targets(
         places = legs * root + scale * (motion.positions[:, joints[role]] - root)
         turns = motion.rotations[:, joints[role]] @ axes @ _rest_turn(role, own, rest @ axes, joints) @ turned[role]
         found[role] = (places, turns)
+    if {"left_hip", "right_hip"} <= found.keys():  # a figure's pelvis may be elsewhere above its hips
+        hips = 0.5 * (found["left_hip"][0] + found["right_hip"][0])
+        above = own["pelvis"] - 0.5 * (own["left_hip"] + own["right_hip"])
+        found["pelvis"] = (hips + motion.rotations[:, joints["pelvis"]] @ axes @ above, found["pelvis"][1])
     if "left_ankle" in found:  # the ankles are as high above the floor as where the figure stands
         low = min(float(np.percentile(found[role][0][:, 2], 2.0)) for role in ("left_ankle", "right_ankle"))
         for places, _ in found.values():
