@@ -13,7 +13,7 @@ from wholebody.base.runner import processor_time
 from wholebody.bench.rows import Row
 from wholebody.bench.suite.problem_sets.registry import problem_set
 from wholebody.planning.local_planner import Geodesics
-from wholebody.planning.timing import length
+from wholebody.planning.smoothing import length
 
 RESOLUTION = 0.02  # rad: between the postures of an edge that OMPL tests; ours proves edges free
 

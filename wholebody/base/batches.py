@@ -28,19 +28,10 @@ _Sent = tuple[int, Callable[..., Any], tuple[Any, ...], float]
 
 
 def run_batch(work: Iterable[Job], jobs: int = 1, cluster: str | None = None) -> Iterator[Outcome]:
-    """Do jobs beside each other, and give their outcomes as they end. A job is asked for when it can begin.
+    """Do jobs, asked for one by one, beside each other, and give their outcomes as they end.
 
-    The libraries of a process compute on one core. Closing the iterator, as an exception does, ends the processes that
-    are busy; idle ones serve the next call.
-
-    Args:
-        work: asked for one by one. A deadline of 0 seconds is none; functions need not be importable.
-        jobs: how many at a time.
-        cluster: address of a dask scheduler; processes of this machine where None.
-
-    Raises:
-        MissingPackageError: dask is not installed.
-        WholebodyError: the cluster does not answer.
+    `cluster` is the address of a dask scheduler, else processes of this machine, which compute on one core each.
+    Closing the iterator ends those that are busy. MissingPackageError without dask, WholebodyError without an answer.
     """
     asked = iter(work)
     if cluster is None:
@@ -65,19 +56,10 @@ def run_batch(work: Iterable[Job], jobs: int = 1, cluster: str | None = None) ->
 def shared(
     items: Sequence[T], jobs: int, here: Callable[[T], Any], there: Callable[[list[T], bool], Job]
 ) -> Iterator[tuple[T, Any, EndedError | None]]:
-    """Do work in this process, and beside it in `jobs - 1` others as soon as they are ready.
+    """Do work in this process, and beside it in `jobs - 1` others, which get ready meanwhile; answers or errors.
 
-    Others get ready by doing the first of the work too. Where all is done before, they go on for the next call.
-
-    Args:
-        items: the work.
-        jobs: processes, this one included.
-        here: does one item; its answer.
-        there: the job that does several, whose answer is a list of theirs. If that is None, the job is asked for again
-            with True, and has all that the process may lack.
-
-    Returns:
-        Each item with its answer, or with the error of its process, as they are done.
+    `here` does one item, `there` makes the job that does several, or None if the process lacks something: it is asked
+    again with True. Where all is done before the others are ready, they go on for the next call.
     """
     left, alone = deque(items), deque[T]()  # items whose process ended are done again, one by one
     with _children(min(jobs, len(items)) - 1) as others:

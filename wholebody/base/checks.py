@@ -60,6 +60,8 @@ def shown(value: object) -> str:
     """A value as messages quote it: its representation in one line, shortened, or its type if it has none."""
     if isinstance(value, np.generic):
         value = value.item()
+    if type(value) is str and value.isascii() and value.isidentifier() and len(value) <= _SHORT.maxstring - 2:
+        return f"'{value}'"  # a name, by which every term is called that is made: in a tenth of the time
     try:
         return " ".join(_SHORT.repr(value).split())
     except Exception:  # a user's __repr__ may raise anything; Python refuses that of an int beyond 4300 digits
@@ -270,7 +272,7 @@ def posture(value: object, size: int, what: str = "a posture") -> Array:
     found = array(value, what, f"{size} numbers; start from figure.posture(...)")
     if found.shape != (size,):
         raise InputError(f"{what} has shape ({size},), not {found.shape}; start from figure.posture(...)")
-    if np.count_nonzero(np.isfinite(found)) != size:  # called at every step: a third of the time of all()
+    if not math.isfinite(found.dot(found)) and not np.isfinite(found).all():  # the first takes a fifth of the time
         wrong = int(np.flatnonzero(~np.isfinite(found))[0])
         raise InputError(f"{what} entry {wrong} is not finite; give finite numbers")
     return found

@@ -96,13 +96,7 @@ class Child:
     """A child process that does one job at a time; a new one replaces it when it has ended."""
 
     def __init__(self, environment: Mapping[str, str] | None = None, forked: bool = False) -> None:
-        """Prepare; the first job starts the process.
-
-        Args:
-            environment: variables of the process that differ from those of this process.
-            forked: whether each job has a process of its own, forked from this one. Such a process has everything that
-                was imported and compiled here, and neither functions nor arguments have to be importable.
-        """
+        """Prepare, with `environment` in place of this process's; `forked`: a fork a job, which needs no imports."""
         self._environment, self._forked = dict(environment or {}), forked
         self._process: subprocess.Popen[bytes] | BaseProcess | None = None
         self._output: IO[bytes] | None = None
@@ -232,10 +226,7 @@ def interrupt_ignored() -> Iterator[None]:
 
 
 def run_jobs(next_job: Callable[[], Job | None], children: Sequence[Child]) -> Iterator[Outcome]:
-    """Run jobs in parallel, each in one of the children, and yield outcomes as they end. An early end closes busy ones.
-
-    `next_job` is called for a job whenever a process is free; it returns None if there is none (now, or any more).
-    """
+    """Run jobs, each in one of the children, and yield outcomes as they end; `next_job` returns None for none."""
     free, busy = list(children), list[Child]()
     try:
         while True:

@@ -32,6 +32,10 @@ from wholebody.figures.state import State
 from wholebody.geometry.proximity import Contacts, PairTable
 from wholebody.scene.matter.materials import Surface
 
+Gains = float | Mapping[str, float] | None
+RATE = 2500.0  # 1/s^2: stiffness over inertia of Schmidl and Lin's spring, 1000 N/m at 0.4 kg
+MOST = 1e9  # N m/rad, N/m, N m s/rad, N s/m
+
 
 @dataclass(frozen=True)
 class Spring(Checked):
@@ -176,12 +180,6 @@ def contact_impulse(relative: Array, normal: Array, mobility: Array, surface: Su
         along = sliding / speed
         impulse = impulse - min(surface.friction * size, speed / float(along @ mobility @ along)) * along
     return np.asarray(impulse)
-
-
-Gains = float | Mapping[str, float] | None
-
-RATE = 2500.0  # 1/s^2: stiffness over inertia of Schmidl and Lin's spring, 1000 N/m at 0.4 kg
-MOST = 1e9  # N m/rad, N/m, N m s/rad, N s/m
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,9 @@ TINY = 1e-12  # m^2, m^3: no direction is straight up or down exactly
 BLURRED = 0.05  # m: nearer points are not seen
 
 
+NEAREST = 1e-3  # m: a nearer point has no direction from the eyes
+
+
 @dataclass(frozen=True)
 class FieldOfView(Checked):
     """An elliptical cone about the normal line of sight.
@@ -184,9 +187,6 @@ def _between(scene: Scene, q: Array, eyes: Array, target: Array, own: tuple[str,
 def _meet(first: Any, there: coal.Transform3s, second: Any, at: coal.Transform3s) -> bool:
     """Whether two convex shapes overlap."""
     return bool(coal.collide(first, there, second, at, coal.CollisionRequest(), coal.CollisionResult()))
-
-
-NEAREST = 1e-3  # m: a nearer point has no direction from the eyes
 
 
 @dataclass(frozen=True, eq=False)

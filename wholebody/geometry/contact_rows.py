@@ -64,13 +64,8 @@ class ContactRowBuilder:
     def rows(self, contacts: Contacts, clearance: Array | float = 0.0) -> ContactRows:
         """Rows of all contacts among the same pieces, to which `clearance` metres are asked, (k,) or one for all.
 
-        Where coal's normal is that of a face but for rounding, it becomes the face's own, in `contacts` too. coal stops
-        within 1e-6 m of the distance, which at a few centimetres leaves its normal up to 6e-3 rad off: half a
-        millimetre at the end of a forearm that lies along a table. The face's own normal is right if it parts the
-        pieces by as much.
-
-        Raises:
-            InputError: contacts of other pieces.
+        coal stops within 1e-6 m of the distance, which leaves its normal up to 6e-3 rad off. The face's own normal,
+        where it parts the pieces by as much, replaces it, in `contacts` too.
         """
         if len(contacts.placements) != len(self.table.joint):
             raise InputError(

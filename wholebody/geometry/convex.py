@@ -74,11 +74,7 @@ def convex_pieces(
 
 
 def mesh_hull(vertices: ArrayLike, faces: ArrayLike, what: str = "mesh") -> ConvexPieces:
-    """The convex hull of a whole triangle mesh, vertices (n, 3) in metres and faces (m, 3), as one piece around it.
-
-    A hull of many vertices is replaced by one around it with fewer (`HULL_VERTICES`), and a mesh that is too thin
-    to be solid is thickened. `notes` gives the added volume. An InputError names `what` if the arrays are no mesh.
-    """
+    """The convex hull of a triangle mesh as one piece, with fewer vertices than `HULL_VERTICES`, thickened if thin."""
     cloud, triangles = check_mesh(vertices, faces, what)
     points = cloud[np.unique(triangles)]
     notes: list[str] = []

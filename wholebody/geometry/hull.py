@@ -162,11 +162,8 @@ def _smallest_basis(points: Array, candidates: list[int], scale: float) -> tuple
 
 
 def simplified_hull(points: Array, max_vertices: int) -> Array:
-    """Vertices (k, 3) of a convex polytope that contains points (n, 3) and has at most `max_vertices`, 8 or more.
-
-    The polytope begins as a box along the points' principal axes. Planes of the points' own hull then cut it: each time
-    the plane that cuts most off the farthest protruding vertex, as long as the number of vertices allows.
-    """
+    """Vertices (k, 3) of a convex polytope around points (n, 3) with at most `max_vertices`, 8 or more."""
+    # A box along principal axes, cut each time by the hull's plane that cuts most off the farthest vertex.
     from scipy.spatial import ConvexHull, QhullError
 
     hull = ConvexHull(points)

@@ -26,12 +26,7 @@ PROTOCOL = "solve", "tracker", "accepts"
 
 
 def method_named(name: str) -> Method:
-    """A method with its default settings, or one of one's own as "module:Class".
-
-    Raises:
-        UnknownNameError: there is no such method.
-        InputError: the module or its class cannot be imported, or is no method.
-    """
+    """A method with its default settings, or one of one's own as "module:Class"."""
     if ":" in name:
         return as_method(imported(name)())
     if name not in METHODS:

@@ -177,11 +177,9 @@ class Holds:
         surface: Callable[[Array], float | None] | None,
         touched: Touched | None = None,
     ) -> None:
-        """Take the points that rest at some time, the ground that says when, and the seconds of a frame.
-
-        `scale` are metres of the figure for each metre of height of the recording's ground; `surface` is the height of
-        the highest surface below a place (3,), metres, None for that of the recording; `touched` what is touched.
-        """
+        """Take the points that rest at some time, the ground that says when, and what is touched."""
+        # `scale` are metres of the figure for each metre of height of the recording's ground; `surface` is the height
+        # of the highest surface below a place (3,), None for the recording's ground.
         self.points, self._scale, self._surface, self._touched = points, scale, surface, touched
         self.over = max(1, round(OVER / dt))
         contacts = () if touched is None else touched.contacts

@@ -76,12 +76,8 @@ class GroundForces(NamedTuple):
 
 
 def ground_forces(wrench: Array, about: Array, points: Array, friction: float) -> GroundForces:
-    """Forces at points (p, 3) of soles, within their cones of friction, that give a wrench (6,) as nearly as can be.
-
-    Minimises |sum of the forces' wrenches - wrench|^2 + (e |forces|)^2 over combinations with coefficients >= 0 of the
-    edges of each point's friction pyramid (non-negative least squares, Lawson and Hanson 1974, chapter 23). Moments
-    are about a point (3,).
-    """
+    """Forces at points (p, 3) of soles, within cones of friction, that give a wrench (6,) about a point as nearly."""
+    # Least |wrench's error|^2 + (e |forces|)^2 over edges of pyramids (Lawson and Hanson 1974, chapter 23).
     if len(points) == 0:
         return GroundForces(np.zeros((0, 3)), wrench.copy(), np.zeros((0, 6)))
     from scipy.optimize import nnls
@@ -108,23 +104,15 @@ def ground_forces(wrench: Array, about: Array, points: Array, friction: float) -
 
 
 class Stand(NamedTuple):
-    """Where a frame stands.
+    """Where a frame stands."""
 
-    Attributes:
-        points: (p, 3) points of the soles that bear force, metres.
-        owner: (p,) number of the foot of each.
-        corners: (c, 2) of the support polygon, anticlockwise; both ends where the points lie on a line; none in flight.
-        normals: (e, 2) inward normals of its edges; of a line of both sides and both ends.
-        offsets: (e,) inside, ``normals @ place >= offsets``, metres.
-        height: of the ground, metres.
-    """
-
-    points: Array
-    owner: Indices
+    points: Array  # (p, 3) points of the soles that bear force, metres
+    owner: Indices  # (p,) number of the foot of each
+    # (c, 2) of the support polygon, anticlockwise; both ends where the points lie on a line; none in flight
     corners: Array
-    normals: Array
-    offsets: Array
-    height: float
+    normals: Array  # (e, 2) inward normals of its edges; of a line of both sides and both ends
+    offsets: Array  # (e,) inside, ``normals @ place >= offsets``, metres
+    height: float  # of the ground, metres
 
     def shifted(self, shifts: Sequence[Array]) -> Stand:
         """The same with each foot (3,) farther, metres."""

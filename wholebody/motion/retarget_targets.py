@@ -103,11 +103,7 @@ def rest_axes(motion: SkeletonMotion, roles: Roles) -> Array | None:
 
 
 def targets(motion: SkeletonMotion, figure: Figure, roles: Roles, ground: Ground, path: float | None) -> Targets:
-    """Goals of all frames; where the skeleton's feet stand on the lowest level, the figure's are near the plane z = 0.
-
-    `path` is the metres of the figure for each metre of the way and of the ground's heights; None for as many as its
-    legs have for each metre of the skeleton's.
-    """
+    """Goals of all frames; `path`: metres of the figure a metre of the way and heights, None as its legs."""
     places, turned, lowest = standing_places(figure, roles)
     own = _Body(places)
     joint = {role: motion.names.index(name) for role, name in roles.joints.items()}

@@ -23,7 +23,8 @@ from wholebody.methods.qp.method import QP
 from wholebody.motion.clip import Clip
 from wholebody.planning.local_planner import Geodesics, LocalPlanner, TrackedMotions, holds
 from wholebody.planning.rrt_connect import RRTConnect
-from wholebody.planning.timing import SPACING, Pace, Timing, length, resampled, shortcut, smooth
+from wholebody.planning.smoothing import SPACING, length, resampled, shortcut, smooth
+from wholebody.planning.timing import Pace, Timing
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
 from wholebody.tasks.base import Bound, Constraint, Goal

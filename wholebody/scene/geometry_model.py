@@ -240,7 +240,8 @@ def _pairs_of_things(
         pairs = np.column_stack([np.tile(firsts, len(seconds)), np.repeat(seconds, len(firsts))])
         found.append(pairs[pairs[:, 0] < pairs[:, 1]])
     pairs = np.concatenate(found)
-    pairs = pairs[np.lexsort((pairs[:, 0], pairs[:, 1]))]
+    if len(found) > 2:  # those of one joint are in order
+        pairs = pairs[np.lexsort((pairs[:, 0], pairs[:, 1]))]
     if excluded:
         kept = [(owners[first], owners[second]) not in excluded for first, second in pairs.tolist()]
         pairs = pairs[np.array(kept, dtype=bool)] if len(pairs) else pairs

@@ -46,18 +46,7 @@ class MovingScene:
         centres: Mapping[str, Array] | None = None,
         between_things: bool = True,
     ) -> None:
-        """Add the joints.
-
-        Args:
-            built: the scene's geometry, `scene.built`; later changes of placements are taken by `refresh`.
-            names: the things that move. A carried thing moves relative to its segment.
-            centres: thing to the point (3,) in its own frame about which it turns; by default the centre of its volume.
-            between_things: whether to add the pairs of two things in the world of which one moves at least.
-
-        Raises:
-            UnknownNameError: there is no such thing.
-            InputError: a thing is named twice, or a centre is not three finite numbers.
-        """
+        """Add the joints of things that move, about `centres` (3,), by default of their volume."""
         self.built, self.names, self.owners = built, tuple(names), built.owners
         for name in self.names:
             known(name, built.pieces_of, "object")

@@ -32,6 +32,9 @@ Run = tuple[Any, Sequence[Make]]
 """The posture (nq,) from which the first of some problems is tried, None for its own start; and the problems."""
 
 
+LARGEST = 256  # problems of a batch. More: fewer calls; less: progress is told sooner, and processes end together.
+
+
 @dataclass(frozen=True)
 class Case:
     """A problem that is made where it is solved."""
@@ -122,9 +125,6 @@ def warmed(method: Any) -> Any:
         return replace(method, **dict.fromkeys(settings & {"restarts", "budget"}, 0))
     except Exception:  # a method of the user's own may refuse them
         return method
-
-
-LARGEST = 256  # problems of a batch. More: fewer calls; less: progress is told sooner, and processes end together.
 
 
 def at_once(problems: Sequence[Problem], method: Any, jobs: int) -> Iterator[tuple[int, dict[str, Any]]]:

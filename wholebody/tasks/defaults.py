@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Callable, Sequence, Set
 
 import numpy as np
 
@@ -99,15 +99,15 @@ def default_constraints(
 
 
 def standing(
-    scene: Surroundings, state: State, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound]
+    scene: Surroundings, at: Callable[[], State], terms: Sequence[Constraint | Goal], bounds: Sequence[Bound]
 ) -> tuple[str, ...]:
-    """The persons who stand, by what the names of each begin with; see `_stands`."""
+    """The persons who stand, by what the names of each begin with; see `_stands`. `at` gives the state at the start."""
     figure = scene.figure
-    return tuple(
-        body
-        for body in balancing(scene, terms)
-        if figure.ranges and f"{body}root" in figure.roots and _stands(scene, state, terms, bounds, body)
-    )
+    bodies = [body for body in balancing(scene, terms) if figure.ranges and f"{body}root" in figure.roots]
+    if not bodies:
+        return ()
+    state = at()
+    return tuple(body for body in bodies if _stands(scene, state, terms, bounds, body))
 
 
 def balancing(scene: Surroundings, terms: Sequence[Constraint | Goal]) -> tuple[str, ...]:

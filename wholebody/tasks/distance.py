@@ -133,21 +133,13 @@ SAME = 1e-9
 
 
 class BallJoint(NamedTuple):
-    """Three hinges with one centre, whose axes are at right angles where all three angles are zero.
+    """Three hinges with one centre, whose axes are at right angles where all three angles are zero."""
 
-    Attributes:
-        idx_q: places in the posture.
-        idx_v: the same in the tangent.
-        axes: (3, 3) a hinge's axis a row, in what carries the first hinge, where the angles are zero.
-        weights: (3,) of the rotation vector's part along each axis, not negative.
-        start: (3, 3) rotation of the last hinge against that of zero angles, at the start.
-    """
-
-    idx_q: tuple[int, int, int]
-    idx_v: tuple[int, int, int]
-    axes: Array
-    weights: Array
-    start: Array
+    idx_q: tuple[int, int, int]  # places in the posture
+    idx_v: tuple[int, int, int]  # the same in the tangent
+    axes: Array  # (3, 3) a hinge's axis a row, in what carries the first hinge, where the angles are zero
+    weights: Array  # (3,) of the rotation vector's part along each axis, not negative
+    start: Array  # (3, 3) rotation of the last hinge against that of zero angles, at the start
 
     def turn(self, q: Array) -> tuple[Array, Array]:
         """Rotation (3, 3) at a posture, and the hinges' axes there (3, 3), an axis a column."""

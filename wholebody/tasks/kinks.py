@@ -53,12 +53,8 @@ def faces_met(
 
 
 def crossed_edges(first: Surface, second: Surface, near: Nearest, state: State) -> Array:
-    """Normals and points (k, 2, 3) of edges that cross where the pieces slide along each other.
-
-    Of sharp pieces that touch: where two edges cross, the least depth is along the normal of both, which no face has,
-    and at the point of the first piece where they cross, which no corner is. A normal is from the second surface to the
-    first. There are none of round pieces, whose normal turns steadily, and of a point, which meets faces alone.
-    """
+    """Normals, from the second surface, and points (k, 2, 3) of edges that cross where sharp pieces slide."""
+    # The least depth of crossing edges is along the normal of both, which no face has; round pieces have none.
     i, j = near.pieces
     sharp = first.fixed is None and second.fixed is None and not _roundness(first, i) + _roundness(second, j)
     if not sharp or abs(near.distance) > STEP:
@@ -75,11 +71,7 @@ def crossed_edges(first: Surface, second: Surface, near: Nearest, state: State) 
 
 
 def bends(first: Surface, second: Surface, near: Nearest, state: State, radius: float = 0.0) -> Array:
-    """Directions (b, 3), each times the root of the distance's second derivative when the pieces slide along it.
-
-    Of pieces that are round where they meet: the normal turns as they slide. Where both are sharp there are none. A
-    first surface that is the middle of a round piece has the radius of that.
-    """
+    """Directions (b, 3), each times the root of the distance's second derivative when round pieces slide along it."""
     i, j = near.pieces
     a, b = first.placed(i, state), second.placed(j, state)
     round_by = max(_roundness(first, i), radius) + _roundness(second, j)

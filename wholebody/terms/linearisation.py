@@ -186,14 +186,8 @@ class Lineariser:
         return other
 
     def at(self, q: Array, within: float, planes: bool = False) -> Linearisation:
-        """Everything at the posture q, shape (nq,), with the pairs nearer than `within` metres plus their clearance.
-
-        Pairs that cannot come as near as their clearance are left out, where speeds are bounded and `dt` is given.
-        Supporting planes of the terms are added if they are asked for.
-
-        Raises:
-            InputError: q is no posture, or a term of one's own has another number of rows than at the start.
-        """
+        """Everything at q (nq,), with the pairs nearer than `within` plus their clearance, and planes if asked for."""
+        # Pairs that cannot come as near as their clearance are left out, where speeds are bounded and `dt` is given.
         nv, rows = self.state.model.nv, len(self._value)
         squares = np.empty((self._plan.squares, nv))
         value, box, measure = np.empty(rows), np.empty((2, nv)), np.empty((3 if len(squares) else 2, nv + 1))

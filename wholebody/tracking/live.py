@@ -230,10 +230,7 @@ class LiveDrag:
             self._drag, self._trouble = None, str(trouble)
 
     def _rehearse(self) -> None:
-        """Make frames that are forgotten: what is loaded or set up at the first of a kind is there then.
-
-        A handle stays where it is, and a thing moves by a micrometre.
-        """
+        """Make frames that are forgotten, so that what is loaded or set up at the first of a kind is there then."""
         q, remembered = self.q, self._subject.remembered(self.q)
         name = next(iter(self.handles))
         place = self.place(name)

@@ -16,6 +16,8 @@ from wholebody.view.sender import Sender
 from wholebody.view.server import Command, Store
 from wholebody.view.style import LOOK, Color
 
+MANY = 1000  # opaque pieces of things in the world, from which on those of one form are drawn together
+
 
 @dataclass(frozen=True)
 class Marker:
@@ -205,9 +207,6 @@ def continuous_quaternions(rotations: Array) -> Array:
     flips = np.sign(np.einsum("ni,ni->n", q[1:], q[:-1]))
     q[1:] *= np.cumprod(np.where(flips == 0, 1.0, flips))[:, None]
     return q
-
-
-MANY = 1000  # opaque pieces of things in the world, from which on those of one form are drawn together
 
 
 class Instances(NamedTuple):

@@ -45,11 +45,7 @@ CASES = {
 def attack(
     cases: Iterator[Case], jobs: int, going: Callable[[], bool], deadline: float = 60.0
 ) -> Iterator[tuple[Case, Verdict]]:
-    """Run cases, `jobs` at a time, and return them as they end; no more are begun once `going` says no.
-
-    A case that takes longer than the deadline, seconds of the processor, or ten times that by the clock, is run once
-    more before it counts as one that hangs.
-    """
+    """Run cases, `jobs` at a time, as they end, while `going`; over the deadline [s of the processor] run twice."""
     again: deque[Case] = deque()
     repeated: set[Case] = set()
 

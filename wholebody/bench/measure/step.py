@@ -68,11 +68,8 @@ Runs = Mapping[str, Sequence[Run]]
 def measure(
     track: Track, tools: Sequence[str], repeats: int, say: Callable[[str], None] = lambda text: None
 ) -> dict[str, list[Run]]:
-    """Let every tool make a reach a number of times, each from a fresh set-up; `say` takes a line about each.
-
-    Tools take turns of `TURN` steps, so that the machine is as fast for one as for the other; their order rotates. One
-    step of each set-up is made before the clock starts, and a first round is not counted.
-    """
+    """Let every tool make a reach `repeats` times, each from a fresh set-up, in turns of `TURN` steps that rotate."""
+    # The machine is as fast for one as for the other. One step of each, and a first round, are not counted.
     runs: dict[str, list[Run]] = {name: [] for name in tools}
     for repeat in range(repeats + 1):
         beside = _beside(track, tools, repeat)

@@ -25,6 +25,12 @@ from wholebody.figures.reach_cones import ReachCone
 from wholebody.figures.reduction import drop_rigid_pairs
 from wholebody.figures.tables import named_angles, table
 
+TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "neck", "head")
+Pairs = tuple[tuple[tuple[str, str], ...], tuple[ExcludedPair, ...]]
+"""Pairs that are tested, and those that are not."""
+_LIMBS = (("clavicle", "upper_arm", "forearm", "hand"), ("thigh", "shank", "foot", "toes"))
+_NEXT = {frozenset(pair) for limb in _LIMBS for pair in pairwise(limb)} | {frozenset(("shank", "toes"))}
+
 
 def human_figure(
     sex: str = "male",
@@ -146,15 +152,6 @@ def avatar_figure(
     """
     person = make_person(sex, stature, mass, percentile, age, proportions)
     return figure_of(avatar_spec(person, detail), detail)
-
-
-TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "neck", "head")
-
-Pairs = tuple[tuple[tuple[str, str], ...], tuple[ExcludedPair, ...]]
-"""Pairs that are tested, and those that are not."""
-
-_LIMBS = (("clavicle", "upper_arm", "forearm", "hand"), ("thigh", "shank", "foot", "toes"))
-_NEXT = {frozenset(pair) for limb in _LIMBS for pair in pairwise(limb)} | {frozenset(("shank", "toes"))}
 
 
 def body_pairs(solids: tuple[Solid, ...]) -> Pairs:

@@ -17,6 +17,9 @@ from wholebody.figures.surface.hand_shape import hand_shape
 from wholebody.figures.surface.nets import Triangles, coarsened, triangles
 from wholebody.figures.surface.person_shape import COLORS, HALVES, PersonShape
 
+BONES_EACH = 4
+"""Bones that move a vertex: as many as a page's shader takes."""
+
 
 class Part(NamedTuple):
     """A closed surface in the binding posture; weights (n, b) of the bones on its vertices, at most four not zero."""
@@ -108,10 +111,6 @@ def _divided(bones: Mapping[str, Bone], parts: Iterable[Part]) -> Surface:
             name, split = f"{part.name}:{names[number]}", len(faces)
             found.append(Patch(name, names[number], part.color, *made, corners[:split], corners[split:]))
     return Surface(tuple(bones.values()), tuple(found))
-
-
-BONES_EACH = 4
-"""Bones that move a vertex: as many as a page's shader takes."""
 
 
 class Bound(NamedTuple):

@@ -73,11 +73,10 @@ class Entered(NamedTuple):
 def entered(
     sweep: Sweep, depths: SweptDepth, path: Sequence[Array], watched: NDArray[np.bool_]
 ) -> list[Entered]:  # fmt: skip
-    """The pairs that one motion after the other leads through each other, and those that overlap where it ends.
+    """The pairs that motions lead through each other, or that overlap at their end; none where one way is free.
 
-    They get deeper on the way than at the beginning by `OVERLAP`, or overlap at the end by `INSIDE`: if they are not
-    watched (pairs,), by that much more than at the beginning. There are none where the motions one after the other are
-    free, or the straight one from the first configuration to the last. The path has one configuration (nq,) or more.
+    They get deeper on the way by `OVERLAP`, or overlap at the end by `INSIDE`, for pairs not watched (pairs,) more than
+    at the beginning. The path has one configuration (nq,) or more.
     """
     last = _by_pair(depths.start(path[-1]), len(watched))
     ways = ((path[0], path[-1]), path) if len(path) > 2 else (path,)
@@ -105,11 +104,8 @@ def _by_pair(depths: Depths, pairs: int) -> Array:
 
 
 def last_free(model: pin.Model, free: Array, q: Array, overlaps: Callable[[Array], object], halvings: int) -> Array:
-    """Bisect the motion from a free posture (nq,) to one that overlaps something; the result was tested to be free.
-
-    Algorithm 1, step 4, of Schmidl and Lin. The result is accurate to 2 to the power of minus the number of halvings.
-    If the motion is free again after an overlap, it may be on either side.
-    """
+    """Bisect the motion from a free posture (nq,) to one that overlaps; the result was tested to be free."""
+    # Algorithm 1, step 4, of Schmidl and Lin: accurate to 2 to the power of minus the number of halvings.
     inside, outside = 0.0, 1.0
     for _ in range(halvings):
         middle = 0.5 * (inside + outside)
@@ -121,12 +117,8 @@ def last_free(model: pin.Model, free: Array, q: Array, overlaps: Callable[[Array
 
 
 def passes_through(queries: Queries, before: QueryResult, after: QueryResult, q0: Array, q1: Array) -> bool:
-    """Whether some pair has changed sides during a motion from posture q0 to q1 (nq,), near pairs known at both.
-
-    A pair that touches during the motion and at its end is a collision, which its distance shows; a pair that touches
-    and is separate again was passed through. The motion is halved a few times, which decides most pairs at a tenth of
-    the cost of a sweep; the remaining pairs are swept. The state of `queries` is moved.
-    """
+    """Whether some pair has changed sides during a motion from q0 to q1 (nq,); the state of `queries` is moved."""
+    # Halving decides most pairs at a tenth of a sweep's cost. A pair that touches at the end is seen by its distance.
     table = queries.table
     moved = far_moved(table, before, after)
     if not len(moved):

@@ -142,21 +142,13 @@ def lower_bounds(
 
 
 class Sliding(NamedTuple):
-    """Pairs at a posture of a motion, each to be kept above a distance.
+    """Pairs at a posture of a motion, each to be kept above a distance."""
 
-    Attributes:
-        number: (k,) places of the pairs.
-        rows: (k, 4) distance and normal, from the first piece to the second.
-        level: (k,) the distance.
-        place: (n, 4, 3) where the pieces are.
-        twist: (njoints, 6) velocity of each joint's body, linear at the world's origin, then angular, per duration.
-    """
-
-    number: Indices
-    rows: Array
-    level: Array
-    place: Array
-    twist: Array
+    number: Indices  # (k,) places of the pairs
+    rows: Array  # (k, 4) distance and normal, from the first piece to the second
+    level: Array  # (k,) the distance
+    place: Array  # (n, 4, 3) where the pieces are
+    twist: Array  # (njoints, 6) velocity of each joint's body, linear at the world's origin, then angular, per duration
 
 
 @compiled()

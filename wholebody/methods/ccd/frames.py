@@ -48,18 +48,8 @@ def resolve_overlap(
 ) -> OverlapResult:
     """The posture nearest to the wanted one that this frame can reach without overlap, and the work to find it.
 
-    It is within limits and reach cones and never NaN. If things were moved into `q_free`, leaving them comes first.
-
-    Args:
-        scene: figure and things. Prepared data of the scene are cached between calls.
-        q_free: (nq,) the last posture without overlap: the one shown before.
-        q_wanted: (nq,) the tracked posture. It may overlap; it is clamped to limits and cones.
-        rng: of the order of the chains; the same seed gives the same answer.
-        largest_motion: (nv,) of each degree of freedom, radians and metres; None for no limit. The remainder is left
-            to the next frame.
-
-    Raises:
-        InputError: a posture of the wrong shape, or a value that is not finite.
+    It goes from `q_free` (nq,), the posture shown before, or out of things moved there, by `largest_motion` (nv,) at
+    most, and is within limits and reach cones, as `q_wanted` (nq,) is made. `rng` orders the chains.
     """
     checked = [_posture(scene, q, what) for q, what in ((q_free, "q_free"), (q_wanted, "q_wanted"))]
     with scene.built.pool(FrameResolver, lambda: FrameResolver(scene)).borrow() as frames:

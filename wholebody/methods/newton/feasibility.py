@@ -42,11 +42,8 @@ def satisfy(
     early_exit: bool = False,
     thorough: bool = False,
 ) -> FeasibilityResult:
-    """Satisfy all equations from x (7 n,) to tolerances [m, rad], or reduce their error as far as possible.
-
-    `early_exit` ends at the first steps that gain little. `thorough` goes on from states nearby where no step lowers
-    the error, and from where goals out of reach pulled the constraints open, with goals that give way.
-    """
+    """Satisfy all equations from x (7 n,) to tolerances [m, rad], or reduce their error as far as possible."""
+    # `early_exit`: ends at little gain. `thorough`: also from nearby, and where far goals pulled constraints open.
     run = Iteration(active_system, x, tolerance, tolerance if goal_tolerance is None else goal_tolerance, kind)
     far = run.goal
     run.iterate(iterations, goals=True, measures="lower", early_exit=early_exit)

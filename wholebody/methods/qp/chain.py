@@ -21,9 +21,8 @@ from wholebody.figures.figure import Figure
 from wholebody.methods.control import Control
 from wholebody.methods.qp.chain_kernel import Goals
 from wholebody.methods.qp.closed_form import Branches
-from wholebody.methods.qp.multistart import Budget
 from wholebody.methods.qp.plain_chain import FIRST, NEARBY, Chains, PlainChain
-from wholebody.methods.qp.settings import SEEDS
+from wholebody.methods.qp.settings import SEEDS, Budget
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
@@ -54,11 +53,8 @@ def chains_of(problem: Problem) -> Pool[Chains]:
 
 
 def branches(figure: Figure, frame: str, placement: pin.SE3, at: Array) -> Array:
-    """Postures (k, nq) with a frame at a placement in the world, by the closed form of the arm that carries it.
-
-    Within limits and sorted from `at` (nq,) on, where other joints stay: all with six joints, samples with seven, some
-    off by what limits take away. None where the arm has no closed form.
-    """
+    """Postures (k, nq) with a frame at a placement, by the closed form of its arm, the nearest to `at` (nq,) first."""
+    # All with six joints, samples with seven, some off by what limits take away. None where it has no closed form.
     model = figure.model
     known = model.frames[figure.frame_id(frame)]
     chain = Chains(model, figure.limits).of(frozenset((known.parentJoint,)))

@@ -123,11 +123,8 @@ class Stage:
 def judge(
     before: tuple[float, float], after: tuple[float, float], predicted: PredictedReduction, width: float | None
 ) -> StepAcceptance:
-    """Judge a step by violation and measures before and after; near the goals the Lagrangian stands for the measures.
-
-    Far from the goals it must reduce the violation; near, the measures, inside a funnel of a width (Gould and Toint
-    2010, whose funnel narrows). None where the measures do not count.
-    """
+    """Judge a step: far from the goals by the violation, near by the measures (or Lagrangian), inside a funnel."""
+    # Gould and Toint 2010, whose funnel narrows; `width` is None where the measures do not count.
     inside = width is not None and before[0] <= width
     lead = inside and predicted.measure > DESCENT.switch * before[0] ** 2
     criteria = [("goal", before[0] - after[0], predicted.violation, predicted.violation > 0.0)]

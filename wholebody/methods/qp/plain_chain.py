@@ -159,11 +159,8 @@ class PlainChain:
     def descents(
         self, tables: Array, goals: Goals, nearest: Array, asked: Array, ends: Array, seeds: int = 0
     ) -> tuple[Array, Indices]:
-        """Descend for k problems from branches of the closed form, or `seeds` given ones; `ends` (k, m, n) are written.
-
-        `tables` (k, e, 36) are the floats of the goals; see `chain_kernel.reach`. What was found (k, m, 4), and how
-        many (k,); -1 for more than there is room for.
-        """
+        """Descend for k problems from branches of the closed form, or `seeds` given ones; writes `ends` (k, m, n)."""
+        # `tables` (k, e, 36) of goals. What was found (k, m, 4), how many (k,); -1 for more than there is room for.
         room = self.room(sum(3 * int(each[3] + each[4]) for each in goals.entries))
         found, counts = np.empty((*ends.shape[:2], 4)), np.full(len(ends), seeds)
         arm = _NO_ARM if seeds or self.arm is None else self.arm

@@ -5,6 +5,18 @@ from __future__ import annotations
 from typing import NamedTuple
 
 
+class Budget(NamedTuple):
+    """What a search is bounded by; see `QP`."""
+
+    tolerance: float
+    iterations: int
+    programs: int
+    restarts: int
+    seed: int
+    measures: bool
+    restarts_for_measure: int = 0
+
+
 class Weights(NamedTuple):
     """Weights of the rows, 1/m^2 or 1/rad^2, in the order in which they give way."""
 

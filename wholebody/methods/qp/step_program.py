@@ -233,12 +233,7 @@ def _holding(problem: Problem, state: State, held: NDArray[np.intp]) -> tuple[li
 
 
 def numbers_of(scale: float) -> Array:
-    """The numbers of a tracker's programs, (29,).
-
-    They are those of `StepSize`, in which a step replaces its damping and whether measures count, of `ProgramNumbers`,
-    `Corrections` and `Weights`; the scale of the measures; damping of the pull of goals out of reach; error below which
-    a goal rests; and how far what is held is run ahead of at most.
-    """
+    """The numbers of a tracker's programs, (29,), in the order in which `tracking_kernel` reads them."""
     size = StepSize(STEP.radius, PROGRAM.error_clamp * STEP.radius, 0.0, True)
     return np.concatenate([
         size, PROGRAM, CORRECTIONS, WEIGHTS, (scale, STEP.damping, STEP.resting, STEP.curved),

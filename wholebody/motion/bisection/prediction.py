@@ -79,11 +79,8 @@ class Predictor:
         effort_from: Array | None = None,
         most: int | None = None,
     ) -> Prediction:
-        """Predict the posture of a frame, from a start (nq,) and within further planes.
-
-        Holds and the effort refer to the original posture of the frame, the effort to `effort_from` (nq,) where that
-        is given. After `most` iterations of the method its best posture so far is taken.
-        """
+        """Predict the posture of a frame, from a start (nq,), within further planes, by `most` iterations."""
+        # Holds refer to the original posture of the frame, and the effort too, or to `effort_from` (nq,).
         scene, terms = self.run.scene, self.run.terms
         asked = terms.asked(frame)
         goals = [term for term in asked if isinstance(term, Goal)]

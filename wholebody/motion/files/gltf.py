@@ -105,11 +105,7 @@ class JointTree:
         self, name: str, surface: Surface, places: Sequence[tuple[str, Array]], prefix: str = "",
         color: Color | None = None,
     ) -> None:  # fmt: skip
-        """Add one mesh that bones bend, a primitive for each colour.
-
-        The places are the joints that carry the bones, by names that a prefix precedes in the model, and the
-        placements (4, 4) of the bones there. `color` is that of all of it; each patch has its own if None.
-        """
+        """Add one mesh that bones bend, a primitive a colour; `places`: joints after a prefix, (4, 4) of bones."""
         bones: list[int] = []
         held = [(joint_in(self._model, prefix, joint), offset) for joint, offset in places]
         whole = {number: (first, second) for number, first, second in surface.halves}

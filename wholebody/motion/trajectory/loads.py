@@ -137,11 +137,8 @@ class ClipLoads:
         return ClipLoads(clip, self.dynamics, [self.stands[frame] for frame in frames], bounds, q)
 
     def corrected(self, q: Array) -> ClipLoads:
-        """The same with rows whose loads at postures (n, nq) are those that `wb.motion.torques` measures.
-
-        Rows see a change of the recording as it is, and the feet where they stood. The measurement filters the sum, and
-        looks at which feet stand then. The difference of both is nearly the same for postures nearby.
-        """
+        """The same with rows whose loads at postures (n, nq) are those that `wb.motion.torques` measures."""
+        # The measurement filters and sees which feet stand; the difference is nearly the same for postures nearby.
         own, clip = self.of(q), Clip(self.figure, q, self.dt)
         steady, marks = smoothed(clip, CUTOFF).q, standing_feet(clip, self.dynamics.feet)
         torque, place = np.zeros((len(q), self.figure.model.nv)), np.zeros((len(q), 2))

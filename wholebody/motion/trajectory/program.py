@@ -89,25 +89,15 @@ class Layout(NamedTuple):
 
 
 class Step(NamedTuple):
-    """A step from deviations: what its program is made of.
+    """A step from deviations: what its program is made of."""
 
-    Attributes:
-        x: (n, nv) deviations.
-        rows: of all nodes at x, in the order of their frames.
-        dofs: (a,) degrees of freedom that may change, ascending.
-        radius: largest change of any deviation, radians and metres.
-        penalty: of a metre or radian of shortfall.
-        multipliers: of the equalities of each node.
-        kept: for each node which of its rows the program gets.
-    """
-
-    x: Array
-    rows: Sequence[Rows]
-    dofs: Indices
-    radius: float
-    penalty: float
-    multipliers: Sequence[Array]
-    kept: Sequence[Mask]
+    x: Array  # (n, nv) deviations
+    rows: Sequence[Rows]  # of all nodes at x, in the order of their frames
+    dofs: Indices  # (a,) degrees of freedom that may change, ascending
+    radius: float  # largest change of any deviation, radians and metres
+    penalty: float  # of a metre or radian of shortfall
+    multipliers: Sequence[Array]  # of the equalities of each node
+    kept: Sequence[Mask]  # for each node which of its rows the program gets
 
 
 def lay_out(objective: Objective, limits: Limits, step: Step) -> Layout:

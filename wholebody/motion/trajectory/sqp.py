@@ -159,15 +159,9 @@ class WindowProgram:
         self, x: Array, cancel: Cancel, radius: float | None = None, largest: float | None = None,
         early: bool = False, rough: bool = False,
     ) -> SQPResult:  # fmt: skip
-        """Iterate from deviations x (n, nv).
+        """Iterate from deviations x (n, nv), in trust regions from `radius` to `largest`.
 
-        Args:
-            x: (n, nv) deviations.
-            cancel: told how far it is.
-            radius: first trust region; None for that of the settings.
-            largest: largest trust region; None for that of the settings.
-            early: end where much is missed after ten steps, or no longer less, as there are other beginnings.
-            rough: end as soon as little is missed, however much less the objective could be.
+        `early` ends where much is missed after ten steps, as there are other beginnings; `rough` as soon as little is.
         """
         here, ways, programs, missed = self._at(x), _Filter(radius, largest), 0, list[float]()
         multipliers = [np.zeros(len(one.equal)) for one in here.rows]

@@ -116,15 +116,9 @@ class ClipRun:
         self, run: Run, reference: Array, time: float | None, rate: float | None = 1.0,
         loads: ClipLoads | None = None, near: float = NEARLY,
     ) -> None:  # fmt: skip
-        """Take what is needed.
+        """Take postures (n, nq) that deviations are from, and what a push spreads over [s] or None, by its jerk.
 
-        Args:
-            run: of the clip.
-            reference: (n, nq) postures that the deviations are from.
-            time: seconds that a push spreads over; None for what the jerk of the answer asks for.
-            rate: factor of the speed limits, for a clip that will be slowed by as much; None for no limits.
-            loads: of the reference postures, if they are to keep to their bounds.
-            near: trust region of windows that are begun with given postures, radians and metres.
+        `rate` is the factor of speed limits, None for none; `near` the trust region of windows with given postures.
         """
         self._run, self._reference = run, reference
         self._time, self._rate, self._loads, self._near = time, rate, loads, near
@@ -133,16 +127,10 @@ class ClipRun:
         self, window: Window, found: Faults, cancel: Callable[[float], bool], begun: Array | None = None,
         around: Array | None = None, whole: bool = True,
     ) -> WindowResult:  # fmt: skip
-        """Free one window.
+        """Free one window; a `cancel` that says so leaves it as it was.
 
-        Args:
-            window: which frames.
-            found: what is wrong with the original postures of the clip.
-            cancel: told the share done; true ends the attempt, and the window stays as it was.
-            begun: (n, nq) postures of the clip to begin with, of which those beyond the window stay; None for the
-                original ones, and others after them.
-            around: (n, nq) postures of the clip, of which those beyond the window stay; None for the original ones.
-            whole: False for a part of a window that goes on after it: its last frame is free.
+        `begun` (n, nq) has postures to begin with, `around` those that stay beyond the window, the originals if
+        None; with `whole` false the last frame of a part is free.
         """
         around = begun if around is None else around
         own = self._of(window, found, cancel, around, (window.first > 0, whole and window.end < len(self._reference)))

@@ -142,11 +142,7 @@ def run(
     cluster: str | None = None,
     tell: Callable[[Progress], None] = lambda progress: None,
 ) -> Store:
-    """Compare, or go on with a comparison that was ended; `cluster` is the address of a dask scheduler.
-
-    Raises InputError where the folder holds a run with other settings, WholebodyError for a set whose cases cannot be
-    built.
-    """
+    """Compare, or go on with a comparison that was ended; `cluster` is the address of a dask scheduler."""
     store, plan = Store(folder, settings.described()), Plan(settings, jobs)
     for chunk in store.chunks:
         plan.note(chunk)

@@ -133,11 +133,8 @@ def _listed(values: Sequence[float] | Array) -> list[float]:
 
 
 def far_seed(case: Case, rng: np.random.Generator) -> Array:
-    """A random posture (nq,) from which solving is hard: the first draw in which nothing overlaps, or the least does.
-
-    Joints that carry what is held in the world stay as they are at the start; all others are drawn uniformly within
-    their limits, and two frames that hold each other are brought together again by Newton's method.
-    """
+    """A random posture (nq,), hard to solve from: the first of some draws in which nothing, or least, overlaps."""
+    # What carries things held in the world stays; frames that hold each other are brought together by Newton's method.
     problem = case.problem
     free, closing = _free(problem), [term for term in held(problem) if _is_relative(term)]
     best, least = np.array(problem.start), np.inf

@@ -23,6 +23,9 @@ PACKAGES: Mapping[str, str] = MappingProxyType(
 """Packages of solvers that are known, whether they are installed or not."""
 
 
+FAR = 1e20  # what all solvers take for infinite
+
+
 def solver_names() -> tuple[str, ...]:
     """Names that `make_solver` takes on this machine: "osqp", "active_set" and what is installed beside."""
     from qpsolvers import available_solvers
@@ -51,9 +54,6 @@ def make_solver(name: str, hot_start: bool = True) -> QPSolver:
     from wholebody.methods.qp.solvers.registry import QpsolversSolver
 
     return QpsolversSolver(name, hot_start)
-
-
-FAR = 1e20  # what all solvers take for infinite
 
 
 class QpsolversSolver(QPSolver):

@@ -1,0 +1,84 @@
+"""Shortcuts through a path, and a smooth path beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+from scipy.ndimage import gaussian_filter1d
+
+from wholebody.base.arrays import Array
+from wholebody.planning.local_planner import LocalPlanner
+
+TRIES = 20  # shortcuts in a row that fail; more = shorter paths, later
+WORTH = 0.98  # of the length of a part: a shortcut is at most as long
+CORNER = 2.0  # points: width of the filter of what is left of corners; larger = rounder, less exact
+MIXTURES = 8  # of the filtered path and the free one; more = smoother beside things, and later
+SPREAD = 0.05  # of the length of a path: width of the filter; larger = smoother, farther off
+SPACING = 0.015  # rad, m: between postures of a path; smaller = nearer to the free path, and dearer
+
+
+def length(model: pin.Model, path: Sequence[Array]) -> float:
+    """Length of a path through postures (nq,), radians and metres."""
+    return float(sum(np.linalg.norm(pin.difference(model, *pair)) for pair in pairwise(path)))
+
+
+def shortcut(
+    model: pin.Model, path: list[Array], local: LocalPlanner, rng: np.random.Generator, ended: Callable[[], bool]
+) -> list[Array]:
+    """A shorter path: parts of it are replaced by motions of the local planner, until several tries in a row fail."""
+    failed = 0
+    while failed < TRIES and len(path) > 2 and not ended():
+        first, last = sorted(rng.choice(len(path), 2, replace=False).tolist())
+        way, met = local.towards(path[first], path[last], WORTH * length(model, path[first : last + 1]))
+        path = [*path[: first + 1], *way, *path[last + 1 :]] if met else path
+        failed = 0 if met else failed + 1
+    return path
+
+
+def resampled(model: pin.Model, path: Sequence[Array], count: int) -> Array:
+    """Postures (count, nq) at equal lengths on a path."""
+    steps = [np.asarray(pin.difference(model, *pair)) for pair in pairwise(path)]
+    at = np.concatenate([[0.0], np.cumsum([np.linalg.norm(step) for step in steps])])
+    found = []
+    for place in np.linspace(0.0, at[-1], count)[1:-1]:
+        gap = int(np.clip(np.searchsorted(at, place, side="right") - 1, 0, len(steps) - 1))
+        part = (place - at[gap]) / max(at[gap + 1] - at[gap], 1e-15)
+        found.append(np.asarray(pin.integrate(model, path[gap], part * steps[gap])))
+    return np.array([path[0], *found, path[-1]])
+
+
+def places(model: pin.Model, path: Sequence[Array] | Array) -> Array:
+    """(n, nv) differences of postures (n, nq) from the first; joints that turn without limits go on beyond pi."""
+    found = np.array([pin.difference(model, path[0], q) for q in path])
+    turning = [joint.idx_v for joint in model.joints[1:] if (joint.nq, joint.nv) == (2, 1)]
+    found[:, turning] = np.unwrap(found[:, turning], axis=0)
+    return found
+
+
+def smooth(model: pin.Model, path: Array, local: LocalPlanner) -> Array:
+    """A smooth path (n, nq) beside a free one: a Gaussian filters it, less so where that would not be free."""
+    free = places(model, path)
+    wide, share, found = _filtered(free, SPREAD * len(path)), np.ones(len(path)), path
+    for _ in range(MIXTURES):
+        share[[0, -1]] = 0.0
+        found, blocked = local.settled(_postures(model, path, free + share[:, None] * (wide - free)))
+        if not blocked.any():
+            break
+        near = gaussian_filter1d(np.convolve(blocked, [1.0, 1.0]), 0.5 * SPREAD * len(path), mode="nearest")
+        share *= 1.0 - 0.6 * near / near.max()
+    return local.settled(_postures(model, path, _filtered(places(model, found), CORNER)))[0]
+
+
+def _filtered(free: Array, spread: float) -> Array:
+    """A Gaussian of a width in points filters (n, nv); reflections about both ends keep these in place."""
+    count = len(free)
+    mirrored = np.concatenate([2.0 * free[0] - free[:0:-1], free, 2.0 * free[-1] - free[-2::-1]])
+    return np.asarray(gaussian_filter1d(mirrored, spread, axis=0, mode="nearest")[count - 1 : 2 * count - 1])
+
+
+def _postures(model: pin.Model, path: Array, away: Array) -> Array:
+    """The postures (n, nq) of such differences, between the ends of a path."""
+    return np.array([path[0], *(pin.integrate(model, path[0], place) for place in away[1:-1]), path[-1]])
