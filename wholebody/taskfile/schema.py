@@ -148,7 +148,7 @@ MEASURES = {
     "rotation_effort": _form(tasks.RotationEffort, "weight"),
     "discomfort": _form(tasks.Discomfort, "weight"),
     "displacement": _form(tasks.Displacement, "weight"),
-    "rhythm": _form(tasks.Rhythm, "weight"),
+    "rhythm": _form(tasks.Rhythm, "weight style"),
     "stance": _form(tasks.Stance, "feet weight", feet=Several(SEGMENT)),
     "exertion": _form(ergonomics.Exertion, "forces strength standing weight", forces=FORCES, strength=STRENGTH),
     "potential_energy": _form(tasks.PotentialEnergy, "weight"),

@@ -20,7 +20,7 @@ from wholebody.figures.description import Limits
 from wholebody.figures.state import State, Wrench, extended_columns, free_roots, root_freedoms
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.distance import LEAST_CURVATURE, SquaredDistance
-from wholebody.tasks.rhythm import LUMBAR_MOST, LUMBAR_RATE, LUMBAR_WEIGHT
+from wholebody.tasks.rhythm import LUMBAR_RATE
 from wholebody.terms import entries as kinds
 from wholebody.terms.entries import Entry, Integers, Row, entries_of, placement_floats
 
@@ -221,7 +221,7 @@ def _measures(
                 numbers = np.array([term.weight * part.weight, part.most, part.rest, part.onset])
                 parts[kinds.ELEVATION].append(((*part.idx_q, *part.idx_v), numbers))
             for spine in term.lumbar:
-                share = np.array([term.weight * LUMBAR_WEIGHT, LUMBAR_MOST, LUMBAR_RATE, spine.rest])
+                share = np.array([term.weight * spine.weight, spine.most, LUMBAR_RATE, spine.rest])
                 parts[kinds.LUMBAR].append(((*spine.idx_q, *spine.idx_v, *spine.root), share))
         else:
             others.append(term)

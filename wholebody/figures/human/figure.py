@@ -17,7 +17,7 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.hand import FINGERS, finger_degrees, finger_pair, is_finger
 from wholebody.figures.human.capsules import SPREAD
 from wholebody.figures.human.details import sphere_names
-from wholebody.figures.human.fingers import EFFORT, finger_angles
+from wholebody.figures.human.fingers import finger_angles, finger_effort
 from wholebody.figures.human.spec import human_solids, human_spec
 from wholebody.figures.motion_ranges import human_ranges
 from wholebody.figures.postures import stand
@@ -67,7 +67,8 @@ def figure_of(spec: BodySpec, detail: str, sex: str | None = None) -> Figure:
         postures={name: partial(stand, degrees={**held, **own}) for name, own in named_angles("human").items()},
         cones=human_cones(),
         collision_groups={segment: collision_group(segment) for segment in segments},
-        effort={row["name"]: float(row["effort_weight"]) for row in table("joints")} | dict.fromkeys(fingers, EFFORT),
+        effort={row["name"]: float(row["effort_weight"]) for row in table("joints")}
+        | {name: finger_effort(name) for name in fingers},
         excluded=(*excluded, *rigid),
         person=spec.person,
         notes=() if spec.person is None else spec.person.notes,

@@ -37,8 +37,15 @@ HANDS = ("rigid", "fingers")
 
 SIDES = ("left", "right")
 
-EFFORT = 0.2
-"""Weight of a finger's joint in a person's effort, beside 1 of the arm's. ESTIMATE: fingers move before an arm."""
+
+def finger_effort(joint: str) -> float:
+    """Weight of a finger's joint in a person's effort, beside 1 of an elbow.
+
+    FITTED with those of the arm to how people type; of the thumb an ESTIMATE: it moves before an arm.
+    """
+    if "thumb" in joint:
+        return 0.2
+    return 1.6 if joint.endswith("flexion") else 0.4
 
 
 class _Part(NamedTuple):
