@@ -32,9 +32,9 @@ def shortcut(
     failed = 0
     while failed < TRIES and len(path) > 2 and not ended():
         first, last = sorted(rng.choice(len(path), 2, replace=False).tolist())
-        way, met = local.towards(path[first], path[last], WORTH * length(model, path[first : last + 1]))
-        path = [*path[: first + 1], *way, *path[last + 1 :]] if met else path
-        failed = 0 if met else failed + 1
+        way = local.joined(path[first], path[last], WORTH * length(model, path[first : last + 1]))
+        path = [*path[: first + 1], *way, *path[last + 1 :]] if way else path
+        failed = 0 if way else failed + 1
     return path
 
 
