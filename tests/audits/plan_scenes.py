@@ -1,4 +1,4 @@
-"""Scenes to plan motions in: arms in the manner of MotionBenchMaker (Chamzas and others 2022), bodies at gaps, a hand."""
+"""Scenes to plan motions in: arms (in the manner of MotionBenchMaker, Chamzas and others 2022), bodies, a hand."""
 
 from __future__ import annotations
 
@@ -68,9 +68,9 @@ def robot_at_gap(number: int) -> Question:
 
 
 def hand_into_box(number: int) -> Question:
-    """An open hand above a closed box, and in it, through a hole of 0.14 by 0.09 m in its front, as if it gripped."""
+    """An open hand above a closed box, and in it, through a hole of 0.17 by 0.11 m in its front, as if it gripped."""
     figure = wb.load("hand", side=("right", "left")[number % 2])
-    scene, (wide, high) = wb.Scene(figure), (0.14, 0.09)
+    scene, (wide, high) = wb.Scene(figure), (0.17, 0.11)
     boards = {
         "floor": ((0.3, 0.32, 0.01), (0.0, 0.0, -0.12)),
         "roof": ((0.3, 0.32, 0.01), (0.0, 0.0, 0.12)),
@@ -81,7 +81,11 @@ def hand_into_box(number: int) -> Question:
     for name, side in product(("front", "beam"), (1.0, -1.0)):
         breadth = 0.5 * (0.32 - wide) if name == "front" else wide
         height = 0.24 if name == "front" else 0.5 * (0.24 - high)
-        middle = (0.0, side * (0.5 * wide + 0.5 * breadth), 0.0) if name == "front" else (0.0, 0.0, side * 0.5 * (high + height))
+        middle = (
+            (0.0, side * (0.5 * wide + 0.5 * breadth), 0.0)
+            if name == "front"
+            else (0.0, 0.0, side * 0.5 * (high + height))
+        )
         boards[f"{name} {side:+.0f}"] = ((0.01, breadth, height), (-0.145, *middle[1:]))
     for name, (size, at) in boards.items():
         scene.add(wb.Box(size), name=name, at=at)
@@ -89,7 +93,7 @@ def hand_into_box(number: int) -> Question:
     return Question(
         scene,
         _placed(figure, "open", pin.SE3(turn, np.array((0.1, 0.0, 0.30)))),
-        _placed(figure, "grip", pin.SE3(np.eye(3), np.array((-0.09, -0.02, -0.03)))),
+        _placed(figure, "grip", pin.SE3(np.eye(3), np.array((-0.09, (-0.03, 0.03)[number % 2], 0.02)))),
     )
 
 

@@ -119,7 +119,7 @@ def plan(
     found = None
     with problem.borrow() as workspace:
         tracked = bool(problem.constraints or problem.bounds or scene.figure.followers)
-        local: LocalPlanner = TrackedMotions(problem) if tracked else Geodesics(problem, workspace)
+        local: LocalPlanner = TrackedMotions(problem, workspace) if tracked else Geodesics(problem, workspace)
         ready = processor_time()  # what is compiled or built at the first plan is no part of the search
 
         def ended() -> bool:

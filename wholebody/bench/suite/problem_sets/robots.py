@@ -119,7 +119,7 @@ def _reach(figure: wb.Figure) -> float:
 
 
 def _furnished(figure: wb.Figure, kind: str, reach: float, rng: np.random.Generator) -> tuple[wb.Scene, Array]:
-    """A scene with a shelf, a bin, a table or the like around an arm, and a place (3,) to reach in, over or under it."""
+    """Furniture around an arm, and a place (3,) to reach in, over or under it."""
     given = getattr(of_known, kind)
     scene, turn = floor_scene(figure), pin.utils.rotate("z", float(rng.uniform(-of_known.turn_rad, of_known.turn_rad)))
     at = pin.SE3(turn, turn @ (reach * rng.uniform(*given.at)))
