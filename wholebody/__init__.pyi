@@ -16,7 +16,7 @@ from wholebody.base.errors import (
     UnknownNameError as UnknownNameError,
     WholebodyError as WholebodyError,
 )
-from wholebody.dynamics.actuated import Actuated as Actuated
+from wholebody.dynamics.coupling import Actuated as Actuated
 from wholebody.dynamics.world import World as World
 from wholebody.figures import Figure as Figure, load as load
 from wholebody.geometry.shapes import (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import fields, is_dataclass
 from functools import partial
 from operator import is_
@@ -33,6 +33,7 @@ from wholebody.terms.plan import TermPlan, Terms, make_plan
 
 CLEARANCE = Range(0.0, 0.5, "m")  # more is refused as a wrong unit
 _TermError = TypeVar("_TermError", bound=TermError)
+_State = Callable[[], State]
 _Planned = tuple[tuple[Constraint, ...], tuple[Bound, ...], tuple[Measure, ...]]
 
 
@@ -125,15 +126,15 @@ class Problem(checks.FixedAttributes):
         self.measures: tuple[Measure, ...] = (
             self._usual_measures(stated) if measured is None else tuple(m.resolve(scene, self.start) for m in measured)
         )
-        with scene.borrow() as workspace:
-            state = workspace.state
-            if scene.figure.roots or self.bounds or any(map(is_own, (*self.goals, *stated, *self.measures))):
-                state.update(self.start)
-            self.defaults, self.left_out = self._usual_constraints(state, stated)
+        with borrowed(scene.built, Workspace.refresh) as workspace:
+            at = partial(workspace.state.update, self.start)
+            self.defaults, self.left_out = self._usual_constraints(at, stated)
             self.constraints: tuple[Constraint, ...] = (*stated, *self.defaults)
-            self._check_frozen(state)
-            _check_goals(self.goals, state)
-            self._check_terms(state)
+            if self.bounds:
+                self._check_frozen(at())
+            if any(map(is_own, (*self.goals, *self.constraints, *self.measures))):
+                _check_goals(self.goals, at())
+                self._check_terms(at())
             self.clearances = self._clearances(workspace)
 
     def _resolved(self, terms: Sequence[Constraint]) -> tuple[Constraint, ...]:
@@ -144,16 +145,19 @@ class Problem(checks.FixedAttributes):
             hash(key)
         except TypeError:  # arrays and placements
             return tuple(found)
-        return tuple(found) if any(map(is_own, terms)) else once(self.scene, key, partial(tuple, found))
+        return tuple(found) if not terms or any(map(is_own, terms)) else once(self.scene, key, partial(tuple, found))
 
     def _usual_measures(self, stated: Sequence[Constraint]) -> tuple[Measure, ...]:
         scene, start, ranges = self.scene, self.start, self.range_of_motion
         make = partial(default_measures, scene, start, feet := stances(scene, start, stated), ranges=ranges)
         return scene.built.known(("measures", ranges, feet, start.tobytes()), make)
 
-    def _usual_constraints(self, state: State, stated: Sequence[Constraint]) -> tuple[tuple[Constraint, ...], str]:
-        scene, start, ranges, known = self.scene, self.start, self.range_of_motion, frozenset(map(type, stated))
-        steady = standing(scene, state, (*stated, *self.goals), self.bounds) if self.balance is None else ()
+    def _usual_constraints(self, at: _State, stated: Sequence[Constraint]) -> tuple[tuple[Constraint, ...], str]:
+        scene, start, ranges = self.scene, self.start, self.range_of_motion
+        if not (scene.figure.ranges or self.balance):
+            return (), ""  # no person
+        known = frozenset(map(type, stated))
+        steady = standing(scene, at, (*stated, *self.goals), self.bounds) if self.balance is None else ()
         steady = balancing(scene, stated) if (required := self.balance is True) else steady
         if not (steady or (ranges and scene.figure.ranges)):
             return (), ""
@@ -318,24 +322,17 @@ class Problem(checks.FixedAttributes):
 
     def _check_frozen(self, state: State) -> None:
         """Raise InputError if a bound keeps a joint out of its limits."""
-        if not self.bounds:
-            return
         least, most = self.scene.figure.tangent_bounds(self.start)
         for bound in self.bounds:
             low, high = bound.bounds(state, None)
             wrong = np.flatnonzero((high < least) | (low > most))
             if len(wrong):
                 joint = next(j for j in self.scene.model.joints if j.idx_v <= wrong[0] < j.idx_v + j.nv)
-                name = self.scene.model.names[joint.id]
-                raise InputError(
-                    f"{type(bound).__name__} keeps {name} where it starts, out of its limits; start it within them"
-                )
+                told = f"{type(bound).__name__} keeps {self.scene.model.names[joint.id]} where it starts"
+                raise InputError(f"{told}, out of its limits; start it within them")
 
     def _check_terms(self, state: State) -> None:
-        """Evaluate terms of one's own at the start, so that a wrong one is named before anything is computed.
-
-        Those of the package find every mistake when they are made and resolved.
-        """
+        """Evaluate terms of one's own at the start; those of the package find mistakes when they are resolved."""
         for number, constraint in enumerate(self.constraints):
             if is_own(constraint):
                 check_rows(f"constraints[{number}]", constraint, constraint.value, state)
@@ -357,6 +354,7 @@ class Problem(checks.FixedAttributes):
 
     def _resting(self, workspace: Workspace) -> tuple[Indices, Array]:
         """Pairs (k,) nearer than the clearance at the start that do not penetrate, and their distances (k,)."""
+        workspace.begin()
         near = workspace.near_views(self.start, self.clearance + 1e-9)
         resting = near.distance >= -1e-6
         return near.number[resting], np.maximum(near.distance[resting], 0.0)
@@ -385,7 +383,9 @@ def _start(scene: Scene, start: Array | str | Mapping[str, Array | str] | None) 
     figure.warn_of_angles(q, "start")
     if q.dot(q) > FARTHEST**2 and np.abs(q).max() > FARTHEST:
         raise InputError(f"start has a value of {np.abs(q).max():.3g}; give metres and radians")
-    if scene.model.nq > scene.model.nv and not pin.isNormalized(scene.model, q, UNIT_TOLERANCE):
+    if scene.model.nq == scene.model.nv:
+        return np.array(q)
+    if not pin.isNormalized(scene.model, q, UNIT_TOLERANCE):
         raise InputError("the start's quaternion is not of unit length; normalise it with pin.normalize(model, q)")
     return np.array(pin.normalize(scene.model, q))
 

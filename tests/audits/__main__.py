@@ -20,7 +20,7 @@ from wholebody.bench.rows import only, report
 from wholebody.bench.tables import machine, write_rows, write_text
 from wholebody.cli.bench.command import listed, measuring, publish, seed
 from wholebody.cli.bench.measuring import CLIPS, chosen, clips
-from wholebody.cli.command import command, count, option
+from wholebody.cli.command import command, count, flag, option
 
 QUICK = 45  # quadratic programs
 
@@ -305,7 +305,30 @@ def plans(arguments: argparse.Namespace) -> None:
     publish("plans", text, arguments, facts=facts, tables={"plans": found}, page=None)
 
 
-COMMANDS = (newton, qp, human, regress, loads, clip_constants, detail, ablation, robots, pen, plans)
+@measuring(
+    "postures",
+    "postures of people beside ours, and weights fitted to them",
+    "Solve the tasks in which postures of people were measured. With --fit, first change the weights of a person's "
+    "effort for the postures of one half of the data; the other half judges them.",
+    flag("--fit", "fit the weights, in some minutes"),
+)
+def postures(arguments: argparse.Namespace) -> None:
+    """Measure or fit; --quick takes the half that is fitted to."""
+    from tests.audits import human_fit, human_postures
+
+    facts, man = machine(), human_postures.median_man()
+    if arguments.fit:
+        fitted = human_fit.fit(man, lambda told: print(told, flush=True))
+        factors = ", ".join(f"{group} {factor:.2f}" for group, factor in fitted.factors.items())
+        rows, notes = fitted.rows, [f"Factors on the weights: {factors}."]
+    else:
+        rows, notes = list(human_postures.measure(man, "fit" if arguments.quick else None)), []
+    told = f"Standard deviations of people: {human_postures.summary(rows)}."
+    text = "\n\n".join(["# Postures of people and ours", told, *notes])
+    publish("postures", text, arguments, facts=facts, tables={"postures": rows}, page=None)
+
+
+COMMANDS = (newton, qp, human, postures, regress, loads, clip_constants, detail, ablation, robots, pen, plans)
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -7,8 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from tests.audits import human_contacts, human_sizes, human_tasks
+from tests.audits import human_contacts, human_postures, human_sizes, human_tasks
 from tests.audits.human_contacts import ContactRow
+from tests.audits.human_postures import PostureRow
 from tests.audits.human_sizes import DimensionRow, RangeRow
 from tests.audits.human_tasks import TaskRow
 from tests.audits.templates import TEMPLATES
@@ -27,12 +28,14 @@ class Measured:
         ranges: of motion, of the median man.
         contacts: of the median man with himself.
         tasks: of the median man.
+        postures: of the median man, beside those of people.
     """
 
     dimensions: Sequence[DimensionRow]
     ranges: Sequence[RangeRow]
     contacts: Sequence[ContactRow]
     tasks: Sequence[TaskRow]
+    postures: Sequence[PostureRow]
 
     @property
     def largest(self) -> DimensionRow:
@@ -62,7 +65,9 @@ def measure(pictures: Path | None, *, quick: bool) -> Iterator[str | Measured]:
         row, _ = human_tasks.solve_task(name, made[name](), pictures)
         rows.append(row)
         yield f"{name}: {row.status} in {row.seconds:.2f} s"
-    yield Measured(sizes, ranges, contacts, rows)
+    postures = list(human_postures.measure(human_postures.median_man(), "fit" if quick else None))
+    yield human_postures.summary(postures)
+    yield Measured(sizes, ranges, contacts, rows, postures)
 
 
 def page(found: Measured, facts: Mapping[str, str], *, pictures: bool) -> str:
@@ -75,6 +80,8 @@ def page(found: Measured, facts: Mapping[str, str], *, pictures: bool) -> str:
             found=found,
             facts=facts,
             by_name=by_name,
+            summary=human_postures.summary(found.postures),
+            sources=list(dict.fromkeys(row.source for row in found.postures)),
             pictures=pictures,
         )
         + "\n"
@@ -89,5 +96,6 @@ def figures(found: Measured, facts: Mapping[str, str]) -> str:
         "ranges": [asdict(row) for row in found.ranges],
         "contacts": [asdict(row) | {"reached": row.reached} for row in found.contacts],
         "tasks": [asdict(row) | {"plausible": row.plausible} for row in found.tasks],
+        "postures": [asdict(row) | {"off": row.off} for row in found.postures],
     }
     return json.dumps(told, indent=1) + "\n"

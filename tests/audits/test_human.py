@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+import wholebody as wb
+from tests.audits import human_postures
 from tests.audits.human_contacts import distance
 from tests.audits.human_sizes import dimensions, ranges
 from wholebody.figures import load
@@ -30,3 +32,27 @@ def test_distances_are_those_of_the_scene() -> None:
     owners = [{scene.piece_owner[int(k)] for k in pair} for pair in contacts.pair]
     tested = min(d for d, pair in zip(contacts.distance, owners, strict=True) if pair == {"left_hand", "left_thigh"})
     assert distance(figure, q, ["left_hand"], ["left_thigh"]) == pytest.approx(tested, abs=1e-6)
+
+
+def test_published_postures_are_numbers_with_sources() -> None:
+    rows = human_postures.published()
+    assert {row["posture"] for row in rows} == set(human_postures.TASKS)
+    assert len(human_postures.TASKS) >= 8
+    assert {row["half"] for row in rows} == {"fit", "kept"}
+    for row in rows:
+        assert float(row["sd"]) > 0.0, row
+        assert 0.0 < float(row["mean"]) < 180.0, row
+        assert row["source"], row
+        assert row["spread"] in ("sd", "range"), row
+
+
+def test_typing_wrists_turn_as_those_of_90_typists_do() -> None:
+    """They are extended and turned to the little finger (Simoneau et al. 1999); they were 20 degrees radial."""
+    man = {"fingers": human_postures.median_man()["fingers"]}
+    problem = human_postures.typing(man["fingers"])
+    q = wb.solve(problem).q
+    found = {name: human_postures.angle(man["fingers"], q, name) for name in
+             ("left wrist extension", "left wrist ulnar deviation", "left forearm pronation")}  # fmt: skip
+    assert found["left wrist extension"] == pytest.approx(21.2, abs=8.8)
+    assert found["left forearm pronation"] == pytest.approx(62.2, abs=10.6)
+    assert found["left wrist ulnar deviation"] > 0.0

@@ -8,7 +8,7 @@ import pytest
 
 from tests.csv_rows import csv_rows
 from wholebody.cli import main
-from wholebody.dynamics.scenes import WORLD_SCENES
+from wholebody.dynamics.world import WORLD_SCENES
 
 TASK = """\
 [figure]

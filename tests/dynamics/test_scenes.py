@@ -9,8 +9,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.base.errors import InputError, UnknownNameError
-from wholebody.dynamics.scenes import WORLD_SCENES, build_world_scene, standing_scene
-from wholebody.dynamics.world import World, WorldFrame
+from wholebody.dynamics.world import WORLD_SCENES, World, WorldFrame, build_world_scene, standing_scene
 
 
 @cache

@@ -10,7 +10,7 @@ import wholebody as wb
 from tests.reference.linearisation import ReferenceLineariser
 from wholebody.figures.state import Wrench
 from wholebody.tasks.base import Goal, Measure, filled
-from wholebody.terms.constraint_values import ConstraintValues
+from wholebody.terms.linearisation import ConstraintValues
 from wholebody.terms.plan import Terms, make_plan
 
 

@@ -11,8 +11,7 @@ import wholebody as wb
 from wholebody.base.errors import InputError
 from wholebody.tracking.overlaps import overlaps
 from wholebody.view import Viewer
-from wholebody.view.composition import Composition
-from wholebody.view.legend import legend
+from wholebody.view.composition import Composition, legend
 from wholebody.view.scene_graph import SceneGraph
 
 

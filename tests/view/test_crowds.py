@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wholebody.view import Viewer, crowds, style
+from wholebody.view import Viewer, scene_graph, style
 from wholebody.view.browser import Browser
 from wholebody.view.style import LOOK
 
@@ -24,7 +24,7 @@ READ = """["together 0", "together 1"].map(name => {
 def test_each_is_where_it_stands_in_its_size_and_colour(
     exhibit: Any, browser: Browser, nodes: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(crowds, "MANY", 4)
+    monkeypatch.setattr(scene_graph, "MANY", 4)
     for k in range(3):
         exhibit.add(f"ball {k}", coal.Sphere(0.1 + 0.1 * k), (3.0, 0.5 * k, 1.0), color=(0.2, 0.4, 0.1 * k, 1.0))
     exhibit.add("block", coal.Box(0.2, 0.4, 0.6), (4.0, 0.0, 0.0), color=(1.0, 0.0, 0.0, 1.0))

@@ -69,13 +69,7 @@ class _Asked(NamedTuple):
 
 
 class FirstOrder:
-    """Optimality and blockers of a judged posture: each is computed when it is first asked for, as things were then.
-
-    Both raise a `TermError` where a term of one's own has no finite derivative at the posture.
-
-    Attributes:
-        fits: whether goals are met and everything holds, so that nothing is in the way.
-    """
+    """Optimality and blockers of a judged posture, computed when first asked for; `fits`: nothing is in the way."""
 
     def __init__(self, problem: Problem, pairs: AllPairs, fits: bool) -> None:
         self.fits = fits
@@ -143,10 +137,7 @@ def _residual(asked: _Asked, state: State, active: _Active) -> Array:
 
 
 def _blockers(asked: _Asked, state: State, near: NearPairs, clearances: Array) -> tuple[Blocker, ...]:
-    """What keeps a posture from meeting the goals, or the constraints; the hardest first.
-
-    If something is violated, the violated constraints come first, ordered by violation, then those that block repair.
-    """
+    """What keeps a posture from the constraints, or if they hold, from the goals; the hardest first."""
     nv = state.model.nv
     signed, one_sided, rows, numbers = _active(asked, state, near)
     gradient = np.zeros(nv)
@@ -252,12 +243,10 @@ def _row_space(rows: Array) -> Array:
 
 
 def nonnegative_least_squares(rows: Array, right: Array, lengths: Array) -> tuple[Array, Array]:
-    """The nonnegative combination of rows (m, n) nearest to a right side (n,): shares (m,), and what it leaves (n,).
+    """Shares (m,) >= 0 of rows (m, n) whose sum is nearest to a right side (n,), and the rest (n,).
 
-    Lawson and Hanson 1974, "Solving least squares problems", chapter 23: the row that agrees most with what is left
-    joins the passive set, and rows whose share would turn negative leave it. scipy's does the same, but loading
-    scipy.optimize takes longer than a whole solve. A row that is shorter than `INDEPENDENT` of its length (m,) counts
-    as zero.
+    Lawson and Hanson 1974, "Solving least squares problems", chapter 23; scipy.optimize loads longer than a solve.
+    A row that is shorter than `INDEPENDENT` of its length (m,) counts as zero.
     """
     norms = np.linalg.norm(rows, axis=1)
     counts = norms > INDEPENDENT * lengths

@@ -60,10 +60,7 @@ def assess_motion(
 
 
 def pairs_along(scene: Scene, q: Array, moves: Mapping[str, Sequence[pin.SE3]] | None = None) -> Iterator[AllPairs]:
-    """All pairs at each of the postures (n, nq), with the kinematic state; each is valid until the next one.
-
-    `moves` has n placements of each thing that moves; the scene itself stays as it is.
-    """
+    """All pairs at each of the postures (n, nq), valid until the next; `moves` has n placements of moving things."""
     scene = copy.copy(scene) if moves else scene
     built = scene.built
     with all_pairs(built).borrow() as pairs:
@@ -112,10 +109,7 @@ def root_mean_square(values: Array) -> Array:
 def frames_passed_through(
     scene: Scene, q: Array, depth: float, moves: Mapping[str, Sequence[pin.SE3]] | None = None
 ) -> tuple[int, ...]:
-    """Indices of postures of (n, nq): some pair gets deeper than `depth` metres between the previous one and it.
-
-    `moves` has n placements of each thing that moves, at the postures; it goes straight from one to the next.
-    """
+    """Indices of postures (n, nq) before which a pair gets deeper than `depth` [m]; `moves` as for `pairs_along`."""
     if moves:
         return tuple(
             frame
@@ -130,10 +124,7 @@ def frames_passed_through(
 
 
 def deepened(scene: Scene, q: Array) -> Array:
-    """(n - 1,) bound on how much deeper any pair gets between two of the postures (n, nq) than at both, metres.
-
-    It is the least of `DEPTHS` that no pair exceeds in a sweep from either end; inf if some pair exceeds all of them.
-    """
+    """(n - 1,) least of `DEPTHS` [m] that no pair deepens by between two postures (n, nq), swept from either end."""
     sweep, found = Sweep(scene.model, scene.geometry), []
     for way in pairwise(q):
         free = (
@@ -146,11 +137,7 @@ def deepened(scene: Scene, q: Array) -> Array:
 
 
 def depth_between(scene: Scene, before: Array, after: Array, depth: float) -> tuple[float, str]:
-    """Depth of the motion between two postures (nq,), metres, and the names of the pair; things stay in place.
-
-    The sweep tests whether the motion gets deeper than `depth`, however thin the thing; the depth is measured at
-    postures along the motion.
-    """
+    """Depth [m] of the motion between two postures (nq,), if more than `depth`, and the names of the pair."""
     contact = scene.sweep(before, after, depth)
     if contact is None or not contact.certain:
         return 0.0, ""

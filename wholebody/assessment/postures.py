@@ -9,11 +9,12 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.assessment.all_pairs import all_pairs
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Indices
 from wholebody.problem import Problem
 from wholebody.tasks.inputs import WORLD, Place
 from wholebody.tasks.point import Point
 
+TOGETHER = 50_000  # bounds of pairs that are looked at together: more take more memory than the processor keeps near
 _UNTURNED, _UNMOVED = np.eye(3), np.zeros(3)
 
 
@@ -34,6 +35,10 @@ class Numbers(NamedTuple):
         references = np.array([_distance(problem).reference for problem in problems])
         return cls(offsets, targets, undo, references, np.array([problem.clearances for problem in problems]))
 
+    def of_some(self, rows: Indices) -> Numbers:
+        """What some of them (m,) ask."""
+        return Numbers(*(part[rows] for part in self))
+
 
 class Judged(NamedTuple):
     """Arrays (k,) with a number a posture; see `Assessment`."""
@@ -52,24 +57,12 @@ class Judged(NamedTuple):
 
 
 def judged(problem: Problem, numbers: Numbers, q: Array) -> Judged:
-    """Judge postures q (k, nq), each for its own problem.
-
-    Args:
-        problem: one of them: without constraints and bounds, its measure a squared distance.
-        numbers: of all of them.
-        q: the postures.
-
-    Raises:
-        InputError: q has a value that is not finite.
-    """
+    """Judge postures q (k, nq), each with its own numbers of one problem without constraints and bounds."""
     model, built, figure = problem.scene.model, problem.scene.built, problem.scene.figure
-    joints, least, short = np.empty((len(q), model.njoints, 4, 3)), np.empty(len(q)), np.empty(len(q))
     with all_pairs(built).borrow() as pairs:
-        for k, (posture, asked) in enumerate(zip(q, numbers.clearances, strict=True)):
-            pairs.move(posture)
-            pairs.ask(asked)
-            joints[k], least[k] = pairs.state.joints, pairs.least
-            short[k] = np.maximum.reduce(asked - pairs.distance, initial=0.0)
+        step = max(1, TOGETHER // max(1, len(built.table.pairs)))
+        parts = [pairs.shortfalls(q[k : k + step], numbers.clearances[k : k + step]) for k in range(0, len(q), step)]
+    joints, penetration, short = (np.concatenate(each) for each in zip(*parts, strict=True))
     far, turned = np.zeros((2, 1 + len(problem.goals), len(q)))
     for g, goal in enumerate(problem.goals):
         far[g], turned[g] = _errors(model, goal, joints, [part[:, g] for part in numbers[:3]])
@@ -80,7 +73,6 @@ def judged(problem: Problem, numbers: Numbers, q: Array) -> Judged:
     else:
         away = np.array([pin.difference(model, *each) for each in zip(numbers.references, q, strict=True)])
     measure = problem.measures[0].weight * ((away * away) @ _distance(problem).weights)
-    penetration = np.maximum(0.0, -least)
     return Judged(far.max(axis=0), turned.max(axis=0), penetration, short, beyond, np.zeros(len(q)), measure)
 
 

@@ -25,10 +25,7 @@ def as_dict(record: tuple[Any, ...]) -> dict[str, Any]:
 
 
 def with_values(record: Record, **values: Any) -> Record:
-    """A copy of a record with other values of some fields, as `copy.replace` of Python 3.13 makes it.
-
-    A TypeError if it has no field of that name.
-    """
+    """A copy of a record with other values of some fields, as `copy.replace` of Python 3.13 makes it."""
     return type(record)(**{**as_dict(record), **values})
 
 

@@ -1,19 +1,19 @@
-"""Many jobs beside each other, in child processes of this machine or, through joblib, on a dask cluster.
-
-A job that crashes ends only its own process. Processes of this machine are kept from call to call.
-"""
+"""Many jobs beside each other: in child processes, which are kept from call to call, or on a dask cluster."""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
+import sys
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from multiprocessing.connection import wait
 from typing import Any, TypeVar
 
+from wholebody.base import checks
 from wholebody.base.arrays import with_values
 from wholebody.base.errors import InputError, MissingPackageError, WholebodyError, one_line
 from wholebody.base.runner import ONE_THREAD, Child, EndedError, Job, Outcome, end_with, interrupt_ignored, run_jobs
@@ -28,19 +28,10 @@ _Sent = tuple[int, Callable[..., Any], tuple[Any, ...], float]
 
 
 def run_batch(work: Iterable[Job], jobs: int = 1, cluster: str | None = None) -> Iterator[Outcome]:
-    """Do jobs beside each other, and give their outcomes as they end. A job is asked for when it can begin.
+    """Do jobs, asked for one by one, beside each other, and give their outcomes as they end.
 
-    The libraries of a process compute on one core. Closing the iterator, as an exception does, ends the processes that
-    are busy; idle ones serve the next call.
-
-    Args:
-        work: asked for one by one. A deadline of 0 seconds is none; functions need not be importable.
-        jobs: how many at a time.
-        cluster: address of a dask scheduler; processes of this machine where None.
-
-    Raises:
-        MissingPackageError: dask is not installed.
-        WholebodyError: the cluster does not answer.
+    `cluster` is the address of a dask scheduler, else processes of this machine, which compute on one core each.
+    Closing the iterator ends those that are busy. MissingPackageError without dask, WholebodyError without an answer.
     """
     asked = iter(work)
     if cluster is None:
@@ -65,19 +56,10 @@ def run_batch(work: Iterable[Job], jobs: int = 1, cluster: str | None = None) ->
 def shared(
     items: Sequence[T], jobs: int, here: Callable[[T], Any], there: Callable[[list[T], bool], Job]
 ) -> Iterator[tuple[T, Any, EndedError | None]]:
-    """Do work in this process, and beside it in `jobs - 1` others as soon as they are ready.
+    """Do work in this process, and beside it in `jobs - 1` others, which get ready meanwhile; answers or errors.
 
-    Others get ready by doing the first of the work too. Where all is done before, they go on for the next call.
-
-    Args:
-        items: the work.
-        jobs: processes, this one included.
-        here: does one item; its answer.
-        there: the job that does several, whose answer is a list of theirs. If that is None, the job is asked for again
-            with True, and has all that the process may lack.
-
-    Returns:
-        Each item with its answer, or with the error of its process, as they are done.
+    `here` does one item, `there` makes the job that does several, or None if the process lacks something: it is asked
+    again with True. Where all is done before the others are ready, they go on for the next call.
     """
     left, alone = deque(items), deque[T]()  # items whose process ended are done again, one by one
     with _children(min(jobs, len(items)) - 1) as others:
@@ -146,10 +128,7 @@ def _children(count: int) -> Iterator[list[Child]]:
 def spread(
     function: Callable[[Any], Any], arguments: Iterable[Any], jobs: int, cluster: str | None = None
 ) -> Iterator[Any]:
-    """Call a function with each argument in as many processes, or threads of a cluster, as there are jobs at a time.
-
-    Its answers are given as they come. See `run_batch` for the arguments and the errors.
-    """
+    """Call a function with each argument in `jobs` processes, or threads of a cluster; answers come as they end."""
     import joblib
 
     try:
@@ -199,11 +178,7 @@ def _in_own_child(sent: _Sent) -> tuple[int, Any, tuple[int, str] | None]:
 
 
 def fingerprint(*asked: Any) -> str:
-    """Fingerprint of a request.
-
-    Raises:
-        InputError: it cannot be sent to another process.
-    """
+    """Fingerprint of a request; InputError if it cannot be sent to another process."""
     import joblib
 
     try:
@@ -233,3 +208,27 @@ def _client(address: str) -> AbstractContextManager[Any]:
     except (OSError, ValueError) as error:
         raise WholebodyError(f"no dask scheduler answers at {address} ({error}); start one: dask scheduler") from None
     return client
+
+
+def reporter(value: Callable[..., Any] | bool | None, what: str) -> Callable[..., Any] | None:
+    """The function to call with the number done and of all: a given one, a line on the error output, or None."""
+    return checks.function({True: _Line(), False: None}[value] if isinstance(value, bool) else value, what)
+
+
+class _Line:
+    """A line that is written anew from its beginning, at most ten times a second."""
+
+    def __init__(self) -> None:
+        self._began, self._told = time.perf_counter(), 0.0
+
+    def __call__(self, *given: Any) -> None:
+        done, total = (given[0] if isinstance(given[0], tuple) else given)[:2]
+        now = time.perf_counter()
+        if done < total and now - self._told < 0.1:
+            return
+        self._told, spent = now, now - self._began
+        rest = f", {spent / done * (total - done):.0f} s to go" if 0 < done < total else ""
+        bar, end = "#" * int(20 * done / max(total, 1)), "\n" if done >= total else ""
+        if sys.stderr is not None:
+            sys.stderr.write(f"\r{bar:.<20} {done} of {total}, {spent:.0f} s{rest}   {end}")
+            sys.stderr.flush()

@@ -60,6 +60,8 @@ def shown(value: object) -> str:
     """A value as messages quote it: its representation in one line, shortened, or its type if it has none."""
     if isinstance(value, np.generic):
         value = value.item()
+    if type(value) is str and value.isascii() and value.isidentifier() and len(value) <= _SHORT.maxstring - 2:
+        return f"'{value}'"  # a name, by which every term is called that is made: in a tenth of the time
     try:
         return " ".join(_SHORT.repr(value).split())
     except Exception:  # a user's __repr__ may raise anything; Python refuses that of an int beyond 4300 digits
@@ -234,10 +236,7 @@ def path(value: object, what: str) -> Path:
 
 
 def array(value: object, what: str, wanted: str) -> Array:
-    """Real numbers as an array of any shape, infinite ones and NaN too; an array of floats is returned without a copy.
-
-    `wanted` says what is accepted, such as "corners, shape (k, 3), metres".
-    """
+    """Real numbers as an array, infinite ones and NaN too; `wanted`: "corners, shape (k, 3), metres"."""
     if type(value) is np.ndarray and value.dtype == np.float64:
         return value
     if isinstance(value, np.ma.MaskedArray) and value.dtype.kind in NUMERIC:
@@ -273,17 +272,14 @@ def posture(value: object, size: int, what: str = "a posture") -> Array:
     found = array(value, what, f"{size} numbers; start from figure.posture(...)")
     if found.shape != (size,):
         raise InputError(f"{what} has shape ({size},), not {found.shape}; start from figure.posture(...)")
-    if np.count_nonzero(np.isfinite(found)) != size:  # called at every step: a third of the time of all()
+    if not math.isfinite(found.dot(found)) and not np.isfinite(found).all():  # the first takes a fifth of the time
         wrong = int(np.flatnonzero(~np.isfinite(found))[0])
         raise InputError(f"{what} entry {wrong} is not finite; give finite numbers")
     return found
 
 
 def color(value: object, what: str) -> tuple[float, float, float, float]:
-    """Red, green, blue and alpha, each from 0 to 1, of three or four such numbers, a name of CSS, or "#rrggbb(aa)".
-
-    Alpha is 1 if it is missing.
-    """
+    """Red, green, blue and alpha from 0 to 1, of three or four such numbers, a name of CSS, or "#rrggbb(aa)"."""
     wanted = "red, green, blue and, if wanted, alpha, each from 0 to 1, such as (1.0, 0.0, 0.0), a name or '#rrggbb'"
     if isinstance(value, str):
         from PIL import ImageColor  # the names of CSS

@@ -1,7 +1,4 @@
-"""Compilation by numba: compiled code is cached, the first compilation is logged, and its time is counted.
-
-``python -m wholebody.base.compiled`` compiles all loops, on as many cores as there are, so that no solve has to.
-"""
+"""Compilation by numba, cached, logged and timed; ``python -m wholebody.base.compiled`` compiles all loops."""
 
 from __future__ import annotations
 
@@ -93,10 +90,7 @@ def compile_all(names: Sequence[str] = LOOPS) -> None:
 
 
 def compile_in_processes(processes: int, groups: Sequence[Sequence[str]] = TOGETHER) -> None:
-    """Compile groups of modules in processes beside each other, as far as they are not in the cache.
-
-    A process that ends early, for want of memory say, leaves its loops to this one.
-    """
+    """Compile groups of modules in parallel processes, as far as not cached; this one does what those leave."""
     if processes > 1:
         from concurrent.futures import ProcessPoolExecutor
         from concurrent.futures.process import BrokenProcessPool
@@ -113,10 +107,7 @@ def compile_in_processes(processes: int, groups: Sequence[Sequence[str]] = TOGET
 
 
 def compile_beside() -> None:
-    """Let another process compile the longest loop, unless there is one core or this process is itself another's.
-
-    A first solve needs it last, after 20 s of compilation of its own.
-    """
+    """Let another process compile the longest loop, which a first solve needs last, unless there is one core."""
     if _compiling["alone"] or usable_cores() < 2 or parent_process() is not None:
         return
     with suppress(OSError):  # no process may be started here

@@ -42,12 +42,7 @@ UNLOCKED = 60.0  # s: for which a scratch folder may be without its lock file; m
 
 
 def read_bytes(path: str | PathLike[str], kind: str = "file", largest: int = LARGEST) -> bytes:
-    """Read a regular file of at most `largest` bytes; `kind` is its name in messages: "task file", "mesh".
-
-    Raises:
-        FileFormatError: there is no such file, it is no regular file (a folder, a device, a pipe), it is too large, or
-            it cannot be read.
-    """
+    """Read a regular file of at most `largest` bytes, or raise a FileFormatError that calls it a `kind`."""
     with _opened(path, kind, largest) as descriptor, open(descriptor, "rb", closefd=False) as file:
         try:
             data = file.read(largest + 1)
@@ -59,11 +54,7 @@ def read_bytes(path: str | PathLike[str], kind: str = "file", largest: int = LAR
 
 
 def read_text(path: str | PathLike[str], kind: str = "file", largest: int = LARGEST_TEXT) -> str:
-    """Read a text file in UTF-8, with or without a byte order mark; line ends are kept as they are.
-
-    Raises:
-        FileFormatError: as for `read_bytes`, or the text is not in UTF-8.
-    """
+    """Read a text file in UTF-8, with or without a byte order mark, as `read_bytes` does; line ends are kept."""
     data = read_bytes(path, kind, largest)
     try:
         return data.decode("utf-8-sig")
@@ -197,14 +188,8 @@ def _named(path: str | PathLike[str]) -> str:
 
 
 def write(path: str | PathLike[str], content: str | bytes) -> Path:
-    """Write a file whole or not at all, text as UTF-8. A link is followed; devices and pipes are written into.
-
-    A process that is killed during the call may leave a temporary file; the next process that writes to the folder
-    removes it.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
+    """Write a file whole or not at all, text as UTF-8, or raise an InputError; links are followed."""
+    # A process that is killed may leave a temporary file; the next one that writes to the folder removes it.
     target = Path(path)
     data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
     try:
@@ -236,15 +221,7 @@ def write(path: str | PathLike[str], content: str | bytes) -> Path:
 
 
 def check_writable(path: Path, read: Iterable[str | PathLike[str] | None] = ()) -> Path:
-    """The path of a file to write, checked before long work.
-
-    Args:
-        path: of the file.
-        read: files that the work reads, None for none: what is read is not written over.
-
-    Raises:
-        InputError: its folder is missing or not writable, or it is one of the files that are read.
-    """
+    """The path of a file to write, checked before long work: an InputError if it cannot be, or is one of those read."""
     for each in read:
         if each is not None and path.exists() and os.path.exists(each) and os.path.samefile(path, each):
             raise InputError(
@@ -269,13 +246,7 @@ def checked_target(
 
 
 def checked_ending(path: object, what: str, content: str, endings: Collection[str]) -> Path:
-    """The path of a file to write in the format that its ending says, one of `endings`: in lower case, with the dot.
-
-    `what` names the path in messages, `content` what the file has: "a scene".
-
-    Raises:
-        InputError: no path, or the ending of its name is no such format.
-    """
+    """The path of a file of some `content`, whose ending is one of `endings`, lower case with the dot."""
     place = checks.path(path, what)
     if place.suffix.lower() not in endings:
         given = one_line(place.suffix) or "a file without ending"

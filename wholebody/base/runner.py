@@ -96,13 +96,7 @@ class Child:
     """A child process that does one job at a time; a new one replaces it when it has ended."""
 
     def __init__(self, environment: Mapping[str, str] | None = None, forked: bool = False) -> None:
-        """Prepare; the first job starts the process.
-
-        Args:
-            environment: variables of the process that differ from those of this process.
-            forked: whether each job has a process of its own, forked from this one. Such a process has everything that
-                was imported and compiled here, and neither functions nor arguments have to be importable.
-        """
+        """Prepare, with `environment` in place of this process's; `forked`: a fork a job, which needs no imports."""
         self._environment, self._forked = dict(environment or {}), forked
         self._process: subprocess.Popen[bytes] | BaseProcess | None = None
         self._output: IO[bytes] | None = None
@@ -200,10 +194,7 @@ class Child:
 
 
 def start_process(environment: Mapping[str, str]) -> Started:
-    """Start an interpreter that reads jobs, with these variables and no others.
-
-    It ignores Ctrl-C from its beginning, and prints no traceback: who began it ends it.
-    """
+    """Start an interpreter that reads jobs, with these variables and no others; it ignores Ctrl-C."""
     import wholebody
 
     ours, theirs = socket.socketpair()
@@ -235,10 +226,7 @@ def interrupt_ignored() -> Iterator[None]:
 
 
 def run_jobs(next_job: Callable[[], Job | None], children: Sequence[Child]) -> Iterator[Outcome]:
-    """Run jobs in parallel, each in one of the children, and yield outcomes as they end. An early end closes busy ones.
-
-    `next_job` is called for a job whenever a process is free; it returns None if there is none (now, or any more).
-    """
+    """Run jobs, each in one of the children, and yield outcomes as they end; `next_job` returns None for none."""
     free, busy = list(children), list[Child]()
     try:
         while True:
@@ -260,29 +248,19 @@ def run_jobs(next_job: Callable[[], Job | None], children: Sequence[Child]) -> I
 
 
 def allow(seconds: float, processor: float = 0.0) -> None:
-    """Move the deadline of the running job to so many seconds from now; 0 for none. It does nothing outside a job.
-
-    `processor` are seconds of the processor's time, which passes slowly where others use it too.
-    """
+    """Move the deadline of the running job to so many seconds from now, by the clock and the processor; 0 for none."""
     if _parent is not None:
         signal.setitimer(signal.ITIMER_REAL, seconds)
         signal.setitimer(signal.ITIMER_PROF, processor)
 
 
 def allow_processor(seconds: float) -> None:
-    """Move the deadline of the running job to so many seconds of the processor's time from now.
-
-    Others' work on the machine does not shorten that. By the clock it is `BY_THE_CLOCK` times as far, for a job that
-    waits for ever.
-    """
+    """Move the deadline to so many seconds of the processor's, by the clock `BY_THE_CLOCK` times as many."""
     allow(BY_THE_CLOCK * seconds, seconds)
 
 
 def processor_time() -> float:
-    """Processor's time of all threads of this process, seconds from an arbitrary zero.
-
-    `time.process_time` goes by ticks of 4 ms while a deadline of the processor's time runs; this does not.
-    """
+    """Processor's time of this process, seconds; `time.process_time` ticks by 4 ms while a deadline runs."""
     usage = resource.getrusage(resource.RUSAGE_SELF)
     return usage.ru_utime + usage.ru_stime
 
@@ -294,10 +272,7 @@ def tell(note: Any) -> None:
 
 
 def end_with(parent: int) -> None:
-    """End this process when its parent has ended, also in the middle of a job, and where it had ended before this call.
-
-    Whoever began this process says the parent's id, for an orphan's parent is another process.
-    """
+    """End this process when its parent, a process id, has ended or had ended before this call."""
     threading.Thread(target=_end_after, args=(parent,), daemon=True).start()
 
 
@@ -308,10 +283,7 @@ def _end_after(parent: int) -> None:
 
 
 def serve(descriptor: int, parent: int) -> None:
-    """Do jobs until the parent, a process id, has ended; the main loop of a process of `Child`.
-
-    Ctrl-C reaches all processes of a terminal; the parent decides what it ends.
-    """
+    """Do jobs until the parent, a process id, has ended; the main loop of a process of `Child`."""
     global _parent
     _parent = Connection(descriptor)
     _end_at_alarms()

@@ -82,10 +82,7 @@ def shares_and_times(
     rows: Mapping[str, Mapping[str, tuple[Interval, Interval]]], styles: Mapping[str, Style], note: str, heading: str,
     path: Path,
 ) -> tuple[Path, Path]:  # fmt: skip
-    """A row a set: what each method solves [%] and its mean time [ms], with their intervals.
-
-    `rows` are by the title of the set and the name of the method; `note` says how failures count in the mean time.
-    """
+    """A row a set: what each method solves [%] and its mean time [ms], with intervals; `note`: how failures count."""
     chart, axes = figure(1, 2, (11.0, 0.9 + 0.85 * len(rows)))
     left, right = axes[0]
     drawn: dict[str, Any] = {}

@@ -71,10 +71,7 @@ def formatted(value: float, spec: str, unit: str = "", none: str = "") -> str:
 
 
 def spanned(found: Interval, spec: str, scale: float = 1.0, unit: str = "", ends: str = "") -> str:
-    """A figure and its interval, such as "98.5 % [93, 99]"; nothing for one that is not a number.
-
-    It is multiplied by `scale`; `ends` is the format of the ends, that of the figure where it is left out.
-    """
+    """A figure times `scale` and its interval, such as "98.5 % [93, 99]"; nothing for NaN. `ends`: their format."""
     if found.value != found.value:
         return ""
     low, high = (formatted(scale * each, ends or spec, none="∞") for each in (found.low, found.high))

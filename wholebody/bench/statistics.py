@@ -70,11 +70,7 @@ def quantile(values: Sequence[float], part: float) -> Interval:
 
 
 def shifted_geometric_mean(values: Sequence[float], shift: float = 1e-3) -> Interval:
-    """`exp(mean(log(values + shift))) - shift` of times in seconds, with its interval.
-
-    The shift keeps the shortest times from deciding the mean. Failures belong among the values, with the time at the
-    end.
-    """
+    """`exp(mean(log(values + shift))) - shift` of times [s] with its interval; failures belong among them."""
     known = np.asarray(values, dtype=float)
     if not len(known):
         return NOTHING
@@ -103,11 +99,8 @@ def paired_difference(one: Mapping[int, bool], other: Mapping[int, bool]) -> flo
 
 
 def quantile_ratio(one: Array, other: Array, part: float) -> Interval:
-    """A quantile of one tool's steps (runs, steps) over that of another's beside it: the median of the runs.
-
-    Runs are drawn with replacement, and steps in blocks, since neighbours are alike: the circular block bootstrap
-    (Politis & Romano 1992). Both tools have the same draws.
-    """
+    """Median of the runs of a quantile of one tool's steps (runs, steps) over that of another's beside it."""
+    # Runs are drawn with replacement, steps in blocks, as neighbours are alike (Politis & Romano 1992).
     runs, steps = one.shape
     random, block = np.random.default_rng(0), min(BLOCK, steps)
     chosen = random.integers(0, runs, (RESAMPLES, runs, 1))

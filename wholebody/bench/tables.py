@@ -77,10 +77,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_rows(path: Path, facts: Mapping[str, str], rows: Sequence[Any]) -> None:
-    """Write dataclass instances of one kind, one a line, under their field names; the facts stand above as comments.
-
-    An interval has three columns, of which the ends are called NAME_low and NAME_high; a mapping has a column a key.
-    """
+    """Write dataclass instances, one a line, an interval in three columns; the facts stand above as comments."""
     text = io.StringIO()
     for name, value in facts.items():
         text.write(f"# {name}: {value}\n")
@@ -144,11 +141,7 @@ def summed_programs(texts: Iterable[str]) -> str:
 
 
 def publish_text(docs: Path, name: str, report: str, page: str | None, pictures: Sequence[str] = ()) -> Path:
-    """Write a report into ``assets/bench/NAME.txt`` of the documentation; return the file that shows it.
-
-    A page gets the pictures, the first table, and the line about the machine, which leads to the rest. Raises
-    FileFormatError where the page has no section NAME.
-    """
+    """Write a report to ``assets/bench/NAME.txt`` of the documentation, its pictures and first table to a page."""
     whole = docs / "assets" / "bench" / f"{name}.txt"
     if page is not None:
         table = re.search(r"^\|.*(?:\n\|.*)*", report, re.MULTILINE)
@@ -160,10 +153,7 @@ def publish_text(docs: Path, name: str, report: str, page: str | None, pictures:
 
 
 def replace_section(path: Path, name: str, text: str) -> None:
-    """Put text between the markers ``<!-- bench:NAME -->`` and ``<!-- /bench:NAME -->`` of a page.
-
-    Raises FileFormatError where the page does not exist or does not have the markers.
-    """
+    """Put text between the markers ``<!-- bench:NAME -->`` and ``<!-- /bench:NAME -->`` of a page."""
     first, last = f"<!-- bench:{name} -->", f"<!-- /bench:{name} -->"
     if not path.is_file():
         raise FileFormatError(f"{path}: there is no such page; give the folder that holds results.md")

@@ -17,10 +17,7 @@ JOINED = "X,Y,Z"
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose messages about unknown commands and options name the nearest known ones.
-
-    A word such as -0.3,0.5,1.2 is a value, as a negative number is for `argparse`.
-    """
+    """A parser whose messages name the nearest known commands and options; -0.3,0.5,1.2 is a value."""
 
     def __init__(self, *given: Any, **settings: Any) -> None:
         super().__init__(*given, **settings)
@@ -108,11 +105,7 @@ def check_overlaps(chosen: Iterable[str]) -> None:
 
 
 def scene_names(arguments: argparse.Namespace, scenes: Mapping[str, str], command: str, *, files: bool) -> list[str]:
-    """Names of the scenes to run; none if the list was asked for, which is printed.
-
-    `scenes` says what each shows; a task file may stand for a scene if `files`. Raises InputError for no scene or a
-    negative seed, UnknownNameError where there is no such scene.
-    """
+    """Names of the scenes to run, or of task files if `files`; none if the list was asked for, which is printed."""
     if arguments.list:
         for name, about in scenes.items():
             print(f"{name:20} {about}")

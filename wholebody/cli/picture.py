@@ -37,11 +37,7 @@ def viewer_of(problem: Problem, view: View, title: str, **settings: Any) -> View
 def draw(
     problem: Problem, q: Array, view: View, folder: Path, title: str, screenshots: Screenshots | None
 ) -> tuple[list[Path], str]:
-    """Write scene.html and, by a headless browser if there is one, scene.png.
-
-    Returns:
-        The files, and a sentence if the picture could not be drawn.
-    """
+    """Write scene.html and, by a browser if any, scene.png: the files, and a sentence if there is no picture."""
     with viewer_of(problem, view, title, screenshots=screenshots) as viewer:
         viewer.show(q, problem=problem)
         written = [viewer.save(folder / "scene.html")]

@@ -44,10 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def pose(path: Path, method: str | None, out: Path, *, as_json: bool = False, draw: bool = True) -> int:
-    """Pose the figure of a task file by a method, or that of the file; write into a folder, and return the exit code.
-
-    Raises WholebodyError where the task cannot be read, or the folder cannot be written to.
-    """
+    """Pose the figure of a task file by a method, or that of the file; write into a folder; the exit code."""
     from wholebody.base.files import is_file
     from wholebody.view.screenshot import Screenshots
 

@@ -84,10 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _subject(what: str, options: Mapping[str, Any]) -> tuple[Problem, NDArray[np.float64], View, str]:
-    """Problem, posture, view and title of the subject.
-
-    Raises InputError for options of a person beside a file that has its figure in it.
-    """
+    """Problem, posture, view and title of the subject."""
     from wholebody.base.errors import InputError
     from wholebody.figures import load
     from wholebody.problem import Problem

@@ -34,10 +34,7 @@ _COLORS = {"solved": "green", "unreachable": "yellow", "stalled": "yellow", "inf
 
 
 def progress_bar(*, counted: bool = True, thread: bool = True) -> Progress:
-    """A bar on the terminal's error output that goes when it is done; it counts things, or shows a share in percent.
-
-    A thread redraws it; what forks needs one without, for a fork may catch a thread with a lock.
-    """
+    """A bar on the error output that goes when it is done; `thread`: redrawn by one, which a fork must not have."""
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,

@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.measure.frames import world_report
     from wholebody.bench.tables import machine, write_text
     from wholebody.cli.tables import print_rows
-    from wholebody.dynamics.scenes import WORLD_SCENES
+    from wholebody.dynamics.world import WORLD_SCENES
     from wholebody.tracking.overlaps import GIVE_WAY
 
     names = scene_names(arguments, WORLD_SCENES, "world", files=True)
@@ -112,7 +112,7 @@ def _live(scene: InteractionScene, arguments: argparse.Namespace) -> int:
 def _scene(name: str, arguments: argparse.Namespace) -> InteractionScene:
     """The scene of a name, or that of a task file, whose figure stands as the file starts."""
     from wholebody.base.files import title_of
-    from wholebody.dynamics.scenes import build_world_scene, standing_scene
+    from wholebody.dynamics.world import build_world_scene, standing_scene
     from wholebody.taskfile import read_task
 
     if name.endswith(".toml"):

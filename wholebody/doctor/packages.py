@@ -119,10 +119,7 @@ def exact_needs(distribution: Distribution) -> list[tuple[str, str]]:
 
 
 def conflicts(have: Mapping[str, Distribution]) -> list[Conflict]:
-    """Exact versions that an installed package requires and that are not installed.
-
-    Those are the binary interfaces of Pinocchio, coal and placo, which are built against each other.
-    """
+    """Exact versions that an installed package requires and that are not installed: pin, coal, placo are so built."""
     found = []
     for who, distribution in sorted(have.items()):
         for name, version in exact_needs(distribution):

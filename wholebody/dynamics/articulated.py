@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.dynamics import impulse_kernel
-from wholebody.dynamics.actuated import Actuated
+from wholebody.dynamics.coupling import Actuated
 from wholebody.dynamics.frame import EngineFrame
 from wholebody.dynamics.pieces import HUMAN
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
@@ -84,10 +84,7 @@ class Articulated:
         impulse_kernel.compiled_kernel()
 
     def advance(self, tracked: Array, dt: float, moved: Moved, segments: Mapping[str, int]) -> None:
-        """Go on by a frame, towards the tracked posture (nq,) at its end; the things go on with it.
-
-        `moved` are things with their placements before and after, `segments` the frames of what the engine calls so.
-        """
+        """Go on by a frame, towards the tracked posture (nq,) at its end; the things go on with it."""
         steady = pin.difference(self._model, self._tracked, tracked) / dt
         now, left, self.impulses, self.frames, self.ends = 0.0, dt, {}, [], []
         while left > 1e-9 * dt:
@@ -265,10 +262,7 @@ class Articulated:
         return self._solved(inertia, points, speed, target)
 
     def _solved(self, inertia: Array, points: Points, speed: Array, target: Array, blow: bool = False) -> Array:
-        """Impulses (m, 3) that bring the points to least normal velocities; figure and things take them.
-
-        Those of a blow add no kinetic energy.
-        """
+        """Impulses (m, 3) that bring the points to least normal velocities; those of a blow add no kinetic energy."""
         if not len(target):
             return np.zeros((0, 3))
         answer = np.linalg.solve(inertia, points.figure.T)

@@ -1,4 +1,4 @@
-"""The spring between a tracker and what it drives: equation 6 of Schmidl and Lin, m x'' = -K x - R x'.
+"""Springs between a tracker and what it drives: `Spring`, equation 6 of Schmidl and Lin, m x'' = -K x - R x'.
 
 x is where the driven posture is, seen from the tracked one, in the tangent space of postures: one equation for each
 degree of freedom. During a frame the tracked posture moves with constant velocity, and x' is relative to that, so a
@@ -8,6 +8,8 @@ stable at any frame time.
 Overlap removal stops a hand at the surface of a thing that is in its way, and what the spring between tracker and hand
 still wants there becomes an impulse on the thing: equations 7 to 10. The hand's side of equation 9 is the joint's mass
 and inertia, with what it carries; friction is capped where sliding ends.
+
+`Actuated` is the other one: a spring and a damper at each freedom of a figure that yields (`articulated`).
 """
 
 from __future__ import annotations
@@ -21,12 +23,18 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import TIME_STEP, number, posture, time_step
+from wholebody.base.checks import TIME_STEP, a, instance, known, number, posture, time_step
+from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range
 from wholebody.dynamics.rigid_bodies import RigidBodies
+from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.proximity import Contacts, PairTable
 from wholebody.scene.matter.materials import Surface
+
+Gains = float | Mapping[str, float] | None
+RATE = 2500.0  # 1/s^2: stiffness over inertia of Schmidl and Lin's spring, 1000 N/m at 0.4 kg
+MOST = 1e9  # N m/rad, N/m, N m s/rad, N s/m
 
 
 @dataclass(frozen=True)
@@ -95,10 +103,7 @@ class Coupling:
         return np.asarray(pin.integrate(model, tracked, xx * apart + xv * relative))
 
     def stopped(self, shown: Array, wanted: Array, dt: float) -> None:
-        """Take the posture (nq,) that contact allowed in place of the one (nq,) that the spring wanted.
-
-        Where they differ, the velocity becomes that of what was done in the `dt` seconds of the frame.
-        """
+        """Take the posture (nq,) that contact allowed for the wanted one; the velocity becomes that of a frame."""
         model = self._model
         missed = np.abs(pin.difference(model, wanted, shown))
         done = pin.difference(model, self._shown, shown) / dt
@@ -117,12 +122,12 @@ class PushedContacts:
         self._engine, self._state = engine, state
         self.rows: list[tuple[int, str, int, Array, Array]] = []
         """Joint, thing, piece of the figure or what it carries, point (3,), normal (3,) towards the thing."""
-        for (first, second), normal, a, b in zip(
+        for (first, second), normal, at_a, at_b in zip(
             near.pair.tolist(), near.normal, near.point_a, near.point_b, strict=True
         ):
             for own, other, out in ((first, second, normal), (second, first, -normal)):
                 if other in bodies and table.joint[own] > 0:
-                    self.rows.append((int(table.joint[own]), bodies[other], own, 0.5 * (a + b), out))
+                    self.rows.append((int(table.joint[own]), bodies[other], own, 0.5 * (at_a + at_b), out))
 
     def push(self, velocity: Array, surfaces: Mapping[tuple[int, str], Surface]) -> dict[str, Array]:
         """Give the things the impulses (3,) of a figure that wants to move with a velocity (nv,); by thing, N s."""
@@ -157,13 +162,10 @@ class PushedContacts:
 
 
 def contact_impulse(relative: Array, normal: Array, mobility: Array, surface: Surface) -> Array | None:
-    """Impulse (3,) on body B of a contact, N s: equation 9, with friction of equation 10; None if they do not approach.
+    """Impulse (3,) on body B, N s: equation 9, with friction of equation 10; None if A and B do not approach.
 
-    Args:
-        relative: (3,) velocity of B's point relative to A's.
-        normal: (3,) from A to B.
-        mobility: (3, 3) change of that velocity by an impulse on B, and its opposite on A.
-        surface: restitution and friction.
+    `relative` (3,) is the velocity of B's point relative to A's, `normal` (3,) from A to B, and `mobility` (3, 3) the
+    change of that velocity by an impulse on B, and its opposite on A.
     """
     approach, least = -float(normal @ relative), 1e-6  # m/s
     if approach <= least:
@@ -178,3 +180,62 @@ def contact_impulse(relative: Array, normal: Array, mobility: Array, surface: Su
         along = sliding / speed
         impulse = impulse - min(surface.friction * size, speed / float(along @ mobility @ along)) * along
     return np.asarray(impulse)
+
+
+@dataclass(frozen=True)
+class Actuated:
+    """A figure whose joints follow a tracker through springs and dampers, and yield to what they meet.
+
+    Equation 6 of Schmidl and Lin for each freedom, as torques: I q'' = -K (q - tracked) - R (q' - tracked').
+    A freedom with a spring also bears the figure's own weight there; one without is free, and all of them a ragdoll.
+
+    Attributes:
+        figure: whose joints are meant.
+        stiffness: K [N m/rad], of translations [N/m]: one for all freedoms, or a mapping of joints, groups and "root",
+            where what is not named has none. None: 2500 /s^2 times the inertia that the freedom moves at the start.
+        damping: R [N m s/rad, N s/m] likewise. None: critical, at that inertia.
+
+    Raises:
+        InputError: no figure, or a number that is negative or too large.
+        UnknownNameError: a name that is no joint or group of the figure.
+
+    Examples:
+        >>> soft = wb.Actuated(human, stiffness={"right_arm": 40.0})  # the other joints are limp
+        >>> world = wb.World(scene, standing, spring=soft)
+    """
+
+    figure: Figure
+    stiffness: Gains = None
+    damping: Gains = None
+
+    def __post_init__(self) -> None:
+        instance(self.figure, Figure, "Actuated: figure", "give a figure, such as scene.figure")
+        for what, gains in (("stiffness", self.stiffness), ("damping", self.damping)):
+            if gains is not None:
+                self._spread(gains, f"Actuated: {what}")
+
+    def gains(self, inertia: Array) -> tuple[Array, Array]:
+        """K and R (nv,) of freedoms that move inertias (nv,) [kg m2, kg]."""
+        stiffness = RATE * inertia if self.stiffness is None else self._spread(self.stiffness, "Actuated: stiffness")
+        critical = 2.0 * np.sqrt(stiffness * inertia)
+        return stiffness, critical if self.damping is None else self._spread(self.damping, "Actuated: damping")
+
+    def _spread(self, gains: float | Mapping[str, float], what: str) -> Array:
+        """Numbers for all freedoms (nv,)."""
+        model, figure = self.figure.model, self.figure
+        if not isinstance(gains, Mapping):
+            return np.full(model.nv, number(gains, what, 0.0, MOST))
+        found = np.zeros(model.nv)
+        roots = {name: [str(model.names[joint])] for name, joint in figure.roots.items()}
+        names = {**roots, **figure.groups, **{name: [name] for name in figure.joints}}
+        for name, value in gains.items():
+            size = number(value, f"{what}[{name!r}]", 0.0, MOST)
+            for joint in names[known(name, names, "joint or group", what)]:
+                moved = model.joints[model.getJointId(joint)]
+                found[moved.idx_v : moved.idx_v + moved.nv] = size
+        return found
+
+    def check(self, model: pin.Model) -> None:
+        """Raise InputError for a scene with another model."""
+        if list(model.names) != list(self.figure.model.names):
+            raise InputError(f"Actuated: the scene is not one of {a(self.figure.name)}; give scene.figure")

@@ -123,11 +123,8 @@ def settle(
     before: tuple[Array, Array, Array],
     gravity: Array,
 ) -> None:
-    """Scale the velocities of islands with joints, and of those that something moved pushes, after a step.
-
-    Afterwards they have no more energy than before the step and the work (m,) on them, and joints without contacts no
-    less. Of the points the first `contacts` are contacts; `before` are positions, rotations and velocities.
-    """
+    """Scale velocities of islands with joints, or pushed, to the energy before the step and the work (m,) on them."""
+    # The first `contacts` points are contacts; `before` are positions, rotations and velocities.
     root, kind, pushed = _islands(points, impulse, contacts, bodies)
     count, moving = len(root), bodies.moving
     linked, touched = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)

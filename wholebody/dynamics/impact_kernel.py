@@ -28,10 +28,9 @@ def resolve(
     touching: Indices, pair: Indices, rows: Rows, restitution: Array, laws: Laws, jointed: Mask, twist: Array,
     events: Array,
 ) -> tuple[int, bool]:  # fmt: skip
-    """Resolve impacts of points (k,) that touch until none is left; how many there were, and whether none is left.
+    """Resolve impacts of points (k,) that touch: how many there were, and whether none is left.
 
-    Each of the events (most, 5) is the point, the approach [m/s] and the impulse [N s] along the world's axes. The
-    targets of the laws are room, and the velocities change in place.
+    Each of the events (most, 5) is the point, the approach [m/s] and the impulse [N s]; velocities change in place.
     """
     count = len(touching) + len(laws.hold)
     chosen, before, impulse = np.empty(count, dtype=np.intp), np.zeros((count, 3)), np.zeros((len(rows.bodies), 3))

@@ -19,8 +19,7 @@ from numpy.typing import ArrayLike
 from wholebody.base.arrays import Array
 from wholebody.base.checks import choice, instance, known, numbers
 from wholebody.base.errors import InputError
-from wholebody.dynamics.actuated import Actuated
-from wholebody.dynamics.coupling import Spring
+from wholebody.dynamics.coupling import Actuated, Spring
 from wholebody.dynamics.world import World
 from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem

@@ -149,11 +149,7 @@ def _orthonormal(rotation: Array) -> None:
 
 @compiled()
 def drift(bodies: Bodies, pushed: Mask, gravity: Array, time: float) -> None:
-    """Move all bodies for a time [s]: positions, rotations and angular velocities change in place.
-
-    Bodies on which a contact acts are pushed (n,): they move with the velocity at the end, the others with the mean of
-    those at the start and at the end.
-    """
+    """Move bodies for a time [s] in place; pushed ones (n,) with the velocity at the end, others with the mean."""
     now, turn = np.empty((3, 3)), np.empty(3)
     for b in range(len(bodies.mass)):
         if not bodies.moving[b] and not bodies.given[b]:

@@ -39,11 +39,7 @@ class StepStart:
 
 
 class PassingCheck(NamedTuple):
-    """Whether no pieces can have been deeper than `PASSING` in each other on the way of a step.
-
-    Else `meetings` are shares of the step, at least 0.1, at which pieces meet or may meet; none where there are too
-    many doubts.
-    """
+    """Whether no pieces can have been deeper than `PASSING` on the way, else shares `meetings` where they may meet."""
 
     free: bool
     meetings: tuple[float, ...] = ()
@@ -68,8 +64,7 @@ def check_passing(
 ) -> PassingCheck:
     """Whether pieces can have been deeper than `PASSING` in each other on the way of a step, and where.
 
-    The step took `time` seconds. Pairs `after` it are within margins (n,) of both bodies, metres; no point of a body
-    has moved farther than its travel (n,).
+    Pairs `after` it are within margins (n,) of both bodies, metres; no point of a body moved more than its travel (n,).
     """
     before.widen(travel)
     pieces, near = state.pieces, before.near

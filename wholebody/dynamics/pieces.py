@@ -67,12 +67,7 @@ class Pieces:
     """
 
     def __init__(self, scene: Scene, q: Array) -> None:
-        """Gather bodies, pieces and pairs; the figure is in the posture q (nq,).
-
-        Raises:
-            InputError: two materials can meet of which neither knows the other, or a thing has a joint to itself.
-            UnknownNameError: a joint names a thing that is not there.
-        """
+        """Gather bodies, pieces and pairs, with the figure in the posture q (nq,)."""
         objects = scene.objects
         free = [thing for thing in objects.values() if thing.body is not None]
         fixed = [thing for thing in objects.values() if thing.body is None and thing.segment is None]
@@ -250,12 +245,8 @@ class ContactFinder:
 
 @compiled()
 def needed(contact: Indices, count: int, normal: Array, point: Array, gap: Array, within: float) -> Mask:
-    """All points (m,) but the witness points between ends of their patch that touch when they do.
-
-    First come the witness points of all `count` contacts, then the ends, sorted by contact. Ends count whose gap is
-    larger than that of the witness point by no more than `within` [m]. Ends alone bear a face on a face, as in Bullet,
-    MuJoCo and ODE: friction at a witness point that bore all of it would not turn or stop a box that spins.
-    """
+    """Points (m,) but the witness points, which come first, between touching ends of a patch, to `within` [m]."""
+    # Ends alone bear a face on a face, as in Bullet, MuJoCo and ODE: friction at a witness point would not stop a spin.
     found, first, arm = np.ones(len(contact), dtype=np.bool_), count, np.empty((len(contact) - count, 3))
     while first < len(contact):
         c, arms, last = contact[first], 0, first

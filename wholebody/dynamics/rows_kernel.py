@@ -200,10 +200,8 @@ def push(c: int, row: int, impulse: float, rows: Rows, twist: Array) -> None:
 
 @compiled()
 def rates(bodies: Indices, jacobian: Array, twist: Array, result: Array) -> None:
-    """Write the relative velocities (m, 3) along the axes of all points.
-
-    It takes arrays of `Rows`, not the record: numba needs four microseconds to recognise a record from Python.
-    """
+    """Write the relative velocities (m, 3) along the axes of all points."""
+    # Arrays, not the record: numba needs four microseconds to recognise a record from Python.
     for c in range(len(bodies)):
         a, b = bodies[c, 0], bodies[c, 1]
         for row in range(3):

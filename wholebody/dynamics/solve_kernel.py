@@ -66,11 +66,7 @@ def _push(c: int, one: float, two: float, three: float, rows: Rows, twist: Array
 
 @compiled(error_model="numpy", fastmath=FAST, inline="always")
 def _visit(c: int, rows: Rows, laws: Laws, twist: Array, impulse: Array) -> tuple[float, float, bool]:
-    """Solve the program for one point alone.
-
-    Return the change of u, that of a joint times `JOINT_PRECISION`; the square of that of the impulse; and whether the
-    point bears or nearly bears something.
-    """
+    """Solve for one point: change of u (a joint's times `JOINT_PRECISION`), its impulse's squared, whether it bears."""
     if rows.mobility[c, 0] <= 0.0:
         return 0.0, 0.0, False
     normal, one, two = _rates(c, rows, twist)
@@ -204,14 +200,7 @@ def _by_island(listed: Indices, rows: Rows, root: Indices, changes: Array) -> tu
 
 @compiled()
 def join(points: Indices, bodies: Indices, movable: Mask, root: Indices) -> None:
-    """Write the least body of the island of each: bodies that points join, which do not reach through fixed bodies.
-
-    Args:
-        points: (k,) those that join, such as the points that bear something.
-        bodies: (m, 2) of all points.
-        movable: (n,) bodies that islands may reach through.
-        root: (n,) room.
-    """
+    """Write the least body of the island of each into `root`; islands do not reach through bodies not movable (n,)."""
     for body in range(len(root)):
         root[body] = body
     for c in points:
@@ -259,10 +248,7 @@ def solve_from(
     impulse: Array,
     limits: Limits,
 ) -> tuple[float, float]:
-    """Solve the program of all points from the impulses of the step before; returns the residuals.
-
-    The velocities have no impulses yet; the impulses (m, 3) are room, but a start for those of joints.
-    """
+    """Solve the program of all points from the impulses of the step before; returns the residuals."""
     impulse[: len(laws.target)] = 0.0
     _warm_start(old, new, rows.axes, impulse)
     for c in range(len(impulse)):
@@ -275,11 +261,8 @@ def solve_from(
 
 @compiled(inner=True)
 def _warm_start(old: tuple[Indices, Array, Array], new: tuple[Indices, Array], axes: Array, impulse: Array) -> None:
-    """Write the impulses of the nearest old points (pair, place in the first body's axes, impulse) of a pair.
-
-    An old point that is not the nearest of any new one within 0.01 m gives its impulse to the nearest new one, as
-    witness points jump from corner to corner.
-    """
+    """Write the impulses of the nearest old points (pair, place in the first body's axes, impulse) of a pair."""
+    # Witness points jump from corner to corner: an old point nearest to none gives to the nearest within 0.01 m.
     pair, local, world = old
     new_pair, new_local = new
     most = -1

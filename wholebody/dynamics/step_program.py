@@ -103,11 +103,7 @@ class StepProgram:
         return Limits(tolerance, min(1000, 20_000 // max(len(self._rows.bodies), 1) + 1))
 
     def add_points(self, points: ContactPoints, time: float, share: float = 1.0) -> None:
-        """Add contact points as they are after a share of a step, which led to overlap that no point foresaw.
-
-        Their gaps become those that lead there with the velocities after the step, of this time; they have to last for
-        the share of it only.
-        """
+        """Add contact points at a share of a step of this time, with gaps that lead there with its velocities."""
         late = StepProgram(self.state, points, self.gravity, self.joints)
         late.read_velocities(~self.pushed())
         until = share * time
@@ -134,10 +130,7 @@ class StepProgram:
         self.impulse = inserted(self.impulse, np.zeros((len(gap), 3)))
 
     def resolve_impacts(self) -> tuple[Array, bool]:
-        """Resolve the impacts of points that touch: events as in `impact_kernel.resolve`, and whether none is left.
-
-        A body whose motion is given takes part with its mass, and keeps its motion afterwards.
-        """
+        """Resolve the impacts of points that touch: events as in `impact_kernel.resolve`, and whether none is left."""
         if not (self._touching & (self.speed < -SLOW)).any():
             return np.zeros((0, 5)), True
         state, points = self.state, self.points
@@ -153,13 +146,10 @@ class StepProgram:
         return events[:count], ended
 
     def solve(self, time: float, together: bool, old: Impulses, hold: Array) -> None:
-        """Change the velocities to those at the end of a step of this time, which adds no energy.
+        """Change the velocities to those at the end of a step of `time` seconds, which adds no energy.
 
-        Args:
-            time: seconds.
-            together: whether impacts during the step bounce by this program; else the step ends with the first.
-            old: impulses of the step before.
-            hold: (j, 3) velocity of the joint points of B seen from those of A, m/s.
+        `together`: impacts during the step bounce by this program, else the first ends it; `old`: impulses of the step
+        before; `hold`: (j, 3) velocity of the joint points of B seen from those of A, m/s.
         """
         state, points = self.state, self.points
         twist, moving = state.bodies.twist, state.bodies.moving
@@ -226,10 +216,7 @@ class StepProgram:
         return found
 
     def remembered(self, time: float) -> Impulses:
-        """What the next program starts from.
-
-        Bodies between two that are pushed together have no solution: started from the last one, it would grow for ever.
-        """
+        """What the next program starts from; the impulses of bodies pushed together would grow for ever."""
         kept, count = np.flatnonzero(self._bearing() & ~self._jammed), len(self.points.gap)
         return Impulses(
             self.points.pair[kept], self._local[kept], self.world_impulse()[kept], self.impulse[count:].copy(), time

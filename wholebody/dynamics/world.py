@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Collection, Mapping
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -16,11 +17,10 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array, brief
-from wholebody.base.checks import array, choice, instance, time_step
+from wholebody.base.checks import array, choice, instance, posture, time_step, whole
 from wholebody.base.errors import InputError
-from wholebody.dynamics.actuated import Actuated
 from wholebody.dynamics.articulated import Articulated, Moved
-from wholebody.dynamics.coupling import Coupling, PushedContacts, Spring
+from wholebody.dynamics.coupling import Actuated, Coupling, PushedContacts, Spring
 from wholebody.dynamics.frame import EngineFrame, one_frame
 from wholebody.dynamics.pieces import HUMAN, segment_placements
 from wholebody.dynamics.rigid_bodies import RigidBodies
@@ -34,6 +34,8 @@ from wholebody.scene.workspace import NotCopyable
 from wholebody.tracking.frame import FRAME, Frame
 from wholebody.tracking.loop import FrameLoop, invalid_reason
 from wholebody.tracking.overlaps import GIVE_WAY, Overlap, overlaps
+from wholebody.tracking.scenes import InteractionScene, SceneFile
+from wholebody.tracking.tracks import MOST_FRAMES, Track
 
 Advance = tuple[Array, Frame, Mapping[str, Array], EngineFrame | None]
 """The posture that was wanted, the frame, impulses on things, and what the things did."""
@@ -312,3 +314,20 @@ def _scene_instead(given: object) -> str:
     if isinstance(given, AssemblyBodies):
         correction += "; an assembly has no motion of its own: add its bodies as things with wb.Body(joints=...)"
     return correction
+
+
+_FILE = SceneFile(Path(__file__).with_name("scenes.toml"))
+
+WORLD_SCENES = _FILE.scenes
+"""Descriptions of the scenes, by name."""
+
+build_world_scene = _FILE.build
+
+
+def standing_scene(name: str, scene: Scene, q: Array, *, frames: int, dt: float = FRAME) -> InteractionScene:
+    """A scene of one's own, in which the figure keeps the posture q (nq,) for a number of frames."""
+    frames = whole(frames, "frames", 1, MOST_FRAMES)
+    if not any(thing.body is not None for thing in scene.objects.values()):
+        raise InputError(f"{name}: nothing moves by itself; give an object a density or a mass")
+    track = Track.of(scene.figure, np.tile(posture(q, scene.model.nq), (frames, 1)), dt, name)
+    return InteractionScene(name, "things move around a figure that stands", scene, track)

@@ -6,7 +6,7 @@ from wholebody.ergonomics.exertion import (
     back_compression as back_compression,
 )
 from wholebody.ergonomics.lifting import Lift as Lift, lift_between as lift_between
-from wholebody.ergonomics.looking import Look as Look
+from wholebody.ergonomics.vision import Look as Look
 from wholebody.ergonomics.owas_score import Owas as Owas, owas as owas
 from wholebody.ergonomics.posture_torques import StaticTorques as StaticTorques, static_torques as static_torques
 from wholebody.ergonomics.reba_score import Reba as Reba, RebaParts as RebaParts, reba as reba

@@ -1,7 +1,4 @@
-"""What a posture does not tell: load, repetition, grip, support; and whether somebody sits.
-
-Who sits is told by `Work`, by what is below pelvis and thighs in a scene, or by the posture.
-"""
+"""What a posture does not tell: load, repetition, grip, support; and whether somebody sits."""
 
 from __future__ import annotations
 

@@ -86,11 +86,7 @@ SKIN = (0.85, 0.68, 0.55, 1.0)
 
 
 def urdf_text(spec: BodySpec, extension: str = "") -> str:
-    """Return the URDF of a body specification: metres, radians (degrees in comments), capsules marked for Pinocchio.
-
-    URDF has no capsule: a cylinder is written, with Pinocchio's ``collision_checking`` tag that makes it a capsule of
-    that length between the centres of its caps. The extension is text at the end of the file.
-    """
+    """Return the URDF of a body: metres, radians (degrees in comments); cylinders tagged as capsules for Pinocchio."""
     lines = [
         '<?xml version="1.0" encoding="utf-8"?>',
         f"<!-- {spec.title} -->",

@@ -15,9 +15,9 @@ from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.pool import Pool
 from wholebody.figures.body_spec import geometry_of
 from wholebody.figures.description import Description, followers_of, is_root, limits_of
-from wholebody.figures.grounding import grounded
 from wholebody.figures.joining import mounted_parts, posture_of_all
 from wholebody.figures.model_check import LARGEST, Turning, check_model
+from wholebody.figures.postures import grounded
 from wholebody.figures.reduction import reduced_parts
 from wholebody.figures.state import free_roots, root_freedoms
 from wholebody.geometry.placement import placement

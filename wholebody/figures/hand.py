@@ -36,11 +36,7 @@ _JOINT |= {f"{kind}_abd": f"{kind}_abduction" for kind in ("cmc", "mcp")}
 
 
 def hand_spec(side: str = "right", person: Person | None = None) -> BodySpec:
-    """Return the specification of a hand, "left" or "right", of a person, or of the median man.
-
-    Raises:
-        InputError: another side.
-    """
+    """Return the specification of a hand, "left" or "right", of a person, or of the median man."""
     if side not in ("left", "right"):
         raise InputError(f"side is {side!r}; give 'left' or 'right'")
     person = person or make_person()

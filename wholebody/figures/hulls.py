@@ -18,10 +18,7 @@ AROUND = 10
 
 @lru_cache(maxsize=1)
 def unit_sphere() -> Array:
-    """Return vertices (n, 3) on the unit sphere, mirror-symmetric in y.
-
-    Every second ring is turned by half a step, so that no four vertices of the sides lie in one plane.
-    """
+    """Vertices (n, 3) on the unit sphere, mirror-symmetric in y; turned rings, so that no four lie in one plane."""
     points = [np.array([0.0, 0.0, 1.0])]
     for ring in range(1, RINGS + 1):
         polar = np.pi * ring / (RINGS + 1)

@@ -60,10 +60,7 @@ def joined_parts(members: Mapping[str, Member]) -> Parts:
 
 
 def joint_in(model: pin.Model, prefix: str, joint: str) -> int:
-    """Index in the model of several figures of a joint of one of them, whose names begin with `prefix` there.
-
-    What a fixed root carries hangs on the world of the whole model.
-    """
+    """Index in the joined model of a figure's joint; what a fixed root carries hangs on the world."""
     return int(model.getJointId(prefix + joint)) if joint != model.names[0] else 0
 
 

@@ -63,11 +63,7 @@ def check_concavity(concavity: object, links: Iterable[str]) -> Concavity:
 
 
 def link_pieces(shape: LinkShape, concavity: Concavity) -> tuple[list[tuple[Any, pin.SE3]], tuple[str, ...]]:
-    """Convex pieces of one shape, in its own frame, and one sentence on each change of the shape.
-
-    Raises:
-        WholebodyError: a mesh that cannot be read.
-    """
+    """Convex pieces of one shape, in its own frame, and one sentence on each change of the shape."""
     size, here = shape.size, pin.SE3.Identity()
     if shape.kind in ("mesh", "triangles"):
         share = concavity.get(shape.link) if isinstance(concavity, Mapping) else concavity
@@ -90,11 +86,7 @@ def link_pieces(shape: LinkShape, concavity: Concavity) -> tuple[list[tuple[Any,
 
 
 def drawn_pieces(visual: pin.GeometryObject, link: str) -> list[tuple[Any, pin.SE3]]:
-    """Convex pieces of what is drawn of a link, in the frame of its joint.
-
-    Raises:
-        WholebodyError: a mesh that cannot be read.
-    """
+    """Convex pieces of what is drawn of a link, in the frame of its joint."""
     solid: Any = visual.geometry
     kind = type(solid).__name__.lower()
     if visual.meshPath:

@@ -74,10 +74,7 @@ MeshParts = tuple[tuple[Array, NDArray[np.int64], Color | None], ...]
 
 @lru_cache(maxsize=256)
 def mesh_parts(path: str, scale: tuple[float, ...]) -> MeshParts:
-    """The parts of a mesh file by colour: vertices (n, 3), faces (m, 3), and red, green, blue, alpha if it has any.
-
-    Raises WholebodyError where the file cannot be read.
-    """
+    """The parts of a mesh file by colour: vertices (n, 3), faces (m, 3), and red, green, blue, alpha if it has any."""
     place = Path(path)
 
     def make() -> MeshParts:

@@ -109,11 +109,7 @@ def _joints(part: MotionRange) -> set[str]:
 
 
 def shoulder_twist(side: str) -> TwistRange:
-    """Return the range of the inward rotation of an upper arm in the thorax.
-
-    The bound is linear in the height of the direction in which the arm points, through the two points of
-    `INTERNAL_ROTATION`.
-    """
+    """Range of the inward rotation of an upper arm in the thorax: linear in the height of the arm's direction."""
     outward = 1.0 if side == "left" else -1.0
     # Degrees from the sagittal plane, outwards: where the arm points, level, in the middle of its directions.
     center = swing(90.0, 45.0, outward)
@@ -131,11 +127,7 @@ def shoulder_twist(side: str) -> TwistRange:
 
 
 def swing(elevation: float, plane: float, outward: float) -> Array:
-    """Return the rotation (3, 3) of a hanging arm that is raised without twist.
-
-    Degrees: from hanging, and of the plane in which it is raised, from straight ahead outwards; `outward` is 1 for the
-    left arm, -1 for the right one.
-    """
+    """Rotation (3, 3) of a hanging arm raised in a plane, degrees from ahead outwards; `outward`: 1 left, -1 right."""
     angle, turn = math.radians(elevation), math.radians(plane)
     # From -z towards (cos, +-sin, 0): about the level axis that is square to both.
     cross = pin.skew(np.array([outward * math.sin(turn), -math.cos(turn), 0.0]))

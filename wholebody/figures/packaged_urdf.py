@@ -14,11 +14,7 @@ if TYPE_CHECKING:
 
 
 def urdf_folder() -> Path:
-    """Return the folder of the packaged URDFs: inside an installed package, or at the top of a checkout.
-
-    Raises:
-        WholebodyError: the installation lacks it.
-    """
+    """Return the folder of the packaged URDFs: inside an installed package, or at the top of a checkout."""
     return _folder("urdf", "human.urdf")
 
 
@@ -39,20 +35,12 @@ def urdf_path(name: str) -> Path:
 
 
 def task_paths() -> dict[str, Path]:
-    """Return the packaged task files by name: inside an installed package, or among the examples of a checkout.
-
-    Raises:
-        WholebodyError: the installation lacks them.
-    """
+    """Return the packaged task files by name: inside an installed package, or among the examples of a checkout."""
     return _files("examples/tasks", "*.toml", "shelf.toml")
 
 
 def script_paths() -> dict[str, Path]:
-    """Return the packaged example scripts by name: inside an installed package, or among the examples of a checkout.
-
-    Raises:
-        WholebodyError: the installation lacks them.
-    """
+    """Return the packaged example scripts by name: inside an installed package, or among those of a checkout."""
     found = _files("examples", "*.py", "shelf.py")
     del found["presenting"]
     return found
@@ -77,11 +65,7 @@ def _folder(name: str, file: str) -> Path:
 
 
 def write_human(path: str | os.PathLike[str], person: Person, hands: str = "rigid") -> None:
-    """Write the URDF of a person, pieces as capsules and boxes; `hands` as for `human_spec`.
-
-    Raises:
-        InputError: the name does not end in .urdf, or the file cannot be written.
-    """
+    """Write the URDF of a person, pieces as capsules and boxes; `hands` as for `human_spec`."""
     from wholebody.figures.body_spec import urdf_text
     from wholebody.figures.human.figure import figure_of
     from wholebody.figures.human.spec import human_spec

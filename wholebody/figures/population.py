@@ -79,16 +79,7 @@ class Population:
     def unlikely(
         self, values: Mapping[str, float], size: Mapping[str, float]
     ) -> tuple[str, float, float, float] | None:
-        """Say which dimension, if any, makes a person of a size nobody: fewer than one in a million, see `RARE`.
-
-        Args:
-            values: the dimensions.
-            size: others that are not in question, such as stature and mass.
-
-        Returns:
-            The dimension that deviates most from what the others say, by how many standard deviations, and the values
-            of it, metres, between which it goes with them; None where the dimensions go together.
-        """
+        """Which dimension makes a person of a size nobody (`RARE`), by how many deviations, its likely range."""
         from scipy.special import chdtri  # loading it takes longer than loading a person, and few are asked for so
 
         which, given = self.deviates({**size, **values})
@@ -120,13 +111,9 @@ class Population:
         return self.values(np.full(len(self.names), NormalDist().inv_cdf(share)))[name]
 
     def sample(self, count: int, rng: np.random.Generator) -> list[dict[str, float]]:
-        """Draw people: their dimensions.
-
-        Shares of few people are nearer to those of all than at random. The deviates are a scrambled Sobol sequence
-        along the principal components, the largest first (Acworth, Broadie and Glasserman 1998); then those of each
-        dimension become the normal scores of their ranks, which leaves the rank correlations (Iman and Conover 1982);
-        those of fewer than `RANKED` people stay.
-        """
+        """Draw people: their dimensions; shares of few people are nearer to those of all than at random."""
+        # Scrambled Sobol along principal components (Acworth, Broadie, Glasserman 1998), then ranks as normal scores,
+        # which leaves correlations (Iman and Conover 1982); of fewer than `RANKED` people they stay.
         from scipy.special import ndtri
         from scipy.stats.qmc import Sobol
 
@@ -139,11 +126,8 @@ class Population:
         return [self.values(one) for one in deviates]
 
     def boundary(self, dimensions: Sequence[str], confidence: float) -> list[dict[str, float]]:
-        """Return people on the boundary of a share of all people, in the space of some dimensions, and their middle.
-
-        Bittner's (2000) A-CADRE in the principal components of the dimensions that have nine tenths of their variance,
-        four at most: the ends of the axes, and the middle of each orthant, of the ellipsoid that holds the share.
-        """
+        """Return people on the boundary of a share of all people, in the space of some dimensions, and their middle."""
+        # Bittner's (2000) A-CADRE in the principal components with nine tenths of the variance, four at most.
         from itertools import product
 
         from scipy.special import chdtri

@@ -1,4 +1,4 @@
-"""Named postures of the person: overlaps are parted, and the root is placed."""
+"""Named postures of the person, overlaps parted and the root placed, and postures moved onto what is below."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import coal
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.figures.description import Articulated
 
 GAP = 0.004
@@ -17,11 +19,7 @@ GAP = 0.004
 
 
 def stand(figure: Articulated, degrees: Mapping[str, float]) -> Array:
-    """Return the posture (nq,) of a row of `named_angles`: pelvis above the origin, lowest piece on z = 0, no overlap.
-
-    Very stout builds (body mass index above about 45) cannot squat: their thighs, spread to the limit,
-    overlap the belly.
-    """
+    """Posture (nq,) of a row of `named_angles`: pelvis above the origin, lowest piece on z = 0, no overlap."""
     q = pin.neutral(figure.model)
     values: dict[str, float] = {}
     for name, angle in degrees.items():
@@ -91,3 +89,50 @@ def support(shape: Any, placement: pin.SE3, direction: Array) -> float:
     if kind == "Ellipsoid":
         return far + float(np.linalg.norm(row * np.asarray(shape.radii)))
     return far + float((np.asarray(shape.points()) @ row).max())
+
+
+def grounded(model: pin.Model, segments: tuple[str, ...], q: Array, scene: Any, height: int) -> Array:
+    """Copy (nq,) of a posture with the root's `height` such that its `segments` stand; see `Figure.grounded`."""
+    data = model.createData()
+    pin.forwardKinematics(model, data, q)
+    own, around = set(segments), set(scene.objects)
+    pieces = list(zip(scene.geometry.geometryObjects, scene.piece_owner, strict=True))
+    placed = [(piece.geometry, data.oMi[piece.parentJoint] * piece.placement, owner) for piece, owner in pieces]
+    body = [
+        (shape, place, -support(shape, place, np.array((0.0, 0.0, -1.0))))
+        for shape, place, owner in placed
+        if owner in own
+    ]
+    things = [
+        (shape, coal.Transform3s(place.rotation, place.translation))
+        for (shape, place, owner), (piece, _) in zip(placed, pieces, strict=True)
+        if owner in around and piece.parentJoint == 0
+    ]
+    if not things or not body:
+        raise InputError("grounded: there is nothing to stand on; add wb.HalfSpace() to the scene")
+    bottom = min(low for *_, low in body)
+    # m: segments that reach as low as this above the lowest point are those that stand
+    soles = [(shape, place) for shape, place, low in body if low <= bottom + 0.03]
+    shift = 0.0
+    # most steps; each goes down by the least distance, so none goes through anything
+    for _ in range(2000):
+        gap = _least(soles, things, shift)
+        if abs(gap) <= 1e-7:  # m: gap that counts as standing
+            break
+        shift -= gap  # into what it overlaps the figure is no deeper than that, so it comes out after a few steps
+        if abs(shift) > 10.0:
+            raise InputError("grounded: nothing is below the figure within 10 m; add wb.HalfSpace()")
+    result = np.array(q, dtype=float)
+    result[height] += shift
+    return result
+
+
+def _least(soles: list[tuple[Any, pin.SE3]], things: list[tuple[Any, Any]], shift: float) -> float:
+    """Least signed distance of the soles from the things when the figure is higher by `shift`."""
+    up, least = np.array((0.0, 0.0, shift)), np.inf
+    for shape, place in soles:
+        at = coal.Transform3s(place.rotation, place.translation + up)
+        for thing, where in things:
+            gap = coal.distance(shape, at, thing, where, coal.DistanceRequest(), coal.DistanceResult())
+            least = min(least, float(gap))
+    return least

@@ -36,11 +36,7 @@ class ReachCone:
     """
 
     def __init__(self, vertices: Any, visible: Any) -> None:
-        """Check the polygon and precompute its planes.
-
-        Raises:
-            InputError: fewer than three corners, a zero or non-finite direction, or an edge hidden from `visible`.
-        """
+        """Check the polygon (three visible corners or more) and precompute its planes."""
         self.vertices, self.visible = _unit(vertices, "reach cone corner"), _unit(visible, "visible point")
         if self.vertices.ndim != 2 or len(self.vertices) < 3 or self.visible.shape != (3,):
             raise InputError(
@@ -70,14 +66,7 @@ class ReachCone:
         return self.signed_angle(direction)[0] >= 0.0
 
     def signed_angle(self, direction: Any) -> tuple[float, Array]:
-        """Return the angle of a direction (3,) to the nearest edge, radians, positive inside, and its gradient (3,).
-
-        A rotation of the direction by a small vector w, ``L + w x L``, changes the angle by ``gradient . (w x L)``; the
-        gradient is tangent to the sphere and of length 1, except where the nearest edge changes.
-
-        Raises:
-            InputError: the direction is zero, not finite, or of another shape.
-        """
+        """Angle of a direction (3,) to the nearest edge, radians, positive inside, and its gradient (3,), a tangent."""
         direction = _unit(direction, "direction")
         if direction.shape != (3,):
             raise InputError(f"a direction has shape (3,), not {direction.shape}")

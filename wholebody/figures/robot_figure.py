@@ -94,10 +94,8 @@ def _told(rest: RestPosture) -> list[str]:
 
 
 def check_size(model: pin.Model, path: Path) -> None:
-    """Refuse by an `InputError` a model that needs more memory than this machine has.
-
-    Pinocchio's data has four tables of the cube of the degrees of freedom: 0.26 GB for 200 of them, 108 GB for 1,500.
-    """
+    """Refuse by an `InputError` a model that needs more memory than this machine has."""
+    # Pinocchio's data has four tables of the cube of the degrees of freedom: 108 GB for 1,500.
     needed = 4 * 4 * 8 * model.nv**3  # a scene with one problem has four of Pinocchio's data objects
     try:
         memory = float(os.sysconf("SC_PAGE_SIZE")) * float(os.sysconf("SC_PHYS_PAGES"))
@@ -124,10 +122,7 @@ def link_chains(model: pin.Model, links: Iterable[str]) -> dict[str, Chain]:
 
 
 def visual_of_links(model: pin.Model, visuals: Iterable[LinkVisual]) -> pin.GeometryModel | None:
-    """Return what is drawn of links, named by link and number; None without anything.
-
-    A mesh is named by its `meshPath`; it is read when it is drawn, as that takes seconds.
-    """
+    """Return what is drawn of links, named by link and number; meshes are read when they are drawn."""
     made = []
     for number, (shape, color) in enumerate(visuals):
         frame_id = model.getFrameId(shape.link, pin.FrameType.BODY)
@@ -156,19 +151,7 @@ def geometry_of_links(
     named: bool = False,
     colors: Mapping[str, tuple[float, float, float, float]] = MappingProxyType({}),
 ) -> tuple[pin.GeometryModel, tuple[str, ...], tuple[int, ...]]:
-    """Return the convex pieces of links, sentences on changes, and the number of the shape of each piece.
-
-    Args:
-        model: Pinocchio's model.
-        shapes: of the links.
-        concavity: see `urdf_figure`.
-        path: of the file, for errors.
-        named: whether a piece has the name of its shape in the file, and not "<link>:<k>".
-        colors: link to red, green, blue, alpha; the pieces of other links have the colour of a robot.
-
-    Raises:
-        FileFormatError: a mesh that cannot be read, with the link.
-    """
+    """Return the convex pieces of links, sentences on changes, and the number of the shape of each piece."""
     made, notes, numbers = [], [], []
     count: dict[str, int] = {}
     for number, shape in enumerate(shapes):

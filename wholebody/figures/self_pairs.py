@@ -18,12 +18,8 @@ UNLIMITED = np.pi
 
 
 def choose_pairs(model: pin.Model, geometry: pin.GeometryModel, samples: int, seed: int) -> tuple[ExcludedPair, ...]:
-    """Set the pairs of the geometry to those that can touch.
-
-    Pairs of pieces on one link or joint are left out, and pairs of neighbours (no piece on any joint between them).
-    Pairs that touch or overlap in nearly all of a number of random postures within the limits are left out too: they
-    are nested shells, which almost no posture separates. Returned are the pairs left out, with the reason.
-    """
+    """Set the pairs of the geometry to those that can touch; return the pairs left out, with the reason."""
+    # Pairs of one joint, of neighbours, and of nested shells, which nearly always overlap, are left out.
     geometry.removeAllCollisionPairs()
     joint = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
     above = carriers_above(model, joint)
@@ -94,10 +90,7 @@ def carriers_above(model: pin.Model, joint: Indices) -> Indices:
 
 
 def _seldom_free(model: pin.Model, geometry: pin.GeometryModel, postures: Array) -> dict[int, int]:
-    """Pairs that touch or overlap in all but a share `SELDOM` of these postures -> number of postures without contact.
-
-    A pair is tested until it was free too often; for most pairs that happens at once.
-    """
+    """Pairs that touch in all but a share `SELDOM` of these postures -> number of postures without contact."""
     if not len(geometry.collisionPairs) or not len(postures):
         return {}
     data, results = model.createData(), pin.GeometryData(geometry)

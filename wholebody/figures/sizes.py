@@ -92,10 +92,7 @@ joint beside the middle and before the clavicle's inner end, and by how much it 
 def arm_sizes(
     sex: str, of: Mapping[str, float], stated: Collection[str], frame: Skeleton
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the sizes of the arms that hang on a frame, and the dimensions that follow from them, metres.
-
-    Of all dimensions the stated ones, by name, are met before others.
-    """
+    """Return the sizes of the arms on a frame, and the dimensions that follow, metres; stated ones are met first."""
     rows = keyed("arm_sizes", "name")
     usual = np.array([float(rows[name][sex]) for name in ARM]) * of["stature"]
     spread = np.array([float(rows[name]["spread"]) for name in ARM])

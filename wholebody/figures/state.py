@@ -195,10 +195,7 @@ def _restored(model: pin.Model, q: Array) -> State:
 
 
 def free_roots(model: pin.Model) -> tuple[int, ...]:
-    """The joints that are floating bases: the first one, and of figures that were joined those with a root's name.
-
-    A joint without limits too has more coordinates than degrees of freedom.
-    """
+    """The joints that are floating bases: the first one, and of figures that were joined those with a root's name."""
     return tuple(
         k
         for k in range(1, model.njoints)

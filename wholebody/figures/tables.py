@@ -16,11 +16,7 @@ Row = dict[str, str]
 
 @cache
 def table(name: str) -> tuple[Row, ...]:
-    """Return the rows of a table in `figures/data`, each a mapping from column to text.
-
-    Raises:
-        UnknownNameError: there is no such table.
-    """
+    """Return the rows of a table in `figures/data`, each a mapping from column to text."""
     path = FOLDER / f"{name}.csv"
     if not path.is_file():
         raise UnknownNameError("table", name, [file.stem for file in FOLDER.glob("*.csv")])
@@ -44,11 +40,7 @@ def keyed(name: str, column: str) -> dict[str, Row]:
 
 
 def named_row(name: str, key: str, what: str) -> Mapping[str, str]:
-    """Return the row of a table that has a name in its column "name".
-
-    Raises:
-        UnknownNameError: there is no such row.
-    """
+    """Return the row of a table that has a name in its column "name"."""
     rows = keyed(name, "name")
     if key not in rows:
         raise UnknownNameError(what, key, rows)

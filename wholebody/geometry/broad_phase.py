@@ -14,11 +14,7 @@ AT_ONCE = 1_000_000  # pairs of boxes that are compared in one go; more = more m
 
 
 def box_pairs(low: Array, high: Array) -> Indices:
-    """Pairs (k, 2), the lesser index first, of boxes that overlap or touch, with corners `low` and `high` (n, 3).
-
-    They are sorted along the axis on which they are spread most; what begins there before another one ends is compared
-    on the other two.
-    """
+    """Pairs (k, 2), the lesser index first, of boxes that overlap or touch, with corners `low` and `high` (n, 3)."""
     if len(low) < 2:
         return np.zeros((0, 2), dtype=np.intp)
     axis = int(np.argmax(np.ptp(low + high, axis=0)))
@@ -47,17 +43,10 @@ def near_among(
     within: float,
     left_out: Collection[tuple[int, int]] = (),
 ) -> Contacts:
-    """Pairs of some pieces that are nearer than `within` metres, the nearest first, whatever pairs the table has.
+    """Pairs of the pieces (m,) nearer than `within` metres, the nearest first, whatever pairs the table has.
 
-    Of two half-spaces nothing is said: they have no end. `number` is -1 for all.
-
-    Args:
-        table: all pieces.
-        placements: (n, 4, 3) where they are; see `Contacts.placements`.
-        pieces: (m,) those that are looked at.
-        group: (m,) pieces of the same group make no pair.
-        within: metres.
-        left_out: pairs of groups that make no pair either, the lesser group first.
+    Half-spaces make no pair with each other. `placements` (n, 4, 3) as in `Contacts`; pieces of one `group` (m,), or of
+    two groups that are `left_out` (lesser first), make no pair. `number` is -1 for all.
     """
     centre = placements[pieces, 3]
     half = np.einsum("kji,kj->ki", np.abs(placements[pieces, :3]), table.half[pieces]) + 0.5 * within
@@ -79,10 +68,7 @@ def near_among(
 
 
 def _may_be_near(table: PairTable, placements: Array, pairs: Indices, within: float) -> Mask:
-    """Whether the pieces of pairs (k, 2) can be near, along the axes of both of their boxes, or a plane's normal.
-
-    The boxes are those about the pieces along their own axes. Two half-spaces are not near.
-    """
+    """Whether the pieces of pairs (k, 2) can be near, along the axes of both of their boxes, or a plane's normal."""
     axes, half = placements[pairs, :3], table.half[pairs]
     apart = placements[pairs[:, 1], 3] - placements[pairs[:, 0], 3]
     turned = np.abs(np.einsum("kij,klj->kil", axes[:, 0], axes[:, 1]))

@@ -47,17 +47,10 @@ class ContactRows(NamedTuple):
 
 
 class ContactRowBuilder:
-    """Builds contact rows for all near pairs at once. It remembers no posture, so any number of runs may share one.
-
-    Attributes:
-        arrays: of the pieces, as compiled loops take them; see `patch_kernel.TableArrays`.
-    """
+    """Builds contact rows for all near pairs at once, for any number of runs; `arrays` are those of the pieces."""
 
     def __init__(self, table: PairTable, most_ends: int = MOST_ENDS, same_normal: float = SAME_NORMAL) -> None:
-        """Take the pieces and pairs, and how many rows a contact has at most beside its witness row.
-
-        `same_normal` is the cosine of the angle to a face's normal within which coal's may be meant to be it.
-        """
+        """Take the pieces and pairs; `same_normal`: least cosine between coal's normal and a face's that it means."""
         self.table, self.most_ends = table, most_ends
         lengths = LENGTHS.copy()
         lengths[4], lengths[7] = same_normal, most_ends
@@ -71,13 +64,8 @@ class ContactRowBuilder:
     def rows(self, contacts: Contacts, clearance: Array | float = 0.0) -> ContactRows:
         """Rows of all contacts among the same pieces, to which `clearance` metres are asked, (k,) or one for all.
 
-        Where coal's normal is that of a face but for rounding, it becomes the face's own, in `contacts` too. coal stops
-        within 1e-6 m of the distance, which at a few centimetres leaves its normal up to 6e-3 rad off: half a
-        millimetre at the end of a forearm that lies along a table. The face's own normal is right if it parts the
-        pieces by as much.
-
-        Raises:
-            InputError: contacts of other pieces.
+        coal stops within 1e-6 m of the distance, which leaves its normal up to 6e-3 rad off. The face's own normal,
+        where it parts the pieces by as much, replaces it, in `contacts` too.
         """
         if len(contacts.placements) != len(self.table.joint):
             raise InputError(

@@ -74,11 +74,7 @@ def convex_pieces(
 
 
 def mesh_hull(vertices: ArrayLike, faces: ArrayLike, what: str = "mesh") -> ConvexPieces:
-    """The convex hull of a whole triangle mesh, vertices (n, 3) in metres and faces (m, 3), as one piece around it.
-
-    A hull of many vertices is replaced by one around it with fewer (`HULL_VERTICES`), and a mesh that is too thin
-    to be solid is thickened. `notes` gives the added volume. An InputError names `what` if the arrays are no mesh.
-    """
+    """The convex hull of a triangle mesh as one piece, with fewer vertices than `HULL_VERTICES`, thickened if thin."""
     cloud, triangles = check_mesh(vertices, faces, what)
     points = cloud[np.unique(triangles)]
     notes: list[str] = []
@@ -266,11 +262,8 @@ def limited(function: Callable[..., list[Array]], seconds: float, *arguments: An
 
 
 def run_coacd(vertices: Array, faces: NDArray[np.int32], threshold: float) -> list[Array]:
-    """Corners of the convex parts that CoACD finds, each (k, 3); for a child process.
-
-    Self-intersecting meshes make it crash or run for ever. Its own cap on vertices (decimate) leaves parts of the
-    surface outside; its re-meshing (preprocess) inflates thin parts by half, and a closed manifold does not need it.
-    """
+    """Corners of the convex parts that CoACD finds, each (k, 3); for a child process, as bad meshes make it crash."""
+    # Its cap on vertices (decimate) leaves surface outside; its re-meshing (preprocess) inflates thin parts by half.
     import coacd
 
     coacd.set_log_level("error")

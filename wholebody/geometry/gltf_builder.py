@@ -1,7 +1,4 @@
-"""Writes glTF 2 as one binary file (.glb): nodes, meshes with materials, skins, and an animation.
-
-The specification is Khronos's, https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html.
-"""
+"""Writes glTF 2 as one binary file (.glb), https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html."""
 
 from __future__ import annotations
 

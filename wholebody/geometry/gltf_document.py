@@ -1,7 +1,4 @@
-"""Reads glTF 2 (.glb, .gltf): the tree of nodes, arrays, and meshes that bones bend, as they stand.
-
-The specification is Khronos's, https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html.
-"""
+"""Reads glTF 2 (.glb, .gltf) as it stands, https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html."""
 
 from __future__ import annotations
 

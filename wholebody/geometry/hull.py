@@ -130,11 +130,7 @@ def _solid_hull(cloud: Array, what: str) -> Any:
 
 
 def enclosing_ball(points: Array) -> tuple[Array, float]:
-    """Smallest ball that contains points (n, 3): centre (3,) and radius.
-
-    Exchange of bases: the farthest point outside enlarges the ball of at most four points on its surface until
-    no point is outside. The radius grows with each exchange, so this terminates (a pivoting form of Welzl 1991).
-    """
+    """Centre (3,) and radius of the smallest ball around points (n, 3): exchange of bases, after Welzl 1991."""
     scale = float(np.ptp(points, axis=0).max()) or 1.0
     basis = [int(((points - points.mean(axis=0)) ** 2).sum(axis=1).argmax())]
     centre, radius = points[basis[0]], 0.0
@@ -166,11 +162,8 @@ def _smallest_basis(points: Array, candidates: list[int], scale: float) -> tuple
 
 
 def simplified_hull(points: Array, max_vertices: int) -> Array:
-    """Vertices (k, 3) of a convex polytope that contains points (n, 3) and has at most `max_vertices`, 8 or more.
-
-    The polytope begins as a box along the points' principal axes. Planes of the points' own hull then cut it: each time
-    the plane that cuts most off the farthest protruding vertex, as long as the number of vertices allows.
-    """
+    """Vertices (k, 3) of a convex polytope around points (n, 3) with at most `max_vertices`, 8 or more."""
+    # A box along principal axes, cut each time by the hull's plane that cuts most off the farthest vertex.
     from scipy.spatial import ConvexHull, QhullError
 
     hull = ConvexHull(points)

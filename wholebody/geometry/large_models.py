@@ -19,11 +19,8 @@ TABLED = 2000  # number of pieces up to which a model has Pinocchio's table of p
 
 
 def geometry_model(pieces: Sequence[pin.GeometryObject], pairs: Indices | None = None) -> pin.GeometryModel:
-    """Pinocchio's geometry model of these pieces, in this order, and of pairs (k, 2), the lesser index first.
-
-    If its pairs are given, a model of more than `TABLED` pieces has no table of pair numbers. What reads or writes that
-    table cannot be called on it: `addCollisionPair`, `findCollisionPair`, `existCollisionPair`; see `add_pairs`.
-    """
+    """Pinocchio's geometry model of these pieces and pairs (k, 2), the lesser index first."""
+    # With more than `TABLED` pieces it has no table of pair numbers, which `addCollisionPair` and others use.
     tabled = pairs is None or len(pieces) <= TABLED
     pairs = np.zeros((0, 2), dtype=np.intp) if pairs is None else pairs
     if len(pieces) < MANY:
@@ -60,11 +57,7 @@ def _one_by_one(pieces: Sequence[pin.GeometryObject], pairs: Indices) -> pin.Geo
 
 
 def _counted(count: int, given: Indices | None) -> pin.GeometryModel | None:
-    """A model that counts this many pieces and has none yet; None if this Pinocchio serialises in another way.
-
-    With pairs it has these, and no table; otherwise it has a table of no pairs. In the text of a model its number of
-    pieces comes first; its pairs are their number, what stands before the first of them, and two numbers each.
-    """
+    """A model that counts this many pieces and has none yet; None if this Pinocchio serialises in another way."""
     none, two, joined = _tokens(0, False), _tokens(2, False), _tokens(2, True)
     pairs = np.zeros((0, 2), dtype=np.intp) if given is None else given
     words = list(none)

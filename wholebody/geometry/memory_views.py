@@ -32,11 +32,8 @@ def address(array: NDArray[Any]) -> int:
 
 
 def placement_view(placements: Any) -> Array | None:
-    """View of a StdVec_SE3 as (n, 4, 3): [i, :3] holds the columns of the rotation, [i, 3] the translation.
-
-    A point x of frame i is in the world at ``x @ view[i, :3] + view[i, 3]``. The view does not own the memory: keep the
-    Pinocchio data alive. None if the layout in memory is not as expected.
-    """
+    """View of a StdVec_SE3 as (n, 4, 3): columns of the rotation, then the translation; None if laid out otherwise."""
+    # It does not own the memory: keep the Pinocchio data alive.
     count = len(placements)
     if count == 0:
         return np.zeros((0, 4, 3))
@@ -105,12 +102,8 @@ def guess_views(requests: Any) -> tuple[NDArray[np.float64], NDArray[np.int32]] 
 
 
 def fix_box_inflation() -> None:
-    """Make coal use the exact size of boxes in this process, whatever queries follow.
-
-    Otherwise the first query of a box decides for the whole process whether boxes have their exact size or 1 + 1e-10
-    times that, by whether its direction has a zero component (coal 3.0.2, a static variable of its support functions of
-    boxes: one for half-spaces, another for GJK).
-    """
+    """Make coal use the exact size of boxes in this process, whatever queries follow."""
+    # In coal 3.0.2 the first query decides whether boxes are 1 + 1e-10 times as large (a static variable).
     direction = np.full(3, 3.0**-0.5)
     turned = coal.Transform3s(pin.exp3(direction), np.full(3, 3.0))
     here, box = coal.Transform3s(), coal.Box(1.0, 1.0, 1.0)

@@ -70,11 +70,7 @@ def cache_folder() -> Path:
 
 
 def cached(content: tuple[bytes, ...], settings: str, what: str, make: Callable[[], ConvexPieces]) -> ConvexPieces:
-    """Return pieces from the cache, or make and cache them.
-
-    They depend on the content that they are made from, and on settings, with the versions of the libraries. `what`,
-    with which all notes begin, is no part of that.
-    """
+    """Pieces from the cache, or made and cached, by content, settings and libraries; notes begin with `what`."""
     digest = hashlib.sha256("\0".join(("1", __version__, settings)).encode())
     for part in content:
         digest.update(hashlib.sha256(part).digest())
@@ -88,10 +84,7 @@ def cached(content: tuple[bytes, ...], settings: str, what: str, make: Callable[
 
 
 def cached_entry(key: str, make: Callable[[], T], packed: Callable[[T], bytes], unpacked: Callable[[bytes], T]) -> T:
-    """Something from the cache, or made and cached; both times it is what `unpacked` reads of its bytes.
-
-    `key` is the hexadecimal digest of what it is made from, and of the way it is made.
-    """
+    """Something from the cache, or made and cached, by the hexadecimal digest of what it is made from."""
     global _writes
     path = cache_folder() / f"{key}{_SUFFIX}"
     found = _read(path, unpacked)

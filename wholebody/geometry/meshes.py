@@ -56,11 +56,7 @@ def read_mesh(path: str | Path) -> tuple[Array, NDArray[np.int64]]:
 
 
 def read_parts(path: str | Path) -> list[tuple[Array, NDArray[np.int64], tuple[float, float, float, float] | None]]:
-    """Read a file as `read_mesh` does, each object alone and with its colour, in the order of their names.
-
-    Of each vertices (n, 3), faces (m, 3), and red, green, blue, alpha; None where the file has no colour. Of a texture
-    the mean is taken.
-    """
+    """Read a file as `read_mesh` does, each object alone: vertices, faces, and colour (a texture's mean) or None."""
     path = Path(path)
     if (bent := _bent(path)) is not None:
         return [(*_checked(vertices, faces, path), color) for vertices, faces, color in bent]

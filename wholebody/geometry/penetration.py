@@ -70,11 +70,7 @@ def object_penetration(
     allowed: NDArray[np.bool_] | None = None,
     tolerance: float = 1e-6,
 ) -> ObjectPenetration | None:
-    """Both measures of the overlap of two objects, named `a` and `b`; None if no pair overlaps.
-
-    Each piece is a coal geometry with its placement in the world. Of the pairs those count that are allowed (n, m),
-    all by default. Up to the tolerance, metres, a pair only touches.
-    """
+    """Both measures of the overlap of two objects; None if no allowed pair (n, m) is deeper than the tolerance [m]."""
     overlap, depths, normals = ObjectPair(pieces_a, pieces_b, allowed).overlapping(np.zeros(3), tolerance)
     if not overlap:
         return None
@@ -92,12 +88,8 @@ def object_penetrations(
 ) -> list[ObjectPenetration]:
     """Every two owners of pieces that overlap, those with the longest separation first.
 
-    Args:
-        geometry: all pieces.
-        placements: (n, 4, 3) their placements, in the format of `Contacts.placements`.
-        owners: the owner of each piece; the one that comes first in this list is the A of its pair.
-        pairs: (k, 2) pieces that overlap.
-        tested: (m, 2) pairs of pieces that can touch, the geometry's by default; all of two owners where it has none.
+    `placements` as in `Contacts`; the owner of a piece that comes first is the A of its pair; `pairs` (k, 2) overlap,
+    `tested` (m, 2) can touch, the geometry's by default.
     """
     if tested is None:
         tested = pairs_of(geometry)

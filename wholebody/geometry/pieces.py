@@ -39,11 +39,8 @@ class Piece(NamedTuple):
 
 
 def box_corners(geometry: Any) -> Array:
-    """Corners (8, 3) of the axis-aligned box around a coal shape in its own axes, metres; endless for a half-space.
-
-    coal writes the box into the shape. So it is computed of a copy: the shape is part of a scene, whose pickles would
-    change, and an endless box cannot be read from one.
-    """
+    """Corners (8, 3) of the axis-aligned box around a coal shape in its own axes, metres; endless for a half-space."""
+    # coal writes the box into the shape: it is computed of a copy, as pickles of scenes would change.
     own = geometry.clone()
     own.computeLocalAABB()
     sides = np.array([own.aabb_local.min_, own.aabb_local.max_])

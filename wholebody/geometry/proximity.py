@@ -194,11 +194,8 @@ class Proximity:
         return np.array(self.place(data))
 
     def query(self, data: Any, within: float, most: Array | None = None) -> Contacts:
-        """Every pair nearer than `within` metres with the joints as in Pinocchio's `data`, in the order of the pairs.
-
-        With `most`, shape (pairs,), a pair that is as far apart as its entry [m] is left out too. Nothing else is left
-        out. Results of pairs that were culled are never read: coal leaves old numbers in them.
-        """
+        """Every pair nearer than `within` metres, or its `most` (pairs,) where less, at Pinocchio's `data`."""
+        # Results of pairs that were culled are never read: coal leaves old numbers in them.
         index, placed = self.ask(data, within, most)
         return self._gathered(ContactBuffer(len(index)), np.array(placed), index, within, most)
 
@@ -211,10 +208,7 @@ class Proximity:
         return self._gathered(self._buffer, self._placed, index, within, most)
 
     def ask(self, data: Any, within: float, most: Array | None = None) -> tuple[Indices, Array]:
-        """Have coal compute all pairs that can be nearer, see `query`: their numbers (k,), and where the pieces are.
-
-        Both are overwritten by the next question; `results_of` has the distances.
-        """
+        """Have coal compute the pairs of `query`: numbers (k,) and placements, until the next; see `results_of`."""
         began = time.perf_counter()
         distances, results, placed = self.distances, self.results, self.place(data)
         try:

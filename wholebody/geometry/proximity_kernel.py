@@ -12,10 +12,8 @@ from wholebody.geometry.pieces import COAL_ACCURACY
 
 @compiled(inner=True)
 def travel(placement: Array, last: Array, reach: Array, travelled: Array) -> None:
-    """Add to `travelled` (n,) how far a point of each piece can have moved since `last`, and renew `last` (n, 4, 3).
-
-    A point x of a piece moves by at most |t1 - t0| + |R1 - R0| |x|, with the Frobenius norm of R1 - R0.
-    """
+    """Add to `travelled` (n,) how far a point of each piece can have moved since `last`, and renew `last` (n, 4, 3)."""
+    # A point x moves by at most |t1 - t0| + |R1 - R0| |x|, with the Frobenius norm.
     for i in range(len(reach)):
         shift = 0.0
         turn = 0.0
@@ -97,10 +95,7 @@ def gather(
 
 @compiled(inner=True)
 def renew(marked: Indices, before: int, index: Indices, count: int, changed: Indices) -> tuple[int, int]:
-    """Make ``marked[:before]`` the same pairs as ``index[:count]``, both in ascending order.
-
-    How many pairs are marked no longer, and how many newly; they go to the front of `changed`, in this order.
-    """
+    """Make ``marked[:before]`` the pairs ``index[:count]``, both ascending; the numbers gone and new, in `changed`."""
     gone, came, k = 0, 0, 0
     for m in range(before):
         while k < count and index[k] < marked[m]:

@@ -51,11 +51,8 @@ class _Node(NamedTuple):
 def least_separation(
     pieces_a: Sequence[Placed], pieces_b: Sequence[Placed], allowed: NDArray[np.bool_] | None = None
 ) -> Separation:
-    """Least translation of A after which no piece of it overlaps a piece of B.
-
-    The zero translation if nothing overlaps, and also, with ``separated=False``, if no translation separates the
-    objects (a piece between two half-spaces). See `object_penetration` for the arguments.
-    """
+    """Least translation of A after which no piece of it overlaps B; see `object_penetration` for the arguments."""
+    # Zero where nothing overlaps, and with ``separated=False`` where nothing separates (between two half-spaces).
     pairs = ObjectPair(pieces_a, pieces_b, allowed)
     escapes = pairs.escapes()
     ways = [*escapes, *([] if (found := _depth_first(pairs, _ROOT)) is None else [found])]
@@ -129,10 +126,8 @@ def _children(
 
 
 def _nearest_on_rows(new: Sides, normals: Array, offsets: Array) -> Array:
-    """Least t under the old rows and each new row, which the old answer violates: (k, 3), NaN where none exists.
-
-    The new row is then active, with at most two old ones: all such sets are tried, for all new rows at once.
-    """
+    """Least t under the old rows and each new row, which the old answer violates: (k, 3), NaN where none exists."""
+    # The new row is active then, with at most two old ones: all such sets are tried at once.
     count = len(new.offsets)
     best, answers = np.full(count, np.inf), np.full((count, 3), np.nan)
     for size in (0, 1, 2):
@@ -177,11 +172,8 @@ def _first_free(pairs: ObjectPair, direction: Array, reach: float) -> Array | No
 
 
 def _descent(pairs: ObjectPair, translation: Array) -> Array:
-    """Shorten a translation that separates, keeping every pair on its sides of the plane that now separates it.
-
-    Each such plane is a sufficient condition, so the QP under all of them always has an answer, never a longer one, and
-    its answer separates again.
-    """
+    """Shorten a translation that separates, keeping every pair on its sides of the plane that now separates it."""
+    # Each plane is a sufficient condition: the QP under all has an answer, never a longer one, which separates.
     for _ in range(MOST_DESCENTS):
         sides = pairs.between(translation)
         if sides is None:

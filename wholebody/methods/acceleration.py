@@ -33,10 +33,7 @@ class Anderson:
         self._displacements: list[Array] = []
 
     def propose(self, step: Array, stretch: float = STRETCH) -> Array | None:
-        """The accelerated step for the plain one (k,), at most `stretch` times as long; None while too little is known.
-
-        The plain step is remembered once `record` gets the displacement.
-        """
+        """The accelerated step for the plain one (k,), at most `stretch` times as long; None while too little known."""
         self._step = step
         if len(self._steps) < 2:
             return None

@@ -1,7 +1,4 @@
-"""The protocols of methods, trackers and steps, and functions that several methods share.
-
-Comparisons, drags and paths use methods only through these protocols, so they work with your own methods too.
-"""
+"""The protocols of methods, trackers and steps, and functions that several methods share."""
 
 from __future__ import annotations
 
@@ -135,10 +132,7 @@ def refusal(method: str, terms: Sequence[str]) -> str | None:
 
 
 def named_terms(problem: Problem) -> list[tuple[str, object]]:
-    """The terms that were stated, each with its index and class, such as "constraints[1], Balance".
-
-    Those that a problem has by default are not among them: a method may leave them to the assessment.
-    """
+    """The stated terms, each with its index and class, such as "constraints[1], Balance"; no defaults."""
     groups: tuple[tuple[str, Sequence[object]], ...] = (
         ("goals", problem.goals),
         ("constraints", problem.stated),

@@ -51,11 +51,8 @@ def within_budget(seconds: float) -> Iterator[None]:
 
 
 def budget_for_sweep() -> Callable[[], bool]:
-    """Whether a sweep that begins now has had its share of this thread's budget.
-
-    A search ends within one budget or little more; sweeps have another two. One that came later leaves as much as most
-    sweeps take, so that its motion is not given up without a look.
-    """
+    """Whether a sweep that begins now has had its share of this thread's budget."""
+    # A search ends within one budget or little more; sweeps have another two.
     until = max(3.0, BUDGET.spent + 1.0)
     return lambda: BUDGET.spent > until
 

@@ -59,10 +59,7 @@ class Stepper(Protocol):
     """A tool, set up for one problem."""
 
     def step(self, q: Array, weight: float, damping: float) -> Array:
-        """One step of the tool from the posture q (nq,): the displacement (nv,); a `StepError` if it found none.
-
-        `weight` is that of the measures, against goals of weight 1, `damping` that of the motion itself.
-        """
+        """Displacement (nv,) of one step of the tool from q (nq,), measures weighted against 1; `StepError` if none."""
 
 
 class Settings(NamedTuple):

@@ -26,12 +26,7 @@ PROTOCOL = "solve", "tracker", "accepts"
 
 
 def method_named(name: str) -> Method:
-    """A method with its default settings, or one of one's own as "module:Class".
-
-    Raises:
-        UnknownNameError: there is no such method.
-        InputError: the module or its class cannot be imported, or is no method.
-    """
+    """A method with its default settings, or one of one's own as "module:Class"."""
     if ":" in name:
         return as_method(imported(name)())
     if name not in METHODS:
@@ -62,12 +57,7 @@ def imported(name: str) -> Callable[..., Method]:
 
 
 def as_method(given: object) -> Method:
-    """A method from its name, or a configured one as it is.
-
-    Raises:
-        UnknownNameError: there is no such method.
-        InputError: it is neither.
-    """
+    """A method from its name, or a configured one as it is; InputError if it is neither."""
     if isinstance(given, str):
         return method_named(given)
     parts = (getattr(given, name, None) for name in PROTOCOL)

@@ -38,10 +38,7 @@ def restarts(
     count: int,
     spreads: Sequence[float] = (),
 ) -> Iterator[Array]:
-    """Random postures (nq,) within limits and bounds, as far from the start as the spreads say in turn.
-
-    Those are the largest distances as shares of each joint's range, `SPREADS` if empty. The state is moved.
-    """
+    """Random postures (nq,) within limits and bounds, as far as `spreads`, shares of the ranges, say in turn."""
     lower, upper = _ranges(problem, start)
     span = upper - lower
     shares = spreads or SPREADS
@@ -64,8 +61,7 @@ def throughout(problem: Problem, state: State, start: Array, rng: np.random.Gene
     """Postures within limits, shape (nq,), of which each joint has every part of its range once.
 
     A Latin hypercube (M. D. McKay, R. J. Beckman, W. J. Conover, "A comparison of three methods for selecting values of
-    input variables", Technometrics 21, 1979): a limb of few joints is seen in all of its configurations. Joints without
-    limits stay near the start (nq,); the state is moved.
+    input variables", Technometrics 21, 1979). Joints without limits stay near the start; the state is moved.
     """
     lower, upper = _ranges(problem, start)
     parts = rng.permuted(np.tile(np.arange(count), (len(lower), 1)), axis=1)

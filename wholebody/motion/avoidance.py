@@ -107,6 +107,11 @@ def avoid(
     scene = Scene(clip.figure) if scene is None else scene
     instance(scene, Scene, "avoid: scene", "make one with wb.Scene(clip.figure)")
     same_joints(clip, scene.figure, "avoid")
+    if clip.things:
+        raise InputError(
+            f"avoid: {', '.join(clip.things)} of {clip.name} moves, and methods know things that stand; attach it to a "
+            "segment with scene.attach and give Clip(clip.figure, clip.q, clip.dt)"
+        )
     function(progress, "avoid: progress")
     chosen = as_avoider(method)
     if isinstance(dynamics, Strength) or flag(dynamics, "avoid: dynamics"):

@@ -98,14 +98,7 @@ class Follower:
         self._tracker = QP(restarts=0).tracker(self._problem, terms.dt)
 
     def frame(self, number: int, q: Array, more: float = 0.0, *, goal: Array | None = None) -> Array:
-        """The posture (nq,) of a frame, after three steps of the tracker at most.
-
-        Args:
-            number: of the frame.
-            q: (nq,) where the steps begin, once it is within the bounds of the frame.
-            more: metres that are asked of every pair beyond the clearance.
-            goal: (nq,) followed in place of the original posture.
-        """
+        """The posture (nq,) of a frame, after three steps at most, with `more` metres of clearance, towards `goal`."""
         terms, problem = self._terms, self._problem
         if terms.kept(number):
             return np.array(terms.q[number])

@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array
-from wholebody.base.batches import fingerprint, run_batch
+from wholebody.base.batches import fingerprint, reporter, run_batch
 from wholebody.base.errors import InputError, WholebodyError
 from wholebody.base.files import is_file, read_bytes
-from wholebody.base.progress import reporter
 from wholebody.base.runner import Job
 from wholebody.figures.figure import Figure
 from wholebody.motion.avoidance import as_avoider, avoid

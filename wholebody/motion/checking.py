@@ -7,18 +7,21 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.assessment.motion import root_mean_square, third_differences, velocities
 from wholebody.base.arrays import Array
 from wholebody.base.charts import Shown, new_chart, plain
-from wholebody.base.checks import function, instance, number
+from wholebody.base.checks import function, instance, known, number
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import root_freedoms
 from wholebody.geometry.continuous.swept_depth import SweptDepth
+from wholebody.geometry.proximity import PairTable
 from wholebody.motion.clip import Clip
 from wholebody.motion.clip_contacts import Contact, ContactTable, contact_as_dict
 from wholebody.motion.stance import Sliding, sliding
+from wholebody.scene.moving_scene import MovingScene
 from wholebody.scene.scene import Scene
 
 DEPTH = 1e-4
@@ -191,7 +194,7 @@ def check(
     Between two frames the figure moves along ``pin.interpolate``, as `Clip.at` does. What gets deeper than `depth` in
     between is always found, however short the time and however thin the piece. Pairs that the figure or the scene leave
     out (`Figure.excluded_pairs`, `Scene.excluded_pairs`) are left out. Things stand where they are when the check
-    begins.
+    begins, but those of `clip.things`, which move.
 
     Args:
         clip: the clip.
@@ -215,11 +218,24 @@ def check(
     depth = number(depth, "check: depth", SMALLEST, LARGEST, "m")
     tell: Progress | None = function(progress, "check: progress") if progress is not None else None
     table = ContactTable(scene, len(clip))
+    for name in clip.things:
+        known(name, [each for each, thing in scene.objects.items() if thing.segment is None], "thing", "check: scene")
     with scene.borrow() as workspace:
-        swept = SweptDepth(workspace.table, workspace.geometry, depth)
-        table.add(0, swept.start(clip.q[0]), between=False)
+        swept, q = SweptDepth(workspace.table, workspace.geometry, depth), clip.q
+        if clip.things:  # the things that move get joints
+            moving = MovingScene(scene.built, clip.things, between_things=False)
+            moving.refresh(workspace.geometry)
+            swept = SweptDepth(PairTable(moving.model, moving.geometry), moving.geometry, depth)
+            tracks = [[pin.XYZQUATToSE3(one) for one in track] for track in clip.things.values()]
+            q = np.array(
+                [
+                    moving.configuration(one, dict(zip(clip.things, at, strict=True)))
+                    for one, *at in zip(clip.q, *tracks, strict=True)
+                ]
+            )
+        table.add(0, swept.start(q[0]), between=False)
         for frame in range(1, len(clip)):
-            found, passing = swept.advance(clip.q[frame])
+            found, passing = swept.advance(q[frame])
             table.add(frame, found, between=False)
             table.add(frame - 1, passing, between=True)
             if tell is not None and frame % 16 == 0:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,91 +12,18 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array
 from wholebody.base.charts import Shown, new_chart, plain
 from wholebody.base.checks import array, instance, listed, number, shown, text, time_step
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.figures.joined import one_figure
 from wholebody.figures.state import UNIT_TOLERANCE
+from wholebody.motion.mirroring import mirrored
+from wholebody.motion.thing_tracks import MIRROR as THING_MIRROR
+from wholebody.motion.thing_tracks import between, thing_tracks
 from wholebody.tracking.tracks import MOST_FRAMES, Track, check_figure, check_frames
 
 DRAWN = 8  # joints of `Clip.plot`
-MIRROR = np.diag([1.0, -1.0, 1.0])
-"""Reflection at the plane y = 0."""
-
-SIDES = (
-    ("left", "right"),
-    ("Left", "Right"),
-    ("LEFT", "RIGHT"),
-    (r"(?<![A-Za-z])l(?![A-Za-z])", r"(?<![A-Za-z])r(?![A-Za-z])"),
-    (r"(?<![A-Za-z])L(?![A-Za-z])", r"(?<![A-Za-z])R(?![A-Za-z])"),
-    (r"(?<![A-Za-z])[lL](?=[A-Z])", r"(?<![A-Za-z])[rR](?=[A-Z])"),
-)
-"""How names say their side; the patterns of single letters need a letter that stands alone or before a capital."""
-
-
-def other_side(name: str) -> str:
-    """The name of the same part on the other side; the name itself if it names no side."""
-    words = {"left": "right", "Left": "Right", "LEFT": "RIGHT", "l": "r", "L": "R"}
-    words |= {right: left for left, right in words.items()}
-    for left, right in SIDES:
-        both = re.compile(f"{left}|{right}")
-        if both.search(name):
-            return both.sub(lambda found: words[found.group()], name, count=1)
-    return name
-
-
-def mirrored(figure: Figure, q: Array) -> Array:
-    """Postures (n, nq) with left and right exchanged, mirrored at the plane y = 0 of the world.
-
-    Raises:
-        InputError: the figure is not symmetric to y = 0 of its root, or has joints of more than one degree of freedom.
-    """
-    source, sign = _exchange(one_figure(figure, "mirrored: the clip's figure"))
-    found: Array = q[:, source] * sign
-    if figure.root == "free":  # (x, -y, z), and the rotation M R M: the axis's x and z change their signs
-        found[:, :7] = q[:, :7] * (1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0)
-    return found
-
-
-def _exchange(figure: Figure) -> tuple[Indices, Array]:
-    """For each value of a posture: the value of which it takes the place, and the sign that it gets."""
-    model = figure.model
-    data = model.createData()
-    q = pin.neutral(model)
-    pin.computeJointJacobians(model, data, q)
-    source, sign = np.arange(model.nq), np.ones(model.nq)
-    for name in figure.joints:
-        joint = model.joints[figure.joint_id(name)]
-        if name in figure.followers:
-            continue
-        partner = other_side(name)
-        if partner not in figure.joints:
-            raise InputError(f"{figure.name} cannot be mirrored: {name!r} has no partner {partner!r}")
-        other = model.joints[figure.joint_id(partner)]
-        if joint.nv != 1 or joint.nq != other.nq:
-            raise InputError(f"{figure.name} cannot be mirrored: {name!r} is no joint of one degree of freedom")
-        here = MIRROR @ data.oMi[joint.id].translation
-        apart = np.linalg.norm(here - data.oMi[other.id].translation)
-        if apart > 0.01:  # m: descriptions of robots have their digits cut off
-            raise InputError(f"{figure.name} cannot be mirrored: {name!r} and {partner!r} are not symmetric to y = 0")
-        along = _along(data.J[:, joint.idx_v], data.J[:, other.idx_v])
-        if abs(along) < np.cos(0.05):
-            raise InputError(f"{figure.name} cannot be mirrored: {name!r} and {partner!r} turn about other axes")
-        for k in range(joint.nq):  # an unlimited joint holds cosine and sine; the sine alone changes its sign
-            source[joint.idx_q + k] = other.idx_q + k
-            sign[joint.idx_q + k] = np.sign(along) if k == joint.nq - 1 else 1.0
-    return source, sign
-
-
-def _along(own: Array, other: Array) -> float:
-    """Cosine between a joint's mirrored axis and its partner's, of their columns (6,); axes of rotation turn round."""
-    if np.linalg.norm(own[3:]) > 0.5:
-        return float(-(MIRROR @ own[3:]) @ other[3:])
-    return float((MIRROR @ own[:3]) @ other[:3]) if np.linalg.norm(other[3:]) < 0.5 else 0.0
-
-
 ROUNDING = 1e-9
 """Share of a time step by which a time may be outside of a clip: the rounding of sums of steps."""
 
@@ -113,6 +39,8 @@ class Clip(Shown):
         q: (n, nq) one posture for each frame, read-only; quaternions are of unit length.
         dt: seconds from frame to frame.
         name: name of the clip in messages and files.
+        things: name to placements (n, 7) of what moves beside the figure, such as a box that it carries: x, y, z,
+            metres, and a quaternion x, y, z, w. `wb.check` moves the things of its scene so.
 
     Raises:
         InputError: no frame, another number of values than the figure has, a value that is not finite, a quaternion
@@ -127,6 +55,7 @@ class Clip(Shown):
     q: Array
     dt: float
     name: str = "clip"
+    things: Mapping[str, Array] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -145,6 +74,8 @@ class Clip(Shown):
         self.figure.warn_of_angles(q, self.name)
         q.setflags(write=False)
         object.__setattr__(self, "q", q)
+        things = instance(self.things, Mapping, f"{self.name}: things", "give placements by name")
+        object.__setattr__(self, "things", thing_tracks(things, len(q), self.name) if things else {})
 
     def __repr__(self) -> str:
         """One line."""
@@ -204,16 +135,24 @@ class Clip(Shown):
                 f"{self.name}[{shown(frames)}]: no frame of {len(self)} in ascending order is in it; "
                 "give first < last and a positive step"
             )
-        return Clip(self.figure, self.q[first:last:step], self.dt * step, self.name)
+        things = {name: track[first:last:step] for name, track in self.things.items()}
+        return Clip(self.figure, self.q[first:last:step], self.dt * step, self.name, things)
 
     def part(self, name: str) -> Clip:
         """The clip of one of the figures that were joined, by its name: what files and measures of one person take."""
         q = self.figure.part(name, self.q)
-        return Clip(self.figure.members[name].figure, q, self.dt, f"{self.name} of {name}")
+        return Clip(self.figure.members[name].figure, q, self.dt, f"{self.name} of {name}", self.things)
 
     def with_q(self, q: ArrayLike, name: str | None = None) -> Clip:
-        """The clip with other postures (m, nq), any number of them, and another name if one is given."""
-        return Clip(self.figure, q, self.dt, self.name if name is None else name)  # type: ignore[arg-type]
+        """The clip with other postures (m, nq), and another name if one is given.
+
+        There may be any number of them; things that move go on only beside as many as before.
+        """
+        postures = array(q, f"{self.name}: q", "postures, shape (frames, nq)")
+        if postures.ndim != 2:
+            raise InputError(f"{self.name}: q has shape {postures.shape}; give postures, shape (frames, nq)")
+        things = self.things if len(postures) == len(self) else {}
+        return Clip(self.figure, postures, self.dt, self.name if name is None else name, things)
 
     def at(self, t: float) -> Array:
         """Posture (nq,) at a time from 0 to `duration`, interpolated between two frames on the configuration manifold.
@@ -250,7 +189,9 @@ class Clip(Shown):
         frames = int(np.floor(self.duration / dt + ROUNDING * len(self))) + 1
         if frames > MOST_FRAMES:
             raise InputError(f"{self.name}: dt of {dt:g} s makes {frames} frames; give a longer one")
-        return Clip(self.figure, np.array([self._between(k * dt / self.dt) for k in range(frames)]), dt, self.name)
+        places = [k * dt / self.dt for k in range(frames)]
+        things = {name: np.array([between(track, place) for place in places]) for name, track in self.things.items()}
+        return Clip(self.figure, np.array([self._between(place) for place in places]), dt, self.name, things)
 
     def mirrored(self) -> Clip:
         """The clip with left and right exchanged, mirrored at the plane y = 0 of the world.
@@ -258,13 +199,14 @@ class Clip(Shown):
         Raises:
             InputError: the figure is not symmetric, or its joints do not name their sides.
         """
-        return Clip(self.figure, mirrored(self.figure, self.q), self.dt, self.name)
+        things = {name: THING_MIRROR * track for name, track in self.things.items()}
+        return Clip(self.figure, mirrored(self.figure, self.q), self.dt, self.name, things)
 
     def joined(self, other: Clip) -> Clip:
         """This clip and then the other one. Nothing is blended: the first frame of the other follows the last of this.
 
         Raises:
-            InputError: the other has other joints or another time step.
+            InputError: the other has other joints, another time step, or other things that move.
         """
         other = instance(other, Clip, f"{self.name}: joined: other", "give a clip with the same joints and time step")
         if other.names != self.names or other.q.shape[1] != self.q.shape[1]:
@@ -273,7 +215,15 @@ class Clip(Shown):
             raise InputError(
                 f"{self.name}: its time step is {self.dt:g} s, that of {other.name} {other.dt:g} s; resample one"
             )
-        return Clip(self.figure, np.concatenate([self.q, other.q]), self.dt, self.name)
+        if other.things.keys() != self.things.keys():
+            both = (", ".join(sorted(one.things)) or "nothing" for one in (self, other))
+            raise InputError(
+                "{0}: {2} moves beside it, and {3} beside {1}; join clips with the same things".format(
+                    self.name, other.name, *both
+                )
+            )
+        things = {name: np.concatenate([track, other.things[name]]) for name, track in self.things.items()}
+        return Clip(self.figure, np.concatenate([self.q, other.q]), self.dt, self.name, things)
 
     def velocities(self) -> Array:
         """Velocities (n, nv), rad/s and m/s, by differences on the manifold: central, and one-sided at both ends.

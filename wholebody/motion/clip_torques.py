@@ -210,12 +210,8 @@ def clip_torques(
 
 
 def smoothed(clip: Clip, cutoff: float | None = CUTOFF) -> Clip:
-    """The clip without what is faster than a cutoff frequency, Hz: Butterworth, forward and backward (Winter).
-
-    Postures are filtered value by value; quaternions are made continuous before and of unit length after. Ends are
-    extended by reflection through the end point. A clip whose frame rate is less than four times the cutoff, or of one
-    frame, stays as it is.
-    """
+    """The clip without what is faster than a cutoff [Hz]: Butterworth, forward and backward (Winter)."""
+    # A clip whose frame rate is less than four times the cutoff, or of one frame, stays as it is.
     rate = 1.0 / clip.dt
     if cutoff is None or rate < 4.0 * cutoff:
         return clip

@@ -56,10 +56,7 @@ def dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, list[
 
 
 def sampled_dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> list[tuple[int, float]]:
-    """Places between frames that overlap, or nearly so, if some of them dip; a few of each gap are looked at.
-
-    What nearly overlaps is told too, because what pushes one gap out pushes its neighbours in.
-    """
+    """Places between frames that overlap, or nearly so, if some of them dip; a few of each gap are looked at."""
     near, dipping = [], False
     for gap in gaps:
         depths = _depths(workspace, q[gap], q[gap + 1], FEW, 2e-4)
@@ -71,10 +68,8 @@ def sampled_dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> list[tu
 
 
 def _deepest(workspace: Workspace, before: Array, after: Array, numbers: Sequence[int]) -> list[float]:
-    """Shares of the way between two postures (nq,) at which pairs are nearest, by their numbers.
-
-    A corner dips in a hundredth of a gap, so many places are looked at, and between the nearest ones by golden section.
-    """
+    """Shares of the way between two postures (nq,) at which pairs are nearest, by their numbers."""
+    # A corner dips in a hundredth of a gap: between the nearest of many places golden sections look.
     model, data = workspace.model, workspace.model.createData()
     request, result = coal.DistanceRequest(), coal.DistanceResult()
     pairs = [[workspace.geometry.geometryObjects[int(piece)] for piece in workspace.table.pairs[k]] for k in numbers]
@@ -141,11 +136,8 @@ class Faults(NamedTuple):
 
 
 def faults(workspace: Workspace, terms: FrameTerms, q: Array, clearance: float = 0.0, first: int = 0) -> Faults:
-    """What is wrong with postures (n, nq), of which the first belongs to frame `first` of a clip.
-
-    That is frames nearer than the clearance by more than 0.05 mm, beyond a limit by 1e-6 rad or m, or that miss what is
-    held by 1e-4 m or rad; and gaps that dip.
-    """
+    """What is wrong with postures (n, nq) from frame `first` of a clip on, and gaps that dip."""
+    # Nearer than the clearance by 0.05 mm, beyond a limit by 1e-6 rad or m, off what is held by 1e-4 m or rad.
     limits = terms.scene.figure.limits
     depths = np.array([depth(workspace, posture, clearance) for posture in q])
     values = q[:, limits.idx_q]

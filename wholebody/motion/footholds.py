@@ -39,12 +39,12 @@ def speeds(places: Array, dt: float) -> Array:
 
 def resting(places: Array, dt: float, limits: RestLimits, kinds: Sequence[int]) -> Mask:
     """(n, p) when points (n, p, 3) rest, `dt` seconds apart; points of one kind are equally high on level ground."""
-    fast, found = speeds(places, dt), np.zeros(places.shape[:2], dtype=bool)
-    slow = [_slow(places[:, k], fast[:, k], dt, limits) for k in range(places.shape[1])]
-    if not slow:
+    found = np.zeros(places.shape[:2], dtype=bool)
+    rests = [slow(places[:, k], dt, limits) for k in range(places.shape[1])]
+    if not rests:
         return found
-    marks = np.stack(slow, axis=1)
-    stands = [(k, run, lowest(places[run.first : run.end, k, 2])) for k, mask in enumerate(slow) for run in runs(mask)]
+    marks = np.stack(rests, axis=1)
+    stands = [(k, run, lowest(places[run.first : run.end, k, 2])) for k, mask in enumerate(rests) for run in runs(mask)]
     kind = np.array(kinds, dtype=int)
     lows = _level_of_kinds(stands, kind)
     base = np.array([low - lows[kind[k]] for k, _, low in stands])
@@ -62,8 +62,9 @@ def resting(places: Array, dt: float, limits: RestLimits, kinds: Sequence[int]) 
     return np.stack([long_runs(column, max(1, round(limits.least / dt))) for column in found.T], axis=1)
 
 
-def _slow(places: Array, speed: Array, dt: float, limits: RestLimits) -> Mask:
-    """(n,) frames of rests by speed alone; where a point goes on slowly, its fastest frames part them."""
+def slow(places: Array, dt: float, limits: RestLimits) -> Mask:
+    """(n,) frames of rests of a point (n, 3) by speed alone; where it goes on slowly, its fastest frames part them."""
+    speed = speeds(places, dt)
     low, high = speed <= 2.0 / 3.0 * limits.speed, speed <= limits.speed
     kept = np.zeros(len(speed), dtype=bool)
     for run in runs(high):
@@ -94,7 +95,7 @@ def _level_of_kinds(stands: Sequence[tuple[int, Window, float]], kind: Array) ->
     return found
 
 
-def _bears(heights: Array, run: Window, low: float, dt: float, found: Mask, slow: Mask) -> bool:
+def _bears(heights: Array, run: Window, low: float, dt: float, found: Mask, marks: Mask) -> bool:
     """Whether a point came down to a rest and goes up from it, or the body has nothing else that may bear it."""
     far = max(1, round(BEFORE / dt))
     before, after = heights[max(0, run.first - far) : run.first], heights[run.end : run.end + far]
@@ -102,5 +103,5 @@ def _bears(heights: Array, run: Window, low: float, dt: float, found: Mask, slow
         not len(part) or float(part.max()) > low + CAME_DOWN for part in (before, after)
     ):
         return True
-    alone = ~(found[run.first : run.end].any(axis=1)) & (slow[run.first : run.end].sum(axis=1) <= 1)
+    alone = ~(found[run.first : run.end].any(axis=1)) & (marks[run.first : run.end].sum(axis=1) <= 1)
     return bool(alone.sum() * dt > WAITED)

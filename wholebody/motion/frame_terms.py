@@ -202,19 +202,7 @@ class FrameTerms:
 
 
 def frame_terms(scene: Scene, q: Array, dt: float, constraints: Iterable[Given], clearance: float = 0.0) -> FrameTerms:
-    """Check what is to hold, and find the feet that stand.
-
-    Args:
-        scene: figure and things.
-        q: (n, nq) original postures.
-        dt: seconds from frame to frame.
-        constraints: terms.
-        clearance: least distance of every pair that is asked for, metres; grips that are nearer are held beside.
-
-    Raises:
-        InputError: something else than a constraint, a goal, a bound, `StanceFeet` or `MotionBounds`.
-        UnknownNameError: a term names something that the figure does not have.
-    """
+    """Check what is to hold in frames q (n, nq), and find the feet that stand; grips too near are held beside."""
     given: list[Any] = listed(constraints, "avoid: constraints", "[wb.Freeze('root')]")
     feet: list[list[str]] = [[] for _ in q]
     largest: Array | None = None

@@ -1,35 +1,43 @@
 """Points of a figure that rest where those of a skeleton rest: heels, toes, hands and knees, frame by frame.
 
 A point goes over to the place where it rests before it does, and away from it afterwards. The sole of a rigid foot
-keeps its length: of heel and toes, what rests first says where the other one comes down.
+keeps its length: of heel and toes, what rests first says where the other one comes down. What touches a thing goes
+with it.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Mask, brief
+from wholebody.base.arrays import Array, Mask, brief, with_values
 from wholebody.figures.figure import Figure
 from wholebody.geometry.pieces import swept_points
 from wholebody.motion.posture_fit import CLEARANCE
 from wholebody.motion.roles import Roles
+from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.motion.standing_ground import Foothold, Ground
 from wholebody.motion.structure import upright
+from wholebody.motion.thing_contacts import ThingContact, Things
+from wholebody.motion.windows import long_runs, runs
 from wholebody.scene.scene import Scene
 
 STRONG, NEARING, SWING = 800.0, 30.0, 0.3  # weights of what rests, nearly does, and of a sole between; 1 of a bone
+TOUCH = 100.0  # of what touches a thing
 LANDING = 3.0  # weight in the frame in which a point comes down, where contact decides
 BESIDE = np.array([0.1, 0.1, 1.0])  # shares of that weight: soles that meet come down beside each other
 STEP = 0.3  # m: a surface higher than this above the recording's ground is not what a sole comes down on
 SOLE = 0.002  # m: what is lower than this above a foot's lowest point is its sole
 FACING = 0.3  # least cosine of the angle from up to the normal of a sole that faces the ground
 FOLLOW = 0.8  # share of the body's shift that a new place keeps; the rest goes back with time
+KEPT_OFF = 0.03  # m: by which a thing keeps a point off the place where it would touch it, at most
+LOST = 0.02  # m: what is farther than this from where it is to touch a thing cannot reach it
+THICKEST = 0.25  # m: of a part from its joint to its skin
 OVER = 0.2  # s: in which a point goes over to where it rests
 
 
@@ -44,6 +52,7 @@ class HeldPoint:
     joint: int  # index of the joint that carries it
     place: Array  # (3,) in the joint's frame, metres
     edge: bool = False  # whether it is on the edge of a sole, so that its height alone counts: soles come down flat
+    thing: bool = False  # whether it touches things, and not the ground
 
 
 def held_points(figure: Figure, roles: Roles, ground: Ground) -> list[HeldPoint]:
@@ -63,6 +72,32 @@ def held_points(figure: Figure, roles: Roles, ground: Ground) -> list[HeldPoint]
             if role in resting and role in roles.frames:
                 frame = figure.model.frames[figure.frame_id(roles.frames[role])]
                 found.append(HeldPoint(role, "", int(frame.parentJoint), np.array(frame.placement.translation)))
+    return found
+
+
+def touching_points(
+    figure: Figure, roles: Roles, motion: SkeletonMotion, contacts: Sequence[ThingContact], joints: Mapping[str, str]
+) -> list[HeldPoint]:
+    """The points of a figure that touch things: of a hand as far from the wrist as the skeleton's joint is.
+
+    `joints` are those of the skeleton's roles, of which the figure may lack hands: these go on along the forearm.
+    """
+    found, data = [], figure.model.createData()
+    pin.framesForwardKinematics(figure.model, data, upright(figure))
+    places = {role: np.array(data.oMf[figure.frame_id(frame)].translation) for role, frame in roles.frames.items()}
+    for role in dict.fromkeys(one.role for one in contacts):
+        elbow, wrist = role.replace("hand", "elbow"), role.replace("hand", "wrist")
+        carrier = role if role in places else wrist
+        place = places[carrier]
+        if role.endswith("hand") and {elbow, wrist} <= places.keys():
+            forearm = places[wrist] - places[elbow]
+            way = place - places[wrist] if carrier == role else forearm
+            hand, own = _length(motion, joints, wrist, role), float(np.linalg.norm(forearm))
+            far = hand / _length(motion, joints, elbow, wrist) * own
+            most = float(np.linalg.norm(way)) if carrier == role else np.inf
+            place = places[wrist] + min(far, most) / max(float(np.linalg.norm(way)), 1e-9) * way
+        joint = int(figure.model.frames[figure.frame_id(roles.frames[carrier])].parentJoint)
+        found.append(HeldPoint(role, "", joint, np.array(data.oMi[joint].actInv(place)), thing=True))
     return found
 
 
@@ -93,12 +128,45 @@ def _sole(figure: Figure, data: pin.Data, side: str, ankle: str) -> list[tuple[i
     return found
 
 
-class Holds:
-    """Where each point is to be in each frame, and with which weight.
+def _length(motion: SkeletonMotion, joints: Mapping[str, str], first: str, last: str) -> float:
+    """Metres from one joint of a skeleton to another, in the middle of its frames; never zero."""
+    start, end = (motion.positions[:, motion.names.index(joints[role])] for role in (first, last))
+    return max(float(np.median(np.linalg.norm(end - start, axis=1))), 1e-6)
 
-    Attributes:
-        points: the points.
-    """
+
+class Touched:
+    """What a figure touches, and with which side."""
+
+    def __init__(self, figure: Figure, things: Things, contacts: Sequence[ThingContact]) -> None:
+        self.things, self.contacts, self._figure = things, contacts, figure
+        self._data = figure.model.createData()
+
+    def held(self, contact: ThingContact, point: HeldPoint, q: Array) -> Array:
+        """(3,) where a point is held in a thing's axes, by the thickness of the part on the side that touches it."""
+        pin.forwardKinematics(self._figure.model, self._data, q)
+        at = self._data.oMi[point.joint]
+        into = at.rotation.T @ self.things.at(contact.thing, contact.first).rotation @ -contact.normal
+        pieces = [piece for piece in self._figure.geometry.geometryObjects if piece.parentJoint == point.joint]
+        return contact.place + (thickness(pieces, point.place, into) + CLEARANCE) * contact.normal
+
+
+def thickness(pieces: Sequence[pin.GeometryObject], start: Array, along: Array) -> float:
+    """Metres from a place (3,) in a joint's axes along a direction (3,) to where the last of its pieces ends."""
+    ball, request, result = coal.Sphere(1e-6), coal.DistanceRequest(), coal.DistanceResult()
+    last = 0.0
+    for piece in pieces:
+        where, far = coal.Transform3s(piece.placement.rotation, piece.placement.translation), 0.0
+        while far < THICKEST:  # goes on by the distance to the surface, inside and outside, so it misses nothing thick
+            center = coal.Transform3s(np.eye(3), start + far * along)
+            gap = float(coal.distance(ball, center, piece.geometry, where, request, result))
+            if gap < 0.0:
+                last = max(last, far - gap)
+            far += max(abs(gap), 1e-3)
+    return last
+
+
+class Holds:
+    """Where each of `points` is to be in each frame, and with which weight."""
 
     def __init__(
         self,
@@ -107,24 +175,69 @@ class Holds:
         scale: float,
         dt: float,
         surface: Callable[[Array], float | None] | None,
+        touched: Touched | None = None,
     ) -> None:
-        """Take the points that rest at some time, the ground that says when, and the seconds of a frame.
-
-        `scale` are metres of the figure for each metre of height of the recording's ground; `surface` is the height of
-        the highest surface below a place (3,), metres, None for that of the recording.
-        """
-        self.points, self._scale, self._surface = points, scale, surface
+        """Take the points that rest at some time, the ground that says when, and what is touched."""
+        # `scale` are metres of the figure for each metre of height of the recording's ground; `surface` is the height
+        # of the highest surface below a place (3,), None for the recording's ground.
+        self.points, self._scale, self._surface, self._touched = points, scale, surface, touched
         self.over = max(1, round(OVER / dt))
-        self._stands = [[each for each in ground.footholds if each.role == point.role] for point in points]
+        contacts = () if touched is None else touched.contacts
+        self._stands: list[list[Foothold | ThingContact]] = [
+            [each for each in (contacts if point.thing else ground.footholds) if each.role == point.role]
+            for point in points
+        ]
         self._down: Mask | None = None
         self._places: dict[tuple[int, int], Array] = {}
+        self._gone: dict[int, dict[int, float]] = {}  # by point and frame the metres to what it is to touch
+
+    def lost(self, frame: int, places: Array, held: tuple[Array, Array]) -> bool:
+        """Whether points (h, 3) are too far from the things that they are to touch; these are let go of in the frame.
+
+        `held` are the goals and weights of the frame; those of what is let go of become zero.
+        """
+        goals, weights = held
+        far = np.linalg.norm(places - goals, axis=1)
+        gone = [k for k, one in enumerate(self.points) if one.thing and far[k] > LOST and weights[k, 0] == TOUCH]
+        for known in self._gone.values():
+            known.pop(frame, None)
+        for number in gone:
+            weights[number] = 0.0
+            self._gone.setdefault(number, {})[frame] = float(far[number])
+        return bool(gone)
+
+    def give_up(self) -> str:
+        """Split the contacts with things where points were let go of; says which, or nothing."""
+        told, places = [], dict[tuple[int, int], Array]()
+        for number, stands in enumerate(self._stands):
+            gone, kept = self._gone.get(number, {}), list[Foothold | ThingContact]()
+            for stand in stands:
+                reached = np.array([frame not in gone for frame in range(stand.first, stand.end)])
+                if not isinstance(stand, ThingContact) or reached.all():
+                    kept.append(stand)
+                    continue
+                off = max(gone.get(frame, 0.0) for frame in range(stand.first, stand.end))
+                told.append(f"{self.points[number].role} does not reach {stand.thing} by {1e3 * off:.0f} mm at most")
+                own = self._places[number, stand.first]
+                for part in runs(long_runs(reached, self.over)):
+                    first = stand.first + part.first
+                    kept.append(with_values(stand, first=first, end=stand.first + part.end))
+                    places[number, first] = own
+            self._stands[number] = kept
+        self._gone.clear()
+        self._places = places if told else self._places  # where feet come down is decided anew too
+        return "; ".join(told)
+
+    def moved(self, frame: int) -> Mapping[str, pin.SE3]:
+        """Where the things that move are in a frame."""
+        return {} if self._touched is None else self._touched.things.moved(frame)
+
+    def begin(self, free: Array) -> None:
+        """Take the postures (n, nq) of the free fit, which say which side of a part touches a thing."""
+        self._free = free
 
     def goals(self, frame: int, paths: Array, shift: Array, again: bool = False) -> tuple[Array, Array]:
-        """Goals (h, 3) and weights (h, 3) of a frame.
-
-        Without holds the points would be on `paths` (n, h, 3); the body is beside its free fit by a shift (3,),
-        metres. `again` says that it is known where points come down.
-        """
+        """Goals (h, 3) and weights (h, 3) of a frame; `paths` (n, h, 3) without holds, `shift` (3,) of the body."""
         if self._down is None:
             self._down = self._facing_down(paths)
         goals, weights = np.array(paths[frame]), np.zeros((len(self.points), 3))
@@ -133,32 +246,37 @@ class Holds:
             around = stands[max(0, after - 1) : after + 1] if after else stands[:1]
             if not around:
                 continue
-            places = [self._place(number, stand, paths, shift) for stand in around]
+            nearest = [min(max(frame, stand.first), stand.end - 1) for stand in around]
+            places = [
+                self._place(number, stand, paths, shift, near) for stand, near in zip(around, nearest, strict=True)
+            ]
             if around[0].first <= frame < around[0].end:
                 goals[number] = places[0]
-                weights[number] = LANDING * BESIDE if frame == around[0].first and not again else STRONG
+                if self.points[number].thing:
+                    weights[number] = TOUCH
+                else:
+                    weights[number] = LANDING * BESIDE if frame == around[0].first and not again else STRONG
             else:
-                goals[number], share = self._swing(number, frame, around, places, paths)
+                goals[number], share = self._swing(number, frame, nearest, places, paths)
                 weights[number] = (
                     BESIDE * (SWING + (NEARING - SWING) * share) if self.points[number].foot else NEARING * share
                 )
             if self.points[number].edge:
                 weights[number, :2] = 0.0
-            if not self._down[frame, number]:
+            if not (self._down[frame, number] or self.points[number].thing):
                 weights[number, 2] = 0.0  # contact says how high
         return goals, weights
 
     def _swing(
-        self, number: int, frame: int, around: list[Foothold], places: list[Array], paths: Array
+        self, number: int, frame: int, nearest: list[int], places: list[Array], paths: Array
     ) -> tuple[Array, float]:
         """Where a point (3,) is to be between rests, and how near in time it is to one, from 0 to 1.
 
-        Its way is led from one rest to the next; it comes to rest, and starts, slowly.
+        Its way is led from one rest to the next; it comes to rest, and starts, slowly. `nearest` are their frames.
         """
-        nearest = [min(max(frame, stand.first), stand.end - 1) for stand in around]
         beside = [place - paths[near][number] for place, near in zip(places, nearest, strict=True)]
         gone = 0.0
-        if len(around) == 2:
+        if len(nearest) == 2:
             part = (frame - nearest[0]) / (nearest[1] - nearest[0])
             gone = part * part * (3.0 - 2.0 * part)
         way = paths[frame][number]
@@ -181,12 +299,24 @@ class Holds:
     def landed(self, frame: int, places: Array) -> None:
         """Keep points where they came down, (h, 3), if a rest begins in this frame: contact may have kept them off."""
         for number, stands in enumerate(self._stands):
-            if any(stand.first == frame for stand in stands):
+            stand = next((each for each in stands if each.first == frame), None)
+            if isinstance(stand, ThingContact) and self._touched is not None:
+                # beside the place that is touched nothing moves: the thing may only keep the point farther off
+                own, at = self._places[number, frame], self._touched.things.at(stand.thing, frame)
+                off = float(stand.normal @ (at.actInv(places[number]) - own))
+                own += min(max(off, 0.0), KEPT_OFF) * stand.normal
+            elif stand is not None:
                 self._places[number, frame][:2] = places[number, :2]
 
-    def _place(self, number: int, stand: Foothold, paths: Array, shift: Array) -> Array:
-        """(3,) where a point rests, decided when it is first asked for."""
+    def _place(self, number: int, stand: Foothold | ThingContact, paths: Array, shift: Array, frame: int) -> Array:
+        """(3,) where a point rests, decided when it is first asked for; on a thing, where that is in the frame."""
         known = self._places.get((number, stand.first))
+        if isinstance(stand, ThingContact):
+            assert self._touched is not None
+            if known is None:
+                known = self._touched.held(stand, self.points[number], self._free[stand.first])
+                self._places[number, stand.first] = known
+            return np.asarray(self._touched.things.at(stand.thing, frame).act(known))
         if known is not None:
             return known
         frames = range(stand.first, min(stand.end, stand.first + self.over))
@@ -199,7 +329,9 @@ class Holds:
                 before = [
                     each
                     for each in stands
-                    if each.first <= stand.first < each.end and (other, each.first) in self._places
+                    if isinstance(each, Foothold)
+                    and each.first <= stand.first < each.end
+                    and (other, each.first) in self._places
                 ]
                 if (
                     self.points[other].foot == point.foot
@@ -224,13 +356,16 @@ class Holds:
         return CLEARANCE + (told if below is None else below)
 
 
-def surface_of(scene: Scene) -> Callable[[Array], float | None]:
-    """The height of the first surface of a scene's things below a place (3,), metres; None for none within 2 m."""
+def surface_of(scene: Scene, moving: Collection[str]) -> Callable[[Array], float | None]:
+    """The height of the first surface of a scene's things below a place (3,), metres; None for none within 2 m.
+
+    Things that are moving are left out.
+    """
     owners, geometry = scene.piece_owner, scene.geometry
     still = [
         (piece.geometry, coal.Transform3s(piece.placement.rotation, piece.placement.translation))
         for piece, owner in zip(geometry.geometryObjects, owners, strict=True)
-        if owner in scene.objects and scene.objects[owner].segment is None
+        if owner in scene.objects and scene.objects[owner].segment is None and owner not in moving
     ]
     ball, request, result = coal.Sphere(1e-4), coal.DistanceRequest(), coal.DistanceResult()
 

@@ -76,12 +76,8 @@ class GroundForces(NamedTuple):
 
 
 def ground_forces(wrench: Array, about: Array, points: Array, friction: float) -> GroundForces:
-    """Forces at points (p, 3) of soles, within their cones of friction, that give a wrench (6,) as nearly as can be.
-
-    Minimises |sum of the forces' wrenches - wrench|^2 + (e |forces|)^2 over combinations with coefficients >= 0 of the
-    edges of each point's friction pyramid (non-negative least squares, Lawson and Hanson 1974, chapter 23). Moments
-    are about a point (3,).
-    """
+    """Forces at points (p, 3) of soles, within cones of friction, that give a wrench (6,) about a point as nearly."""
+    # Least |wrench's error|^2 + (e |forces|)^2 over edges of pyramids (Lawson and Hanson 1974, chapter 23).
     if len(points) == 0:
         return GroundForces(np.zeros((0, 3)), wrench.copy(), np.zeros((0, 6)))
     from scipy.optimize import nnls
@@ -108,23 +104,15 @@ def ground_forces(wrench: Array, about: Array, points: Array, friction: float) -
 
 
 class Stand(NamedTuple):
-    """Where a frame stands.
+    """Where a frame stands."""
 
-    Attributes:
-        points: (p, 3) points of the soles that bear force, metres.
-        owner: (p,) number of the foot of each.
-        corners: (c, 2) of the support polygon, anticlockwise; both ends where the points lie on a line; none in flight.
-        normals: (e, 2) inward normals of its edges; of a line of both sides and both ends.
-        offsets: (e,) inside, ``normals @ place >= offsets``, metres.
-        height: of the ground, metres.
-    """
-
-    points: Array
-    owner: Indices
+    points: Array  # (p, 3) points of the soles that bear force, metres
+    owner: Indices  # (p,) number of the foot of each
+    # (c, 2) of the support polygon, anticlockwise; both ends where the points lie on a line; none in flight
     corners: Array
-    normals: Array
-    offsets: Array
-    height: float
+    normals: Array  # (e, 2) inward normals of its edges; of a line of both sides and both ends
+    offsets: Array  # (e,) inside, ``normals @ place >= offsets``, metres
+    height: float  # of the ground, metres
 
     def shifted(self, shifts: Sequence[Array]) -> Stand:
         """The same with each foot (3,) farther, metres."""
@@ -197,10 +185,8 @@ class InverseDynamics:
         return np.array(pin.rnea(self._model, self._data, q, v, a))
 
     def grounded(self, q: Array, torques: Array, shares: Array, stand: Stand) -> tuple[Array, Array]:
-        """Parts of torques (k, nv) in the air, after the ground's forces, and the wrenches (k, 6) of the parts.
-
-        The forces are linear in the parts while the same edges of friction bear: those at the sum with shares (k,).
-        """
+        """Parts of torques (k, nv) in the air, after the ground's forces, and the wrenches (k, 6) of the parts."""
+        # The forces are linear while the same edges of friction bear: those at the sum with shares (k,).
         model, data = self._model, self._data
         if not self.free:
             return torques, np.zeros((len(torques), 6))
@@ -310,10 +296,8 @@ def foot_wrenches(forces: Array, stand: Stand, soles: Soles) -> list[Array]:
 
 
 def zero_moment_point(wrench: Array, height: float) -> Array:
-    """(2,) where the ground gives a wrench (6,), about the world's origin, without a horizontal moment; metres.
-
-    Vukobratovic and Borovac 2004, "Zero-moment point - thirty five years of its life". The vertical force is not zero.
-    """
+    """(2,) where the ground gives a wrench (6,) without a horizontal moment, metres; its vertical force is not zero."""
+    # Vukobratovic and Borovac 2004, "Zero-moment point - thirty five years of its life"
     force, turning = wrench[:3], wrench[3:]
     found: Array = np.array([-turning[1] + height * force[0], turning[0] + height * force[1]]) / force[2]
     return found

@@ -22,12 +22,8 @@ PASSED = 1e-2  # m: a deeper motion between two postures passes through somethin
 
 
 def one_sided(run: Run, q: Array) -> Array:
-    """Postures (n, nq) of a clip of which fewer motions pass something; the given q (n, nq) where that is not found.
-
-    Motions that pass divide the clip into runs of frames, on one side and on the other in turn. Where one side has at
-    most a quarter of the frames, these take the other. Else motions that pass take the side of the frame before, from
-    the first to the last, or that of the frame after, from the last to the first.
-    """
+    """Postures (n, nq) of a clip of which fewer motions pass something; the given q where that is not found."""
+    # Motions that pass divide the frames into two sides: the smaller, up to a quarter, changes, else each follows on.
     depths = depths_between(run.workspace, q, range(len(q) - 1))
     passing = [gap for gap, deep in depths.items() if deep > PASSED]  # frames that overlap are followed too
     parts = [range(*each) for each in pairwise([0, *(gap + 1 for gap in passing), len(q)])]
@@ -56,16 +52,7 @@ def one_sided(run: Run, q: Array) -> Array:
 def keep_back(
     run: Run, q: Array, gap: int, most: int, first: int = 0, *, cancelled: Callable[[], bool] | None = None
 ) -> bool:
-    """Keep frames beside a gap on one side of what its motion passes, in place, as few as can be; whether that is done.
-
-    Args:
-        run: of the clip.
-        q: (n, nq) postures of the frames from `first` on; at most `most` are replaced.
-        gap: the frame before the motion that passes through something.
-        most: how many frames may change.
-        first: number of the first frame.
-        cancelled: asked before each frame; True ends it.
-    """
+    """Keep frames beside a gap on one side of what its motion passes, in place, `most` at most; whether done."""
     ways = {side: _beside(run, q, gap, side, SHALLOW, first) for side in (1, -1)}
     found = dict[int, list[Array]]((side, []) for side in ways)
     for _ in range(most):
@@ -93,10 +80,7 @@ def kept_beside(run: Run, window: Window, q: Array, gaps: Iterable[int]) -> Arra
 
 
 def followed(run: Run, window: Window, middle: int) -> Array:
-    """Postures (n, nq) of a window, followed from the freed posture of one of its frames to both ends.
-
-    Iterations keep the side on which they begin. Following ends on a side where it is calm for 0.25 s.
-    """
+    """Postures (n, nq) of a window, followed from the freed posture of one of its frames until calm for 0.25 s."""
     terms = run.terms
     q = np.array(terms.q[window.first : window.end])
     q[middle - window.first] = run.follower.freed(middle, terms.q[middle])
@@ -146,11 +130,8 @@ def _kept(run: Run, q: Array, passing: Sequence[int], side: int) -> Array:
 
 
 def _beside(run: Run, q: Array, gap: int, side: int, passed: float, first: int = 0) -> Iterator[_Beside]:
-    """Frames after (side 1) or before (-1) a gap, on the side of what the motion in it passes of the frame at its end.
-
-    They follow the original until the motion to the next frame of q is no deeper than `passed`, metres. Each begins
-    at the posture before it: its deviation on the next original posture may be on the other side.
-    """
+    """Frames after (side 1) or before (-1) a gap, on the side of what its motion passes of the frame at its end."""
+    # They follow the original until the motion to the next frame is no deeper than `passed` [m].
     workspace = run.workspace
     here, frame = (q[gap], gap + 1) if side > 0 else (q[gap + 1], gap)
     while 0 <= frame < len(q):

@@ -11,6 +11,7 @@ pairs that are near, relaxed at a high price. Joint limits hold exactly, cones t
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import daqp
@@ -54,11 +55,7 @@ class Layout(NamedTuple):
 
 
 class Fitter:
-    """Fits postures of a figure in a workspace, which is its own; so each thread needs one.
-
-    Attributes:
-        figure: the figure.
-    """
+    """Fits postures of a figure in a workspace of its own, so each thread needs one."""
 
     def __init__(self, figure: Figure, layout: Layout, workspace: Workspace) -> None:
         """Choose what goals are of."""
@@ -91,6 +88,10 @@ class Fitter:
         parts = [np.vstack([frame.placement.rotation, frame.placement.translation]) for frame in found]
         return np.array([frame.parentJoint for frame in found], dtype=np.intp), np.array(parts).reshape(-1, 4, 3)
 
+    def see(self, things: Mapping[str, pin.SE3]) -> None:
+        """See things at these placements from now on."""
+        self._workspace.place(things)
+
     def held(self, q: Array) -> Array:
         """(h, 3) where the points are at a posture (nq,) that may be held."""
         self._state.update(q)
@@ -115,11 +116,7 @@ class Fitter:
     def step(
         self, q: Array, goals: Goals, *, damping: float = DAMPING, among: bool = True, most: Array | None = None
     ) -> Array:
-        """The posture (nq,) after one program from q (nq,), which is within the limits.
-
-        `damping` is that of every joint, m²/rad²; contacts count if `among`; `most` (2, nv) are the least and greatest
-        displacement.
-        """
+        """The posture (nq,) after one program from q (nq,); `most` (2, nv) displacements, contacts only if `among`."""
         near = self._workspace.near(q, WITHIN) if among else None
         self._state.update(q)
         rows, errors = self._rows(goals), self._errors(q, goals)

@@ -103,7 +103,7 @@ def read_clip(
         if frames is None:
             assert motion is not None
             return retarget(motion, figure, names=names)
-        return Clip(figure, frames.q, frames.dt, frames.name)
+        return Clip(figure, frames.q, frames.dt, frames.name, frames.things)
     except InputError as error:
         raise FileFormatError(f"{one_line(path.name)}: {error}") from None
 

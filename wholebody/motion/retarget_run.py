@@ -43,12 +43,17 @@ TURNS = {"pelvis": 0.3, "head": 0.15, "ankle": 0.15, "hand": 0.08}  # m/rad, wei
 
 
 class Run:
-    """Postures of all frames of one skeleton."""
+    """Postures of all frames of one skeleton.
+
+    Attributes:
+        lost: what does not reach the things that it is to touch, for a message; empty where all do.
+    """
 
     def __init__(
         self, figure: Figure, wanted: Targets, roles: Roles, dt: float, holds: Holds | None, workspace: Workspace
     ) -> None:
         """Set up; without holds the skeleton alone is followed, and nothing is free."""
+        self.lost = ""
         self.figure, self.model, self.dt, self.holds = figure, figure.model, dt, holds
         points = [role for role in wanted.points if role in roles.frames]
         turns = [role for role in wanted.turns if role in roles.frames]
@@ -77,7 +82,11 @@ class Run:
         if self.holds is None:
             return np.array([self._within(k, q) for k, q in enumerate(free)])
         paths = np.array([self.fitter.held(q) for q in free])
+        self.holds.begin(free)
         found = self._passed(free, paths, self.holds, done)
+        self.lost = self.holds.give_up()
+        if self.lost:
+            found = self._passed(free, paths, self.holds, done)
         deviation = np.array([pin.difference(self.model, *pair) for pair in zip(free, found, strict=True)])
         deviation = smoothed(deviation, self.dt, SPREAD)
         found = np.array(
@@ -167,10 +176,14 @@ class Run:
             shift = deviation[:3] if self.figure.root == "free" else np.zeros(3)
             shift = pin.XYZQUATToSE3(free[k, :7]).rotation @ shift if self.figure.root == "free" else shift
             before = found[k - 1] if k else None
+            self.fitter.see(holds.moved(k))
             found[k] = self._reached(before, reference)
             for _ in range(1 if k else STARTS):
-                goals = self._goals(k, reference, CHANGE * self.levers, holds.goals(k, paths, shift))
+                held = holds.goals(k, paths, shift)
+                goals = self._goals(k, reference, CHANGE * self.levers, held)
                 found[k] = self._settled(found[k], goals, before)
+                if holds.lost(k, self.fitter.held(found[k]), held):
+                    found[k] = self._settled(self._reached(before, reference), goals, before)
                 holds.landed(k, self.fitter.held(found[k]))
             q = found[k]
             latest = np.asarray(pin.difference(model, free[k], q))
@@ -194,6 +207,7 @@ class Run:
     def _swept(self, frame: int, reference: Array, found: Array, paths: Array) -> Array:
         """The posture (nq,) between its neighbours."""
         assert self.holds is not None
+        self.fitter.see(self.holds.moved(frame))
         held = self.holds.goals(frame, paths, np.zeros(3), again=True)
         goals = self._goals(frame, reference, BEND / self.dt * self.levers, held)
         before = found[frame - 1] if frame else None
@@ -263,10 +277,7 @@ def _layout(points: list[str], turns: list[str], roles: Roles, figure: Figure, h
 
 
 def smoothed(values: Array, dt: float, time: float) -> Array:
-    """Values (n, m) of least sum of squared changes and accelerations.
-
-    Whittaker, On a New Method of Graduation, 1923; `time` is that in seconds over which values are smoothed.
-    """
+    """Values (n, m) of least squared changes and accelerations over a time [s] (Whittaker 1923, graduation)."""
     count, weight = len(values), (time / dt) ** 4
     if count < 3:
         return values
@@ -280,10 +291,8 @@ def smoothed(values: Array, dt: float, time: float) -> Array:
 
 
 def slowed(values: Array, most: Array) -> Array:
-    """Values (n, m) nearest to given ones that change by at most `most` (m,) from row to row, but for rounding.
-
-    Alternating direction method of multipliers: Boyd and others, Foundations and Trends in Machine Learning 3(1), 2011.
-    """
+    """Values (n, m) nearest to given ones that change by at most `most` (m,) from row to row, but for rounding."""
+    # ADMM: Boyd and others, Foundations and Trends in Machine Learning 3(1), 2011.
     changes = np.diff(values, axis=0)
     if not (np.abs(changes) > most).any():
         return values

@@ -1,20 +1,22 @@
-"""Goals of all frames: the directions of a skeleton's bones at a figure's lengths, and orientations of its parts."""
+"""Goals of all frames: the directions of a skeleton's bones at a figure's lengths, and orientations of its parts.
+
+Skeletons have ankles and toes at other heights than the figure; `soled` gives their feet the figure's.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Mask
 from wholebody.figures.figure import Figure
 from wholebody.geometry.pieces import box_corners
 from wholebody.motion.roles import Roles
 from wholebody.motion.skeleton import RIGID, SkeletonMotion
-from wholebody.motion.soles import soled
 from wholebody.motion.standing_ground import Ground
 from wholebody.motion.structure import upright
 
@@ -101,11 +103,7 @@ def rest_axes(motion: SkeletonMotion, roles: Roles) -> Array | None:
 
 
 def targets(motion: SkeletonMotion, figure: Figure, roles: Roles, ground: Ground, path: float | None) -> Targets:
-    """Goals of all frames; where the skeleton's feet stand on the lowest level, the figure's are near the plane z = 0.
-
-    `path` is the metres of the figure for each metre of the way and of the ground's heights; None for as many as its
-    legs have for each metre of the skeleton's.
-    """
+    """Goals of all frames; `path`: metres of the figure a metre of the way and heights, None as its legs."""
     places, turned, lowest = standing_places(figure, roles)
     own = _Body(places)
     joint = {role: motion.names.index(name) for role, name in roles.joints.items()}
@@ -180,10 +178,7 @@ def known_bones(limb: tuple[str, ...], side: str, roles: Collection[str]) -> lis
 
 
 def _points(own: _Body, source: _Body, hips: Array, anchored: bool) -> dict[str, Array]:
-    """Places (n, 3) of the roles: from the hips up to the shoulders and the head, and outwards along the limbs.
-
-    Limbs of which nothing nearer to the trunk is known begin where the figure's do, if they are `anchored`.
-    """
+    """Places (n, 3) of the roles: from the hips up to the shoulders and the head, and outwards along the limbs."""
     points, top = _girdles(own, source, hips)
     limbs = [(limb, known_bones(limb, side, own.places.keys())) for limb in LIMBS for side in ("left", "right")]
     rigid = {
@@ -221,10 +216,7 @@ def _girdles(own: _Body, source: _Body, hips: Array) -> tuple[dict[str, Array], 
 
 
 def _pelvis(source: _Body, motion: SkeletonMotion) -> Array:
-    """Orientation of the pelvis (n, 3, 3) from places alone: y from right to left, z towards the shoulders.
-
-    Without hips and shoulders it is that of the skeleton's root.
-    """
+    """Orientation of the pelvis (n, 3, 3) from places: y from right to left, z towards the shoulders; or the root's."""
     pair = next((part for part in ("hip", "shoulder") if source.has(f"left_{part}", f"right_{part}")), None)
     if pair is None:
         return np.array(motion.rotations[:, 0])
@@ -269,3 +261,31 @@ def _frame(along: Array, towards: Array) -> Array:
     y = np.cross(towards, x)
     y /= np.linalg.norm(y)
     return np.stack([x, y, np.cross(x, y)], axis=1)
+
+
+def soled(
+    motion: SkeletonMotion, roles: Roles, stands: Mapping[str, Mask], places: Mapping[str, Array]
+) -> dict[str, Array]:
+    """Places (n, 3) of a skeleton's toes as if its feet had the two joints as high above their soles as the figure's.
+
+    The way between the two may differ by 20 degrees and more. While both stand (n,) the sole is flat, which says in
+    the ankle's axes where the toes of the figure would be: `places` (3,) are those in its neutral posture, by role.
+    """
+    found = {}
+    for side in ("left", "right"):
+        ankle, toe = f"{side}_ankle", f"{side}_toe"
+        if not {ankle, toe} <= stands.keys() & places.keys():
+            continue
+        flat = stands[ankle] & stands[toe]
+        start, end = (motion.names.index(roles.joints[role]) for role in (ankle, toe))
+        ways, turns = motion.positions[:, end] - motion.positions[:, start], motion.rotations[:, start]
+        lengths, own = np.linalg.norm(ways, axis=1), places[toe] - places[ankle]
+        heading = ways[flat] * (1.0, 1.0, 0.0)
+        along = np.linalg.norm(heading, axis=1)
+        if not flat.any() or along.min() < 0.5 * np.median(lengths):  # a foot that hangs says nothing
+            continue
+        rise = float(own[2] / np.linalg.norm(own))
+        wanted = heading / along[:, None] * np.sqrt(1.0 - rise**2) + (0.0, 0.0, rise)
+        local = np.einsum("nji,nj->ni", turns[flat], wanted).mean(axis=0)
+        found[toe] = motion.positions[:, start] + lengths[:, None] * (turns @ (local / np.linalg.norm(local)))
+    return found

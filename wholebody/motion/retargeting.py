@@ -3,26 +3,28 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import function, instance, warn
+from wholebody.base.checks import function, instance, known, warn
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.joined import one_figure
+from wholebody.geometry.placement import PlacementLike
 from wholebody.geometry.shapes import HalfSpace
 from wholebody.motion.clip import Clip
-from wholebody.motion.held_points import Holds, held_points, surface_of
+from wholebody.motion.held_points import Holds, Touched, held_points, surface_of, touching_points
 from wholebody.motion.retarget_run import Run
-from wholebody.motion.retarget_targets import LIMBS, known_bones, standing_places, targets
-from wholebody.motion.roles import Roles, matched
+from wholebody.motion.retarget_targets import LIMBS, known_bones, soled, standing_places, targets
+from wholebody.motion.roles import Roles, matched, skeleton_roles
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
-from wholebody.motion.soles import soled
 from wholebody.motion.stance import paths
 from wholebody.motion.standing_ground import NOTHING, Ground
 from wholebody.motion.standing_ground import ground as find_ground
+from wholebody.motion.thing_contacts import Things, still_things
+from wholebody.motion.thing_tracks import thing_tracks
 from wholebody.scene.scene import Scene
 
 
@@ -32,6 +34,7 @@ def retarget(
     scene: Scene | None = None,
     ground: str | Ground | None = "auto",
     *,
+    things: Mapping[str, Iterable[PlacementLike]] | None = None,
     names: str | os.PathLike[str] | Mapping[str, Mapping[str, str]] | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Clip:
@@ -44,6 +47,9 @@ def retarget(
             their size with the figure, so a way among them keeps its length.
         ground: "auto" to find what the person stands on, as `wb.motion.ground(motion)` does; that, or one that was
             changed; None to hold nothing, and without a scene to follow the skeleton alone.
+        things: where things of the scene are that move in the recording: by name, a placement in each frame. The clip
+            has them as `things`. Beside others that stand they move as recorded; alone, on a way as much shorter, and
+            as much less high above the floor, as the figure's legs are shorter.
         names: which joint of the skeleton and which frame of the figure are which part of a body: a TOML file or a
             mapping; see docs/motion.md. Names of CMU, Mixamo, LAFAN1, SMPL, DeepMimic, Bandai-Namco, Biovision, Xsens,
             Poser, Daz, 3ds Max (biped), Unreal, VRM, VRoid, Rokoko and Motive are known.
@@ -51,7 +57,8 @@ def retarget(
 
     Returns:
         A clip within the figure's joint limits, reach cones and speed limits. Feet, hands and knees that rest are held
-        where they came down, soles on the ground. In every frame the figure is free of itself, of the ground and of
+        where they came down, soles on the ground. Hands, elbows, knees and the pelvis that touch a thing of the scene
+        touch it at the same place, and go with it. In every frame the figure is free of itself, of the ground and of
         things where the holds and limits leave room for it. Between frames parts may pass through each other: what
         `wb.check` tells of either, `wb.avoid` mends. With `ground=None` and no scene the figure may collide.
 
@@ -59,7 +66,7 @@ def retarget(
         UnknownNameError: a name that does not exist.
         FileFormatError: the TOML file cannot be read.
         InputError: no bones are known to belong to the figure, or two ends of none; the scene is of another figure; the
-            ground is none, or of a recording of another length.
+            ground is none, or of a recording of another length; so are placements of a thing.
 
     Examples:
         >>> walk = wb.retarget(skeleton, human)
@@ -81,8 +88,11 @@ def retarget(
             f"retarget: no joint of {motion.name} is known for {', '.join(roles.missing)}, so these follow nothing; "
             'name them by names= (or --names FILE.toml): a table "skeleton" with left_wrist = "hand.L"'
         )
+    tracks = _tracks(motion, scene, things)
     found = _ground(motion, figure, ground, names)
-    wanted = targets(motion, figure, roles, found, path=None if scene is None else 1.0)
+    # where nothing but floors stands, the ways of things are as long for the figure as its own way is
+    still = [] if scene is None else [name for name in still_things(scene) if name not in tracks]
+    wanted = targets(motion, figure, roles, found, path=None if scene is None or (tracks and not still) else 1.0)
     if not wanted.points:
         raise InputError(
             f"the roles that {motion.name} and {figure.name} have in common ({', '.join(roles.joints)}) make no bone; "
@@ -94,15 +104,53 @@ def retarget(
     holds = None
     if ground is not None or scene is not None:
         held = NOTHING if ground is None else found
-        surface = None if scene is None else surface_of(scene)
-        holds = Holds(held_points(figure, roles, held), held, wanted.path, motion.dt, surface)
+        surface = None if scene is None else surface_of(scene, tracks)
+        touched = None
+        if scene is not None:
+            recorded = Things(scene, tracks)
+            there = ground is not None and figure.root == "free"
+            tracks = {name: recorded.scaled(name, wanted.path) for name in tracks}
+            joints = skeleton_roles(motion, names)
+            contacts = recorded.contacts(motion, _touching(joints, roles)) if there else []
+            touched = Touched(figure, Things(scene, tracks), contacts)
+        points = held_points(figure, roles, held)
+        if touched is not None and touched.contacts:
+            points = [point for point in points if point.role not in {one.role for one in touched.contacts}]
+            points += touching_points(figure, roles, motion, touched.contacts, joints)
+        holds = Holds(points, held, wanted.path, motion.dt, surface, touched)
     with world.borrow() as workspace:
-        clip = Clip(
-            figure, Run(figure, wanted, roles, motion.dt, holds, workspace).run(progress), motion.dt, motion.name
-        )
+        run = Run(figure, wanted, roles, motion.dt, holds, workspace)
+        q = run.run(progress)
+        clip = Clip(figure, q, motion.dt, motion.name, tracks)
+    if run.lost:
+        warn(f"retarget: {motion.name}: {run.lost}, which it lets go of there; things keep their places and sizes")
     if told := said_of(errors_of(motion, clip, roles)):
         warn(f"retarget: {motion.name}: {told}; bone_errors has them frame by frame")
     return clip
+
+
+def _tracks(
+    motion: SkeletonMotion, scene: Scene | None, given: Mapping[str, Iterable[PlacementLike]] | None
+) -> dict[str, Array]:
+    """Placements (n, 7) of things that move."""
+    if given is None:
+        return {}
+    named = instance(given, Mapping, "retarget: things", "give placements by name: {'box': [(0.4, 0.0, 1.0), ...]}")
+    if scene is None:
+        raise InputError("retarget: things move in a scene; give scene= with them")
+    standing = [name for name, thing in scene.objects.items() if thing.segment is None]
+    for name in named:
+        known(name, standing, "thing", "retarget: things")
+    return thing_tracks(named, len(motion), "retarget")
+
+
+def _touching(joints: Mapping[str, str], roles: Roles) -> dict[str, str]:
+    """Joints of the skeleton by roles that a figure can bring to things: its own, and hands beyond its wrists."""
+    return {
+        role: joint
+        for role, joint in joints.items()
+        if role in roles.frames or (role.endswith("hand") and role.replace("hand", "wrist") in roles.frames)
+    }
 
 
 def same_figure(scene: Scene, figure: Figure) -> None:

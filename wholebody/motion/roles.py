@@ -37,19 +37,7 @@ class Roles(NamedTuple):
 def matched(
     motion: SkeletonMotion, figure: Figure, names: str | os.PathLike[str] | Mapping[str, Mapping[str, str]] | None
 ) -> Roles:
-    """The roles that a skeleton and a figure have in common: as names tell, and where they do not, its structure.
-
-    Args:
-        motion: of the skeleton.
-        figure: the figure.
-        names: a TOML file or a mapping with tables `skeleton` and `figure`, each role to name; what it leaves out is
-            matched by the table `data/roles.csv`.
-
-    Raises:
-        UnknownNameError: a role, a joint or a frame that does not exist.
-        FileFormatError: the file cannot be read.
-        InputError: less than two roles are common to both.
-    """
+    """The roles that skeleton and figure have in common, by `names` (tables `skeleton` and `figure`) or structure."""
     given = _given(names)
     table, found, more, said = _joints(motion, given)
     frames = _frames(figure)

@@ -172,10 +172,7 @@ class _Grid:
 
 
 def _winding(corners: Array, xs: Array, ys: Array, zs: Array) -> Array:
-    """How often the surface of triangles (m, 3, 3) winds about the points of a grid, (x, y, z).
-
-    A ray goes up from every point: a face that it leaves through counts 1, one that it enters through -1.
-    """
+    """How often the surface of triangles (m, 3, 3) winds about the points of a grid, (x, y, z), by rays upwards."""
     crossed = np.zeros((len(xs), len(ys), len(zs) + 1))
     for a, b, c in corners:
         area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

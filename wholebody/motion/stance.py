@@ -100,12 +100,7 @@ class StanceFeet:
 
 
 def standing(figure: Figure, q: Array, dt: float, feet: StanceFeet | None = None) -> Mapping[str, Mask]:
-    """For each foot in which frames of (n, nq), `dt` seconds apart, it stands: name -> (n,).
-
-    Raises:
-        UnknownNameError: the figure has no such frame.
-        InputError: the figure has no feet of the usual names, and none are named.
-    """
+    """For each foot in which frames of (n, nq), `dt` seconds apart, it stands: name -> (n,)."""
     settings = StanceFeet() if feet is None else feet
     names = settings.names(figure)
     limits = RestLimits(settings.speed, settings.height, settings.least, slid=np.inf)
@@ -129,11 +124,7 @@ def usual_feet(figure: Figure, constraints: Iterable[object]) -> tuple[str, ...]
 
 
 def standing_feet(clip: Clip, feet: Sequence[str]) -> dict[str, Mask]:
-    """In which frames (n,) each foot stands: one of its points does; none of a root that is fixed.
-
-    Raises:
-        InputError: no feet are named.
-    """
+    """In which frames (n,) each foot stands: one of its points does; none of a root that is fixed."""
     figure = clip.figure
     found: dict[str, Mask] = {}
     if figure.root != "free":

@@ -1,7 +1,4 @@
-"""Joint strength of people: the largest torques that muscles exert, by joint, direction, sex and percentile.
-
-The measurements are Stobbe's (1982); the table is `figures/data/strength.csv`.
-"""
+"""Joint strength of people: the largest torques that muscles exert (Stobbe 1982; `figures/data/strength.csv`)."""
 
 from __future__ import annotations
 

@@ -147,10 +147,8 @@ def upright(figure: Figure) -> Array:
 
 
 def built_figure(figure: Figure) -> dict[str, str]:
-    """Joint by role of a figure without names of parts, by its limbs at its zero; empty where it is no person's.
-
-    Joints that are near to each other are one: a hip is where its last joint is, a wrist where its first one is.
-    """
+    """Joint by role of a figure without names of parts, by its limbs at its zero; empty where it is no person's."""
+    # Near joints are one: a hip is where its last joint is, a wrist where its first one is.
     model, data = figure.model, figure.model.createData()
     pin.forwardKinematics(model, data, upright(figure))
     at = np.array([place.translation for place in data.oMi])
@@ -181,10 +179,7 @@ def built_figure(figure: Figure) -> dict[str, str]:
 
 
 def recognised_unit(parents: Indices, offsets: Array) -> str:
-    """The unit of `UNITS` in which a skeleton of a person's structure is nearest to a person's size.
-
-    Of other skeletons the size says little: they are in metres up to 3, in centimetres up to 300, else in millimetres.
-    """
+    """The unit of `UNITS` in which a person's skeleton is a person's size; of others m to 3, cm to 300, else mm."""
     size = max(longest_way(parents, offsets), 1e-12)
     if limb_pairs(parents, offsets):
         return min(

@@ -1,8 +1,4 @@
-"""Equipment: what a figure wears on its segments, and ready-made pieces for people.
-
-A piece is exact, or filled with spheres that join a collision group. Ready-made pieces are parametric meshes and solids
-of the sizes of common gear; their places follow from the figure's pieces.
-"""
+"""Equipment: what a figure wears on its segments, exact or as spheres, and ready-made pieces for people."""
 
 from __future__ import annotations
 
@@ -282,12 +278,7 @@ def dressed(figure: Figure, worn: Worn) -> Scene:
 
 
 def put_on(scene: Scene, worn: Worn) -> Scene:
-    """The scene, which is changed, with something attached to its figure.
-
-    Raises:
-        UnknownNameError: there is no such equipment.
-        WholebodyError: a mesh that cannot be read, or a figure that the equipment does not fit.
-    """
+    """The scene, which is changed, with something attached to its figure."""
     if isinstance(worn, tuple):
         for one in worn:
             put_on(scene, one)

@@ -202,11 +202,8 @@ def _answers(problem: Problem, rng: np.random.Generator) -> Iterator[_End]:
 
 
 def _drawn(problem: Problem, near: Array, spread: float, rng: np.random.Generator) -> Array:
-    """A posture (nq,) whose joints are a share of the way from another one to a random one.
-
-    A free root is within `ROOM` of that of the other posture; where nothing is held, it is turned about the vertical,
-    else it moves by the same share.
-    """
+    """A posture (nq,) whose joints are a share of the way from another one to a random one."""
+    # A free root is within `ROOM` of the other's; where nothing is held it turns about the vertical.
     held = holds(problem)
     figure, (drawn,) = problem.scene.figure, random_postures(problem.scene.model, 1, int(rng.integers(2**31)))
     away = spread * np.asarray(pin.difference(figure.model, near, drawn))

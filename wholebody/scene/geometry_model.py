@@ -129,10 +129,7 @@ class SceneGeometry:
     def update_placements(
         self, proximity: Proximity, seen: int, moved: dict[str, tuple[pin.SE3, pin.SE3]] | None = None
     ) -> int:
-        """Update the placements of the pieces that moved since `seen`; returns the present number of moves.
-
-        `moved` takes the objects that moved, with their placements before and after; of those put, after as both.
-        """
+        """Update placements of pieces that moved since `seen`; the number of moves. `moved` takes before and after."""
         if seen == self.moves:
             return seen
         with self.lock:
@@ -162,10 +159,7 @@ class SceneGeometry:
         return self._pools.setdefault(kind, Pool(make)) if pool is None else pool
 
     def known(self, key: Hashable, make: Callable[[], T]) -> T:
-        """What follows from the model and a key alone: made by `make` the first time, and read-only.
-
-        The 32 that were asked for last are kept.
-        """
+        """What follows from the model and a key alone, made the first time and read-only; the last 32 are kept."""
         found: T | None = self._known.get(key)
         if found is None:
             found = make()
@@ -198,10 +192,7 @@ class SceneGeometry:
 
 
 def assemble(figure: Figure, objects: Iterable[SceneObject], excluded: dict[tuple[str, str], str]) -> SceneGeometry:
-    """Geometry model of a figure with things: the figure's pieces first, then carried ones, then the world's.
-
-    A figure with outer pieces has them after its own: they meet what stands in the world, and its own meet the rest.
-    """
+    """Geometry model of a figure with things: the figure's pieces, outer ones, carried ones, the world's."""
     model = figure.model
     pieces = [pin.GeometryObject(piece) for piece in figure.geometry.geometryObjects]
     owners = [model.frames[piece.parentFrame].name for piece in pieces]
@@ -249,7 +240,8 @@ def _pairs_of_things(
         pairs = np.column_stack([np.tile(firsts, len(seconds)), np.repeat(seconds, len(firsts))])
         found.append(pairs[pairs[:, 0] < pairs[:, 1]])
     pairs = np.concatenate(found)
-    pairs = pairs[np.lexsort((pairs[:, 0], pairs[:, 1]))]
+    if len(found) > 2:  # those of one joint are in order
+        pairs = pairs[np.lexsort((pairs[:, 0], pairs[:, 1]))]
     if excluded:
         kept = [(owners[first], owners[second]) not in excluded for first, second in pairs.tolist()]
         pairs = pairs[np.array(kept, dtype=bool)] if len(pairs) else pairs

@@ -63,11 +63,8 @@ class FrameMotion:
         return {name: self._scene.placement(at, name) for name in self._scene.names}
 
     def next_share(self, share: float, near: Contacts, within: float) -> float:
-        """The share of the frame up to which things may move before the figure is asked again.
-
-        No pair comes nearer until then than it is apart now, and a part of its width. `near` are the pairs that are
-        nearer than `within` metres where things are now.
-        """
+        """The share of the frame up to which things may move before the figure is asked again."""
+        # Until then no pair, `near` or beyond `within` metres, comes nearer than it is now, and a part of its width.
         pairs, table = near.pair, self._both.table
         coming = self.way[pairs].sum(axis=1)
         # Share of the width of two pieces by which one may come into the other before the figure gives way. More =
@@ -83,10 +80,7 @@ class FrameMotion:
         return self._both.sweep.first_contact(self._at(q0, 0.0), self._at(q1, 1.0), tolerance=tolerance)
 
     def collisions(self, path: Sequence[tuple[float, Array]]) -> tuple[Collision, ...]:
-        """What the figure and things could not avoid on a path of shares of the frame and postures, the deepest first.
-
-        Nothing is in the way if the straight motion from the first posture to the last is free, or that along the path.
-        """
+        """What was not avoided on a path of shares of the frame and postures, the deepest first; none if free."""
         along = [self._at(q, share) for share, q in path]
         found = entered(self._both.sweep, self._both.depths, along, self._both.moves)
         owners, pairs = self._scene.owners, self._both.table.pairs

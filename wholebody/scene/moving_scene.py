@@ -46,18 +46,7 @@ class MovingScene:
         centres: Mapping[str, Array] | None = None,
         between_things: bool = True,
     ) -> None:
-        """Add the joints.
-
-        Args:
-            built: the scene's geometry, `scene.built`; later changes of placements are taken by `refresh`.
-            names: the things that move. A carried thing moves relative to its segment.
-            centres: thing to the point (3,) in its own frame about which it turns; by default the centre of its volume.
-            between_things: whether to add the pairs of two things in the world of which one moves at least.
-
-        Raises:
-            UnknownNameError: there is no such thing.
-            InputError: a thing is named twice, or a centre is not three finite numbers.
-        """
+        """Add the joints of things that move, about `centres` (3,), by default of their volume."""
         self.built, self.names, self.owners = built, tuple(names), built.owners
         for name in self.names:
             known(name, built.pieces_of, "object")
@@ -84,10 +73,7 @@ class MovingScene:
                 self.geometry.geometryObjects[index].placement = given.geometryObjects[index].placement
 
     def configuration(self, q: Array, placements: Mapping[str, pin.SE3]) -> Array:
-        """The configuration (nq,) of the figure's posture (figure_nq,) and a placement of each thing that moves.
-
-        Placements are in the world, or in its joint's frame for a carried thing.
-        """
+        """The configuration (nq,) of a posture (figure_nq,) and placements, in the world or a carried thing's joint."""
         parts = [np.asarray(q, dtype=float)]
         for name in self.names:
             place = placements[name]

@@ -11,19 +11,17 @@ from typing import Any, NamedTuple, TypeVar
 
 from wholebody.base import checks
 from wholebody.base.arrays import brief
-from wholebody.base.batches import fingerprint, run_batch, shared
-from wholebody.base.progress import reporter
+from wholebody.base.batches import fingerprint, reporter, run_batch, shared
 from wholebody.base.runner import EndedError, Job
 from wholebody.methods.base import Method
 from wholebody.methods.control import ctrl_c_ends_all
 from wholebody.methods.inputs import check_problem
 from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
-from wholebody.studies.at_once import at_once
 from wholebody.studies.neighbours import Family, Work, lower, name_changes, solve_from_neighbours
 from wholebody.studies.records import ENDED, Records, RecordStore, SolveRecord
 from wholebody.studies.sending import Sender, sent_to
-from wholebody.studies.solving import Case, Run, solve_runs
+from wholebody.studies.solving import Case, Run, at_once, solve_runs
 from wholebody.tasks.answers import is_own
 
 MOST_JOBS = 4096
@@ -67,12 +65,7 @@ class Running:
     def checked(
         cls, what: str, method: object, jobs: object, cluster: object, seconds: object, progress: Any
     ) -> Running:
-        """Check the arguments of a function that runs cases.
-
-        Raises:
-            InputError: one is of the wrong kind or range.
-            UnknownNameError: there is no such method.
-        """
+        """Check the arguments of a function that runs cases."""
         return cls(
             as_method(method),
             checks.whole(jobs, f"{what}: jobs", 1, MOST_JOBS),
@@ -173,7 +166,7 @@ def run_cases(runs: Sequence[Sequence[Case]], running: Running, store: RecordSto
     if not over:
         single = [run[0] for run in numbered if len(run) == 1 and run[0] not in done]
         with closing(_at_once(single, order, running)) as answers:
-            over = any(keep(k, replace(order[k].record, **answer)) for k, answer in answers)
+            over = any(keep(k, _answered(order[k].record, answer)) for k, answer in answers)
     waiting = [run for run in numbered if any(k not in done for k in run)]
     # The first of each run begin at each other's answers, one after the other, and the rest of a run at its first: so
     # all runs are of one family of postures, whatever `jobs` is.
@@ -200,6 +193,11 @@ def _at_once(
         yield numbers[place], answer
 
 
+def _answered(record: SolveRecord, answer: dict[str, Any]) -> SolveRecord:
+    """The record of a case with what came of it: `replace`, in a third of the time."""
+    return SolveRecord(record.name, factors=record.factors, **answer)
+
+
 def _computed(order: Sequence[Case], running: Running, function: Callable[..., Any], work: Work) -> dict[Any, Any]:
     """Answers of a function of `solving` by key, see `Family`."""
     given, sender = {key: (order[k].make, *rest) for key, (k, *rest) in work.items()}, Sender()
@@ -220,10 +218,7 @@ def _run(
     work: Sequence[Sequence[int]], order: Sequence[Case], running: Running, keep: Callable[[int, SolveRecord], bool],
     alone: list[Sequence[int]], begun: Mapping[int, Any],
 ) -> bool:  # fmt: skip
-    """Do runs; whether the caller ended them. Runs of several cases whose process ended are left in `alone`.
-
-    `begun` has the posture (nq,), or None, from which the first case of a run is tried before its own start.
-    """
+    """Do runs; whether the caller ended them. Those of several cases whose process ended are left in `alone`."""
     sender = Sender()
 
     def made(run: Sequence[int]) -> Run:
@@ -252,10 +247,7 @@ def _done(
     work: Sequence[T], cases: Iterable[Case], running: Running,
     ways: tuple[Callable[[T], Any], Callable[[list[T], bool], Job]],
 ) -> Generator[tuple[T, Any, EndedError | None], None, None]:  # fmt: skip
-    """Do work, in this process too where nobody else's code in its cases can end it or go on for ever.
-
-    `ways` are how a part is done here, and the job that does parts elsewhere; see `shared`.
-    """
+    """Do work, in this process too where nobody else's code can end it; `ways`: here, and as jobs of `shared`."""
     here, there = ways
     if _is_quick(cases, running):
         yield from shared(work, running.jobs, here, there)

@@ -56,10 +56,8 @@ def solve_from_neighbours(family: Family) -> bool:
 
 
 def _nearest(solved: Indices, distances: Indices, tried: Mapping[int, int]) -> tuple[int, int] | None:
-    """The nearest of some solved cases that was not tried, and how far it is; None where enough were tried.
-
-    After `NEIGHBOURS` only those count that are nearer than all before: an answer spreads from neighbour to neighbour.
-    """
+    """The nearest solved case that was not tried, and how far it is; None where enough were tried."""
+    # After `NEIGHBOURS` only those nearer than all before: an answer spreads from neighbour to neighbour.
     left = ~np.isin(solved, [*tried])
     if not left.any():
         return None
@@ -69,16 +67,11 @@ def _nearest(solved: Indices, distances: Indices, tried: Mapping[int, int]) -> t
 
 
 def lower(family: Family) -> bool:
-    """Solve both cases of each jump from their own starts and from the answers of all neighbours; the lowest stays.
+    """Solve the cases beside a jump (`JUMP`) again, also from the answers of all neighbours; whether the caller ended.
 
-    A jump is between neighbours that are solved and whose coordinates differ by more than `JUMP`. A warm start may
-    follow a family of postures that is no longer the lowest, and an own start may lead to a worse one: the lower family
-    spreads from a jump to the next case, until nothing is lower. A case is solved at most `TRIES` times more, whatever
-    the count of cases is, and not where nothing is measured. Each round takes the answers of the one before, so that
-    the order in which solves end does not matter.
-
-    Returns:
-        Whether the caller ended the run.
+    A warm start may follow a family of postures that is no longer the lowest, and an own start lead to a worse one: the
+    lower spreads from case to case, each at most `TRIES` times. A round takes the answers of the one before, so the
+    order in which solves end does not matter.
     """
     order, done, compute, keep = family
     pairs = _neighbours(order)

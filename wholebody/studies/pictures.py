@@ -81,10 +81,7 @@ def write_page(found: Any, path: Path) -> Path:
 
 
 def heat(found: Any) -> Array:
-    """(nx, ny, nz) what is drawn: minus the distance that is left, metres; where reached, 0 to 1 by the measure.
-
-    1 is the least measure of all reached places, 0 the greatest.
-    """
+    """(nx, ny, nz) minus the distance that is left, metres; where reached, 1 for the least measure to 0."""
     values: Array = -np.asarray(found.left, dtype=float)
     reached = found.reached
     if reached.any():

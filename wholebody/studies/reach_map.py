@@ -10,9 +10,8 @@ import numpy as np
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.base.batches import spread
+from wholebody.base.batches import reporter, spread
 from wholebody.base.errors import InputError
-from wholebody.base.progress import reporter
 from wholebody.base.runner import packed
 from wholebody.geometry.placement import FARTHEST
 from wholebody.methods.base import Method

@@ -20,11 +20,7 @@ class Sent(NamedTuple):
     scenes: dict[str, bytes]  # digest of each of its scenes to that scene, pickled
 
     def read(self) -> Any:
-        """The value, with the scenes that this process has seen already, or has them now.
-
-        Raises:
-            KeyError: it has not seen one that was not sent.
-        """
+        """The value, with the scenes that this process has seen; KeyError for one that was not sent."""
         return _Reader(self).load()
 
 

@@ -1,20 +1,23 @@
-"""What is done in a process that solves problems of many: each answer is what its record says."""
+"""Problems of many, solved in a process one by one, or of one form in batches; answers are what records say."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, as_dict
+from wholebody.base.batches import shared
 from wholebody.base.errors import WholebodyError, one_line
+from wholebody.base.runner import Job
 from wholebody.methods.base import Method
 from wholebody.methods.inputs import check_problem
 from wholebody.problem import Problem
-from wholebody.studies.records import REFUSED, SolveRecord, answer_of
+from wholebody.studies.records import JUDGED, REFUSED, SolveRecord, answer_of
+from wholebody.studies.sending import Sender, sent_to
 from wholebody.tasks.bounds import Freeze
 
 Make = Callable[[], Problem]
@@ -27,6 +30,9 @@ SHIFTING = ("JointModelP", "JointModelTranslation")
 
 Run = tuple[Any, Sequence[Make]]
 """The posture (nq,) from which the first of some problems is tried, None for its own start; and the problems."""
+
+
+LARGEST = 256  # problems of a batch. More: fewer calls; less: progress is told sooner, and processes end together.
 
 
 @dataclass(frozen=True)
@@ -66,10 +72,7 @@ def _solved(make: Make, method: Method, q: Array | None) -> dict[str, Any]:
 
 
 def _warm_answer(problem: Problem, method: Method, q: Array) -> dict[str, Any] | None:
-    """What a record says of a problem solved from another's answer (nq,); None where it is not solved, or refused.
-
-    A start may be refused that is another's answer where the problem's own is not: a hold elsewhere at the start.
-    """
+    """What a record says of a problem solved from another's answer (nq,); None where not solved, or refused."""
     try:
         solution = warmed(method).solve(begun_at(problem, q))
     except WholebodyError:
@@ -90,10 +93,7 @@ def solve_from(given: Sequence[Start], method: Method) -> list[dict[str, Any] | 
 
 
 def most_turned(given: Sequence[tuple[Make, Array, Array]], _method: Method) -> list[tuple[str, float]]:
-    """Of each problem, the joint that turns most between two postures (nq,), and the angle in radians.
-
-    Joints that shift, and the root, are left out; ("", 0.0) where there is no other.
-    """
+    """Of each problem, the joint that turns most between two postures (nq,), and the angle, radians."""
     found = []
     for make, one, other in given:
         model = make().scene.model
@@ -125,3 +125,30 @@ def warmed(method: Any) -> Any:
         return replace(method, **dict.fromkeys(settings & {"restarts", "budget"}, 0))
     except Exception:  # a method of the user's own may refuse them
         return method
+
+
+def at_once(problems: Sequence[Problem], method: Any, jobs: int) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Solve those problems that a method with `batches` answers many of at a time: place and record of each solved."""
+    sender = Sender()
+
+    def there(batches: list[Any], full: bool) -> Job:
+        return Job(batches, sent_to, (_run_all, sender.sent(batches, full)), 0.0)
+
+    batches = method.batches(problems, LARGEST)
+    for batch, answers, error in shared(batches, jobs, lambda batch: batch.run(), there):
+        if error is None:
+            yield from _records(batch, answers)
+
+
+def _run_all(batches: Sequence[Any]) -> list[Any]:
+    return [batch.run() for batch in batches]
+
+
+def _records(batch: Any, answers: Any) -> Iterator[tuple[int, dict[str, Any]]]:
+    """The place of each problem of a batch that is solved, and what its record says."""
+    seconds = answers.seconds / len(batch.places)
+    columns = {name: values.tolist() for name, values in as_dict(answers.judged).items() if name in JUDGED}
+    for k in answers.solved.nonzero()[0].tolist():
+        numbers = {name: values[k] for name, values in columns.items()}
+        said = {"outcome": "solved", "message": "solved directly", "seconds": seconds}
+        yield batch.places[k], {**said, "iterations": int(answers.iterations[k]), "q": answers.q[k].copy(), **numbers}

@@ -89,10 +89,7 @@ SHAPES = {
 
 
 def _form(made: type, names: str, /, **given: Kind) -> Form:
-    """A form whose keys are fields of the class that it makes; those without a default are required.
-
-    Their kinds are what the fields accept, where none is given.
-    """
+    """A form whose keys are fields of the class that it makes; those without a default are required."""
     needed = {field.name for field in fields(made) if field.default is field.default_factory is MISSING}
     keys = (Key(name, given.get(name) or kind_of(made, name), name in needed) for name in names.split())
     return Form(tuple(keys), made)
@@ -151,7 +148,7 @@ MEASURES = {
     "rotation_effort": _form(tasks.RotationEffort, "weight"),
     "discomfort": _form(tasks.Discomfort, "weight"),
     "displacement": _form(tasks.Displacement, "weight"),
-    "rhythm": _form(tasks.Rhythm, "weight"),
+    "rhythm": _form(tasks.Rhythm, "weight style"),
     "stance": _form(tasks.Stance, "feet weight", feet=Several(SEGMENT)),
     "exertion": _form(ergonomics.Exertion, "forces strength standing weight", forces=FORCES, strength=STRENGTH),
     "potential_energy": _form(tasks.PotentialEnergy, "weight"),

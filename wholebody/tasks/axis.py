@@ -121,21 +121,15 @@ class Axis(Goal):
 
 
 def equidistant_error(x: float, y: float, along: float) -> Array:
-    """(2,) angle between a unit direction and the axis, resolved along t1 and t2 [rad].
-
-    The arguments are the components of the direction along t1, t2 and the axis.
-    """
+    """(2,) angle [rad] between a unit direction, by its components along t1, t2 and the axis, and the axis."""
     sine = hypot(x, y)
     angle = atan2(sine, along)
     return np.array((angle, 0.0)) if sine < NO_ANGLE else np.array((x, y)) * (angle / sine)
 
 
 def equidistant_jacobian(x: float, y: float, along: float) -> Array:
-    """(2, 3) derivative of `equidistant_error` by the three components, for changes that keep the length 1.
-
-    theta' = c s' - s c', and (x / s)' is the part of x' across x, over s. Across the error the derivative is the angle
-    over its sine, at most `STEEPEST`.
-    """
+    """(2, 3) derivative of `equidistant_error`, for changes that keep the length 1."""
+    # theta' = c s' - s c', and (x / s)' is the part of x' across x, over s: at most `STEEPEST` across the error.
     sine = hypot(x, y)
     at_an_end = 1.0 if along > 0.0 else STEEPEST
     gain = at_an_end if sine < NO_ANGLE else min(atan2(sine, along) / sine, STEEPEST)

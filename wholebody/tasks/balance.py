@@ -37,10 +37,7 @@ NEAREST = 1e-5  # Distance [m] below which two points count as one corner
 
 
 def standing_points(scene: Surroundings, q: Array, feet: Sequence[str]) -> Array:
-    """Points (n, 3) on which the feet stand at the posture q: the lowest corners of their pieces.
-
-    Child segments of a foot, such as toes, belong to it.
-    """
+    """Points (n, 3) on which the feet, toes included, stand at q: the lowest corners of their pieces."""
     places: dict[int, pin.SE3] = {}
     points = []
     for foot in feet:
@@ -81,11 +78,8 @@ def convex_polygon(points: Array) -> Array:
 
 
 def hull_corners(points: Array) -> list[int]:
-    """Indices of the corners of the convex hull of points (n, 2), anticlockwise; none where they lie on a line.
-
-    Andrew's monotone chain (1979, "Another efficient algorithm for convex hulls in two dimensions"), on micrometres: an
-    edge between two points that differ by rounding alone would have no direction.
-    """
+    """Indices of the convex hull's corners of points (n, 2), anticlockwise; none on a line."""
+    # Andrew's monotone chain (1979), on micrometres: an edge that is rounding alone would have no direction.
     places = points[:, :2].tolist()
     order = sorted(range(len(places)), key=lambda k: (round(places[k][0], 6), round(places[k][1], 6)))
 
@@ -117,10 +111,7 @@ def edges(corners: Array) -> tuple[Array, Array]:
 
 
 def shrunk(corners: Array, margin: float) -> Array:
-    """Corners (m, 2) of the polygon with a margin cut off on every side; empty if nothing remains.
-
-    Clips by one edge after the other (Sutherland and Hodgman 1974, "Reentrant polygon clipping").
-    """
+    """Corners (m, 2) of a polygon with a margin cut off (Sutherland and Hodgman 1974); empty if nothing remains."""
     rest = corners
     for normal, offset in zip(*edges(corners), strict=True):
         inside = rest @ normal - offset - margin

@@ -98,23 +98,11 @@ class Term(Checked):
         return ()
 
     def resolve(self: _T, scene: Surroundings, start: Array) -> _T:
-        """Copy of the term that is ready to be evaluated on the scene.
-
-        Args:
-            scene: the figure and the things around it.
-            start: (nq,) start posture of the problem.
-
-        Raises:
-            UnknownNameError: the term names a frame, joint or group that the figure does not have.
-            InputError: a value does not fit the figure.
-        """
+        """Copy of the term that is ready to be evaluated on the scene; `start` (nq,) is that of the problem."""
         return self
 
     def value_and_jacobian(self, state: State, value: Callable[[State], Array]) -> tuple[Array, Wrench | Array]:
-        """What `value`, which is the `error` or `value` of this term, and `jacobian` answer.
-
-        A term whose values and derivatives come from one computation overrides this.
-        """
+        """Value and Jacobian; a term whose values and derivatives come from one computation overrides this."""
         return value(state), self.jacobian(state)  # type: ignore[attr-defined]
 
 

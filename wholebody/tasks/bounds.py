@@ -129,11 +129,7 @@ def at_speeds(bounds: Sequence[Bound], state: State, dt: float | None) -> Array 
 
 
 def clipped(model: pin.Model, begin: Array, q: Array, most: Array | None) -> Array:
-    """The posture q, or the nearest one whose displacement from `begin`, both (nq,), is within `most` (2, nv).
-
-    Displacements of a root that turns do not add: parts of a motion that are each within bounds may exceed them
-    together.
-    """
+    """The posture q, or the nearest whose displacement from `begin`, both (nq,), is within `most` (2, nv)."""
     if most is None:
         return q
     gone = pin.difference(model, begin, q)

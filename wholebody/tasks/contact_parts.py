@@ -135,10 +135,7 @@ class Gap(NamedTuple):
 
 
 class Meeting(NamedTuple):
-    """Two points that meet: three rows, what is between them along the axes of the world [m].
-
-    Their distance would not do: where it vanishes it has no derivative, and steps to it swing.
-    """
+    """Two points that meet: three rows along the world's axes [m], as a distance has no derivative where it is zero."""
 
     first: Surface  # the points
     second: Surface
@@ -173,10 +170,7 @@ class Near(NamedTuple):
 
 
 class Facing(NamedTuple):
-    """An axis of a frame along a direction that goes with a face: two rows, the angle between them [rad].
-
-    The same azimuthal equidistant rows as those of `Axis`, see there.
-    """
+    """An axis of a frame along a direction that goes with a face: the two rows of `Axis`, angle between them [rad]."""
 
     place: Place  # the frame and its joint
     basis: Array  # (3, 3) rows in the frame: two directions across the axis, and the axis
@@ -336,11 +330,8 @@ def has_face(term: Any) -> bool:
 
 
 def approached(term: _T, distance: float) -> _T:
-    """A resolved term whose surfaces are to be in front of the planes of their faces by a distance [m].
-
-    The signed distance of two surfaces does not tell on which side of a thing a surface is: a foot under a pedal is
-    pushed down out of it, never up through it. Towards the plane of its face the distance leads to the open side.
-    """
+    """A resolved term whose surfaces are to be in front of the planes of their faces by a distance [m]."""
+    # The signed distance does not tell the side: a foot under a pedal is pushed down out of it, never up through it.
     if not has_face(term):
         return term
     return filled(term, parts=tuple(_approached(part, distance) for part in getattr(term, "parts", ())))

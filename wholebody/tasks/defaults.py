@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Callable, Sequence, Set
 
 import numpy as np
 
@@ -32,10 +32,7 @@ _effort = Effort()
 def default_measures(
     scene: Surroundings, start: Array, stances: Sequence[tuple[str, ...]], *, ranges: bool
 ) -> tuple[Measure, ...]:
-    """`Effort`, and for a person `Rhythm` beside it, resolved; and the `Stance` of each pair of feet that may slide.
-
-    Who kneels and does not at the start spares effort from the posture "kneeling" there.
-    """
+    """`Effort`, for a person `Rhythm`, resolved, and the `Stance` of feet that may slide; who kneels spares effort."""
     if not (ranges and scene.figure.ranges and inputs.once(scene, "girdles", lambda: girdles_of(scene.figure))):
         return (_effort.resolve(scene, start),)
     shanks = {side for sides in stances for side in sides if side.endswith("_shank")}
@@ -45,10 +42,7 @@ def default_measures(
 
 
 def stances(scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal]) -> tuple[tuple[str, ...], ...]:
-    """The feet of each that stands and keeps the balance, or is to kneel, but for those who kneel at the start.
-
-    Who sits, leans or holds on puts the feet where they belong.
-    """
+    """The feet of each who stands and balances, or is to kneel, but does not sit, lean or hold on."""
 
     def kneels(stand: Stand) -> bool:
         at_start = stand.value(State(scene.model).update(start))
@@ -105,15 +99,15 @@ def default_constraints(
 
 
 def standing(
-    scene: Surroundings, state: State, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound]
+    scene: Surroundings, at: Callable[[], State], terms: Sequence[Constraint | Goal], bounds: Sequence[Bound]
 ) -> tuple[str, ...]:
-    """The persons who stand, by what the names of each begin with; see `_stands`."""
+    """The persons who stand, by what the names of each begin with; see `_stands`. `at` gives the state at the start."""
     figure = scene.figure
-    return tuple(
-        body
-        for body in balancing(scene, terms)
-        if figure.ranges and f"{body}root" in figure.roots and _stands(scene, state, terms, bounds, body)
-    )
+    bodies = [body for body in balancing(scene, terms) if figure.ranges and f"{body}root" in figure.roots]
+    if not bodies:
+        return ()
+    state = at()
+    return tuple(body for body in bodies if _stands(scene, state, terms, bounds, body))
 
 
 def balancing(scene: Surroundings, terms: Sequence[Constraint | Goal]) -> tuple[str, ...]:

@@ -133,21 +133,13 @@ SAME = 1e-9
 
 
 class BallJoint(NamedTuple):
-    """Three hinges with one centre, whose axes are at right angles where all three angles are zero.
+    """Three hinges with one centre, whose axes are at right angles where all three angles are zero."""
 
-    Attributes:
-        idx_q: places in the posture.
-        idx_v: the same in the tangent.
-        axes: (3, 3) a hinge's axis a row, in what carries the first hinge, where the angles are zero.
-        weights: (3,) of the rotation vector's part along each axis, not negative.
-        start: (3, 3) rotation of the last hinge against that of zero angles, at the start.
-    """
-
-    idx_q: tuple[int, int, int]
-    idx_v: tuple[int, int, int]
-    axes: Array
-    weights: Array
-    start: Array
+    idx_q: tuple[int, int, int]  # places in the posture
+    idx_v: tuple[int, int, int]  # the same in the tangent
+    axes: Array  # (3, 3) a hinge's axis a row, in what carries the first hinge, where the angles are zero
+    weights: Array  # (3,) of the rotation vector's part along each axis, not negative
+    start: Array  # (3, 3) rotation of the last hinge against that of zero angles, at the start
 
     def turn(self, q: Array) -> tuple[Array, Array]:
         """Rotation (3, 3) at a posture, and the hinges' axes there (3, 3), an axis a column."""
@@ -158,11 +150,8 @@ class BallJoint(NamedTuple):
         return rotation, axes
 
     def residuals(self, q: Array) -> tuple[Array, Array]:
-        """Weighted parts of the rotation vector (3,), and their derivatives (3, 3) by the three angles.
-
-        With v the rotation vector of the rotation from the start, dv = J_l^-1(v) sum_k axis_k dq_k; J_l^-1 is the
-        inverse left Jacobian of SO(3), the transpose of the right one (Chirikjian 2011, section 10.6).
-        """
+        """Weighted parts of the rotation vector (3,), and their derivatives (3, 3) by the three angles."""
+        # dv = J_l^-1(v) sum_k axis_k dq_k; J_l^-1 is the transpose of the right one (Chirikjian 2011, section 10.6).
         rotation, axes = self.turn(q)
         away = rotation @ self.start.T
         share = np.sqrt(self.weights)[:, None] * self.axes

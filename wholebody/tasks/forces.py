@@ -89,11 +89,7 @@ def point_rows(state: State, point: Array, joint: int) -> Array:
 
 
 def pressure(state: State, loads: Loads, mass: range | None, height: float) -> tuple[Array, Array]:
-    """The point (2,) where level ground at a height presses against the weight of joints and forces; its derivative.
-
-    About that point [m] the weight and the forces have no moment but about the vertical: without forces it is below
-    the centre of mass.
-    """
+    """The point (2,) about which weight and forces have no moment but a vertical one, and its derivative."""
     model = state.model
     weight = GRAVITY * sum(model.inertias[k].mass for k in (mass or range(1, model.njoints)))
     center, moved = state.center_of_mass(mass)[:2], state.center_of_mass_jacobian(mass)[:2]

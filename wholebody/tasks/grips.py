@@ -51,10 +51,7 @@ def bar_of(thing: Surface, state: State, where: str) -> Face:
 
 
 def rim_of(thing: Surface, outwards: Array, state: State) -> Face | None:
-    """The rim of a ring where it lies in a direction (3,) from the ring's middle, as a bar; None for no ring.
-
-    Axes: the ring's own, outwards in its plane, along the rim. `half`: of its thickness, twice, and of the straight.
-    """
+    """The rim of a ring in a direction (3,) from its middle, as a bar: outwards, along the rim; None for no ring."""
     if len(thing.shapes) < 8:  # least number of pieces of a ring
         return None
     middles = []
@@ -157,10 +154,7 @@ def opened(term: Any, distance: float) -> Any:
 
 
 def _beside(place: Place, bar: Face, axis: int, state: State) -> tuple[Array, Array]:
-    """The way from the palm to a bar along an axis of the palm, across the bar, and along the bar; derivatives (2, nv).
-
-    The way along the bar is that to its middle. Both in metres.
-    """
+    """Ways [m] from the palm to a bar's middle along a palm's axis, across and along the bar; derivatives (2, nv)."""
     center, axes = bar.at(state)
     frame, along = state.frame(place.frame), axes[2]
     palm, across_palm = frame.translation, frame.rotation[:, axis]
@@ -197,10 +191,7 @@ class Looking(NamedTuple):
 
 
 class Opposing(NamedTuple):
-    """The normals of one contact and of several others on a thing within an angle of opposite: one row.
-
-    The row is the angle beyond it, zero within it, times a lever.
-    """
+    """The normals of one contact and of several others within an angle of opposite: the angle beyond, times a lever."""
 
     first: Surface  # surface on one side, such as a thumb
     others: tuple[Surface, ...]  # surfaces on the other, such as fingers

@@ -150,10 +150,7 @@ Name: TypeAlias = Annotated[str, name]
 
 
 def joints_with_mass(scene: Surroundings, where: str, frames: Sequence[str] = ()) -> range | None:
-    """The joints whose centre of mass counts: None for all, or those of the one figure that has these frames.
-
-    An InputError if the frames are of several figures, or if nothing of the figure that moves has mass.
-    """
+    """The joints whose mass counts: None for all, or those of the one figure that has these frames."""
     figure, joints = scene.figure, None
     if frames and len(figure.bodies) > 1:
         body = body_of(scene, frames)

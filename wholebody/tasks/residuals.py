@@ -24,10 +24,7 @@ _FORCES: Array = np.eye(3, 6)
 
 
 def point_rows(point: Array) -> Array:
-    """Wrenches (3, 6) whose rows are the velocity of a moving point in the world's axes.
-
-    Written out because numpy's cross product costs twenty times as much on three rows.
-    """
+    """Wrenches (3, 6) of a moving point's velocity; written out, as numpy's cross product costs 20 times as much."""
     rows: Array = _FORCES.copy()
     fill_point_rows(rows, point)
     return rows
@@ -49,10 +46,7 @@ _angular.flags.writeable = False
 
 
 class PlacementResidual(NamedTuple):
-    """Difference between the placement of one frame relative to another and its target, in the axes of the other frame.
-
-    Rows: position (3, metres) if `position`, then rotation vector (3, radians) if `orientation`.
-    """
+    """Placement of a frame relative to another less its target: position [m], then rotation vector [rad]."""
 
     place: Place  # the frame that moves
     base: Place  # the reference frame; the world by default

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import NamedTuple, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -36,6 +36,26 @@ Database, 559 frames) has knees of 28, 47, 68 and 89 degrees beyond those of sta
 is 16, 32, 58 and 75. He squats more than most: people who lift as they like neither stoop with straight knees nor squat
 (Davis et al. 2002, Occupational Ergonomics 3(2)), so the share, and the weight, are an ESTIMATE beside his."""
 
+Style: TypeAlias = Literal["free", "stoop", "squat"]
+
+
+class Sharing(NamedTuple):
+    """How a style shares a bend; weights in 1/rad^2."""
+
+    knee: float  # of the flexion of a hip
+    knee_weight: float
+    lumbar: float  # most of the lumbar spine, radians
+    lumbar_weight: float
+
+
+STYLES = {
+    "free": Sharing(KNEE_SHARE, KNEE_WEIGHT, LUMBAR_MOST, LUMBAR_WEIGHT),
+    "stoop": Sharing(0.0, 4.0 * KNEE_WEIGHT, LUMBAR_MOST, LUMBAR_WEIGHT),
+    "squat": Sharing(1.5 * KNEE_SHARE, 4.0 * KNEE_WEIGHT, 0.5 * LUMBAR_MOST, 10.0 * LUMBAR_WEIGHT),
+}
+"""Who stoops keeps the knees as they are; who squats bends them by 118 degrees at hips of 100 and keeps the back. The
+weights, ESTIMATES, make a style of what is only a tendency in who does as he likes."""
+
 
 Three: TypeAlias = tuple[int, int, int]
 
@@ -61,7 +81,9 @@ class Lumbar(NamedTuple):
     idx_q: Three  # their flexion: places in the posture
     idx_v: Three  # the same in the tangent
     root: tuple[int, int]  # of the root: its first place in the posture, and in the tangent
-    rest: float  # what they have beyond their share at the start, radians
+    rest: float = 0.0  # what they have beyond their share at the start, radians
+    weight: float = LUMBAR_WEIGHT  # of the square, 1/rad^2
+    most: float = LUMBAR_MOST  # of their share, radians
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,10 +98,13 @@ class Rhythm(Measure):
     - l is the flexion of the lumbar spine beyond its share of the tilt t of the pelvis, ``46 deg tanh(2.5 sin t)``, and
       l_0 the same at the start (lumbar-pelvic rhythm).
 
-    A problem of a person has this measure by default, beside `Effort`.
+    A problem of a person has this measure by default, beside `Effort`. Another style is a choice of how to bend:
+    ``measures=[wb.Effort(), wb.Rhythm(style="stoop")]`` keeps the knees as they are, "squat" bends them by 1.5 times as
+    much as "free" and keeps the back straighter.
 
     Attributes:
         weight: factor on the measure.
+        style: how knees and hips share a bend: "free", "stoop" or "squat".
         girdles: clavicles with their arms, once resolved; those of each of several figures.
         knees: knees with their hips; they count where there is a lumbar spine.
         lumbar: the lumbar spine of each figure with a free root.
@@ -88,10 +113,11 @@ class Rhythm(Measure):
         InputError: a weight out of range, or in a problem a figure that is no person.
 
     Examples:
-        >>> natural = wb.Rhythm(weight=1.0)
+        >>> upright_back = wb.Rhythm(style="squat")
     """
 
     weight: inputs.Weight = 1.0
+    style: Style = "free"
     girdles: tuple[Elevation, ...] = field(init=False, repr=False)
     knees: tuple[Elevation, ...] = field(init=False, repr=False)
     lumbar: tuple[Lumbar, ...] = field(init=False, repr=False)
@@ -101,8 +127,11 @@ class Rhythm(Measure):
         girdles, knees, spines = inputs.once(scene, Rhythm, partial(_parts, scene.figure))
         if not girdles and not spines:
             raise InputError("Rhythm: this figure has no clavicles and no lumbar spine; leave the measure out")
+        own = STYLES[self.style]
+        knees = tuple(with_values(knee, most=own.knee, weight=own.knee_weight) for knee in knees)
         knees = tuple(with_values(knee, rest=_beyond(start, knee)[0]) for knee in knees)
-        lumbar = tuple(with_values(spine, rest=_bent(start, spine)[0]) for spine in spines)
+        lumbar = tuple(with_values(spine, most=own.lumbar, weight=own.lumbar_weight) for spine in spines)
+        lumbar = tuple(with_values(spine, rest=_bent(start, spine)[0]) for spine in lumbar)
         return filled(self, girdles=girdles, knees=knees, lumbar=lumbar)
 
     def value(self, state: State) -> float:
@@ -141,7 +170,7 @@ class Rhythm(Measure):
         for spine in self.lumbar:
             excess, turn = _bent(q, spine)
             places = [*spine.idx_v, spine.root[1] + 4, spine.root[1] + 5]
-            found.append((LUMBAR_WEIGHT, excess, places, np.array([1.0, 1.0, 1.0, *turn])))
+            found.append((spine.weight, excess, places, np.array([1.0, 1.0, 1.0, *turn])))
         return found
 
 
@@ -187,7 +216,7 @@ def _lumbar(figure: Figure, body: str) -> tuple[Lumbar, ...]:
     if f"{body}root" not in figure.roots or not _has(figure, names):
         return ()
     root = figure.model.joints[figure.roots[f"{body}root"]]
-    return (Lumbar(*_places(figure, names), (int(root.idx_q), int(root.idx_v)), 0.0),)
+    return (Lumbar(*_places(figure, names), (int(root.idx_q), int(root.idx_v))),)
 
 
 def _beyond(q: Array, part: Elevation) -> tuple[float, tuple[float, float, float]]:
@@ -211,6 +240,6 @@ def _bent(q: Array, lumbar: Lumbar) -> tuple[float, tuple[float, float]]:
     forward, left, up = 2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)
     # The root's x axis dips by sin(tilt) = -forward, the height of that axis.
     share = math.tanh(-LUMBAR_RATE * forward)
-    steep = LUMBAR_MOST * LUMBAR_RATE * (1.0 - share * share)
+    steep = lumbar.most * LUMBAR_RATE * (1.0 - share * share)
     flexion = sum(float(q[place]) for place in lumbar.idx_q)
-    return flexion - LUMBAR_MOST * share - lumbar.rest, (-steep * up, steep * left)
+    return flexion - lumbar.most * share - lumbar.rest, (-steep * up, steep * left)

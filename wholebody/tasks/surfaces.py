@@ -64,11 +64,8 @@ class Nearest(NamedTuple):
 
 
 def surface(scene: Surroundings, name: str, where: str) -> Surface:
-    """The surface of a thing, a segment or a piece; of a frame, the point at its origin.
-
-    A link of a file may have no pieces of its own: then its surface is the convex hull of what is drawn of it. If
-    nothing is drawn, and it has mass or a joint of its own, it is that of all that moves with it.
-    """
+    """The surface of a thing, a segment or a piece; of a frame, the point at its origin."""
+    # A link of a file without pieces is the hull of what is drawn of it, or of all that moves with it.
     if not isinstance(name, str):
         raise InputError(f"{where} takes the name of a segment, thing, piece or frame, not {shown(name)}")
     owned = [index for index, owner in enumerate(scene.piece_owner) if owner == name]
@@ -215,10 +212,7 @@ def face(scene: Surroundings, name: str, direction: Array, state: State, where: 
 
 
 def outermost(shape: Any, placement: pin.SE3, direction: Array, swept: SweptPoints | None = None) -> Array:
-    """Candidates (n, 3) for the points of a piece farthest along a unit direction (3,), in the world.
-
-    `swept` are the shape's points, where they are known.
-    """
+    """Candidates (n, 3) for a piece's points farthest along a unit direction (3,); `swept` if they are known."""
     swept = swept_points(shape) if swept is None else swept
     if len(swept.points) == 0:  # an ellipsoid: the image of the ball's point whose normal is the direction
         radii = np.asarray(shape.radii)

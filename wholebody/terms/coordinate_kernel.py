@@ -63,9 +63,8 @@ def turns(targets: Array, places: Integers, q: Array, value: Array, jacobian: Ar
 def roots(targets: Array, places: Integers, q: Array, value: Array, jacobian: Array) -> None:
     """Free roots: log of the motion from the target, and its derivative by a motion in the root's own frame.
 
-    With log M = (v, w), v = J p for the inverse left Jacobian J of w and the translation p of M. The derivative is
-    [[A, B A], [0, A]] with A the transpose of J and B the derivative of v by the rotation (Chirikjian 2011, section
-    10.6, in the form of Pinocchio's Jlog6).
+    With log M = (v, w), v = J p: [[A, B A], [0, A]], A the transpose of J, B the derivative of v by the rotation
+    (Chirikjian 2011, section 10.6, in the form of Pinocchio's Jlog6).
     """
     if not len(targets):
         return

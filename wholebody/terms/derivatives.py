@@ -145,10 +145,7 @@ def _derivative(term: Any, state: State) -> Array:
 
 
 def _differences(term: Any, state: State, q: Array) -> tuple[Array, Array]:
-    """The same (m, nv) by central differences of the value, and by how much both sides differ from that.
-
-    At a kink, such as the limit of a joint, a derivative may be that of either side.
-    """
+    """Jacobian (m, nv) by central differences, and how far both sides differ from it, as at a kink."""
     model, columns, kinks = state.model, [], []
     here = _value(term, state.update(q))
     for dof in range(model.nv):

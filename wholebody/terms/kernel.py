@@ -178,10 +178,7 @@ def wrench_rows(wrench: Array, joint: int, against: int, columns: Array, plan: P
 def _row(
     wrench: Array, joint: int, against: int, columns: Array, bodies: Integers, column: Integers, row: Array
 ) -> None:
-    """Add to a row (nv,) the rates at which a wrench works on the motion of a joint relative to another.
-
-    Only the columns of joints between the two count: those of what carries both would cancel.
-    """
+    """Add to a row (nv,) the rates of a wrench on a joint's motion relative to another: of columns between the two."""
     a, b, c, d, e, f = wrench[0], wrench[1], wrench[2], wrench[3], wrench[4], wrench[5]
     while joint != against:  # a joint's number is larger than its parent's
         sign, at = (1.0, joint) if joint > against else (-1.0, against)
@@ -209,10 +206,7 @@ def _mass_centers(
     value: Array,
     jacobian: Array,
 ) -> None:
-    """Rows of the centre of mass: what hangs on a joint moves with it, so each column needs its subtree's moment.
-
-    An entry says of which joints: all, or those of one of several figures, which hang on the world alone.
-    """
+    """Rows of the centre of mass of one figure or all: each column needs its subtree's moment."""
     tables, entries = table
     columns, column, parents = tree
     count = len(bodies)

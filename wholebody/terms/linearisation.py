@@ -1,8 +1,4 @@
-"""The one thing a method asks of a problem at a posture: everything that counts, to first order.
-
-One pass of Pinocchio, one cull, coal for the pairs that survive, and one compiled pass over all built-in terms and
-contacts. Terms of other classes join through their own methods, and cost only themselves.
-"""
+"""Everything that counts at a posture, to first order: the one thing a method asks of a problem."""
 
 from __future__ import annotations
 
@@ -27,7 +23,7 @@ from wholebody.tasks.answers import is_own
 from wholebody.tasks.base import MOST_PLANES, Bound, Constraint, Goal, Measure, Term
 from wholebody.tasks.bounds import StepLimit
 from wholebody.tasks.checks import undefined
-from wholebody.terms.plan import OtherTerm, TermPlan, Terms, checked_rows, make_plan
+from wholebody.terms.plan import OtherTerm, TermPlan, Terms, checked_count, checked_rows, make_plan
 
 
 class TermPlanes(NamedTuple):
@@ -133,11 +129,7 @@ class Lineariser:
         dt: float | None = None,
         plan: TermPlan | None = None,
     ) -> None:
-        """Take the resolved terms of a problem, and a workspace of this run alone.
-
-        Clearances (pairs,) are asked of every collision pair, metres; `dt` is the step in seconds for bounds that need
-        one. The plan is of the same constraints, bounds, measures and step, and of any goals; None to make it here.
-        """
+        """Take resolved terms, clearances (pairs,) [m], a workspace, a step `dt` [s], and a plan or None to make it."""
         self.workspace, self.state, self._limits = workspace, workspace.state, limits
         self.goals, self.constraints, self.bounds, self.measures = terms
         self.dt = dt
@@ -153,11 +145,7 @@ class Lineariser:
         self.take(self.goals, clearances)
 
     def take(self, goals: Sequence[Goal], clearances: Array, constraints: Sequence[Constraint] | None = None) -> bool:
-        """Put other goals and clearances in the place of the present ones, and constraints where they are given.
-
-        Returns:
-            Whether clearances are others than before.
-        """
+        """Take other goals and clearances, and constraints where given; whether clearances are others than before."""
         if clearances.shape != (len(self.workspace.table.pairs),):
             count = len(self.workspace.table.pairs)
             raise InputError(f"clearances have shape {clearances.shape}; give one for each of the {count} pairs")
@@ -198,14 +186,8 @@ class Lineariser:
         return other
 
     def at(self, q: Array, within: float, planes: bool = False) -> Linearisation:
-        """Everything at the posture q, shape (nq,), with the pairs nearer than `within` metres plus their clearance.
-
-        Pairs that cannot come as near as their clearance are left out, where speeds are bounded and `dt` is given.
-        Supporting planes of the terms are added if they are asked for.
-
-        Raises:
-            InputError: q is no posture, or a term of one's own has another number of rows than at the start.
-        """
+        """Everything at q (nq,), with the pairs nearer than `within` plus their clearance, and planes if asked for."""
+        # Pairs that cannot come as near as their clearance are left out, where speeds are bounded and `dt` is given.
         nv, rows = self.state.model.nv, len(self._value)
         squares = np.empty((self._plan.squares, nv))
         value, box, measure = np.empty(rows), np.empty((2, nv)), np.empty((3 if len(squares) else 2, nv + 1))
@@ -239,10 +221,7 @@ class Lineariser:
         )  # fmt: skip
 
     def _pass(self, q: Array, within: float, room: tuple[Array, Array, Array, Array]) -> tuple[Contacts, int]:
-        """Contacts at a posture, and how many rows they have; both, and the Jacobian, are overwritten by the next call.
-
-        Values of the terms, bounds, measures and squares of measures are written into `room`.
-        """
+        """Contacts at a posture, and how many rows; both are overwritten by the next call, `room` takes values."""
         state, plan, near, within = self.state.update(q), self._plan, self.workspace.proximity, within + self._largest
         index, placed = near.ask(state.data, within, self._clearances[1])
         if len(index) > self._near.size:
@@ -357,3 +336,35 @@ def compiled_kernel() -> Any:
     )  # fmt: skip
     term_kernel.wrench_rows(wrenches, 0, 0, state.columns, plan[:4], rows)
     return term_kernel
+
+
+class ConstraintValues:
+    """Values of some constraints, and of nothing else, at any state of one model."""
+
+    def __init__(self, constraints: Sequence[Constraint], state: State) -> None:
+        """Take resolved constraints; `state` tells how many rows terms of one's own have, and stays where it is."""
+        self._kernel = compiled_kernel()
+        self._plan = plan = make_plan(NO_LIMITS, Terms(constraints=constraints), None, state)
+        self._model, rows, nv = state.model, plan.value_rows, state.model.nv
+        self._wrench, self._jacobian = np.empty((rows, 6)), np.empty((rows, nv))
+        self._value, self._box, self._measure = np.empty(rows), np.empty((2, nv)), np.empty((2, nv + 1))
+        self._no_squares = np.zeros((0, nv))
+
+    def take(self, constraints: Sequence[Constraint]) -> bool:
+        """Put others in their place; False, and nothing is done, where these are not of the same classes and frames."""
+        plan = self._plan.with_terms((), self._model, constraints)
+        self._plan = self._plan if plan is None else plan
+        return plan is not None
+
+    def at(self, state: State) -> Array:
+        """The values (c,) where a state is; overwritten by the next call."""
+        plan, value = self._plan, self._value
+        self._kernel.linearise(
+            (state.joints, state.columns, state.q, NO_PIECES), plan[:4], *NO_CONTACTS,
+            (self._wrench, value, self._jacobian, self._box, self._measure, self._no_squares),
+        )  # fmt: skip
+        for term, evaluate, row, rows in plan.others:
+            part = np.atleast_1d(evaluate(state))
+            checked_count(term, len(part), rows)
+            value[row : row + rows] = part
+        return value

@@ -20,7 +20,7 @@ from wholebody.figures.description import Limits
 from wholebody.figures.state import State, Wrench, extended_columns, free_roots, root_freedoms
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.distance import LEAST_CURVATURE, SquaredDistance
-from wholebody.tasks.rhythm import LUMBAR_MOST, LUMBAR_RATE, LUMBAR_WEIGHT
+from wholebody.tasks.rhythm import LUMBAR_RATE
 from wholebody.terms import entries as kinds
 from wholebody.terms.entries import Entry, Integers, Row, entries_of, placement_floats
 
@@ -66,10 +66,7 @@ class TermPlan(NamedTuple):
     def with_terms(
         self, goals: Sequence[Goal], model: pin.Model, constraints: Sequence[Constraint] | None = None
     ) -> TermPlan | None:
-        """The plan with other resolved terms, or None where they are not of the same classes for the same frames.
-
-        Without constraints it keeps those that it has.
-        """
+        """The plan with other resolved terms; None where they are not of the same classes for the same frames."""
         terms: list[Goal | Constraint] = [*goals, *(constraints or ())]
         old = self.goals if constraints is None else (*self.goals, *self.constraints)
         if len(goals) != len(self.goals) or len(terms) != len(old):
@@ -104,11 +101,7 @@ class TermPlan(NamedTuple):
 
 
 def make_plan(limits: Limits, terms: Terms, dt: float | None, state: State) -> TermPlan:
-    """The plan of resolved terms.
-
-    `dt` are the seconds of a step, for bounds that need them; None for a whole solve. The state tells how many rows
-    terms of other classes have, and stays where it is.
-    """
+    """The plan of resolved terms, for steps of `dt` seconds or None; the state tells rows of one's own terms."""
     model, (goals, constraints, bounds, measures) = state.model, terms
     parts: dict[int, list[Row]] = {table: [] for table in range(kinds.EDGE + 1)}
     others: list[OtherTerm] = []
@@ -228,7 +221,7 @@ def _measures(
                 numbers = np.array([term.weight * part.weight, part.most, part.rest, part.onset])
                 parts[kinds.ELEVATION].append(((*part.idx_q, *part.idx_v), numbers))
             for spine in term.lumbar:
-                share = np.array([term.weight * LUMBAR_WEIGHT, LUMBAR_MOST, LUMBAR_RATE, spine.rest])
+                share = np.array([term.weight * spine.weight, spine.most, LUMBAR_RATE, spine.rest])
                 parts[kinds.LUMBAR].append(((*spine.idx_q, *spine.idx_v, *spine.root), share))
         else:
             others.append(term)

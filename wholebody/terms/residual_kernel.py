@@ -1,7 +1,4 @@
-"""Errors of frames, planes, axes, reach cones and twists with their wrenches, as compiled loops: see `plan`.
-
-Each function fills the rows of its table in `wrench` (rows, 6) and `value` (rows,), which are zero before.
-"""
+"""Errors of frames, planes, axes, reach cones and twists with their wrenches, as compiled loops: see `plan`."""
 
 from __future__ import annotations
 
@@ -87,10 +84,7 @@ def residuals(tables: Array, entries: Integers, joints: Array, wrench: Array, va
 
 @compiled(inner=True, error_model="numpy")
 def rotation_vector(turn: Array, angle: Array) -> None:
-    """Rotation vector (3,) of a rotation (3, 3), by way of its quaternion, which is exact at every angle.
-
-    Shepperd 1978, "Quaternion from Rotation Matrix", Journal of Guidance and Control 1(3).
-    """
+    """Rotation vector (3,) of a rotation (3, 3), exact at every angle by its quaternion (Shepperd 1978)."""
     trace = turn[0, 0] + turn[1, 1] + turn[2, 2]
     largest, best = -1, trace
     for i in range(3):
@@ -117,10 +111,8 @@ def rotation_vector(turn: Array, angle: Array) -> None:
 
 @compiled(inner=True, error_model="numpy")
 def inverse_left(angle: Array, left: Array) -> None:
-    """Inverse (3, 3) of the left Jacobian of SO(3) at a rotation vector (3,): 1 - [a]/2 + c [a]^2.
-
-    c = (1 - (t/2) cot(t/2)) / t^2 at the angle t (Chirikjian 2011, section 10.6).
-    """
+    """Inverse (3, 3) of the left Jacobian of SO(3) at a rotation vector (3,): 1 - [a]/2 + c [a]^2."""
+    # c = (1 - (t/2) cot(t/2)) / t^2 at the angle t (Chirikjian 2011, section 10.6)
     x, y, z = angle[0], angle[1], angle[2]
     square = x * x + y * y + z * z
     if square < SMALL * SMALL:

@@ -18,10 +18,7 @@ from wholebody.tracking.frame import Resolution
 
 
 class CCDStrategy:
-    """Follows tracked postures by the loop of Schmidl and Lin (`wholebody.methods.ccd.resolver`), from a shown posture.
-
-    Frames take `dt` seconds; the seed is that of the order of the chains.
-    """
+    """Follows tracked postures by the loop of Schmidl and Lin, in frames of `dt` seconds, from a shown posture."""
 
     sweep_tolerance = 8e-4
 

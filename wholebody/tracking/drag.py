@@ -1,8 +1,4 @@
-"""Dragging with any method: following a moving goal frame by frame.
-
-After Choi and Cremer 1999, section 3: a stream of nearby goals, each met with moderate accuracy and the last one with
-high.
-"""
+"""Dragging with any method: a stream of nearby goals, frame by frame (Choi and Cremer 1999, section 3)."""
 
 from __future__ import annotations
 
@@ -59,10 +55,7 @@ class GoalMoves:
 
     @property
     def budget(self) -> float:
-        """Seconds of the next frame: twice as many after each three in a row that were cut off.
-
-        On a slow machine no step would be complete otherwise, and what is dragged would stay for ever.
-        """
+        """Seconds of the next frame: twice as many after each three in a row that were cut off (a slow machine)."""
         return float(self._seconds * 2.0 ** min(self._starved // 3, 4))
 
     def shares(self, error: float) -> Iterator[float]:
@@ -74,10 +67,7 @@ class GoalMoves:
                 yield min(1.0, move / error) if error else 1.0
 
     def end(self, error: float, *, cut: bool = False) -> None:
-        """End a frame that left an error: the next goes twice as far, or half as far if the budget was not enough.
-
-        A frame that was `cut` off made no step, since joints and contacts did not hold yet when its time was over.
-        """
+        """End a frame that left an error: the next goes twice as far, or half as far if it was `cut` off."""
         asked = min(self._most, self._error)
         if cut:
             self._starved += 1
@@ -139,10 +129,7 @@ class ProblemDrag:
             return solution
 
     def _followed(self) -> int:
-        """Move by the longest of `GoalMoves` for which the motion is free, or out of a thing moved into the figure.
-
-        Returns the iterations.
-        """
+        """Move by the longest free motion of `GoalMoves`, or out of a thing moved into the figure; the iterations."""
         spent, tried, deep = 0, list[Array](), self._came_in()
         for step in self._frames():
             spent, q = spent + step.iterations, step.q
@@ -183,10 +170,7 @@ class ProblemDrag:
         return deep if deep > GRAZE else 0.0
 
     def _leave(self, tried: list[Array], deep: float) -> None:
-        """Move out of an overlap of `deep` metres, after no motion that was tried was free and led out.
-
-        A free motion is better than one that gets deeper first; among these the shallower end is better.
-        """
+        """Move out of an overlap of `deep` metres: by a free motion, else to the shallower end."""
         ends = [*self.tracker.overlap_resolutions(self.q), *tried]
         depths = [_depth(self._workspace, q) for q in ends]
         out = [

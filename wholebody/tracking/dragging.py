@@ -1,9 +1,4 @@
-"""A goal dragged along a path by any method: the postures, their times, and their assessment.
-
-The drag of Choi and Cremer 1999, section 3: a stream of nearby goals, each met with moderate accuracy and the last one
-with high accuracy. All postures are assessed, by every pair of pieces, and the motions between them, by a continuous
-sweep.
-"""
+"""A goal dragged along a path by any method: the postures, their times, and their assessment."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""A figure that is dragged by hand: handles on it and on the things around it, holds, undo, by any method's tracker.
-
-The page that shows it is elsewhere; this is what happens when a handle is taken, moved and let go.
-"""
+"""A figure dragged by hand, without its page: handles on it and on things, holds, undo, by any method's tracker."""
 
 from __future__ import annotations
 
@@ -233,10 +230,7 @@ class LiveDrag:
             self._drag, self._trouble = None, str(trouble)
 
     def _rehearse(self) -> None:
-        """Make frames that are forgotten: what is loaded or set up at the first of a kind is there then.
-
-        A handle stays where it is, and a thing moves by a micrometre.
-        """
+        """Make frames that are forgotten, so that what is loaded or set up at the first of a kind is there then."""
         q, remembered = self.q, self._subject.remembered(self.q)
         name = next(iter(self.handles))
         place = self.place(name)

@@ -110,10 +110,7 @@ class LiveProblem:
         known(name, self.constraints, "constraint")
 
     def drag(self, q: Array, followed: str, target: Array, held: Collection[str], method: Method) -> Drag[Any]:
-        """What follows a handle from the posture q (nq,), while others are held where they are.
-
-        The target is a place (3,), or an orientation (4,) as a quaternion.
-        """
+        """What follows a handle from q (nq,) to a place (3,) or quaternion (4,), others held where they are."""
         goal = Point(followed, target) if len(target) == 3 else Orientation(followed, target)
         self._drag = Drag(self.stated(q, [goal, *self.problem.goals], held), method, budget=BUDGET)
         return self._drag

@@ -159,11 +159,8 @@ class FrameLoop(NotCopyable):
         )  # fmt: skip
 
     def _kept_from_passing(self, resolution: Resolution) -> Resolution:
-        """The first posture to which the motion is free; otherwise a share of the motion, or the posture shown.
-
-        This is the interpolation with the last posture without overlap of algorithm 1, step 4. Motions up to a contact
-        are not taken, because they would creep into it.
-        """
+        """The first posture to which the motion is free; else a share of the motion, or the posture shown."""
+        # Algorithm 1, step 4. Motions up to a contact are not taken, because they would creep into it.
         if resolution.swept:
             return resolution
         began = time.perf_counter()
@@ -185,10 +182,7 @@ class FrameLoop(NotCopyable):
     def _kept_from_moving(
         self, resolution: Resolution, motion: FrameMotion
     ) -> tuple[Resolution, tuple[Collision, ...]]:
-        """The first posture to which the motion is free of things that move meanwhile, or else the least deep.
-
-        Returns the resolution with this posture, and what could not be avoided, which its note names.
-        """
+        """The first posture free of things that move, or the least deep, and what was not avoided."""
         began, start = time.perf_counter(), (0.0, self.shown)
         nearest = resolution.candidates[-1]
         ways: list[tuple[tuple[float, Array], ...]] = [resolution.path] if resolution.path else []
@@ -236,10 +230,7 @@ def _clocks() -> tuple[float, float]:
 def frame_placements(
     scene: Scene, moves: Mapping[str, Sequence[PlacementLike]] | None, count: int, what: str
 ) -> dict[str, tuple[pin.SE3, ...]]:
-    """Placements of things at the ends of `count` frames.
-
-    Raises InputError for what has none for each frame, UnknownNameError where there is no such thing.
-    """
+    """Placements of things at the ends of `count` frames."""
     if moves is None:
         return {}
     instance(moves, Mapping, what, "give {name: a placement for each frame}")
@@ -254,10 +245,7 @@ def frame_placements(
 
 
 def free_start(scene: Scene, q: Array, rigid: bool) -> tuple[Array, str]:
-    """The posture q, or the nearest one without overlap, with a note of the change.
-
-    Raises InputError where no posture near it is free of overlap.
-    """
+    """The posture q, or the nearest one without overlap, with a note of the change."""
     q = scene.figure.clamp(pin.normalize(scene.model, q))
     deepest = deepest_overlap(scene, q)
     if not deepest:

@@ -25,10 +25,7 @@ PASSING = 1e-3  # m: if the motion to a solution gets deeper, a nearer solution 
 
 
 def copied(problem: Problem) -> Problem:
-    """A copy whose goals can be moved without changing the caller's problem.
-
-    Raises InputError where it is no problem, or objects were added to or removed from its scene.
-    """
+    """A copy whose goals can be moved without changing the caller's problem; refused if the scene changed."""
     check_problem(problem, "problem")
     problem.check_fresh()
     return copy.copy(problem)
@@ -67,11 +64,7 @@ def interpolated_target(goal: Point | Frame | Orientation, error: Array, share: 
 
 
 def warm_started(problem: Problem, tracker: Tracker, q: Array) -> Solution:
-    """Solve from the posture q (nq,); the posture is kept if the motion to the solution passes through something.
-
-    If the motion to the best answer penetrates something, the nearest answer is preferred; if neither meets the goal,
-    the posture is kept too. The tracker is that of a method for this problem.
-    """
+    """Solve from q (nq,), to the best or nearest answer to which the motion passes nothing; else keep the posture."""
     solution = tracker.solve(q)
     if problem.scene.sweep(q, solution.q, PASSING) is None:
         return solution

@@ -80,10 +80,7 @@ def overlaps(scene: Scene, q: Array, give_way: str = "figure") -> tuple[Overlap,
 
 
 def make_room(scene: Scene, q: Array) -> None:
-    """Move things with a `wb.Body` out of the figure at a posture (nq,) by half of PD_g, where nothing else is.
-
-    What joints hold stays, and so does a thing that would be in another one; then the figure takes the whole overlap.
-    """
+    """Move things with a `wb.Body` out of the figure at a posture (nq,) by half of PD_g, where nothing else is."""
     objects, figure = scene.objects, scene.figure.name
     joints = [
         (name, joint.to) for name, thing in objects.items() if thing.body is not None for joint in thing.body.joints

@@ -1,8 +1,4 @@
-"""Path following with any method: a goal moves along a path, from one intermediate goal to the next.
-
-After Choi and Cremer 1999, section 3: the intermediate goals are evenly spaced, and the last is the first that cannot
-be reached, or the end.
-"""
+"""Path following with any method: a goal moves along a path in steps (Choi and Cremer 1999, section 3)."""
 
 from __future__ import annotations
 

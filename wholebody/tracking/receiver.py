@@ -26,10 +26,7 @@ class Receiver:
     """
 
     def __init__(self, port: int, handles: Collection[str]) -> None:
-        """Listen for places of some handles at a port; 0 for any that is free.
-
-        Raises InputError where the port is taken, or no number of a port.
-        """
+        """Listen for places of some handles at a port; 0 for any that is free."""
         whole(port, "the port of handles", 0, 65535)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:

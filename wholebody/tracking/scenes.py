@@ -61,11 +61,7 @@ class InteractionScene:
 
 
 class SceneFile:
-    """Scenes with scripted trackers, of a TOML file such as `tracking/scenes.toml`, which says what its tables mean.
-
-    Attributes:
-        scenes: descriptions of the scenes, by name.
-    """
+    """Scenes with scripted trackers, of a TOML file such as `tracking/scenes.toml`, by name."""
 
     def __init__(self, path: Path) -> None:
         """Read the file."""

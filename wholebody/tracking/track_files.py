@@ -79,11 +79,7 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
 def read_values(
     path: Path, figure: Figure, columns: Mapping[str, str] = MappingProxyType({}), *, degrees: bool = False
 ) -> tuple[Array, float]:
-    """The seven values of a free root and one of each joint (n, 7 + joints) of a track, and its time step.
-
-    `columns` names the column of a joint, or of "time", where it has another name; `degrees` says the unit of joints
-    that turn and whose columns do not say it; see `read_track`.
-    """
+    """The root's seven values and one of each joint (n, 7 + joints) of a track, and its time step; see `read_track`."""
     resting = figure.joint_values(figure.neutral)
     if len(resting) < len(figure.joints):
         joint = next(joint for joint in figure.joints if joint not in resting)
@@ -138,10 +134,7 @@ def _in_degrees(column: str, name: str, figure: Figure, *, default: bool) -> boo
 def _without_names(
     path: Path, first: list[str], wanted: list[str], lines: list[tuple[int, list[str]]]
 ) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
-    """Names for the columns of a file that has none, and its lines with times; a warning says what was taken.
-
-    Raises FileFormatError where there are not as many columns as the figure has.
-    """
+    """Names for the columns of a file that has none, and its lines with times; a warning says what was taken."""
     if len(first) != len(wanted) - 1:
         raise FileFormatError(
             f"{path.name}, line {lines[0][0]}: no names of columns, and {len(first)} numbers where the figure has "

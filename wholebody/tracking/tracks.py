@@ -24,10 +24,7 @@ MOST_FRAMES = 1_000_000  # of a track: ten hours at 30 frames a second; more wou
 
 
 def check_frames(q: Array, what: str, place: Callable[[int], str]) -> None:
-    """Check values (frames, columns) of what is named; `place` is what a column is called.
-
-    Raises InputError for a value that is not finite or far too large, and names its frame.
-    """
+    """Refuse values (frames, columns) that are not finite or far too large; `place` names a column."""
     if not (q.min(initial=0.0) >= -LARGEST and q.max(initial=0.0) <= LARGEST):  # false of NaN, and without copies of q
         bad = np.argwhere(~(np.abs(q) <= LARGEST))
         frame, column = (int(k) for k in bad[0])

@@ -15,8 +15,7 @@ from wholebody.figures.link_visuals import drawn_of
 from wholebody.figures.surface import surface_of
 from wholebody.geometry.pieces import box_corners
 from wholebody.view import drawing, style
-from wholebody.view.crowds import crowds
-from wholebody.view.scene_graph import Keyframe, SceneGraph
+from wholebody.view.scene_graph import Keyframe, SceneGraph, crowds
 from wholebody.view.skin import Skin, Skinned
 from wholebody.view.style import LOOK, Color
 from wholebody.view.viewed_scene import ViewedAssembly, ViewedScene
@@ -337,10 +336,7 @@ def node(name: str) -> str:
 
 
 def scene_glb(scene: ViewedScene, bodies: Bodies, postures: Array, dt: float, title: str) -> bytes:
-    """What `bodies` draw of a scene at postures (n, nq), `dt` seconds apart: y up, z forward, metres.
-
-    A node `joint NAME` is each joint, a node `piece NAME` each piece; of half-spaces a square is written.
-    """
+    """What `bodies` draw at postures (n, nq), `dt` seconds apart: y up, z forward; nodes `joint NAME`, `piece NAME`."""
     from wholebody.motion.files.gltf import JointTree
 
     tree = JointTree(scene.model, postures, dt)

@@ -131,10 +131,7 @@ class Browser:
         )
 
     def open(self, url: str, ready: str = _READY) -> None:
-        """Open an address, and wait until a JavaScript expression is true: that the page of a `Viewer` has drawn all.
-
-        Raises BrowserError where the page does not load, or has an error.
-        """
+        """Open an address, and wait until a JavaScript expression is true: that a `Viewer`'s page has drawn all."""
         self.errors.clear()
         self.requests.clear()
         self._loaded = False

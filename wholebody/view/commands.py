@@ -43,13 +43,8 @@ def set_skeleton(
 ) -> Command:
     """Put a skeleton at a node: bones that follow other nodes, and bend the skins that name it.
 
-    Args:
-        path: the node.
-        carriers: for each of n bones the node that it follows.
-        offsets: (n, 4, 4) placement of each bone relative to its carrier.
-        inverses: (n, 4, 4) inverse of each bone's placement where the skin was bound to it.
-        halves: bones that turn half way between two others: index of the bone, of the first and of the second, at
-            whose origin it is.
+    Each of n bones has its carrier, `offsets` (n, 4, 4) from it, and `inverses` (n, 4, 4) where the skin was bound;
+    `halves` turn half way between two others: index of the bone, of the first and of the second, its origin.
     """
     message = {
         "type": "skeleton",
@@ -63,10 +58,7 @@ def set_skeleton(
 
 
 def set_skin(path: str, skeleton: str, patch: Patch, color: tuple[float, ...], unit: float) -> Command:
-    """Put a patch of a body's surface at a node, behind that of its skeleton; positions are rounded to `unit` metres.
-
-    A patch has at most 65,536 vertices and 256 bones.
-    """
+    """Put a patch, of 65,536 vertices and 256 bones at most, at a node behind its skeleton's, rounded to `unit` [m]."""
     weights = np.round(255.0 * patch.weights).astype(int)
     weights[:, 0] += 255 - weights.sum(axis=1)  # the strongest takes the rounding: the page adds them up unscaled
     message = {
@@ -117,10 +109,7 @@ def look_from(eye: Array, target: Array) -> Command:
 
 
 def look_at(points: Array, direction: Sequence[float], margin: float) -> Command:
-    """Turn the camera to the middle of points (n, 3), from a direction (3,) so far away that all are in the picture.
-
-    `margin` is the width of the picture relative to the points; 1 is exact.
-    """
+    """Turn the camera to points (n, 3) from a direction (3,), the picture `margin` times as wide as they are."""
     target = (points.min(axis=0) + points.max(axis=0)) / 2
     return _look(direction=list(direction), target=target.tolist(), points=floats(points), margin=margin)
 
@@ -130,21 +119,13 @@ def _look(**how: Any) -> Command:
 
 
 class Track(NamedTuple):
-    """Values of one property of one node over time.
+    """Values of one property of one node over time."""
 
-    Attributes:
-        path: the node.
-        name: the property, as three.js names it: "position", "material.color".
-        kind: "vector3", "quaternion", "color", "number" or "bool".
-        values: (n, size) one row a frame; n booleans for "bool".
-        steps: whether the value jumps at each frame instead of being interpolated.
-    """
-
-    path: str
-    name: str
-    kind: str
-    values: Any
-    steps: bool = False
+    path: str  # the node
+    name: str  # the property, as three.js names it: "position", "material.color"
+    kind: str  # "vector3", "quaternion", "color", "number" or "bool"
+    values: Any  # (n, size) one row a frame; n booleans for "bool"
+    steps: bool = False  # whether the value jumps at each frame instead of being interpolated
 
     def lower(self, times: Array) -> dict[str, Any]:
         """Return the track in the format of three.js."""

@@ -35,10 +35,7 @@ def color_contacts(keyframe: Keyframe, bodies: Bodies, contacts: Any) -> None:
 
 
 def mark_contacts(keyframe: Keyframe, bodies: Bodies, contacts: Any) -> None:
-    """Mark witness points and normals; for penetrations the vector that moves the figure's piece out.
-
-    A penetration vector is as long as the depth, but at least `LOOK.shortest_depth`; the deepest ones are labelled.
-    """
+    """Mark witness points and normals, penetrations by vectors of at least `LOOK.shortest_depth`, labelled."""
     # number of the nearest contacts with markers; a page with thousands of nodes is slow
     witness, touch = Marker("ball", LOOK.witness, LOOK.witness_radius), Marker("arrow", LOOK.normal, 0.8)
     for row in range(min(len(contacts.distance), 60)):
@@ -107,10 +104,7 @@ def mark_overlaps(keyframe: Keyframe, bodies: Bodies, data: Any, overlaps: Seque
 
 
 def mark_blockers(keyframe: Keyframe, scene: ViewedScene, state: State, contacts: Any, blockers: Sequence[Any]) -> None:
-    """Mark each of the strongest blockers of an assessment, strongest first, by a ball and its name.
-
-    `contacts` are the near pairs at the shown posture, of which `state` is.
-    """
+    """Mark each of the strongest blockers, strongest first, by a ball and its name, among near pairs `contacts`."""
     # most blockers that are marked, the strongest; more labels hide each other
     for number, blocker in enumerate(blockers[:4]):
         place = _place(scene, state, contacts, blocker)

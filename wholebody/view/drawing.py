@@ -19,16 +19,7 @@ _AROUND, _ALONG = 32, 8
 
 
 def piece(geometry: Any, name: str, color: Color) -> Three:
-    """A piece in its own coordinates. It casts a shadow unless it is transparent or a half-space.
-
-    Args:
-        geometry: coal's Sphere, Capsule, Box, Ellipsoid, Convex, Halfspace, Cylinder, Cone or a BVHModel.
-        name: an identifier that nothing else in the page has, as everywhere here.
-        color: red, green, blue, alpha.
-
-    Raises:
-        InputError: a geometry that cannot be drawn.
-    """
+    """A coal geometry in its own coordinates, under a unique name; it casts a shadow unless transparent or endless."""
     shape, scale, center, flat = _shape(geometry, name)
     shadow = color[3] == 1.0 and type(geometry).__name__ != "Halfspace"
     return _mesh(name, shape, _material(color, flat=flat), matrix=_matrix(scale, center), shadow=shadow)
@@ -43,10 +34,7 @@ def unit(geometry: Any) -> Any:
 
 
 def instances(form: Any, name: str, places: Array, colors: Array) -> Three:
-    """Opaque pieces of one form as one object, at (k, 4, 4) placements with scales, in (k, 3) colours.
-
-    Balls have the fewer triangles the more there are.
-    """
+    """Opaque pieces of one form as one object, at (k, 4, 4) placements with scales, in (k, 3) colours."""
     shape, _, _, flat = _shape(form, name)
     if shape["type"] == "SphereGeometry":
         triangles = 1_500_000  # of all balls that are drawn together
@@ -111,10 +99,7 @@ def plate_placement(normal: Array, offset: float) -> Array:
 
 
 def _turned_to(direction: Array) -> Array:
-    """A rotation (3, 3) whose third column is the direction, of any length; the identity for z.
-
-    In plain floats: NumPy's cross product of two vectors takes 20 us, and there are dozens of arrows a frame.
-    """
+    """A rotation (3, 3) whose third column is the direction; in floats, as NumPy's cross product takes 20 us."""
     x, y, z = (float(part) for part in direction)
     length = math.sqrt(x * x + y * y + z * z)
     x, y, z = x / length, y / length, z / length
@@ -161,11 +146,7 @@ def capsule_surface(radius: float, half_length: float) -> tuple[Array, NDArray[n
 
 
 def revolved(profile: Array, normals: Array, around: int = _AROUND) -> tuple[Array, NDArray[np.uint32], Array]:
-    """Surface of revolution about z of a profile (n, 2): distance from the axis and height, from the top down.
-
-    `normals` (n, 2) are outward, `around` the steps of a turn. Returns vertices (n * around, 3), faces (m, 3) that wind
-    outwards, and normals (n * around, 3).
-    """
+    """Surface of revolution of a profile (n, 2), from the top down: vertices, faces (m, 3) outwards, and normals."""
     angle = np.arange(around) * 2 * np.pi / around
     turn = np.column_stack([np.cos(angle), np.sin(angle)])
     vertices = np.concatenate(

@@ -66,11 +66,7 @@ def exhibit(script: Path) -> Exhibit:
 def write_gallery(
     scripts: Sequence[Path], path: Path, say: Callable[[Exhibit], None] = lambda made: None
 ) -> list[Exhibit]:
-    """Run scripts one after the other, and write one page that opens in any browser without a network.
-
-    Each script has a docstring and an option --out; `say` is called with what it made. The player of the scenes is in
-    the page once.
-    """
+    """Run scripts, each with a docstring and an option --out, and write one page that opens without a network."""
     made = []
     for script in scripts:
         made.append(exhibit(script))

@@ -49,12 +49,8 @@ class LivePage:
         save: Callable[[Path], Path] | None = None,
         places: Callable[[], Mapping[str, Array]] | None = None,
     ) -> None:
-        """Open the page at the port, or the next free one; its button "save" writes the posture to `save_to`.
-
-        `places` are asked for before every frame of a world: where handles are to follow from outside.
-
-        Raises MissingPackageError where viser is not installed.
-        """
+        """Open the page at the port, or the next free one; its button "save" writes the posture to `save_to`."""
+        # `places` are asked for before every frame of a world: where handles are to follow from outside.
         self.drag, self.frames, self._places = drag, 0, places
         self._save_to, self._save = save_to, save
         self._lock = threading.RLock()

@@ -24,12 +24,7 @@ FASTEST = {".gif": 25.0, ".mp4": 30.0}
 
 
 def check_movie(path: str | os.PathLike[str]) -> Path:
-    """Return the path of a movie that can be written.
-
-    Raises:
-        InputError: it ends neither in .gif nor in .mp4, or its folder is missing or not writable.
-        MissingPackageError: it ends in .mp4 and there is no ffmpeg.
-    """
+    """The path of a movie, .gif or .mp4, that can be written; MissingPackageError without ffmpeg."""
     path = checked_target(path, "movie: path", "a movie", FASTEST)
     if path.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
         raise MissingPackageError(
@@ -39,11 +34,7 @@ def check_movie(path: str | os.PathLike[str]) -> Path:
 
 
 def frame_times(path: Path, count: int, dt: float, fps: float | None) -> tuple[list[float], float]:
-    """Times of the pictures of a movie, seconds from the motion's beginning, and the rate per second.
-
-    The motion has `count` postures, `dt` seconds apart. If `fps` is None the rate is the motion's own where the kind of
-    file allows it. Raises InputError where it is out of range.
-    """
+    """Times [s] of the pictures of `count` postures, and the rate per second: `fps`, or the motion's own."""
     if fps is None:
         fps = min(1 / dt, FASTEST[path.suffix.lower()])
     fps = number(fps, "fps", 0.01, 100.0, "pictures per second")
@@ -78,10 +69,8 @@ def _gif(pictures: Iterable[bytes], fps: float) -> bytes:
 
 
 def _swatch(frames: Sequence[Any]) -> NDArray[np.uint8]:
-    """An image (rows, 64, 3) from which a palette is chosen: half are the frames' pixels, half are their colours alike.
-
-    By the pixels alone nearly all colours would go to sky and floor, and a face would be grey.
-    """
+    """An image (rows, 64, 3) from which a palette is chosen: half the frames' pixels, half their colours alike."""
+    # By the pixels alone nearly all colours would go to sky and floor, and a face would be grey.
     # pixels, of which one counts for the palette: all of them take half a second
     pixels = np.concatenate([np.asarray(frame).reshape(-1, 3)[::7] for frame in frames])
     _, first = np.unique(pixels >> 3, axis=0, return_index=True)

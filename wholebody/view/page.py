@@ -80,10 +80,7 @@ def live_page(title: str = "wholebody") -> str:
 
 
 def static_page(commands: list[Command], title: str = "wholebody") -> str:
-    """HTML of a page that contains its scene, drawn by these commands in order, and makes no network requests.
-
-    Scene and player are compressed, and unpack themselves.
-    """
+    """HTML of a page that contains its scene, compressed, and makes no network requests."""
     scene = _data("picture", bundle([command.payload for command in commands]))
     return _page(title, scene + player() + _script(_UNPACK))
 
@@ -92,10 +89,7 @@ _carrier = ("", "")  # the cell of a notebook whose output has the player, and t
 
 
 def notebook_frame(commands: list[Command], title: str = "wholebody") -> str:
-    """HTML of a frame with the page of a scene, for the output of a notebook's cell.
-
-    The first cell that shows a scene has the player, whenever it is run; the frames of the others take it from there.
-    """
+    """HTML of a frame with a scene for a notebook's cell; the first has the player, others take it from there."""
     global _carrier
     cell = _cell()
     shared = cell is not None and _carrier[0] != "" and (cell[0] != _carrier[0] or cell == _carrier)

@@ -26,11 +26,7 @@ def check_size(size: Any) -> tuple[int, int]:
 
 
 def changes(before: Store, wanted: Sequence[Command]) -> list[Command] | None:
-    """The commands among the wanted ones that a page lacks; None where it must be built anew.
-
-    That is so where a node is to go, or where a body changes, because the bones of its surface hold its nodes. The
-    wanted ones build the picture in an empty page, in order; `before` is what the page shows.
-    """
+    """The commands that a page with `before` lacks; None where nodes go or bodies change: it is built anew."""
     after = Store()
     for command in wanted:
         after.apply(command)
@@ -67,10 +63,7 @@ class Screenshots:
             self._started()
 
     def picture(self, wanted: Sequence[Command], size: Any, *, legend: bool = False) -> bytes:
-        """PNG of what these commands draw in an empty page, of this width and height; with the panel if wanted.
-
-        Raises InputError for a size out of range, MissingPackageError where there is no Chromium.
-        """
+        """PNG of what commands draw in an empty page, of this width and height; with the panel if wanted."""
         return self._draw(wanted, size).capture(legend=legend)
 
     def pictures(self, wanted: Sequence[Command], size: Any, times: Iterable[float]) -> Iterator[bytes]:

@@ -33,20 +33,10 @@ class ViewerClosedError(WholebodyError):
 
 
 class Sender:
-    """The program's side of a server process. Commands go through a pipe, so no other process can send any.
-
-    Attributes:
-        url: address of the page.
-    """
+    """The program's side of a server process at `url`; commands go through a pipe, so nobody else can send any."""
 
     def __init__(self, page: str, host: str = "127.0.0.1", port: int = 0) -> None:
-        """Serve the HTML of a page at a name or address of this machine; port 0 is the first free one.
-
-        Raises:
-            InputError: the port is taken, or the host is no address of this machine.
-            MissingPackageError: tornado is not installed.
-            ViewerClosedError: the server did not start.
-        """
+        """Serve the HTML of a page at a name or address of this machine; port 0 is the first free one."""
         if importlib.util.find_spec("tornado") is None:
             raise MissingPackageError("showing a scene live needs the package tornado; run: pip install tornado")
         self._lock = threading.Lock()
@@ -80,10 +70,7 @@ class Sender:
             raise
 
     def send(self, commands: Iterable[Command]) -> None:
-        """Send commands to the server in one write; open tabs carry them out together.
-
-        Raises ViewerClosedError where the server process has ended.
-        """
+        """Send commands to the server in one write; open tabs carry them out together."""
         self._write(b"".join(command.pack() for command in commands) + Command(Op.PUSH).pack())
 
     def wait(self, timeout: float) -> bool:

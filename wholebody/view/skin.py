@@ -1,7 +1,4 @@
-"""A body's surface in the scene graph: sent once, then moved by the nodes of the joints alone.
-
-The page bends it itself (linear blend skinning): each of its bones follows the node of a joint.
-"""
+"""A body's surface in the scene graph: sent once, then bent by the page (linear blend skinning)."""
 
 from __future__ import annotations
 

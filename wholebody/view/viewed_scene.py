@@ -121,8 +121,9 @@ class ViewedWorld:
 
     revision = 0
 
-    def __init__(self, scene: Scene, names: Iterable[str]) -> None:
-        self._moving = MovingScene(scene.built, names)
+    def __init__(self, scene: Scene, names: Iterable[str], *, between_things: bool = True) -> None:
+        """Take things that move; contacts of two things are shown if `between_things`."""
+        self._moving = MovingScene(scene.built, names, between_things=between_things)
         self.figure, self.objects = scene.figure, scene.objects
         self.model, self.geometry = self._moving.model, self._moving.geometry
         self.piece_owner = self._moving.owners

@@ -22,9 +22,8 @@ from wholebody.geometry.placement import FARTHEST
 from wholebody.problem import Problem
 from wholebody.view import commands
 from wholebody.view.bodies import scene_glb
-from wholebody.view.composition import Composition
+from wholebody.view.composition import Composition, panel
 from wholebody.view.contact_markers import checked_overlaps
-from wholebody.view.legend import panel
 from wholebody.view.movie import check_movie, counted, frame_times, movie
 from wholebody.view.page import live_page, notebook_frame, static_page
 from wholebody.view.scene_graph import SceneGraph
@@ -311,10 +310,7 @@ class Viewer:
         return f"Viewer({self.title!r}), which shows {len(self._seen)} postures"
 
     def _repr_html_(self) -> str:
-        """The scene in a notebook: a frame with the page that `save` writes; a sentence if nothing is shown yet.
-
-        The player is in the first one of a notebook.
-        """
+        """The scene as a frame in a notebook; a sentence if nothing is shown yet."""
         if not self._seen:
             return "<p>nothing is shown yet; call show(q) or play(motion) first</p>"
         return notebook_frame(self._commands(), self.title)

@@ -15,14 +15,10 @@ _STARTING = threading.Lock()
 
 
 def viser_server(port: int, label: str) -> Any:
-    """A running viser.ViserServer on 127.0.0.1 at the port, or the next free one; the label is the title of its page.
+    """A running viser.ViserServer on 127.0.0.1 at the port, or the next free one; `label` is its page's title.
 
-    viser passes no check of requests on to the library websockets, which serves its page: so what it calls to serve is
-    another function while the server starts, which adds the check. If viser does not call that, there is no server.
-
-    Raises:
-        InputError: the port is no number of a port.
-        MissingPackageError: viser is not installed, or in a version that serves its page in another way.
+    viser passes no check of requests on to websockets: what it calls to serve is another function while it starts,
+    which adds the check. If viser does not call that, there is no server.
     """
     whole(port, "the port of the page", 0, 65535)
     try:

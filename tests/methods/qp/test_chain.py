@@ -18,8 +18,8 @@ from wholebody.methods.damped_least_squares import DampedLeastSquares
 from wholebody.methods.qp import chain_kernel
 from wholebody.methods.qp.chain import from_seeds, goal_entries
 from wholebody.methods.qp.chain_kernel import Goals
-from wholebody.methods.qp.multistart import Budget
 from wholebody.methods.qp.plain_chain import Chains, PlainChain
+from wholebody.methods.qp.settings import Budget
 from wholebody.tasks.base import Goal
 from wholebody.terms.entries import RESIDUAL, Entry
 

@@ -68,10 +68,10 @@ def test_answers_are_where_pinocchio_has_the_tool(scene, arm):
 
 def test_the_judge_of_many_says_what_the_judge_of_one_says(scene, two_arms):
     """At postures that meet nothing, beyond limits and inside of the box."""
-    rng = np.random.default_rng(3)
+    rng, alone = np.random.default_rng(3), wb.Scene(two_arms)
     relative = [
         wb.Problem(
-            wb.Scene(two_arms), rng.uniform(-1.0, 1.0, 7),
+            alone, rng.uniform(-1.0, 1.0, 7),
             goals=[wb.Point("right", rng.uniform(-1.0, 1.0, 3), offset=OFFSET), wb.Relative("left", "right", place)],
             measures=[wb.Displacement(weight=0.3)],
         )
@@ -79,12 +79,12 @@ def test_the_judge_of_many_says_what_the_judge_of_one_says(scene, two_arms):
     ]  # fmt: skip
     seen = np.zeros(5, dtype=bool)
     for problems in (posed(scene, 25, clearance=0.02), relative):
-        for problem in problems:
-            q = rng.uniform(-3.0, 3.0, problem.scene.model.nq)
-            many = judged(problem, Numbers.of([problem]), q[None])
+        postures = rng.uniform(-3.0, 3.0, (len(problems), problems[0].scene.model.nq))
+        many = np.transpose(judged(problems[0], Numbers.of(problems), postures))
+        for problem, q, numbers in zip(problems, postures, many, strict=True):
             one = wb.assess(problem, q)
             found = [one.goal_error, one.goal_angle, one.penetration, one.clearance_violation, one.limit_violation]
-            np.testing.assert_allclose([part[0] for part in many], [*found, 0.0, one.measure], rtol=1e-9, atol=1e-12)
+            np.testing.assert_allclose(numbers, [*found, 0.0, one.measure], rtol=1e-9, atol=1e-12)
             seen |= np.array(found) > 0.0
     assert seen.all()
 

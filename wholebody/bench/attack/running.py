@@ -1,4 +1,4 @@
-"""The attack: cases one after the other in processes that are started anew when a case brings them down."""
+"""The attack: cases in processes that are started anew when a case brings them down, and the report of counts."""
 
 from __future__ import annotations
 
@@ -8,17 +8,24 @@ import resource
 import sys
 import time
 import traceback
-from collections import deque
-from collections.abc import Callable, Iterator
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
+
+import numpy as np
 
 from wholebody.base.errors import UnknownNameError, WholebodyError
 from wholebody.base.files import Scratch
 from wholebody.base.runner import ONE_THREAD, Child, Job, allow_processor, run_jobs
 from wholebody.bench.attack import frames, inputs, solves, terms, ways
 from wholebody.bench.attack.case import KINDS, Case, Verdict
+from wholebody.bench.report import render
+from wholebody.bench.rows import Row, texts, times
+from wholebody.bench.rows import report as tables_of
+from wholebody.bench.statistics import wilson
+from wholebody.bench.tables import write_text
 
 CASES = {
     "argument": inputs.argument,
@@ -38,11 +45,7 @@ CASES = {
 def attack(
     cases: Iterator[Case], jobs: int, going: Callable[[], bool], deadline: float = 60.0
 ) -> Iterator[tuple[Case, Verdict]]:
-    """Run cases, `jobs` at a time, and return them as they end; no more are begun once `going` says no.
-
-    A case that takes longer than the deadline, seconds of the processor, or ten times that by the clock, is run once
-    more before it counts as one that hangs.
-    """
+    """Run cases, `jobs` at a time, as they end, while `going`; over the deadline [s of the processor] run twice."""
     again: deque[Case] = deque()
     repeated: set[Case] = set()
 
@@ -78,10 +81,7 @@ def _attacked(case: Case, deadline: float) -> Verdict:
 
 
 def run(case: Case, folder: Path) -> Verdict:
-    """Run a case in a folder; "wrong" for an error that is none of ours, and where anything reaches standard output.
-
-    Raises UnknownNameError where there is no such kind.
-    """
+    """Run a case in a folder; "wrong" for an error that is none of ours, or anything on the standard output."""
     if case.kind not in CASES:
         raise UnknownNameError("kind of case", case.kind, KINDS)
     with _printed(folder) as lines:
@@ -154,3 +154,43 @@ def for_seconds(seconds: float) -> Callable[[], bool]:
         return time.monotonic() < ends[0]
 
     return going
+
+
+def row(case: Case, verdict: Verdict) -> Row:
+    """Return the row of a case; "seconds" are of the processor, of the call under attack."""
+    words = " ".join(verdict.words.split()).encode("ascii", errors="backslashreplace").decode()
+    figures = {"seed": case.seed, "number": case.number, "outcome": verdict.outcome, "status": verdict.status or "none"}
+    return Row(case.name, case.kind, {**figures, "seconds": verdict.seconds, "words": words or "nothing"})
+
+
+def is_slow(row: Row) -> bool:
+    """Whether it is a solve that took longer than 5 s."""
+    return row.tool == "solve" and bool(row["seconds"] > 5.0)
+
+
+def report(rows: Sequence[Row], facts: dict[str, str]) -> str:
+    """Return the counts as Markdown."""
+    counts = []
+    for kind in (name for name in KINDS if any(one.tool == name for one in rows)):
+        found = Counter(one["outcome"] for one in rows if one.tool == kind)
+        outcomes = {name: found[name] for name in ("right", "refused", "gave up", "wrong")}
+        most = 100.0 * wilson(found["wrong"], found.total())[1]
+        counts.append(
+            Row(texts()["attacked"][kind], kind, {"cases": found.total(), **outcomes, "wrong at most %": most})
+        )
+    spans = []
+    for status in ("solved", "unreachable", "infeasible", "stalled"):
+        spent = np.array([1e3 * one["seconds"] for one in rows if one.tool == "solve" and one["status"] == status])
+        if len(spent):
+            figures = {"count": len(spent), **times(spent), "longest ms": float(spent.max())}
+            spans.append(Row("solves that end", status, figures))
+    seeds = ", ".join(map(str, sorted({one["seed"] for one in rows})))
+    notes = [f"Solves that took more than 5 s: {sum(map(is_slow, rows))}.", f"Seed {seeds}."]
+    return tables_of("What was attacked:", {"Cases": counts, "Times of solves": spans}, facts, notes)
+
+
+def keep(case: Case, verdict: Verdict, folder: Path) -> None:
+    """Write a failure: the script that repeats it, and what was found."""
+    place = folder / case.name
+    write_text(place / "repeat.py", render("repeat.py", case=case) + "\n")
+    write_text(place / "found.txt", verdict.words + "\n")

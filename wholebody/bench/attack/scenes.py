@@ -36,10 +36,7 @@ class Body:
         return list(dict.fromkeys((*self.figure.frames, *self.figure.segments)))
 
     def near(self, q: Array, share: float, rng: np.random.Generator, free: list[int] | None = None) -> Array:
-        """Return a posture (nq,) within the limits, off from q by a share of what joints can do.
-
-        `free` are places in the tangent that may differ; all but a free root's if left out.
-        """
+        """Return a posture (nq,) within the limits, off from q by a share of what joints (places `free`) can do."""
         model, limits = self.figure.model, self.figure.limits
         way = rng.uniform(-share * np.pi, share * np.pi, model.nv)
         reach = limits.upper - limits.lower

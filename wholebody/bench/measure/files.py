@@ -22,12 +22,7 @@ ROBOTS, MESHES, SKELETONS = (
 
 
 def read(folder: Path, frames: int) -> Iterator[Row]:
-    """A row for each file below a folder that has an ending of a kind that is read.
-
-    Args:
-        folder: of the files.
-        frames: of a motion that are retargeted, at most, from its first one on.
-    """
+    """A row for each file below a folder of a kind that is read; `frames`: most of a motion that are retargeted."""
     human = wb.load("human")
     for path in sorted(path for path in folder.rglob("*") if path.is_file()):
         ending = path.suffix.lower()

@@ -34,10 +34,7 @@ SIMPLIFIED = "qp, simplified"
 
 
 def chain(joints: int, pieces: int, segments: int | None = None) -> wb.Figure:
-    """A chain along x, joints about z and y in turn; so many of its links, evenly spread, have boxes: all where None.
-
-    Raises InputError for no joints, or more segments than links.
-    """
+    """A chain along x, joints about z and y in turn, with boxes on `segments` of its links, all where None."""
     if joints < 1 or not 1 <= (segments or joints) <= joints:
         raise InputError(f"a chain of {joints} joints cannot have {segments} segments; give 1 to {joints}")
     solid = {round(k) for k in np.linspace(0, joints - 1, segments or joints)}
@@ -60,11 +57,7 @@ def _boxes(length: float, count: int) -> list[tuple[float, float]]:
 
 
 def task(figure: wb.Figure, things: int, seed: int) -> tuple[wb.Scene, Array]:
-    """A scene in which the chain reaches among things, not built yet, and where its tip is to go.
-
-    The first ten things stand within 2.4 m of the base; more of them are as dense, and go farther out. Raises
-    InputError where no free posture was found.
-    """
+    """A scene in which the chain reaches among things, as dense within 2.4 m as farther out, and its goal (3,)."""
     rng = np.random.default_rng([seed, figure.model.nq, things])
     witness = _free_posture(figure, rng)
     occupied = Occupied(figure, (figure.neutral, witness))
@@ -191,10 +184,7 @@ def _step_ms(problem: wb.Problem, method: str) -> float:
 
 
 def exponent(sizes: Sequence[float], spent: Sequence[float]) -> tuple[float, float]:
-    """Exponent of time ~ size**e over the upper range, and the size that range begins at.
-
-    The line is fitted to the logarithms of the sizes from a tenth of the largest on; of three sizes at least.
-    """
+    """Exponent of time ~ size**e, fitted to the sizes from a tenth of the largest on, and where that range begins."""
     size, duration = np.asarray(sizes, dtype=float), np.asarray(spent, dtype=float)
     order = np.argsort(size)
     size, duration = size[order], duration[order]

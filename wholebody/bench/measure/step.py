@@ -68,11 +68,8 @@ Runs = Mapping[str, Sequence[Run]]
 def measure(
     track: Track, tools: Sequence[str], repeats: int, say: Callable[[str], None] = lambda text: None
 ) -> dict[str, list[Run]]:
-    """Let every tool make a reach a number of times, each from a fresh set-up; `say` takes a line about each.
-
-    Tools take turns of `TURN` steps, so that the machine is as fast for one as for the other; their order rotates. One
-    step of each set-up is made before the clock starts, and a first round is not counted.
-    """
+    """Let every tool make a reach `repeats` times, each from a fresh set-up, in turns of `TURN` steps that rotate."""
+    # The machine is as fast for one as for the other. One step of each, and a first round, are not counted.
     runs: dict[str, list[Run]] = {name: [] for name in tools}
     for repeat in range(repeats + 1):
         beside = _beside(track, tools, repeat)
@@ -97,11 +94,7 @@ def _beside(track: Track, tools: Sequence[str], shift: int) -> dict[str, Run]:
 
 
 def least_times(track: Track, runs: Sequence[Run]) -> Array:
-    """(runs, steps) microseconds that a step's postures take in Pinocchio and coal alone, without a program.
-
-    These are joint Jacobians, placements of the pieces, and distances of the pairs that a tool looks at, by calls of
-    C++ from the guesses of the step before.
-    """
+    """(runs, steps) microseconds of joint Jacobians, placements and distances of a step in Pinocchio and coal alone."""
     model, scene = track.scene.model, track.scene
     pairs = PairDistances(scene.geometry, scene.built.table.pairs)
     data, geometry, told = model.createData(), pairs.geometry, pairs.data
@@ -121,10 +114,7 @@ def least_times(track: Track, runs: Sequence[Run]) -> Array:
 
 
 def time_rows(track: Track, runs: Runs) -> list[Row]:
-    """Times of all steps of each tool, and their ratios to the reference's in the same repeat, with intervals.
-
-    The first tool is compared with `least_times` of its own postures too.
-    """
+    """Times of all steps of each tool, and their ratios to the reference's in the same repeat, with intervals."""
     rows, reference, least = list[Row](), runs.get(REFERENCE, []), None
     for name, mine in runs.items():
         figures: dict[str, Figure] = {}

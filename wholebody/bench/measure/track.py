@@ -59,10 +59,7 @@ class Track:
 
 
 def track(name: str, steps: int = 200) -> Track:
-    """Build the human's reach of a name.
-
-    Raises UnknownNameError for another name, InputError for fewer than two steps.
-    """
+    """Build the human's reach of a name."""
     if name not in VARIANTS:
         raise UnknownNameError("reach", name, VARIANTS)
     if steps < 2:
@@ -94,11 +91,8 @@ def track(name: str, steps: int = 200) -> Track:
 
 
 def smooth_way(places: Array, steps: int) -> Array:
-    """Way (steps, 3) through places (k, 3), at rest at both ends, with a tenth of the time at the end.
-
-    The share of the way done at the time t of 0 to 1 is 10 t^3 - 15 t^4 + 6 t^5: Flash and Hogan 1985, "The
-    coordination of arm movements".
-    """
+    """Way (steps, 3) through places (k, 3), at rest at both ends, with a tenth of the time at the end."""
+    # 10 t^3 - 15 t^4 + 6 t^5 (Flash and Hogan 1985, "The coordination of arm movements")
     from scipy.interpolate import CubicSpline
 
     chord = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
@@ -117,11 +111,7 @@ def put_objects(
     scene: wb.Scene, taken: Occupied, way: Array, rng: np.random.Generator, space: Sequence[Sequence[float]],
     size: float = 1.0, boxes: int = 6,
 ) -> None:  # fmt: skip
-    """Put boxes, spheres and hulls into a space (2, 3) [m], clear of what is taken up and of a way (k, 3) [m].
-
-    `size` of objects and of the room around them is a share of those of the human's reaches. Raises InputError where no
-    place was found for one of them.
-    """
+    """Put boxes, spheres and hulls, scaled by `size`, into a space (2, 3) [m], clear of what is there and a way."""
     kinds = ["box"] * boxes + ["sphere"] * given.spheres + ["hull"] * given.hulls
     taken.keep_free(way[::8], size * (given.room_way_m - given.room_start_m))
 
@@ -197,11 +187,7 @@ def judge(track: Track, postures: Array) -> Verdict:
 
 
 def figure_tracks(spec: str, steps: int = 200) -> list[Track]:
-    """Build the reaches of a figure, by name or path, named as those of the human.
-
-    Pairs keep half of the least distance along the way if that is less than the clearance. Raises InputError where the
-    figure has no chain that moves, no way without contact was found, or no place for an object.
-    """
+    """Build the reaches of a figure, by name or path; pairs keep half of the least distance if that is less."""
     figure = wb.load(spec)
     chains = [chain for chain in figure.chains.values() if chain.joints]
     if not chains:

@@ -62,12 +62,8 @@ def publish(
     charts: Mapping[str, Chart] | None = None,
     page: str | None = "results.md",
 ) -> None:
-    """Write tables and report, draw charts, and write both into the documentation where that is asked for.
-
-    What was measured is written before anything is drawn, so that a chart that fails loses no measurement. Rows are by
-    the name of their CSV file, charts by those of their files. `page` is of the documentation: it gets the charts and
-    the first table; the whole report becomes a file beside the charts, and is all there is where `page` is None.
-    """
+    """Write tables and report, then charts, and both into the documentation where that is asked for."""
+    # Measurements come first. `page` gets charts and the first table; None: only the report's file.
     for table, rows in (tables or {}).items():
         write_rows(arguments.out / f"{table}.csv", facts or {}, rows)
     write_text(arguments.out / f"{name}.md", report + "\n")

@@ -108,7 +108,7 @@ or no end within a minute. What ended before Ctrl-C is written.""",
 )
 def attack(arguments: argparse.Namespace) -> int:
     """Attack; 1 where something was wrong."""
-    from wholebody.bench.attack import report, running
+    from wholebody.bench.attack import running
     from wholebody.bench.rows import Row, read_rows
 
     _check(arguments)
@@ -117,13 +117,13 @@ def attack(arguments: argparse.Namespace) -> int:
     interrupted = False
     try:
         for case, verdict in running.attack(_cases(arguments), arguments.jobs, running.for_seconds(arguments.seconds)):
-            rows.append(report.row(case, verdict))
+            rows.append(running.row(case, verdict))
             if rows[-1]["outcome"] == "wrong":
                 print(f"WRONG: {case.kind} {case.number}: {rows[-1]['words']}", flush=True)
             elif len(rows) % 200 == 0:
                 print(f"{len(rows)} cases, {sum(one['outcome'] == 'wrong' for one in rows)} wrong", flush=True)
-            if rows[-1]["outcome"] == "wrong" or report.is_slow(rows[-1]):
-                report.keep(case, verdict, arguments.out)
+            if rows[-1]["outcome"] == "wrong" or running.is_slow(rows[-1]):
+                running.keep(case, verdict, arguments.out)
     except KeyboardInterrupt:
         interrupted = True
     rows += earlier
@@ -133,7 +133,7 @@ def attack(arguments: argparse.Namespace) -> int:
     facts = machine()
     publish(
         "attack",
-        report.report(rows, facts),
+        running.report(rows, facts),
         arguments,
         facts=facts,
         tables={"attack": rows},

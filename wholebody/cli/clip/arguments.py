@@ -14,6 +14,7 @@ from wholebody.cli.command import Option, option
 if TYPE_CHECKING:
     from wholebody.figures import Figure
     from wholebody.motion.clip import Clip
+    from wholebody.motion.skeleton import SkeletonMotion
     from wholebody.scene.scene import Scene
 
 
@@ -40,6 +41,8 @@ EQUIPMENT = option(
 )  # fmt: skip
 
 SCENE = option("--scene", type=Path, metavar="TASK.toml", help="task file with the figure and its things")
+
+PAGE = option("--html", type=Path, metavar="FILE", help="write curves over time and a film beside the recording")
 
 JOBS: tuple[Option, ...] = (
     option("--jobs", type=int, metavar="N", help="cases at a time (default: 1, or all of the cluster)"),
@@ -89,6 +92,18 @@ def scene_of(arguments: argparse.Namespace) -> Scene:
     if arguments.figure != "human" or arguments.root is not None or person_options(arguments):
         raise InputError("--scene has a figure of its own; leave out --figure and the options of a person")
     return read_task(arguments.scene).problem.scene
+
+
+def skeleton_of(path: Path, frames: int) -> SkeletonMotion | None:
+    """The skeleton that a file of motion holds; None for a clip, or one of other frames: a figure's own BVH file."""
+    from wholebody.base.errors import FileFormatError
+    from wholebody.motion.reading import read_skeleton
+
+    try:
+        motion = read_skeleton(path)
+        return motion if len(motion) == frames else None
+    except FileFormatError:
+        return None
 
 
 def clip_of(arguments: argparse.Namespace) -> Clip:

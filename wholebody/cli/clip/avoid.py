@@ -7,7 +7,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.clip.arguments import EQUIPMENT, JOBS, MOTIONS, SCENE, bar, figure_of, jobs_of, scene_of
+from wholebody.cli.clip.arguments import (
+    EQUIPMENT,
+    JOBS,
+    MOTIONS,
+    PAGE,
+    SCENE,
+    bar,
+    figure_of,
+    jobs_of,
+    scene_of,
+    skeleton_of,
+)
 from wholebody.cli.command import command, flag, option
 
 if TYPE_CHECKING:
@@ -55,10 +66,12 @@ ended goes on.""",
         metavar="OUT",
         help="the file to write (default: <name>-free.npz, beside FILE); of a batch a folder (default: freed)",
     ),
+    PAGE,
     *JOBS,
     epilog="""\
 examples:
   wholebody clip avoid walk.bvh --equipment pack
+  wholebody clip avoid walk.bvh --equipment pack --html walk.html
   wholebody clip avoid walk.bvh run.bvh --equipment pack --equipment vest_plate+pouches --jobs 4 --out freed""",
 )
 def run(arguments: argparse.Namespace) -> int:
@@ -68,7 +81,8 @@ def run(arguments: argparse.Namespace) -> int:
         return _batch(arguments, methods, worn)
     from rich.console import Console
 
-    from wholebody.base.files import check_writable
+    from wholebody.base.errors import InputError
+    from wholebody.base.files import check_writable, checked_target, write
     from wholebody.motion.avoidance import avoid
     from wholebody.motion.files import check_ending
     from wholebody.motion.reading import read_clip
@@ -77,6 +91,10 @@ def run(arguments: argparse.Namespace) -> int:
     (file,) = arguments.files
     jobs_of(arguments)  # one case needs no jobs; what is wrong with them is said all the same
     out = check_writable(check_ending(arguments.out or file.with_name(f"{file.stem}-free.npz")), [file])
+    if arguments.html is not None:
+        checked_target(arguments.html, "--html", "a page", (".htm", ".html"))
+        if arguments.stretch is not None:
+            raise InputError("--html draws frames of before beside those of after; leave out --stretch")
     method, scene = _method(methods[0], arguments), put_on(scene_of(arguments), worn[0])
     clip = read_clip(file, scene.figure)
     with bar(clip.name) as tell:
@@ -89,14 +107,18 @@ def run(arguments: argparse.Namespace) -> int:
             progress=lambda told: bool(tell(told.share, told.note)),  # it goes on: a bar says nothing
         )
     _tell(Console(), avoided, avoided.clip.write(out))
+    if arguments.html is not None:
+        from wholebody.view.motion_curves import motion_curves
+
+        motion = skeleton_of(file, len(clip))
+        before = "before" if motion is None else "retargeted"
+        page = motion_curves(motion, {before: clip, "freed": avoided.clip}, scene)
+        print(f"wrote {write(arguments.html, page)}")
     return 0 if avoided.report.solved else 1
 
 
 def _method(name: str, arguments: argparse.Namespace) -> Avoider:
-    """The method, which may slow the motion, and keep to the strength of a person of the sex that was asked for.
-
-    Raises WholebodyError where there is no such method, or it does not slow motions or take dynamics.
-    """
+    """The method, which may slow the motion, and keep to the strength of a person of the sex that was asked for."""
     from wholebody.base.errors import InputError
     from wholebody.motion.avoidance import as_avoider
     from wholebody.motion.avoider import has_setting
@@ -150,6 +172,8 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
     from wholebody.motion.batch import BatchProgress, avoid_many
     from wholebody.motion.measures import MotionBounds
 
+    if arguments.html is not None:
+        raise InputError("--html is for one motion with one equipment by one method; give one of each")
     if arguments.scene is not None:
         raise InputError("--scene is for one motion with one equipment by one method; give one of each")
     # letters that a line of a batch's table needs

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.clip.arguments import JOBS, MOTIONS, ONE_MOTION, bar, clip_of, figure_of, jobs_of
+from wholebody.cli.clip.arguments import JOBS, MOTIONS, ONE_MOTION, PAGE, bar, clip_of, figure_of, jobs_of
 from wholebody.cli.command import command, flag, option
 
 if TYPE_CHECKING:
@@ -105,12 +105,13 @@ it holds already is not made again.""",
     ),
     option("--unit", metavar="UNIT", help="of lengths, such as centimetres (default: recognised)"),
     option("--up", choices=("y", "z"), help="the axis that points up (default: recognised)"),
+    PAGE,
     *JOBS,
     epilog="""\
 examples:
   wholebody clip retarget walk.bvh --out walk.npz --sex female --stature 1.62
   wholebody clip retarget walk.bvh --to g1.urdf --ground auto --out walk.npz
-  wholebody clip retarget walk.bvh --to g1.urdf --rate 50 --bare --out walk.csv
+  wholebody clip retarget walk.bvh --to g1.urdf --rate 50 --bare --out walk.csv --html walk.html
   wholebody clip retarget walk.bvh run.bvh jump.bvh --out clips --jobs 4""",
 )
 def retarget_motions(arguments: argparse.Namespace) -> int:
@@ -118,12 +119,14 @@ def retarget_motions(arguments: argparse.Namespace) -> int:
     _aim(arguments)
     if len(arguments.files) > 1:
         return _many(arguments)
-    from wholebody.base.files import check_writable
+    from wholebody.base.files import check_writable, checked_target, write
     from wholebody.motion.files import check_ending
     from wholebody.motion.reading import read_skeleton
     from wholebody.motion.retargeting import bone_errors, retarget
 
     check_writable(check_ending(arguments.out, bare=arguments.bare), arguments.files)
+    if arguments.html is not None:
+        checked_target(arguments.html, "--html", "a page", (".htm", ".html"), arguments.files)
     motion = read_skeleton(arguments.files[0], unit=arguments.unit, up=arguments.up)
     figure = figure_of(arguments)
     with bar("retargeting") as tell:
@@ -132,6 +135,12 @@ def retarget_motions(arguments: argparse.Namespace) -> int:
             progress=lambda share: tell(share, "retargeting"),
         )  # fmt: skip
     _print_errors(bone_errors(motion, clip, arguments.names))
+    if arguments.html is not None:
+        from wholebody.scene.scene import Scene
+        from wholebody.view.motion_curves import motion_curves
+
+        page = motion_curves(motion, {"retargeted": clip}, Scene(figure), arguments.names)
+        print(f"wrote {write(arguments.html, page)}")
     if arguments.rate is not None:
         clip = clip.resampled(1.0 / arguments.rate)
     written = clip.write(arguments.out, bare=arguments.bare)
@@ -176,7 +185,7 @@ def _many(arguments: argparse.Namespace) -> int:
     from wholebody.base.errors import InputError
     from wholebody.motion.batch import read_many
 
-    for given in ("names", "ground", "unit", "up", "rate", "bare"):
+    for given in ("names", "ground", "unit", "up", "rate", "bare", "html"):
         if getattr(arguments, given) not in (None, False, "auto"):
             raise InputError(f"--{given} is for one file, and there are {len(arguments.files)}; give one at a time")
     figure, count = figure_of(arguments), len(arguments.files)

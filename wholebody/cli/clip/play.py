@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from wholebody.cli.clip.arguments import ONE_MOTION, bar, clip_of
+from wholebody.cli.clip.arguments import ONE_MOTION, bar, clip_of, skeleton_of
 from wholebody.cli.command import command, option
+
+if TYPE_CHECKING:
+    from wholebody.motion.clip import Clip
+    from wholebody.scene.scene import Scene
+    from wholebody.view.viewer import Viewer
 
 NOTHING = "nothing"
 PICTURES = 8
@@ -23,6 +29,12 @@ ghost. With --equipment the body is shown with what it wears.""",
     *ONE_MOTION,
     option("--ghost", type=Path, metavar="FILE", help="another motion of the figure, shown transparent"),
     option(
+        "--beside",
+        type=Path,
+        metavar="FILE",
+        help="what it was made from, beside it: the recorded skeleton as bones, and the figure that follows it",
+    ),
+    option(
         "--equipment",
         default=NOTHING,
         metavar="WHAT",
@@ -34,7 +46,8 @@ ghost. With --equipment the body is shown with what it wears.""",
 examples:
   wholebody clip play walk.bvh
   wholebody clip play free.npz --ghost walk.npz --out before-after.html
-  wholebody clip play walk-free.npz --ghost walk.bvh --equipment pack""",
+  wholebody clip play walk-free.npz --ghost walk.bvh --equipment pack
+  wholebody clip play walk-free.npz --beside walk.bvh --equipment pack --out film.mp4""",
 )
 def run(arguments: argparse.Namespace) -> int:
     """Show or write the motion."""
@@ -55,11 +68,16 @@ def run(arguments: argparse.Namespace) -> int:
     out: Path | None = arguments.out
     whole(arguments.pictures, "--pictures", 1, 100)
     if out is not None:
-        checked_target(out, "--out", "a clip's picture", ENDINGS, [arguments.file, arguments.ghost])
+        checked_target(out, "--out", "a clip's picture", ENDINGS, [arguments.file, arguments.ghost, arguments.beside])
     clip = clip_of(arguments)
     ghost = None if arguments.ghost is None else read_clip(arguments.ghost, clip.figure)
     if ghost is not None and len(ghost) != len(clip):
         raise InputError(f"--ghost: {arguments.ghost.name} has {len(ghost)} frames and not {len(clip)}")
+    if arguments.beside is not None:
+        if ghost is not None or (out is not None and out.suffix.lower() == ".png"):
+            raise InputError("--beside shows motions side by side, as a page or a movie; leave out --ghost, and .png")
+        viewer = _beside(arguments.beside, clip, dressed(clip.figure, arguments.equipment))
+        return _written(viewer, out)
     scene = dressed(clip.figure, arguments.equipment)
     if clip.figure.root == "free":
         floor = min(lowest(clip.figure, q) for q in clip.q)  # recordings do not all have it at 0
@@ -76,6 +94,25 @@ def run(arguments: argparse.Namespace) -> int:
             print(f"wrote {write_filmstrip(viewer, list(clip.q[frames]), out, ghosts=beside)}")
             return 0
         viewer.play(clip, ghost=ghost, repeat=math.inf if out is None else 1)
+        return _written(viewer, out)
+
+
+def _beside(path: Path, clip: Clip, scene: Scene) -> Viewer:
+    """Both motions side by side, and on the left the skeleton of the first where its file has one."""
+    from wholebody.base.errors import InputError
+    from wholebody.motion.reading import read_clip
+    from wholebody.view.side_by_side import beside
+
+    before = read_clip(path, clip.figure)
+    if len(before) != len(clip):
+        raise InputError(f"--beside: {path.name} has {len(before)} frames and not {len(clip)}")
+    motion = skeleton_of(path, len(clip))
+    return beside(motion, {"before": before, "after": clip}, scene, clip.name)
+
+
+def _written(viewer: Viewer, out: Path | None) -> int:
+    """Show what a viewer plays, or write it as a page, glTF or movie."""
+    with viewer:
         if out is None:
             viewer.open()
             viewer.wait_until_closed()

@@ -37,8 +37,15 @@ HANDS = ("rigid", "fingers")
 
 SIDES = ("left", "right")
 
-EFFORT = 0.2
-"""Weight of a finger's joint in a person's effort, beside 1 of the arm's. ESTIMATE: fingers move before an arm."""
+
+def finger_effort(joint: str) -> float:
+    """Weight of a finger's joint in a person's effort, beside 1 of an elbow.
+
+    FITTED with those of the arm to how people type; of the thumb an ESTIMATE: it moves before an arm.
+    """
+    if "thumb" in joint:
+        return 0.2
+    return 1.6 if joint.endswith("flexion") else 0.4
 
 
 class _Part(NamedTuple):
@@ -76,12 +83,8 @@ def finger_angles(shape: str, side: str | None = None) -> dict[str, float]:
 
 
 def opened_for_a_bar(sides: Sequence[str]) -> Iterator[dict[str, float]]:
-    """Angles of the joints of fingers from which hands take a bar by a power grip, radians; nothing without sides.
-
-    Fingers that bend at their roots first lay their first parts on the bar before it meets the palm. Of a hook the
-    roots are nearly straight. First the thumb is left out, then it is that of a fist, which lies over the fingers, last
-    that of the hook.
-    """
+    """Angles [rad] of fingers from which hands take a bar: no thumb, a fist's, a hook's; nothing without sides."""
+    # Fingers that bend at their roots first lay their first parts on the bar before it meets the palm.
     hook, fist = ({name: angle for side in sides for name, angle in finger_angles(shape, side).items()}
                   for shape in ("hook", "fist"))  # fmt: skip
     fingers = {name: angle for name, angle in hook.items() if "thumb" not in name}
@@ -92,10 +95,7 @@ def opened_for_a_bar(sides: Sequence[str]) -> Iterator[dict[str, float]]:
 
 
 def with_fingers(spec: BodySpec, size: Dimensions, detail: str) -> BodySpec:
-    """Return a person's specification with fingers in the place of hands of one segment.
-
-    Its size is of the same person, the pieces are in a detail of "capsules" or "hulls".
-    """
+    """Return a person's specification with fingers, in "capsules" or "hulls", in the place of hands of one segment."""
     links: list[Link] = [link for link in spec.links if link.name not in ("left_hand", "right_hand")]
     joints, marks, solids = list(spec.joints), list(spec.landmarks), list(spec.solids)
     for side in SIDES:

@@ -77,12 +77,8 @@ def _joints(person: Person) -> tuple[Joint, ...]:
 
 
 def joint_limits(person: Person, row: Mapping[str, str]) -> tuple[float, float]:
-    """Return the least and greatest angle of a joint, degrees. How far the clavicle rises follows from overhead reach.
-
-    From 45 years on they are scaled by the means of people of 45 to 69 over those of 20 to 44 (Soucie et al. 2011),
-    where both are known; else they are at most the older people's mean. Younger people have those of the table
-    "joints", of which the joint is a row.
-    """
+    """Least and greatest angle of a joint, degrees; how far the clavicle rises follows from overhead reach."""
+    # From 45 years on scaled by means of 45 to 69 over 20 to 44 (Soucie et al. 2011), or at most the older mean.
     limits = {"lower": float(row["lower_deg"]), "upper": float(row["upper_deg"])}
     if row["name"].endswith("_clavicle_elevation"):
         limits["upper"] = person.size("elevation")

@@ -29,14 +29,7 @@ def xml_figure(
     samples: int = SAMPLES,
     seed: int = 0,
 ) -> Figure:
-    """Return the figure of an ``.xml`` file: an MJCF if its outermost element is ``<mujoco>``, otherwise a URDF.
-
-    Arguments and errors are those of `urdf_figure`; an MJCF has no packages. Of a file with several robots `root` may
-    be the name of the body of one, which keeps its root.
-
-    Raises:
-        MissingPackageError: an MJCF, and MuJoCo is not installed.
-    """
+    """The figure of an ``.xml`` file, an MJCF or a URDF; arguments as for `urdf_figure`, `root` also a robot's body."""
     place = Path(path)
     if not is_mjcf(place):
         return urdf_figure(path, root, package_dirs, concavity, samples, seed)

@@ -40,11 +40,7 @@ def geom_shape(compiled: Compiled, geom: int) -> LinkShape | None:
 
 
 def height_field(compiled: Compiled, geom: int) -> list[Array]:
-    """Corners (n, 3) of the convex prisms of a geom's height field, in the geom's frame.
-
-    They are below the triangles that MuJoCo tests. A cell has two triangles, whose common edge goes from its first
-    corner to the opposite one. Cells side by side whose tops are in one plane are one prism.
-    """
+    """Corners (n, 3) of the convex prisms of a geom's height field, in its frame, below the triangles MuJoCo tests."""
     model, field = compiled.model, int(compiled.model.geom_dataid[geom])
     rows, columns = int(model.hfield_nrow[field]), int(model.hfield_ncol[field])
     half_x, half_y, top, below = (float(value) for value in model.hfield_size[field])

@@ -14,10 +14,7 @@ Field = Callable[[Array], Array]
 
 
 def round_cone(start: Any, end: Any, first: float, last: float) -> Field:
-    """The hull of two balls, of radius `first` at `start` and `last` at `end`.
-
-    After Quilez, "Distance functions" (round cone), in the form without square roots in its cases.
-    """
+    """The hull of two balls, of radius `first` at `start` and `last` at `end` (Quilez, "Distance functions")."""
     a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
     axis = b - a
     length2, slope = float(axis @ axis), first - last

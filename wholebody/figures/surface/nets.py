@@ -34,10 +34,7 @@ class Triangles(NamedTuple):
 
 
 def triangles(field: Field, low: Array, high: Array, cell: float, cuts: Sequence[Field] = ()) -> Triangles:
-    """Return the surface of what is in a field and in every cut, such as half spaces; edges between them are sharp.
-
-    `low` and `high` (3,) are corners of a box that contains the solid, `cell` is the size of the grid's cells, metres.
-    """
+    """Surface of what is in a field and in every cut, edges sharp, in a box `low`, `high` (3,), cells of `cell` m."""
     body = field
     for cut in cuts:
         field = intersection(field, cut)
@@ -64,9 +61,7 @@ def triangles(field: Field, low: Array, high: Array, cell: float, cuts: Sequence
 def coarsened(surface: Triangles) -> NDArray[np.int64]:
     """Return fewer and larger triangles (m, 3) between the vertices of a closed surface; it stays closed.
 
-    All vertices in a cell of a grid become the one that is nearest to their middle, and triangles that so lose an edge
-    are left out (vertex clustering: Rossignac and Borrel, "Multi-resolution 3D approximations for rendering complex
-    scenes", 1993). Vertices of sharp edges stay, as hems would be ragged.
+    Vertex clustering: Rossignac and Borrel, "Multi-resolution 3D approximations for rendering complex scenes", 1993.
     """
     vertices, faces = surface.vertices, surface.faces
     edges = vertices[faces] - vertices[np.roll(faces, 1, axis=1)]
@@ -184,10 +179,7 @@ def _moved(field: Field, vertices: Array, cell: float) -> Array:
 def _on_edges(
     body: Field, cuts: Sequence[Field], values: Array, cells: NDArray[np.int64], start: Array, cell: float
 ) -> Iterator[tuple[NDArray[np.int64], Array]]:
-    """For each cut, the cells (k,) that its edge with the body passes, and the points (k, 3) of the edge nearest them.
-
-    A vertex belongs to the edge if some of the quadrilaterals around it are the body's and others the cut's.
-    """
+    """For each cut, the cells (k,) that its edge with the body passes, and the nearest points (k, 3) of the edge."""
     sides = [body, *cuts]
     middles = start + (cells + 0.5) * cell
     near = np.flatnonzero(np.min([np.abs(cut(middles)) for cut in cuts], axis=0) < STEEPEST * cell)

@@ -18,10 +18,7 @@ from wholebody.geometry.mesh_cache import cached_entry
 
 
 def surface_of(figure: Any) -> Surface | None:
-    """Return the surface of a person, an avatar or a hand; None for any other figure.
-
-    The first time a body is drawn takes a second more; then it is kept in the user's cache folder.
-    """
+    """Return the surface of a person, an avatar or a hand, kept in the user's cache folder; None for another figure."""
     person = figure.describe().person if isinstance(figure, Figure) else None
     hands = [side for side in ("left", "right") if person and f"{side}_hand" in figure.segments]
     if person is None or ("pelvis" not in figure.segments and len(hands) != 1):

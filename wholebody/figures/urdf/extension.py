@@ -105,11 +105,7 @@ def extension_text(figure: Figure) -> str:
 def extended_figure(
     path: Path, element: Element, name: str, model: pin.Model, geometry: pin.GeometryModel, notes: Sequence[str]
 ) -> Figure:
-    """Return the figure that an element of `extension_text` describes; pairs are added to its pieces.
-
-    Raises:
-        FileFormatError: a name that is not in the file, or numbers of the wrong count or value.
-    """
+    """Return the figure that an element of `extension_text` describes; pairs are added to its pieces."""
     return _Reader(path, element, model, geometry).figure(name, tuple(notes))
 
 

@@ -29,22 +29,7 @@ def urdf_figure(
     seed: int = 0,
     srdf: str | PathLike[str] | None = None,
 ) -> Figure:
-    """Return the figure of a URDF file; arguments as for `wholebody.load`.
-
-    Args:
-        path: the file.
-        root: "fixed" to the world, or "free"; if left out, as in the file (see `urdf.extension`), or "fixed".
-        package_dirs: looked through before the file's own parents and ROS_PACKAGE_PATH and AMENT_PREFIX_PATH.
-        concavity: see there.
-        samples: number of random postures for finding pairs that always overlap.
-        seed: of those postures.
-        srdf: see there.
-
-    Raises:
-        FileFormatError: a file that cannot be read, with the place and the correction.
-        InputError: another root, a concavity out of range, or too many joints for the memory.
-        UnknownNameError: `concavity` names an unknown link.
-    """
+    """Return the figure of a URDF file; arguments and errors as for `wholebody.load`."""
     if root not in (None, "fixed", "free"):
         raise InputError(f"root is {root!r}; give 'fixed' or 'free'")
     folders = [package_dirs] if isinstance(package_dirs, (str, PathLike)) else package_dirs

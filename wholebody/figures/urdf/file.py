@@ -46,11 +46,7 @@ class UrdfFile(NamedTuple):
 
 
 def read_urdf(path: Path, package_dirs: Sequence[Path] = ()) -> UrdfFile:
-    """Read and check a URDF file; `find_mesh` looks in the folders.
-
-    Raises:
-        FileFormatError: one sentence with the place and the correction.
-    """
+    """Read and check a URDF file; `find_mesh` looks in the folders."""
     robot = read_xml(path, "URDF")
     if robot.tag != "robot":
         raise FileFormatError(f"{path}: the outermost element is <{robot.tag}>, not <robot>; give a URDF")
@@ -181,15 +177,8 @@ def _shape(element: Element, link: str, path: Path, package_dirs: tuple[Path, ..
 
 
 def find_mesh(name: str, place: str, path: Path, package_dirs: Sequence[Path]) -> Path:
-    """Find a mesh.
-
-    A path is looked up beside the file and in `package_dirs`; ``package://<package>/<path>`` in `package_dirs`, the
-    file's parents, the folders of ROS_PACKAGE_PATH, and ``share`` below those of AMENT_PREFIX_PATH. A folder may hold
-    packages or be one. A name that is not found is tried with slashes for backslashes and with ``%20`` decoded.
-
-    Raises:
-        FileFormatError: no name, or no such file.
-    """
+    """Find a mesh beside the file, in `package_dirs`, or by ``package://`` in folders of ROS; else FileFormatError."""
+    # A name not found is tried with slashes for backslashes and ``%20`` decoded. A folder may hold packages or be one.
     if not name.strip():
         raise FileFormatError(f"{place} has a mesh without filename; add it")
     for tried in dict.fromkeys((name, unquote(name), unquote(name).replace("\\", "/"))):

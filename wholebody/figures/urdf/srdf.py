@@ -33,11 +33,7 @@ class Srdf(NamedTuple):
 
 
 def read_srdf(path: Path, model: pin.Model, links: tuple[str, ...]) -> Srdf:
-    """Read the SRDF of a URDF that has a model and links.
-
-    Raises:
-        FileFormatError: a file that is no SRDF, or a value that is no number.
-    """
+    """Read the SRDF of a URDF that has a model and links."""
     robot = read_xml(path, "SRDF")
     if robot.tag != "robot":
         raise FileFormatError(f"{path}: the outermost element is <{robot.tag}>, not <robot>; give an SRDF")

@@ -28,10 +28,7 @@ class UrdfAxis(NamedTuple):
 
 
 def urdf_axis(model: pin.Model, index: int) -> UrdfAxis | None:
-    """Kind and axis of a joint of a model; None for one that does not turn about or slide along one axis.
-
-    A joint that follows another has its own axis, without the factor by which it follows.
-    """
+    """Kind and axis of a joint of a model, its own where it follows another; None if it has no single axis."""
     joint = model.joints[index]
     name = joint.shortname()
     follows = name == FOLLOWS
@@ -58,10 +55,7 @@ def add_joint(
     axis: Iterable[float] | None = None,
     limit: Mapping[str, float] | None = None,
 ) -> Element:
-    """Add a joint between two links to the URDF's root element, with exact numbers, and return it.
-
-    The origin places the child in the parent at zero; the limit has numbers by the attributes of ``<limit>``.
-    """
+    """Add a joint to the URDF's root element with exact numbers, its child at `origin` in the parent."""
     joint = SubElement(robot, "joint", name=name, type=kind)
     SubElement(joint, "parent", link=parent)
     SubElement(joint, "child", link=child)

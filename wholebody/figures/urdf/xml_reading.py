@@ -21,11 +21,7 @@ MOST = 1e9
 
 
 def read_xml(path: Path, kind: str) -> Element:
-    """Return the outermost element of an XML file of a kind, such as "URDF".
-
-    Raises:
-        FileFormatError: no file, too large, not text, an unknown encoding, or broken XML.
-    """
+    """Return the outermost element of an XML file of a kind, such as "URDF"."""
     data = read_bytes(path, kind, 64 * 2**20)  # the largest that is accepted as a description of a robot
     try:
         return ElementTree.fromstring(data)
@@ -54,10 +50,7 @@ def unique_names(elements: Sequence[Element], kind: str, path: Path) -> tuple[st
 
 
 def numbers(element: Element, name: str, place: str, count: int, default: str | None = None) -> tuple[float, ...]:
-    """Return the finite numbers of an attribute; another count is refused with the element's place in the file.
-
-    Blanks around them are taken out of the element, for Pinocchio's reader takes a number with blanks for none.
-    """
+    """Return the finite numbers of an attribute, and take out blanks, which Pinocchio does not read."""
     text: Any = element.get(name, default)
     try:
         words = text.split()

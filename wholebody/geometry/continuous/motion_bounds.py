@@ -62,13 +62,7 @@ class MotionBounds:
         self._parents = [int(parent) for parent in model.parents]
 
     def update(self, data: Any, velocity: Array, centers: Array) -> None:
-        """Bound the motion that begins at the posture of `data`.
-
-        Args:
-            data: Pinocchio's data after forwardKinematics at the start, with `velocity`.
-            velocity: (nv,) difference of the two postures.
-            centers: (n, 3) the origins of the pieces at the start, world.
-        """
+        """Bound the motion of `velocity` (nv,) from the posture of `data`, pieces' origins at `centers` (n, 3)."""
         if len(self._first):
             twists = np.add.reduceat(self._twists * velocity[self._column], self._first, axis=1)
             self._slide[1:], self.turn[1:] = np.sqrt(np.einsum("ijk,ijk->ik", *[twists.reshape(2, 3, -1)] * 2))
@@ -112,11 +106,8 @@ class MotionBounds:
 def largest_approach(table: PairTable, centres: Array, most: Array) -> Array:
     """Most by which the distance of every pair can fall (pairs,), metres; infinite where nothing is known.
 
-    Args:
-        table: the pieces and pairs.
-        centres: (n,) most that a piece's origin is away from that of its joint, metres; infinite where it may be placed
-            anew.
-        most: (nv,) largest displacement of every degree of freedom, radians and metres; may be infinite.
+    `centres` (n,): how far a piece's origin is from its joint's, infinite where placed anew; `most` (nv,): largest
+    displacements, radians and metres.
     """
     model = table.model
     moved = np.array([_motion(model, joint, most) for joint in range(model.njoints)])

@@ -20,8 +20,7 @@ def far_moved(
 ) -> Indices:  # fmt: skip
     """Return the pairs (k,) that moved against each other by more than their distance; placements are (n, 4, 3).
 
-    `table` has `pairs`, `widths` and `reach` of the pair table; `near` has the pairs that were near before, their
-    distances, and the query distance, all others being farther apart; then the same after the motion.
+    `table`: `pairs`, `widths` and `reach` of the pair table; `near`: near pairs, distances, query distance, twice.
     """
     pairs, widths, reach = table
     number_before, distance_before, within_before, number_after, distance_after, within_after = near
@@ -73,10 +72,7 @@ def separated(
     doubtful: Indices, before: Array, after: Array, near: tuple[Indices, Indices, Array, Array, Array],
     outline: Outline, overlap: float,
 ) -> Mask:  # fmt: skip
-    """Return whether a plane still separates pairs, (k,); see `moved_pairs.separated`.
-
-    `near` has the numbers of the pairs that were near before, their pieces, normals and nearest points of both.
-    """
+    """Whether a plane still separates pairs, (k,); `near`: their numbers, pieces, normals and nearest points."""
     number, pair, normal, point_a, point_b = near
     found = np.zeros(len(doubtful), dtype=np.bool_)
     for k in range(len(doubtful)):

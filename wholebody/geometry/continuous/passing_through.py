@@ -56,10 +56,7 @@ class Queries(Protocol):
 def is_free(
     queries: Queries, before: Array, after: Array, unswept: float, over: Callable[[], bool] = bool
 ) -> bool:  # fmt: skip
-    """Whether a motion between two postures is known to penetrate nothing.
-
-    One shorter than `unswept`, rad and m, is not swept; a sweep ends where its time is `over`.
-    """
+    """Whether a motion is known to penetrate nothing; one shorter than `unswept` is not swept."""
     if np.isinf(unswept) or np.abs(pin.difference(queries.model, before, after)).max(initial=0.0) <= unswept:
         return True
     return queries.sweep.first_contact(before, after, tolerance=GRAZE, over=over) is None
@@ -76,11 +73,10 @@ class Entered(NamedTuple):
 def entered(
     sweep: Sweep, depths: SweptDepth, path: Sequence[Array], watched: NDArray[np.bool_]
 ) -> list[Entered]:  # fmt: skip
-    """The pairs that one motion after the other leads through each other, and those that overlap where it ends.
+    """The pairs that motions lead through each other, or that overlap at their end; none where one way is free.
 
-    They get deeper on the way than at the beginning by `OVERLAP`, or overlap at the end by `INSIDE`: if they are not
-    watched (pairs,), by that much more than at the beginning. There are none where the motions one after the other are
-    free, or the straight one from the first configuration to the last. The path has one configuration (nq,) or more.
+    They get deeper on the way by `OVERLAP`, or overlap at the end by `INSIDE`, for pairs not watched (pairs,) more than
+    at the beginning. The path has one configuration (nq,) or more.
     """
     last = _by_pair(depths.start(path[-1]), len(watched))
     ways = ((path[0], path[-1]), path) if len(path) > 2 else (path,)
@@ -108,11 +104,8 @@ def _by_pair(depths: Depths, pairs: int) -> Array:
 
 
 def last_free(model: pin.Model, free: Array, q: Array, overlaps: Callable[[Array], object], halvings: int) -> Array:
-    """Bisect the motion from a free posture (nq,) to one that overlaps something; the result was tested to be free.
-
-    Algorithm 1, step 4, of Schmidl and Lin. The result is accurate to 2 to the power of minus the number of halvings.
-    If the motion is free again after an overlap, it may be on either side.
-    """
+    """Bisect the motion from a free posture (nq,) to one that overlaps; the result was tested to be free."""
+    # Algorithm 1, step 4, of Schmidl and Lin: accurate to 2 to the power of minus the number of halvings.
     inside, outside = 0.0, 1.0
     for _ in range(halvings):
         middle = 0.5 * (inside + outside)
@@ -124,12 +117,8 @@ def last_free(model: pin.Model, free: Array, q: Array, overlaps: Callable[[Array
 
 
 def passes_through(queries: Queries, before: QueryResult, after: QueryResult, q0: Array, q1: Array) -> bool:
-    """Whether some pair has changed sides during a motion from posture q0 to q1 (nq,), near pairs known at both.
-
-    A pair that touches during the motion and at its end is a collision, which its distance shows; a pair that touches
-    and is separate again was passed through. The motion is halved a few times, which decides most pairs at a tenth of
-    the cost of a sweep; the remaining pairs are swept. The state of `queries` is moved.
-    """
+    """Whether some pair has changed sides during a motion from q0 to q1 (nq,); the state of `queries` is moved."""
+    # Halving decides most pairs at a tenth of a sweep's cost. A pair that touches at the end is seen by its distance.
     table = queries.table
     moved = far_moved(table, before, after)
     if not len(moved):
@@ -174,10 +163,7 @@ def _swept_through(queries: Queries, q0: Array, q1: Array, doubtful: Indices, en
 def first_passed(
     queries: Queries, before: QueryResult, after: QueryResult, q0: Array, q1: Array, overlap: float
 ) -> FirstContact | None:
-    """First contact, deeper than `overlap`, of a pair that may have changed sides and is separate after the motion.
-
-    The arguments are those of `passes_through`; None if there is none.
-    """
+    """First contact, deeper than `overlap`, of a pair that may have changed sides and is separate after the motion."""
     table = queries.table
     moved = far_moved(table, before, after)
     doubtful = moved[distances(after, len(table.pairs))[moved] > -overlap]
@@ -192,11 +178,8 @@ def doubtful_pairs(table: PairTable, before: QueryResult, after: QueryResult) ->
 def _passing_by(
     queries: Queries, before: QueryResult, after: QueryResult, q0: Array, q1: Array, pairs: Indices
 ) -> NDArray[np.bool_]:
-    """The pairs whose bounding spheres stay separate during the motion, estimated from its middle.
-
-    The relative path of the centres is approximated by two chords that meet in the middle. For a parabola the deviation
-    from these chords is a quarter of the deviation of the middle from the whole chord; twice that is assumed.
-    """
+    """The pairs whose bounding spheres stay separate during the motion, estimated from its middle."""
+    # The centres' path is taken as two chords; twice the deviation of a parabola from them is allowed for.
     table = queries.table
     halfway = queries.placements(np.asarray(pin.interpolate(queries.model, q0, q1, 0.5)))
     first, second = table.pairs[pairs, 0], table.pairs[pairs, 1]

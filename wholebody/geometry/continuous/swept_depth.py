@@ -68,13 +68,8 @@ class SweptDepth:
         return self._overlaps(np.flatnonzero(self._now.least < 0.0))
 
     def advance(self, q: Array) -> tuple[Depths, Depths]:
-        """Go on to the next posture (nq,), along ``pin.interpolate``.
-
-        Returns:
-            The pairs that overlap there, and the pairs that overlap on the way or at one of its ends. No pair gets
-            deeper on the way than the tolerance and the depth that is returned for it. A depth beyond the tolerance
-            may be too large by `SHARP` of the tolerance and `COARSE` of itself; others were found.
-        """
+        """Go on to the next posture (nq,): the pairs that overlap there, and on the way or at one of its ends."""
+        # None gets deeper than tolerance and depth; depths beyond it may be large by `SHARP` of it and `COARSE`.
         assert self._q is not None
         self._before, self._now = self._now, self._before
         before, now = self._before, self._now
@@ -121,11 +116,8 @@ class SweptDepth:
         place.ask(numbers)
 
     def _between(self, doubtful: Indices, speed: Array, velocity: Array) -> Depths:
-        """Depths on the way from the posture before to the present one.
-
-        Parts of the way are halved together, so that all parts are of one length at a time. Each row is a pair during a
-        part: `which` of the pairs, and the places before and after it in `stack`.
-        """
+        """Depths on the way from the posture before to the present one, all parts halved together."""
+        # Each row is a pair during a part: `which` of the pairs, and the places before and after it in `stack`.
         assert self._q is not None
         stack = _Stack(self._before.places, self._now.places)
         rows0, rows1 = self._before.rows[doubtful], self._now.rows[doubtful]
@@ -180,12 +172,7 @@ class SweptDepth:
 
 
 class _Stack:
-    """Placements of the pieces at times of one motion.
-
-    Attributes:
-        times: of the placements, as shares of the motion.
-        places: (m, n, 4, 3) placements; only as many as there are times are filled.
-    """
+    """Placements `places` (m, n, 4, 3) of the pieces at `times`, shares of one motion; as many as times are filled."""
 
     def __init__(self, before: Array, after: Array) -> None:
         self.times, self.places = [0.0, 1.0], np.empty((16, *before.shape))

@@ -142,31 +142,21 @@ def lower_bounds(
 
 
 class Sliding(NamedTuple):
-    """Pairs at a posture of a motion, each to be kept above a distance.
+    """Pairs at a posture of a motion, each to be kept above a distance."""
 
-    Attributes:
-        number: (k,) places of the pairs.
-        rows: (k, 4) distance and normal, from the first piece to the second.
-        level: (k,) the distance.
-        place: (n, 4, 3) where the pieces are.
-        twist: (njoints, 6) velocity of each joint's body, linear at the world's origin, then angular, per duration.
-    """
-
-    number: Indices
-    rows: Array
-    level: Array
-    place: Array
-    twist: Array
+    number: Indices  # (k,) places of the pairs
+    rows: Array  # (k, 4) distance and normal, from the first piece to the second
+    level: Array  # (k,) the distance
+    place: Array  # (n, 4, 3) where the pieces are
+    twist: Array  # (njoints, 6) velocity of each joint's body, linear at the world's origin, then angular, per duration
 
 
 @compiled()
 def keep_apart(sliding: Sliding, shapes: Shapes, motion: Speeds, safe: Array) -> None:
     """Raise the shares `safe` (k,) of a motion for which pairs stay apart, from heights above planes to second order.
 
-    A plane that moves with one piece and supports it bounds the distance from below by the least height of the other
-    piece's swept points. Each height has its exact rate now, and an acceleration of at most `_curvature`. The plane is
-    across coal's normal, and across that of the face nearest to it: a wide face needs its exact normal for a useful
-    bound, and where faces touch, coal's normal can be 1e-4 rad off.
+    A height has its exact rate now, and an acceleration of at most `_curvature`. The planes are across coal's normal
+    and across that of the face nearest to it, from which coal's can be 1e-4 rad off where faces touch.
     """
     asked, rows, level, place, _ = sliding
     pairs, joint, reach, points, first_point, radius, radii, faces, first_face = shapes
@@ -208,10 +198,7 @@ def keep_apart(sliding: Sliding, shapes: Shapes, motion: Speeds, safe: Array) ->
 def _stays_above(
     other: int, carrier: int, normal: Array, height: float, bend: float, level: float, sliding: Sliding, shapes: Shapes
 ) -> float:  # fmt: skip
-    """Share of a motion for which the points of a piece stay `level` above a plane of another one.
-
-    The plane is at a height above the carrier's origin, along a normal in the world; 0 where it is not above now.
-    """
+    """Share of a motion for which a piece's points stay `level` above a plane at a height above a carrier's origin."""
     place, twist = sliding.place, sliding.twist
     a, b, points = shapes.joint[other], shapes.joint[carrier], shapes.points
     ground = height + shapes.radius[other] + level

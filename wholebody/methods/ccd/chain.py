@@ -103,10 +103,7 @@ class ChainResolver:
         return self._finder.deepest(overlaps)
 
     def push(self, link: Link, margin: float = MARGIN, tracked: Tracked | None = None) -> tuple[int, ...]:
-        """Move the link out of the obstacle by `margin` metres; returns the nodes that moved. Call `read` first.
-
-        A link that is translated takes the orientation that it has in `tracked`, or keeps its own.
-        """
+        """Move the link out of the obstacle by `margin` metres; the nodes that moved. Call `read` first."""
         x, y, z = link.push
         length = (x * x + y * y + z * z) ** 0.5
         if length < 1e-9:
@@ -139,11 +136,8 @@ class ChainResolver:
                 return
 
     def _kept(self, link: Link, push: Vector, tracked: Tracked | None) -> Array | None:
-        """(3, 3) axes, one a row, that a link keeps which moves out by translation; None for one that turns.
-
-        A link is translated whose bone is nearly parallel to the obstacle's surface: in its tracked direction, if it is
-        near to that, so that what other links and frames turned is turned back, and while it is held; else as it is.
-        """
+        """(3, 3) axes, one a row, that a link keeps which moves out by translation; None for one that turns."""
+        # Translated is a link parallel to the surface, in its tracked direction if near to that, and while it is held.
         there, bone = _columns(self.limbs.frames[link.node]).copy(), self._bone(link)
         if tracked is not None:
             wanted = np.ascontiguousarray(tracked.placed[self.limbs.joints[link.node]].rotation.T)
@@ -156,10 +150,7 @@ class ChainResolver:
         return there if _parallel(bone, push, PARALLEL) else None
 
     def _held(self, link: Link, tracked: Tracked) -> bool:
-        """Whether a link was moved out by translation before: in this step, or as shown it is aside but not turned.
-
-        It stays so at any angle to the surface: an edge that slides along it meets its round end in the end.
-        """
+        """Whether a link was moved out by translation before, in this step or as shown; it stays so at any angle."""
         joint, base = self.limbs.joints[link.node], self._base
         if joint in self.translated:
             return True
@@ -170,11 +161,8 @@ class ChainResolver:
         return float(np.abs(moved).max()) > 1e-3  # m
 
     def _translate(self, link: Link, push: Vector, inner: Sequence[int], there: Array) -> None:
-        """Move the link by pure translation: its joint's origin moves, and its axes become `there` (3, 3).
-
-        Inner joints whose axes pass through the origin keep it too: an upper arm's rotation moves no elbow. An elbow
-        moves on a sphere, so it moves aside too, as far as it must to get out by the length of the push.
-        """
+        """Move the link by pure translation: its joint's origin moves, and its axes become `there` (3, 3)."""
+        # An upper arm's rotation moves no elbow; an elbow moves on a sphere, so aside too.
         limbs = self.limbs
         own = tuple(node for node in link.nodes if node not in inner)
         own_origin = own[-1]

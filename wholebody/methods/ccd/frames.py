@@ -48,18 +48,8 @@ def resolve_overlap(
 ) -> OverlapResult:
     """The posture nearest to the wanted one that this frame can reach without overlap, and the work to find it.
 
-    It is within limits and reach cones and never NaN. If things were moved into `q_free`, leaving them comes first.
-
-    Args:
-        scene: figure and things. Prepared data of the scene are cached between calls.
-        q_free: (nq,) the last posture without overlap: the one shown before.
-        q_wanted: (nq,) the tracked posture. It may overlap; it is clamped to limits and cones.
-        rng: of the order of the chains; the same seed gives the same answer.
-        largest_motion: (nv,) of each degree of freedom, radians and metres; None for no limit. The remainder is left
-            to the next frame.
-
-    Raises:
-        InputError: a posture of the wrong shape, or a value that is not finite.
+    It goes from `q_free` (nq,), the posture shown before, or out of things moved there, by `largest_motion` (nv,) at
+    most, and is within limits and reach cones, as `q_wanted` (nq,) is made. `rng` orders the chains.
     """
     checked = [_posture(scene, q, what) for q, what in ((q_free, "q_free"), (q_wanted, "q_wanted"))]
     with scene.built.pool(FrameResolver, lambda: FrameResolver(scene)).borrow() as frames:
@@ -112,11 +102,8 @@ class Attraction:
         return np.asarray(pin.integrate(self._model, q, way)), shares
 
     def keep_gains(self, q: Array, trial: Array, wanted: Array, shares: Array, settled: list[bool]) -> Array:
-        """Undo changes that brought a part no nearer to the wanted posture; move joints of blocked parts one by one.
-
-        If overlap resolution undoes the attraction, single joints may still be free: a shoulder can move the whole arm
-        back, although the wrist cannot straighten yet. A part for which this gains nothing either is settled.
-        """
+        """Undo changes that brought a part no nearer to the wanted posture; move joints of blocked parts one by one."""
+        # A shoulder can move the arm back although the wrist cannot straighten. A part that gains nothing is settled.
         before = np.asarray(pin.difference(self._model, q, wanted))
         after = np.asarray(pin.difference(self._model, trial, wanted))
         turned = self._turned_back(q, trial)
@@ -276,10 +263,7 @@ class FrameResolver:
         return way
 
     def _toward(self, q0: Array, q1: Array) -> Array | None:
-        """The direct motion from q0 towards q1, as far as a frame may move; None if that is not free.
-
-        Each part makes its own share of a motion that is too long, or, if that is not free, all make the least.
-        """
+        """The direct motion from q0 towards q1, by each part's share or the least of them; None if that is not free."""
         way = np.asarray(pin.difference(self._model, q0, q1))
         shares = np.minimum(1.0, self._largest_motion / np.maximum(np.abs(way), 1e-12))
         for dofs, _ in self._parts:

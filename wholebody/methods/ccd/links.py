@@ -54,10 +54,7 @@ class LinkFinder:
     """Finds the overlapping link of one chain."""
 
     def __init__(self, workspace: Workspace, limbs: Limbs, foreign: frozenset[int], exact: bool = True) -> None:
-        """Prepare the joints of the chain; `exact` computes the least translation that separates if PD_g cancels.
-
-        Links of the joints `foreign` are no links of this chain, although it may move them.
-        """
+        """Prepare the joints of the chain, links but those of `foreign` joints; `exact`: where PD_g cancels."""
         self._exact = exact
         self._workspace, self._limbs = workspace, limbs
         self._carrier = [limbs.carrier(joint) for joint in range(workspace.model.njoints)]

@@ -27,11 +27,8 @@ class Reached(NamedTuple):
 
 
 def _aims(limbs: Limbs, data: Any, goals: Sequence[GoalPlace]) -> Aims:
-    """The points and axes of all goals with their targets, where `data` has the joints that these limbs do not move.
-
-    A goal's place comes first, then its three axes. Places have the weight of their goal, axes half of it: the squared
-    distances of three axes from themselves turned by a small angle add up to twice its square.
-    """
+    """The points and axes of all goals with their targets, where `data` has the joints that these limbs do not move."""
+    # A place, then three axes of half the weight: their squared distances add up to twice that of a small angle.
     lever = 0.3  # m per radian: weight of orientation against position; about the length of a forearm
     rows: list[tuple[int, Any, Any, bool, float]] = []
     for goal in goals:

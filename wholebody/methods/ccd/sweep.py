@@ -45,16 +45,7 @@ class Aims:
         self, limbs: Limbs, nodes: Sequence[int], local: ArrayLike, there: ArrayLike, points: Sequence[bool],
         weights: ArrayLike | None = None,
     ) -> None:  # fmt: skip
-        """Take what is carried, as it is after `limbs.forward`.
-
-        Args:
-            limbs: the limbs.
-            nodes: (m,) that carry each; -1 is the world.
-            local: (m, 3) each in its node's frame.
-            there: (m, 3) targets in the world.
-            points: (m,) which are points.
-            weights: (m,) factors on the squared distances; None for all alike.
-        """
+        """Take what nodes (m,) carry after `limbs.forward`, -1 the world: `local`, targets `there` (m, 3), points."""
         self._limbs, self._kernel = limbs, compiled_kernel()
         self._carriers, self._are_points = tuple(nodes), tuple(points)
         self._nodes = np.array(nodes, dtype=np.intp)
@@ -78,11 +69,8 @@ class Aims:
         return plan
 
     def sweep(self, plan: Plan) -> float:
-        """Give each joint its best value, within its limits; returns the largest change of one, radians or metres.
-
-        When a joint is processed, the joints farther out have moved, but its axis has not, so only the aims are
-        updated: a sweep is linear in the number of joints. Call `limbs.forward` and `carry` before the next one.
-        """
+        """Give each joint its best value within its limits; the largest change, radians or metres."""
+        # Only aims are updated, not axes, so a sweep is linear. Call `limbs.forward` and `carry` before the next.
         limbs = self._limbs
         return float(
             self._kernel.sweep(limbs.lines, limbs.kinds, limbs.values, limbs.limits, self._rows, plan.turns, plan.moved)
@@ -137,17 +125,8 @@ def sweep(
 ) -> float:  # fmt: skip
     """Give each joint its best value and carry the aims along; return the largest change.
 
-    The arrays come one by one: a sweep of an arm takes some microseconds, and to unpack records at every call would
-    take a good part of that.
-
-    Args:
-        lines: (n, 6) unit axis and origin of each node.
-        kinds: (n,) what each does.
-        values: (n,) changed in place.
-        limits: (2, n) least and greatest values.
-        aims: (m, 11) of `Aims`, carried along in place.
-        turns: (s, 4) of the plan.
-        moved: of the plan.
+    Arrays one by one, as unpacking records takes long: lines (n, 6) axis and origin, kinds (n,), values (n,) in place,
+    limits (2, n), aims (m, 11) in place, turns (s, 4) and `moved` of the plan.
     """
     largest = 0.0
     for node, first, last, places in turns:
@@ -215,10 +194,7 @@ def _shift(line: Array, aims: Array, mine: Indices) -> float:
 
 @compiled()
 def within(best: float, lower: float, upper: float) -> float:
-    """The allowed angle nearest to the best one on the circle: the same after whole turns, or the nearer limit.
-
-    The objective is A cos + B sin of the angle, so it falls with the distance on the circle from the best.
-    """
+    """The allowed angle nearest to the best one on the circle, as A cos + B sin falls with that distance."""
     turns = ceil((lower - best) / TURN) if lower > -inf else floor((upper - best) / TURN)
     angle = best + TURN * turns
     if lower <= angle <= upper:

@@ -43,11 +43,7 @@ class Request:
 
 
 def read(problem: Problem, state: State | None = None) -> Request:
-    """Convert a problem; `state`, if given, is moved to the problem's start.
-
-    Raises:
-        UnsupportedTermError: it has terms that this method cannot take; all of them are listed.
-    """
+    """Convert a problem; `state`, if given, is moved to its start. An UnsupportedTermError lists all such terms."""
     reader = _Reader(problem, State(problem.scene.model) if state is None else state)
     goals = reader.goals()
     cones, ranges = reader.constraints()

@@ -19,7 +19,6 @@ from wholebody.geometry.placement import PlacementLike
 from wholebody.methods.control import budget_for_sweep
 from wholebody.methods.inputs import ITERATIONS, TOLERANCE
 from wholebody.methods.newton.assembly_joints import AssemblyJoints
-from wholebody.methods.newton.assembly_objective import AssemblyObjective, checked
 from wholebody.methods.newton.assembly_solution import (
     AssemblyGoal,
     AssemblySolution,
@@ -27,7 +26,7 @@ from wholebody.methods.newton.assembly_solution import (
     explained,
     to_target,
 )
-from wholebody.methods.newton.assembly_system import AssemblySystem
+from wholebody.methods.newton.assembly_system import AssemblyObjective, AssemblySystem, checked
 from wholebody.methods.newton.batches import Batch, EquationSet, Unit
 from wholebody.methods.newton.feasibility import satisfy
 from wholebody.methods.newton.inequalities import KINDS, Kind

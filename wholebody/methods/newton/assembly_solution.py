@@ -104,10 +104,7 @@ def explained(system: System, x: Array, found: FeasibilityResult, tolerance: flo
 
 @dataclass(frozen=True)
 class AssemblyGoal:
-    """A frame of a body (`local` in the body `index`), and where in the world it is to be (pin.SE3).
-
-    Of the kind "point" only the translation counts, of an "orientation" only the rotation.
-    """
+    """A frame of a body, `local` in body `index`, and its goal (pin.SE3): a "point", an "orientation" or both."""
 
     label: str
     index: int

@@ -29,11 +29,7 @@ def with_world(x: Array) -> Array:
 
 
 class Role(NamedTuple):
-    """What equations are for.
-
-    Goals have a `weight` and may be violated; equations that are `one_sided` are inequalities, residual >= 0; those of
-    the `objective` need not hold, and their squares are minimised.
-    """
+    """What equations are for: weighted goals, residuals >= 0 if `one_sided`, or squares that are minimised."""
 
     weight: float | None = None
     one_sided: bool = False

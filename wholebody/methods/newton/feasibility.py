@@ -42,13 +42,8 @@ def satisfy(
     early_exit: bool = False,
     thorough: bool = False,
 ) -> FeasibilityResult:
-    """Satisfy all equations from x (7 n,) to tolerances [m, rad], or reduce their error as far as possible.
-
-    `early_exit` ends at the first steps that gain little, and does not minimise the error of goals that are not met.
-    `thorough` goes on from states nearby where no step lowers the error, in a frame if its time lasts; and, unless
-    `early_exit`, from where goals out of reach pulled the constraints open and these were restored, with goals that
-    give way: the end is nearer to the goals then.
-    """
+    """Satisfy all equations from x (7 n,) to tolerances [m, rad], or reduce their error as far as possible."""
+    # `early_exit`: ends at little gain. `thorough`: also from nearby, and where far goals pulled constraints open.
     run = Iteration(active_system, x, tolerance, tolerance if goal_tolerance is None else goal_tolerance, kind)
     far = run.goal
     run.iterate(iterations, goals=True, measures="lower", early_exit=early_exit)
@@ -75,10 +70,7 @@ def _restore(run: Iteration, iterations: int, improve_goals: bool) -> None:
 
 
 def _leave_saddle(run: Iteration, nudges: int, iterations: int, improve_goals: bool) -> None:
-    """Go on from states nearby, as a stationary one may be a saddle or a maximum; it stays if that gains nothing.
-
-    A chain that is straight with its goal on its own line is at one: no motion lowers the error to first order.
-    """
+    """Go on from states nearby, as a stationary one may be a saddle: a straight chain, its goal on its own line."""
     saddle = best = run.mark()
     least, rng = _missed(run), np.random.default_rng(0)
     size = np.sqrt(run.system.weight.reshape(-1, 7))
@@ -147,10 +139,7 @@ def kkt_algebra(system: System) -> QuasiDefinite:
 def project(
     system: System, algebra: QuasiDefinite, x: Array, anchor: Array, *, tolerance: float, iterations: int
 ) -> Projection:
-    """Move x, which meets the equations, to the nearest place to the anchor (both (7 n,)), by the system's weights.
-
-    `tolerance` is that of every equation of the KKT system; there are no inequalities.
-    """
+    """Move x, which meets the equations, to the nearest place to the anchor (both (7 n,)), by the system's weights."""
     damping = np.full(system.pattern.height, STEPS.hard_damping)
     y = np.zeros(system.pattern.height)
     residual, values = system.residual(x), system.values(x)

@@ -109,10 +109,7 @@ class FigureBodies:
         return self._present.update(q)
 
     def tangent_rows(self, x: Array) -> Any:
-        """Derivative (nv, 7 count) of the tangent displacement of postures by bodies x (count + 1, 7), a csr_matrix.
-
-        A row has at most eight non-zeros: the rotations of two bodies, or the place or the rotation of a free root.
-        """
+        """Derivative (nv, 7 count) of the tangent displacement by bodies x (count + 1, 7), a csr_matrix."""
         if self._rows_of[0] is not x:
             self._rows_of = x, self._tangent_rows(x)
         return self._rows_of[1]

@@ -55,10 +55,7 @@ class SquaredSlacks:
         return np.where(active, phi, 0.0), np.where(active, 0.0, FREE)
 
     def correct(self, predicted: Array, multiplier: Array) -> tuple[float, bool]:
-        """Set slacks to zero, or release them, as the values and multipliers (k,) of a linear solution say.
-
-        Return the share of the motion from the last solution to this one, and whether to solve again.
-        """
+        """Set or release slacks as values and multipliers (k,) say: the motion's share, and whether to solve again."""
         active = self.slack == 0.0
         crossing = ~active & (predicted < -1e-9)  # m or rad
         if crossing.any():

@@ -108,10 +108,7 @@ class Iteration:
 
     @property
     def values(self) -> Array:
-        """Values (nnz,) of the Jacobian here; asked for when a step needs them, as the last state of a frame has none.
-
-        Those of terms of one's own are asked for where a step ends: it is taken back where they are not finite.
-        """
+        """Values (nnz,) of the Jacobian here; asked for when a step needs them, as a frame's last state has none."""
         if self._values is None:
             self._values = self.system.values(self.x)
         return self._values
@@ -123,11 +120,7 @@ class Iteration:
         return error
 
     def iterate(self, iterations: int, *, goals: bool, measures: Measures, early_exit: bool = False) -> None:
-        """Step until everything holds, nothing moves any more, or the iterations are spent.
-
-        Measures are minimised, kept from growing, or ignored. `early_exit` ends at the first step that gains little,
-        as in a frame whose goal lies inside something.
-        """
+        """Step until everything holds, nothing moves, or iterations are spent; `early_exit`: or a step gains little."""
         self.stationary, active, norms = False, self.active_system, self._norms(self.residual)
         trust = _Trust(self.least_damping, max(STEPS.funnel * norms[1], self.tolerance))
         least, stagnant = sum(norms), 0
@@ -237,9 +230,8 @@ class Iteration:
     ) -> Array:
         """The step of one iteration; the active set changes until the linear solution agrees with it.
 
-        The damping is that of the goals, its square that of constraints. `share` and `goal_share` are the parts of the
-        errors of constraints and goals that the step corrects, `proximity` is the factor of the least motion, against
-        the measures.
+        `damping` of the goals, squared for constraints; `share` and `goal_share` of the errors of constraints and
+        goals that it corrects; `proximity`: factor of the least motion, against the measures.
         """
         asked = self.residual * share
         asked[self.goal_rows] = self.residual[self.goal_rows] * min(goal_share, share)

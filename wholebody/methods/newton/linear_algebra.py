@@ -137,10 +137,7 @@ class NormalEquations:
 
 
 class Products(NamedTuple):
-    """Pairs of entries of J that share a column, one row of the Jacobian after the other.
-
-    An entry (row, column) is paired with the entries of its column from itself on, by row.
-    """
+    """Pairs of entries of J that share a column, from an entry on, one row of the Jacobian after the other."""
 
     by_row: Places  # (nnz,) the entries, row after row and in each row by column
     row_start: Places  # (height + 1,) where those of each row begin
@@ -201,12 +198,7 @@ def _sorted(keys: Places, order: Places, count: int) -> tuple[Places, Places]:
 
 @compiled()
 def _laid_products(products: Products, rows: Places) -> tuple[Places, Places, Places]:
-    """Lay out the lower triangle of J J' with its diagonal, by columns; `rows` (nnz,) are those of the entries.
-
-    Returns:
-        The place (pairs,) of each product in the triangle; the rows of the triangle's entries, ascending in each
-        column; and (height + 1,) where the columns begin.
-    """
+    """Lower triangle of J J' by columns: places (pairs,) of products, rows ascending, and where columns begin."""
     by_row, row_start, by_column, place, column_end = products
     height, pairs = len(row_start) - 1, 0
     for k in range(len(place)):  # a sum of an array would load scipy.linalg with the kept loop
@@ -258,10 +250,7 @@ def compiled_kernel() -> Any:
 
 
 class QuasiDefinite:
-    """L D L' of [H, -J'; -J, -M] with AMD ordering (Vanderbei 1995, "Symmetric quasi-definite matrices").
-
-    H is the diagonal D, or D plus a sparse matrix of second derivatives.
-    """
+    """L D L' of [H, -J'; -J, -M], H diagonal or sparse, with AMD ordering (Vanderbei 1995, quasi-definite matrices)."""
 
     name = "kkt/ldlt"
 
@@ -334,10 +323,8 @@ def dense_columns(pattern: Pattern) -> Indices:
 
 
 def linear_algebra(pattern: Pattern, name: str = "auto") -> LinearAlgebra:
-    """The factorisation of this name for a pattern; "auto" splits off up to fifty dense columns.
-
-    With hundreds of them, as of a body near everything, the small dense systems of a step took 2 s.
-    """
+    """The factorisation of this name for a pattern; "auto" splits off up to fifty dense columns."""
+    # With hundreds of them, as of a body near everything, the small dense systems of a step took 2 s.
     known(name, NAMES, "linear algebra")
     dense = dense_columns(pattern)
     if name == "schur" or (name == "auto" and 0 < len(dense) <= 50):

@@ -152,10 +152,7 @@ def refine(
     tolerance: float,
     rounds: int = REFINEMENT.rounds,
 ) -> tuple[Array, int]:
-    """Lower the measures, a function of the variables (7 n,), from x, where all equations hold to the tolerance.
-
-    A round that moves nothing by more, m and rad, is the last. Return the variables, and the number of iterations.
-    """
+    """Lower the measures from x (7 n,), where all equations hold: variables, and the number of iterations."""
     run = Iteration(active_system, x, REFINEMENT.finer * tolerance, REFINEMENT.finer * tolerance, "slack")
     run.iterate(REFINEMENT.back, goals=True, measures="keep")
     if not run.met:

@@ -1,7 +1,4 @@
-"""The search for one problem: iterations from the start, from bent limbs, and from other postures.
-
-Counts of iterations bound it, not seconds, so that the answer does not depend on the machine's load.
-"""
+"""The search for one problem, bounded by counts: from the start, from bent limbs, and from other postures."""
 
 from __future__ import annotations
 

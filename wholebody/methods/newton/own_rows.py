@@ -35,10 +35,7 @@ class TangentRows(Batch):
         self, bodies: FigureBodies, label: str, function: _Function, chosen: Indices, sign: Array, bound: Array,
         depends: Mask | None = None,
     ) -> None:  # fmt: skip
-        """Take a function, of whose rows those with the indices `chosen` (size,) are used.
-
-        The degrees of freedom on which each used row depends are `depends` (size, nv); None for all.
-        """
+        """Take a function, and its rows `chosen` (size,); `depends` (size, nv) on degrees of freedom, None for all."""
         super().__init__(np.arange(bodies.count)[None], [label])
         self._figure, (self._value, self._slope) = bodies, function
         self.chosen, self.sign, self.bound = chosen, sign, bound

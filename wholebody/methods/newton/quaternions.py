@@ -89,10 +89,7 @@ RELATIVE = np.array([[product(conjugate(a), b) for b in _BASIS] for a in _BASIS]
 
 
 def relative_forms(first: Array, second: Array) -> Array:
-    """Bilinear forms (k, 4, 4, 4) of the relative orientation of axes (k, 4) in a first and in a second body.
-
-    Component i of conj(a first) (b second) is a' [.., i] b.
-    """
+    """Bilinear forms (k, 4, 4, 4) of conj(a first) (b second), for axes (k, 4) in two bodies: a' [.., i] b."""
     turn = product(conjugate(first)[:, None, :], product(_BASIS[None], second[:, None, :]))  # (k, basis, component)
     result: Array = np.einsum("kji,jab->kiab", turn, RELATIVE)
     return result

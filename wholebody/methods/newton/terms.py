@@ -43,11 +43,7 @@ from wholebody.tasks.residuals import PlacementResidual
 
 
 def state_equations(problem: Problem, state: State) -> None:
-    """Build all equations of a problem once, to find unsupported terms; the state is moved to the start.
-
-    Raises:
-        UnsupportedTermError: a term or a joint has no equations here.
-    """
+    """Build all equations of a problem once, to find unsupported terms; the state is moved to the start."""
     bodies = FigureBodies(problem.scene.figure, problem.start)
     goal_equations(problem, bodies, problem.goals)
     constraint_equations(problem, bodies)
@@ -178,10 +174,7 @@ def _local(bodies: FigureBodies, frame: int) -> Any:
 
 
 def _check_own(bodies: FigureBodies, label: str, term: Constraint | None = None) -> None:
-    """Refuse a term of a user's class if the figure's tangent is not a function of its bodies here.
-
-    Ranges of motion are of their own figures' joints: those of another figure do not matter to them.
-    """
+    """Refuse a user's term if the figure's tangent is not a function of its bodies, or those of its range of motion."""
     uncharted = bodies.uncharted
     if isinstance(term, RangeOfMotion) and bodies.figure.members:
         whose = {name.partition("/")[0] for name in term.row_names}
@@ -195,11 +188,7 @@ class FigureSystem(ActiveSystem):
     """A problem's equations, renewed from posture to posture: every iterate is a posture."""
 
     def __init__(self, problem: Problem, workspace: Workspace, algebra: str, *, yielding: bool = False) -> None:
-        """Build the equations, for the violation of the constraints in place of the goals where `yielding`.
-
-        Raises:
-            InputError: a term or a joint that has no equations here.
-        """
+        """Build the equations, for the violation of the constraints in place of the goals where `yielding`."""
         self.problem, self.workspace, self._yielding = problem, workspace, yielding
         self.bodies = bodies = FigureBodies(problem.scene.figure, problem.start)
         held = [Unit(bodies.names), bodies.limits, *bodies.equations.batches()]

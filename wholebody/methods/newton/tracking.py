@@ -121,10 +121,8 @@ class NewtonTracker(NotCopyable):
             active_system.even = False
 
     def _trades(self, before: Array, after: Array) -> bool:
-        """Whether light goals were reduced at the expense of heavy ones, from one posture (nq,) to another.
-
-        They were where the weighted error decreased by a smaller share than half of that of the error without weights.
-        """
+        """Whether light goals were reduced at the expense of heavy ones, from one posture (nq,) to another."""
+        # So where the weighted error fell by a smaller share than half of that of the error without weights.
         goals = self.problem.goals
         weights = np.sqrt([goal.weight for goal in goals])
         errors = []

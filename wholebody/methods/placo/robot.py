@@ -43,12 +43,7 @@ class Robot:
     """
 
     def __init__(self, figure: Figure, frames: Mapping[str, tuple[int, pin.SE3]]) -> None:
-        """Build it, without pieces; `frames` are those that tasks use -> joint of our model and placement in it.
-
-        Raises:
-            InputError: placo has no joint of a kind that the figure has.
-            MissingPackageError: placo is not installed, or was built for another Pinocchio.
-        """
+        """Build it, without pieces; `frames` are those that tasks use -> joint of our model and placement in it."""
         try:
             import placo
         except ModuleNotFoundError:
@@ -141,11 +136,8 @@ class Robot:
             theirs.frames[theirs.getFrameId(name)].placement = placement
 
     def add_pieces(self, problem: Problem, pairs: Indices) -> None:
-        """Add the pieces of pairs of a problem, by their numbers (pairs,) in the scene.
-
-        placo has one margin for all pairs, but a problem has a clearance for each. So the first piece of a pair is
-        enlarged by the clearance, once for every clearance that it has.
-        """
+        """Add the pieces of pairs of a problem, by their numbers (pairs,) in the scene."""
+        # placo has one margin for all pairs, so a pair's first piece is enlarged by each clearance that it has.
         scene, model = problem.scene.geometry, self.wrapper.collision_model
         self._clearances, self._pairs = problem.clearances.copy(), pairs.copy()
         made: dict[tuple[int, float], int] = {}

@@ -100,10 +100,7 @@ def _name(place: Place, offset: Array | None = None) -> str:
 
 
 def add_terms(solver: Any, robot: Robot, problem: Problem, holding: float) -> Tasks:
-    """Add the goals to placo's solver as soft tasks, constraints as hard ones, and the measures.
-
-    `holding` is the weight of holds as soft tasks, 0 for hard ones.
-    """
+    """Add goals to placo's solver as soft tasks, constraints as hard ones, and measures; `holding`: of soft holds."""
     tasks = Tasks()
     for number, goal in enumerate(problem.goals):
         _goal(solver, robot, problem, f"goal {number}", goal)

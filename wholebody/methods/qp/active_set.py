@@ -40,19 +40,7 @@ def violated_set(program: QuadraticProgram) -> ActiveSet:
 
 
 def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) -> QPSolution | None:
-    """Exact answer by correcting a guess of the active set.
-
-    Args:
-        program: what to solve.
-        guess: where to begin.
-        corrections: how many sets to try at the most.
-
-    Returns:
-        The answer, or None when the sets did not settle.
-
-    Raises:
-        ValueError: the sizes of the program or of the guess do not fit together.
-    """
+    """Exact answer by at most so many corrections of a guess of the active set; None when they did not settle."""
     program.check_shapes(guess)
     x = np.empty(program.size)
     active = ActiveSet(guess.lower.copy(), guess.upper.copy(), guess.elastic.copy())
@@ -63,17 +51,7 @@ def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) ->
 
 
 def without_gradient(program: QuadraticProgram, active: ActiveSet, target: Array, work: Array) -> Array | None:
-    """Minimiser of a program with g = 0 and its active set fixed.
-
-    Args:
-        program: what to solve.
-        active: the set.
-        target: (m,) targets of the soft rows, in the place of the program's.
-        work: room; see `room_for`.
-
-    Returns:
-        (n,) the minimiser, clipped to the box; None where it is not finite.
-    """
+    """Minimiser (n,), clipped to the box, with g = 0, an active set and targets (m,); None where not finite."""
     program.check_shapes(active)
     x = np.empty(program.size)
     without = with_values(program, linear=np.zeros(program.size), target=target).packed()
@@ -81,19 +59,7 @@ def without_gradient(program: QuadraticProgram, active: ActiveSet, target: Array
 
 
 def minimise(program: QuadraticProgram, start: Array, iterations: int) -> tuple[Array, ActiveSet, int]:
-    """Lower the objective by semismooth Newton steps until its minimum, or for so many iterations.
-
-    Args:
-        program: what to solve.
-        start: (n,) where to begin; it is clipped to the box.
-        iterations: most steps.
-
-    Returns:
-        x (n,) inside the box, its active set, and the number of iterations used.
-
-    Raises:
-        ValueError: the sizes of the program do not fit together.
-    """
+    """Lower the objective from `start` by semismooth Newton steps: x (n,) in the box, active set, iterations used."""
     x = np.array(start, dtype=float)
     active = ActiveSet(*(np.zeros(size, dtype=bool) for size in (program.size, program.size, len(program.least))))
     program.check_shapes(active)
@@ -103,13 +69,7 @@ def minimise(program: QuadraticProgram, start: Array, iterations: int) -> tuple[
 
 
 def last_resort(program: QuadraticProgram, x: Array, iterations: int) -> QPSolution:
-    """Exact answer by semismooth Newton steps where an approximate one x, shape (n,), does not lead to it.
-
-    Args:
-        program: what to solve.
-        x: (n,) where to begin.
-        iterations: what it took so far.
-    """
+    """Exact answer by semismooth Newton steps where an approximate one x (n,), of `iterations`, does not lead to it."""
     x, active, used = minimise(program, x, 300)  # the hardest programs seen took 63
     solution = solve_from(program, active, CORRECTIONS.of_guess)
     if solution is not None:

@@ -24,17 +24,8 @@ def grow(
 ) -> int:
     """Solve a program from the active set of the one before, with the elastic rows that matter; see `WorkingSet`.
 
-    Args:
-        program: what to solve.
-        key: (k,) names of its elastic rows.
-        known: names of the rows that pushed in the program before, in ascending order.
-        active: the bounds that held x then, and room for rows; it becomes the active set of the answer.
-        limits: of the corrections.
-        room: for this program.
-        x: (n,) becomes the minimiser.
-
-    Returns:
-        How often rows were added, or -1 where the active set of a round did not settle.
+    `key` (k,) names its elastic rows, `known` those that pushed before, ascending; `active` has the bounds of then and
+    becomes the answer's, x (n,) the minimiser. How often rows were added, or -1 where a round did not settle.
     """
     elastic, least = program.elastic, program.least
     pushing = active.elastic
@@ -74,20 +65,8 @@ def _contains(sorted_keys: Indices, key: int) -> bool:
 def primal_dual_active_set(
     program: QuadraticProgram, places: Indices, active: ActiveSet, most: int, limits: Corrections, room: Room, x: Array
 ) -> bool:
-    """Correct an active set, in place, until it is right; x (n,) becomes the minimiser.
-
-    Args:
-        program: what to solve.
-        places: (c,) the elastic rows that count.
-        active: where to begin.
-        most: corrections; the first ones put right all that is wrong, the others only the worst entry.
-        limits: of the corrections.
-        room: of which the second half of `places` is used.
-        x: (n,).
-
-    Returns:
-        Whether it is right: false after so many corrections, and where a set has no finite minimiser.
-    """
+    """Correct an active set for the rows `places` (c,), in place; x (n,) becomes the minimiser. Whether it is right."""
+    # The first corrections put right all that is wrong, the others only the worst entry.
     elastic, lower, upper = program.elastic, program.lower, program.upper
     pushing = active.elastic
     n, m, k = len(program.diagonal), len(program.target), len(places)
@@ -118,10 +97,7 @@ def primal_dual_active_set(
 
 @compiled(error_model="numpy")
 def minimise_with(program: QuadraticProgram, active: ActiveSet, tolerance: float, work: Array, x: Array) -> bool:
-    """Minimiser x (n,) of a program with its active set fixed, clipped to the bounds; whether it is finite.
-
-    `work` is room; see `Room`.
-    """
+    """Minimiser x (n,) of a program with its active set fixed, clipped to the bounds; whether it is finite."""
     soft = len(program.target)
     own = face(work, len(x), soft, len(program.least))
     stack_soft(program, own)

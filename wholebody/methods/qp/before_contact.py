@@ -1,4 +1,4 @@
-"""Starts on the open side of the faces that surfaces are to meet.
+"""Starts on the open side of the faces that surfaces are to meet, and the problem at the place of contacts found.
 
 A descent never passes through a thing. From a foot under the pedal that it is to press, or a back behind its backrest,
 none leads to the contact. The posture just before contact, which is found through everything, is on the right side of
@@ -10,19 +10,29 @@ with the fingers on the bar's far end no descent leads around.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator
 from itertools import chain
+from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
-from wholebody.base.arrays import with_values
+from wholebody.base.arrays import Array, with_values
+from wholebody.figures.state import State
 from wholebody.methods.qp.closest import ENDLESS
 from wholebody.methods.qp.iterates import LocalSolution, Run
 from wholebody.methods.qp.sqp import SQP
 from wholebody.methods.starts import restarts
 from wholebody.problem import Problem
-from wholebody.tasks.contact_parts import approached, has_face
-from wholebody.tasks.grips import opened, takes_bar
+from wholebody.tasks.base import Goal, filled
+from wholebody.tasks.contact_parts import Gap, Near, approached, has_face
+from wholebody.tasks.frame import Frame
+from wholebody.tasks.grips import Opposing, opened, takes_bar
+from wholebody.tasks.inputs import Place
+from wholebody.tasks.point import Point
+from wholebody.tasks.residuals import PlacementResidual
+from wholebody.tasks.surfaces import nearest
 
 IN_FRONT = 0.01  # m: how far surfaces are in front of faces; more: reached by fewer limbs, and farther from the contact
 
@@ -30,19 +40,8 @@ IN_FRONT = 0.01  # m: how far surfaces are in front of faces; more: reached by f
 def before_contact(
     problem: Problem, shared: Run, seed: int, most: int, *, grips: bool = False
 ) -> Iterator[LocalSolution]:
-    """Descents through everything to where surfaces are in front of their faces; none where no term has a face.
-
-    Or, if asked for, to where bars are in front of palms, in problems without faces.
-
-    The measures count: as nothing is in the way, all that the terms leave open is as the figure likes it.
-
-    Args:
-        problem: to be solved.
-        shared: of the search.
-        seed: of the starts.
-        most: entries of the trace with which no further descent begins.
-        grips: whether hands that close around bars are meant.
-    """
+    """Descents through everything to where surfaces are in front of their faces, or bars of palms with `grips`."""
+    # The measures count: nothing is in the way, so what the terms leave open is as the figure likes it.
     terms = (*problem.goals, *problem.constraints)
     faces = any(has_face(term) for term in terms)
     if faces == grips or (grips and not any(takes_bar(term) for term in terms)):
@@ -75,3 +74,48 @@ def before_contact(
     if missed and not alike:
         nearest = min(missed, key=lambda each: each.violation.total)
         yield with_values(nearest, iterations=sum(each.iterations for each in missed))
+
+
+def at_its_place(problem: Problem, state: State) -> Problem | None:
+    """The problem that asks for the places of its contacts at a state; None where fingers close around a thing."""
+    # A contact that turns a frame becomes its goal, another one a point's; other constraints stay. Rows of contacts
+    # bend and have kinks: where a descent to the place ends lower, the answer was one, or another local minimum.
+    terms: list[Any] = [term for term in (*problem.goals, *problem.constraints) if _slides(term)]
+    if not terms or any(isinstance(part, Opposing) for term in terms for part in term.parts):
+        return None
+    result = copy.copy(problem)
+    others = [goal for goal in problem.goals if not _slides(goal)]
+    result.goals = (*others, *(goal for term in terms for goal in _places(problem, term, state)))
+    kept = [(each, _beside(each)) for each in problem.constraints]
+    result.constraints = tuple(filled(each, parts=rest) if rest else each for each, rest in kept if rest != ())
+    return result
+
+
+def _slides(term: Any) -> bool:
+    """Whether a term is a contact whose place is open."""
+    return hasattr(term, "touches") and any(isinstance(part, (Gap, Near)) for part in term.parts)
+
+
+def _beside(term: Any) -> tuple[Any, ...] | None:
+    """The parts of a contact that are not about its place; None for another term."""
+    if not _slides(term):
+        return None
+    return tuple(part for part in term.parts if not hasattr(part, "place") and not isinstance(part, (Gap, Near)))
+
+
+def _places(problem: Problem, term: Any, state: State) -> list[Goal]:
+    """Resolved goals for where a contact's frames are, or its point on all that moves."""
+    names, frames = problem.scene.model.names, problem.scene.model.frames
+    turned: dict[int, Any] = {part.place.frame: part.place for part in term.parts if hasattr(part, "place")}
+    found: list[Goal] = []
+    for place in turned.values():
+        at = pin.SE3(state.frame(place.frame))
+        found.append(filled(Frame(names[place.joint], at), residual=PlacementResidual.build(place, at)))
+    gap = next(part for part in term.parts if isinstance(part, (Gap, Near)))
+    near = nearest(gap.first, gap.second, state)
+    for joint in (near.joint,) if turned else (near.joint, near.against):
+        if joint:
+            number = next(k for k, frame in enumerate(frames) if frame.parentJoint == joint)  # a body may have its name
+            offset: Array = state.frame(number).actInv(near.point)
+            found.append(filled(Point(frames[number].name, near.point, offset=offset), place=Place(number, joint)))
+    return found

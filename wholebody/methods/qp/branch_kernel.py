@@ -15,16 +15,8 @@ def along(
 ) -> float:  # fmt: skip
     """Go along a branch of an arm with a held joint to the least effort, by golden sections over that joint.
 
-    Args:
-        arm: the axes.
-        goal: (36,) as in `branches`.
-        limits: (n,) lower and upper ones of the joints.
-        nearest: (2, n) as in `sampled`.
-        spacing: how far the held joint goes to both sides.
-        q: (n,) a posture of the branch; written: that of the least effort.
-
-    Returns:
-        The effort; inf, with q as it was, where there is none.
+    `goal` and `nearest` as in `branches` and `sampled`; `limits` (n,) each; q (n,) a posture of the branch, written:
+    that of the least effort. The effort; inf, with q as it was, where there is none.
     """
     joint, golden = arm.joints[arm.held], 0.5 * (np.sqrt(5.0) - 1.0)
     low, high, best, end = q[joint] - spacing, q[joint] + spacing, np.inf, q.copy()
@@ -52,20 +44,7 @@ def along(
 def beside(
     arm: Arm, goal: Array, limits: tuple[Array, Array], nearest: Array, value: float, q: Array, posture: Array
 ) -> float:  # fmt: skip
-    """The branch nearest to a posture where the held joint has a value.
-
-    Args:
-        arm: the axes.
-        goal: (36,) as in `branches`.
-        limits: (n,) lower and upper ones of the joints.
-        nearest: (2, n) as in `sampled`.
-        value: of the held joint.
-        q: (n,) the posture.
-        posture: (n,) written: that of the branch.
-
-    Returns:
-        Its effort; inf where there is none within a radian.
-    """
+    """Effort of the branch nearest to q (n,), written, where the held joint has a value; inf if over a radian off."""
     found, best, chosen = np.empty((1, BRANCHES, len(q))), np.inf, -1
     branches(arm, goal, np.array([value]), found)
     for b in range(BRANCHES):

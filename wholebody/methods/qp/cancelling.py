@@ -34,10 +34,7 @@ class _Group(NamedTuple):
 
 
 def posture_apart(problem: Problem, workspace: Workspace, q: Array) -> Array | None:
-    """A posture (nq,) in which two objects are apart whose normals cancel at the posture q (nq,).
-
-    None where no normals cancel, or no translation separates the two. Other pairs may overlap there.
-    """
+    """A posture (nq,) in which objects are apart whose normals cancel at q; None where none do or nothing separates."""
     near = workspace.near(q, 0.0)
     for group in _groups(workspace, near):
         depth = -near.distance[group.rows]

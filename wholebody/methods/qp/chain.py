@@ -21,9 +21,8 @@ from wholebody.figures.figure import Figure
 from wholebody.methods.control import Control
 from wholebody.methods.qp.chain_kernel import Goals
 from wholebody.methods.qp.closed_form import Branches
-from wholebody.methods.qp.multistart import Budget
 from wholebody.methods.qp.plain_chain import FIRST, NEARBY, Chains, PlainChain
-from wholebody.methods.qp.settings import SEEDS
+from wholebody.methods.qp.settings import SEEDS, Budget
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
@@ -54,18 +53,8 @@ def chains_of(problem: Problem) -> Pool[Chains]:
 
 
 def branches(figure: Figure, frame: str, placement: pin.SE3, at: Array) -> Array:
-    """Postures (k, nq) with a frame at a placement in the world, by the closed form of the arm that carries it.
-
-    They are within limits, as near to a posture as whole turns allow, and sorted by how far from it. With six joints
-    they are all that there are; with seven, samples, some of them off by what limits take away. None where the arm has
-    no closed form.
-
-    Args:
-        figure: with the arm on a fixed base.
-        frame: name of a frame.
-        placement: of the frame.
-        at: (nq,) posture; other joints stay there.
-    """
+    """Postures (k, nq) with a frame at a placement, by the closed form of its arm, the nearest to `at` (nq,) first."""
+    # All with six joints, samples with seven, some off by what limits take away. None where it has no closed form.
     model = figure.model
     known = model.frames[figure.frame_id(frame)]
     chain = Chains(model, figure.limits).of(frozenset((known.parentJoint,)))
@@ -92,17 +81,7 @@ def goal_entries(problem: Problem) -> list[Entry] | None:
 
 
 def from_seeds(problem: Problem, workspace: Workspace, budget: Budget, control: Control) -> Met | None:
-    """A posture that meets the goals with everything held: the first that is found, or of the first few the best.
-
-    Args:
-        problem: to be solved.
-        workspace: of the run.
-        budget: of the method.
-        control: is told of every descent.
-
-    Returns:
-        None where the figure or the terms are others than those of the module's head, or nothing was found.
-    """
+    """A posture that meets the goals with everything held, the best of the first few; None for other terms."""
     entries = goal_entries(problem)
     if entries is None:
         return None
@@ -143,11 +122,7 @@ class Descents:
         self.blocked: Array | None = None
 
     def run(self, first: tuple[Array, Array] | None = None) -> Met | None:
-        """The answer of the batches in turn: the closed form's ends, its samples, and ends of random seeds.
-
-        Args:
-            first: ends (k, n) of the first batch and what was found there (k, 4), where that was done already.
-        """
+        """The answer of the batches in turn: the closed form's ends, its samples, random seeds; `first`: ends known."""
         if not self.budget.restarts:
             return self._ended(self.start[None].copy(), 1)
         exact, finite, enough = self.rule[:3]
@@ -270,10 +245,7 @@ class Descents:
         return with_values(met, trace=tuple(self.trace), stationary=True)
 
     def _to_the_edge(self, values: Array) -> Met:
-        """From a free sample (n,) along its branch to the least effort, as far as all clearances are kept.
-
-        The branch is a curve: where something blocks it, the least effort that is free is at the edge, by bisection.
-        """
+        """From a free sample (n,) along its branch to the least effort, as far as clearances are kept, by bisection."""
         chain, (goals, at, nearest, _), trace = self.chain, self.asked, tuple(self.trace)
         blocked = chain.along(goals, nearest, values) if self.measured else None
         if blocked is None:

@@ -1,13 +1,10 @@
-"""Many problems of one chain at once: the first descents of all are one compiled loop.
-
-What it answers is what `chain.from_seeds` leads to for each problem alone. All others are left to a solve of their own.
-"""
+"""Many problems of one chain at once, the first descents in one compiled loop; others are left to solves."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Hashable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,10 +15,13 @@ from wholebody.methods.conclusion import assessed_tolerance
 from wholebody.methods.control import Control
 from wholebody.methods.qp.chain import Asked, Descents, Rule, chains_of, distance_of, goal_entries, how_far
 from wholebody.methods.qp.chain_kernel import Goals
-from wholebody.methods.qp.multistart import Budget
 from wholebody.methods.qp.plain_chain import FIRST, PlainChain
+from wholebody.methods.qp.settings import Budget
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
+from wholebody.tasks.distance import Displacement, Effort
+from wholebody.tasks.frame import Frame, Orientation, Relative
+from wholebody.tasks.point import Point
 from wholebody.terms.entries import Entry
 
 
@@ -53,82 +53,143 @@ class Batch(NamedTuple):
         with chains_of(problem).borrow() as chains, problem.borrow() as workspace:
             chain = chains.carrying(entries)
             assert chain is not None
-            q, iterations, found = _answers(self, chain, entries, workspace)
-        judgement = judged(problem, self.numbers, q)
-        solved = found & judgement.meets(assessed_tolerance(self.budget.tolerance))
+            first = _First.of(self, chain, entries)
+            q, iterations, ended = first.ends()
+            judgement = judged(problem, self.numbers, q)
+            # Where the end of least effort is not free, or not stationary, the others are looked at, one by one.
+            left = np.flatnonzero(~(ended & (judgement.clearance_violation <= 0.0)))
+            ended[left] = False
+            if len(left):
+                for k in left.tolist():
+                    met = first.descents(k, workspace).run(first.found(k))
+                    if met is not None and met.complete:
+                        q[k], iterations[k], ended[k] = met.q, len(met.trace), True
+                again = judged(problem, self.numbers.of_some(left), q[left])
+                for part, other in zip(judgement, again, strict=True):
+                    part[left] = other
+        solved = ended & judgement.meets(assessed_tolerance(self.budget.tolerance))
         return Answers(solved, q, iterations, judgement, time.perf_counter() - began)
 
 
 def batches(problems: Sequence[Problem], budget: Budget, largest: int) -> list[Batch]:
     """The problems that may be solved at once, in batches of at most so many."""
-    groups: dict[Hashable, list[tuple[int, Array]]] = {}
+    groups: dict[Hashable, list[int]] = {}
     known: dict[Hashable, PlainChain | None] = {}
-    for place, problem in enumerate(problems):
-        found = _form(problem, known) if budget.restarts else None
-        if found is not None:
-            groups.setdefault(found[0], []).append((place, found[1]))
+    for place, problem in enumerate(problems if budget.restarts else ()):
+        form = _form(problem, known)
+        if form is not None:
+            groups.setdefault(form, []).append(place)
     made = []
     for group in groups.values():
         for first in range(0, len(group), largest):
-            places, tables = zip(*group[first : first + largest], strict=True)
+            places = group[first : first + largest]
             some = [problems[place] for place in places]
-            starts = np.array([problem.start for problem in some])
-            made.append(Batch(list(places), some[0], starts, np.array(tables), Numbers.of(some), budget))
+            starts, numbers = np.array([problem.start for problem in some]), Numbers.of(some)
+            made.append(Batch(places, some[0], starts, _tables(some[0], numbers), numbers, budget))
     return made
 
 
-def _form(problem: Problem, known: dict[Hashable, PlainChain | None]) -> tuple[Hashable, Array] | None:
-    """What problems of a batch have in common, and the floats (e, 36) of a problem's goals; None without a chain.
-
-    `known` has the chains that were looked up before.
-    """
-    entries = goal_entries(problem)
-    if entries is None or problem.left_out:
+def _form(problem: Problem, known: dict[Hashable, PlainChain | None]) -> Hashable | None:
+    """What problems of a batch have in common; None for one that no chain answers. `known` has the chains of forms."""
+    scene, goals, measures = problem.scene, problem.goals, problem.measures
+    if problem.constraints or problem.bounds or problem.left_out or len(measures) != 1:
+        return None
+    measure: Any = measures[0]
+    if type(measure) not in (Effort, Displacement) or any(type(goal) not in _PLACED for goal in goals):
         return None
     try:
         problem.check_fresh()
     except InputError:
         return None
-    scene, kinds = problem.scene, tuple([(entry.integers, entry.rows) for entry in entries])
-    key: Hashable = id(scene.built), kinds
-    if key not in known:
+    kinds = tuple([_kind(goal) for goal in goals])
+    form = id(scene), scene.built.moves, kinds, type(measure), measure.weight, measure.distance.weights.tobytes()
+    if form not in known:
+        entries = goal_entries(problem)
         with chains_of(problem).borrow() as chains:
-            known[key] = chains.carrying(entries)
-    chain = known[key]
-    distance = None if chain is None else distance_of(problem, chain)
-    if distance is None:
-        return None
-    goals = tuple([(type(goal), goal.weight) for goal in problem.goals])
-    form = id(scene), scene.built.moves, goals, kinds, distance.weights.tobytes(), problem.measures[0].weight
-    return form, np.array([entry.floats for entry in entries])
+            chain = None if entries is None else chains.carrying(entries)
+        known[form] = chain if chain is None or distance_of(problem, chain) is not None else None
+    chain = known[form]
+    # The measure of other joints than the chain's depends on the start too.
+    own = chain is not None and len(chain.idx_v) < scene.model.nv and distance_of(problem, chain) is None
+    return None if chain is None or own else form
 
 
-def _answers(
-    batch: Batch, chain: PlainChain, entries: list[Entry], workspace: Workspace
-) -> tuple[Array, Indices, Mask]:
-    """Postures (k, nq), descents (k,), and which (k,) are free and of the least effort."""
-    problem, budget, numbers = batch.problem, batch.budget, batch.numbers
-    limits = problem.scene.figure.limits
-    at = batch.starts.copy()
-    at[:, limits.idx_q] = np.clip(at[:, limits.idx_q], limits.lower, limits.upper)
-    nearest = np.zeros((len(at), 2, len(chain.idx_v)))
-    nearest[:, 0] = chain.angles(numbers.references if budget.measures else at)
-    if budget.measures:
-        nearest[:, 1] = distance_of(problem, chain).weights[chain.idx_v]  # type: ignore[union-attr]
-    goals = chain.goals(entries)
-    rule = Rule.of(chain, goals, budget, budget.measures)
-    together = 0 if rule.exact else rule.together
-    ends = np.empty((len(at), together or FIRST, nearest.shape[2]))
-    for k in range(len(at) if together else 0):
-        ends[k] = next(chain.seeds(chain.angles(at[k]), budget.seed, together))
-    found, counts = chain.descents(batch.tables, goals, nearest, how_far(budget, rule.enough), ends, together)
-    q, iterations, solved = at.copy(), np.zeros(len(at), dtype=np.intp), np.zeros(len(at), dtype=bool)
-    control = Control(np.inf)
-    for k, count in enumerate(counts.tolist()):
-        asked = Asked(Goals(batch.tables[k], goals.entries), at[k], nearest[k], numbers.clearances[k])
+_PLACED = frozenset((Point, Frame, Orientation, Relative))
+
+
+def _kind(goal: Any) -> Hashable:
+    """What goals have in common that differ in numbers alone."""
+    if type(goal) is Point:
+        return Point, goal.weight, goal.place
+    residual = goal.residual
+    return type(goal), goal.weight, residual.place, residual.base, residual.position, residual.orientation
+
+
+def _tables(problem: Problem, numbers: Numbers) -> Array:
+    """Floats (k, e, 36) of the entries of goals that ask these numbers; the problem is one of them."""
+    tables = np.repeat([[entry.floats for entry in goal_entries(problem) or []]], len(numbers.targets), axis=0)
+    tables[:, :, 24:27] = numbers.targets
+    for g, goal in enumerate(problem.goals):
+        if type(goal) is Point:
+            at = problem.scene.model.frames[goal.place.frame].placement
+            tables[:, g, 9:12] = numbers.offsets[:, g] @ at.rotation.T + at.translation
+        else:
+            tables[:, g, 27:] = numbers.undo[:, g].transpose(0, 2, 1).reshape(-1, 9)
+    return tables
+
+
+class _First(NamedTuple):
+    """Where the first descents of a batch end."""
+
+    batch: Batch
+    chain: PlainChain
+    goals: Goals  # of the first problem
+    rule: Rule
+    at: Array  # (k, nq) starts, within limits
+    nearest: Array  # (k, 2, n) see `chain_kernel.reach`
+    angles: Array  # (k, m, n) the ends
+    known: Array  # (k, m, 4) what was found there, see `chain_kernel.reach`
+    counts: Indices  # (k,) how many
+
+    @classmethod
+    def of(cls, batch: Batch, chain: PlainChain, entries: list[Entry]) -> _First:
+        """Descend from the first seeds of each problem."""
+        problem, budget = batch.problem, batch.budget
+        limits = problem.scene.figure.limits
+        at = batch.starts.copy()
+        at[:, limits.idx_q] = np.clip(at[:, limits.idx_q], limits.lower, limits.upper)
+        nearest = np.zeros((len(at), 2, len(chain.idx_v)))
+        nearest[:, 0] = chain.angles(batch.numbers.references if budget.measures else at)
+        if budget.measures:
+            nearest[:, 1] = distance_of(problem, chain).weights[chain.idx_v]  # type: ignore[union-attr]
+        goals = chain.goals(entries)
+        rule = Rule.of(chain, goals, budget, budget.measures)
+        together = 0 if rule.exact else rule.together
+        ends = np.empty((len(at), together or FIRST, nearest.shape[2]))
+        for k in range(len(at) if together else 0):
+            ends[k] = next(chain.seeds(chain.angles(at[k]), budget.seed, together))
+        found, counts = chain.descents(batch.tables, goals, nearest, how_far(budget, rule.enough), ends, together)
+        return cls(batch, chain, goals, rule, at, nearest, ends, found, np.maximum(counts, 0))
+
+    def ends(self) -> tuple[Array, Indices, Mask]:
+        """Postures (k, nq) at ends of least effort, descents (k,), and whether (k,) goals are met there for good."""
+        rows, taken = np.arange(len(self.at)), np.arange(self.known.shape[1]) < self.counts[:, None]
+        effort = np.where(taken, self.known[:, :, 1], np.inf)
+        least = effort.argmin(axis=1)
+        ended = (effort[rows, least] < np.inf) & (self.known[rows, least, 2] != 0.0)
+        q = self.at.copy()
+        q[ended] = self.chain.posture(self.angles[rows, least][ended], self.at[ended])
+        return q, (taken & (self.known[:, :, 3] != 0.0)).sum(axis=1), ended
+
+    def found(self, k: int) -> tuple[Array, Array]:
+        """The ends (m, n) of one problem, and what was found there (m, 4)."""
+        count = self.counts[k]
+        return self.angles[k, :count], self.known[k, :count]
+
+    def descents(self, k: int, workspace: Workspace) -> Descents:
+        """What goes on from there for one problem."""
+        batch = self.batch
+        goals = Goals(batch.tables[k], self.goals.entries)
+        asked = Asked(goals, self.at[k], self.nearest[k], batch.numbers.clearances[k])
         workspace.begin()
-        count = max(count, 0)
-        met = Descents(asked, chain, rule, workspace, budget, control).run((ends[k, :count], found[k, :count]))
-        if met is not None and met.complete:
-            q[k], iterations[k], solved[k] = met.q, len(met.trace), True
-    return q, iterations, solved
+        return Descents(asked, self.chain, self.rule, workspace, batch.budget, Control(np.inf))

@@ -113,14 +113,10 @@ def reach(
 def _descend(
     chain: Chain, goals: Goals, room: Room, q: Array, near: tuple[float, float], damping: float, most: int
 ) -> int:  # fmt: skip
-    """Step by damped least squares until the errors of the goals are as small as they get, or hardly fall.
+    """Steps of damped least squares until the goals' errors, `room.value`, are small as they get, or hardly fall.
 
     Sugihara 2011, "Solvability-Unconcerned Inverse Kinematics by the Levenberg-Marquardt Method", IEEE Transactions on
-    Robotics 27(5): the damping is half of the squared error. Joints stop at their limits. `near` has the norms of the
-    errors at which the goals are met, and at which no more steps are taken.
-
-    Returns:
-        Steps taken; `room.value` has the errors at the end.
+    Robotics 27(5): the damping is half of the squared error. `near`: norms at which goals are met, and steps end.
     """
     size, rows = len(q), len(room.value)
     right, system, dq = np.empty(rows), np.empty((rows, rows)), np.empty(size)

@@ -107,12 +107,7 @@ class Closest(Stage):
         return LocalSolution(here.at.q, here.violation, here.at.measure, converged, used)
 
     def _curvature(self, rows: Rows, push: Array) -> tuple[Array, Array]:
-        """Soft rows (k, nv) and weights (k,) that stand for the positive curvature of what is pulled and held.
-
-        Args:
-            rows: of the linearisation at the state's posture.
-            push: (soft rows,) multipliers of the last program; goals pull with their residual.
-        """
+        """Soft rows (k, nv) and weights (k,) of the positive curvature of what `push` (soft rows,) pulls and holds."""
         state = self.shared.lineariser.state
         force = np.concatenate([rows.soft_weight[: rows.goals] * rows.soft_error[: rows.goals], push[rows.goals :]])
         columns = state.support.shape[1]
@@ -140,16 +135,8 @@ class Closest(Stage):
 
 
 def _add_kinematic_hessian(total: Array, state: State, part: Wrench, force: Array) -> None:
-    """Add the second derivative of force times place, for the rows of one term on one joint, to a total.
-
-    The rows are forces along the world's axes through a point, or moments, or both in this order; others have none.
-
-    Args:
-        total: (n, n) over the columns of the state's Jacobian; it is changed.
-        state: at the posture.
-        part: rows of the term.
-        force: (rows,) what each pulls with.
-    """
+    """Add the second derivative of force times place to a total (n, n), for rows of one term on one joint."""
+    # The rows are forces along the world's axes through a point, or moments, or both; others have none.
     linear, moment = part.rows[:3], force[3:6] if len(force) == 6 else np.zeros(3)
     if len(linear) != 3:
         return

@@ -77,10 +77,7 @@ def solve(system: Array, right: Array) -> bool:
 
 @compiled(inner=True, error_model="numpy")
 def sort(values: Array, order: Indices) -> None:
-    """Put the places of values (k,) into `order` (k,), the least first; equal ones stay in order.
-
-    By insertion: they are few, and most of them are in order.
-    """
+    """Put the places of values (k,) into `order`, the least first, stably: by insertion, as few are out of order."""
     for place in range(len(order)):
         back = place - 1
         while back >= 0 and values[order[back]] > values[place]:

@@ -54,14 +54,7 @@ def projection_rows(at: PackedLinearisation, rows: Array, room: Array) -> Projec
 
 
 def free_end(model: pin.Model, q: Array, out: float, rows_at: Callable[[Array], ProjectionRows]) -> Array | None:
-    """A posture (nq,) that is free, whatever passes on the way to it; None if none was found in a frame's budget.
-
-    Args:
-        model: of the figure.
-        q: (nq,) the posture at the start of the frame.
-        out: depth up to which a posture is free, metres.
-        rows_at: of a posture (nq,).
-    """
+    """A posture (nq,) that is free to a depth `out` [m], whatever passes; None if a frame's budget finds none."""
     project, box = compiled_kernel().project, rows_at(q).box.copy()
     for start in _starts(model, box):
         gone, least, weak = start, np.inf, 0

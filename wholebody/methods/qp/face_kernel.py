@@ -78,13 +78,8 @@ def stack_elastic(program: QuadraticProgram, pushes: Indices, own: Face) -> None
 def minimise_on_face(
     program: QuadraticProgram, active: ActiveSet, own: Face, size: int, tolerance: float, x: Array
 ) -> bool:
-    """Minimiser x (n,) with the bounds of an active set held and the first `size` rows of a face counted.
-
-    It may be out of the other bounds. Residuals off by more than the tolerance are computed by the other system.
-
-    Returns:
-        Whether x is finite.
-    """
+    """Minimiser x (n,) with an active set's bounds held and `size` rows of a face counted; whether it is finite."""
+    # It may be out of the other bounds. Residuals off by more than the tolerance are computed by the other system.
     diagonal, lower, upper = program.diagonal, program.lower, program.upper
     at_lower, at_upper = active.lower, active.upper
     stacked, right, compliance = own.stacked, own.right, own.compliance

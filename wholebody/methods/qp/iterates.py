@@ -123,17 +123,8 @@ class Stage:
 def judge(
     before: tuple[float, float], after: tuple[float, float], predicted: PredictedReduction, width: float | None
 ) -> StepAcceptance:
-    """Judge a step.
-
-    Far from the goals it must reduce the violation. Near, it must reduce the measures and stay inside a funnel, the
-    violation that is allowed meanwhile (Gould and Toint 2010, whose funnel narrows).
-
-    Args:
-        before: violation and measures before it; near the goals the Lagrangian stands for the measures.
-        after: and after it.
-        predicted: the predicted reduction.
-        width: of the funnel; None where the measures do not count.
-    """
+    """Judge a step: far from the goals by the violation, near by the measures (or Lagrangian), inside a funnel."""
+    # Gould and Toint 2010, whose funnel narrows; `width` is None where the measures do not count.
     inside = width is not None and before[0] <= width
     lead = inside and predicted.measure > DESCENT.switch * before[0] ** 2
     criteria = [("goal", before[0] - after[0], predicted.violation, predicted.violation > 0.0)]

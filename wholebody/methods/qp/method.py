@@ -17,7 +17,8 @@ from wholebody.methods.control import Control, Progress
 from wholebody.methods.inputs import BUDGET, Iterations, Restarts, Seed, TimeLimit, Tolerance, check_problem
 from wholebody.methods.qp.chain import from_seeds
 from wholebody.methods.qp.chain_batch import Batch, batches
-from wholebody.methods.qp.multistart import Budget, Multistart
+from wholebody.methods.qp.multistart import Multistart
+from wholebody.methods.qp.settings import Budget
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.registry import make_solver
 from wholebody.methods.qp.tracking import QPTracker

@@ -13,13 +13,12 @@ from wholebody.assessment.posture import assess
 from wholebody.base.arrays import Array, with_values
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
 from wholebody.methods.control import Control
-from wholebody.methods.qp.at_place import at_its_place
-from wholebody.methods.qp.before_contact import before_contact
+from wholebody.methods.qp.before_contact import at_its_place, before_contact
 from wholebody.methods.qp.cancelling import posture_apart
 from wholebody.methods.qp.closest import ENDLESS, Closest
 from wholebody.methods.qp.feasibility import Feasibility
 from wholebody.methods.qp.iterates import LocalSolution, Run, better, held
-from wholebody.methods.qp.settings import SEARCH
+from wholebody.methods.qp.settings import SEARCH, Budget
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP
 from wholebody.methods.qp.subproblem import Subproblem
@@ -29,18 +28,6 @@ from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
 from wholebody.tasks.distance import Effort
 from wholebody.terms.linearisation import Lineariser
-
-
-class Budget(NamedTuple):
-    """What a search is bounded by; see `QP`."""
-
-    tolerance: float
-    iterations: int
-    programs: int
-    restarts: int
-    seed: int
-    measures: bool
-    restarts_for_measure: int = 0
 
 
 class Attempt(NamedTuple):
@@ -73,6 +60,7 @@ class Multistart:
         self._minima = Minima()  # where relaxed probes ended after the true clearances were required
         self._relaxed_minima = Minima()  # where the others ended
         self._through: list[Array] = []  # where a descent without contacts from another start reached the goals
+        self._nearest_through = np.inf  # least violation of a relaxed probe: so near come the goals, if through things
         self._out_of_reach = False  # which is known
         self._best: LocalSolution | None = None
 
@@ -128,11 +116,10 @@ class Multistart:
         if least is None:
             return
         yield Attempt(self._before_contact(), lambda q: self._descend(q, full_step=True), "from before contact")
-        yield Attempt(self._before_contact(grips=True), self.feasibility_first, "from before a grip")
-        yield Attempt([start], self.feasibility_first, "by feasibility first")
-        hooked = [*self.lineariser.defined(hooked_hands(self.problem, state, start))]
-        yield Attempt(self._while_open(hooked), self._relaxed, "from another start")
-        yield Attempt(hooked, self.feasibility_first, "from hooked hands")
+        yield Attempt(self._before_contact(grips=True), self._closing, "from before a grip")
+        yield Attempt([start], self._closing, "by feasibility first")
+        # hands that are alike are no random starts
+        self._minima, self._relaxed_minima, self._without_gain = Minima(), Minima(), 0
         near = self.best.violation.left <= SEARCH.relaxation_depth  # as far as limbs in the way keep goals off
         yield Attempt(self._while_open([start] if near else []), self._relaxed, "from another start")
         self._out_of_reach = self._known_out_of_reach(self.best.q)
@@ -181,14 +168,19 @@ class Multistart:
         self._accept(local, "by feasibility first")
         return self._descend(local.q)
 
-    def _relaxed(self, start: Array) -> LocalSolution | None:
-        """A relaxed probe, and a descent from where it reaches the goals.
+    def _closing(self, start: Array) -> LocalSolution:
+        """Close hands around bars: from hooked fingers by relaxed probes, then, or without such hands, as they are."""
+        for q in self.lineariser.defined(hooked_hands(self.problem, self.lineariser.state, start)):
+            local = self._relaxed(q)
+            if local is not None and self._accept(local, "from hooked hands"):
+                return local
+        return self.feasibility_first(start)
 
-        It first goes through things, where limbs can change sides, and then is separated from them. Where many in a
-        row, with nothing in their way, came no nearer than the best posture, the goals are out of reach.
-        """
+    def _relaxed(self, start: Array) -> LocalSolution | None:
+        """A relaxed probe through things, and a descent from where it reaches the goals; None where out of reach."""
         tolerance = self.budget.tolerance
         relaxed = self._probe(start, SEARCH.relaxation_depth)
+        self._nearest_through = min(self._nearest_through, relaxed.violation.total)
         nearer = relaxed.violation.left < (1.0 - SEARCH.nearer) * self.best.violation.left
         self._without_gain = 0 if nearer else self._without_gain + 1
         if relaxed.violation.worst > SEARCH.reached * tolerance:
@@ -219,11 +211,8 @@ class Multistart:
         return self.best.measure < SEARCH.moved * before
 
     def _descend_again(self) -> bool:
-        """Where contacts are met, descend at their place, then from beside a kink; whether the end is no minimum.
-
-        Steps along a curved surface can end early, and at a kink: two points touch at once, and the one that counts as
-        the contact should leave. Beside the kink, along the gradient that nothing balances, the other one is nearest.
-        """
+        """Where contacts are met, descend at their place, then from beside a kink; whether the end is no minimum."""
+        # At a kink two points touch at once, and the one that counts as the contact should leave.
         problem, tolerance = self.problem, self.budget.tolerance
         touches = any(hasattr(term, "touches") for term in (*problem.goals, *problem.constraints))
         if not (touches and self.budget.measures and self.best.violation.worst <= tolerance):
@@ -302,11 +291,8 @@ class Multistart:
         return near and bool(self._least) and held(self.best, self.budget.tolerance)
 
     def _known_out_of_reach(self, q: Array) -> bool:
-        """Whether the goals are out of reach: from a posture (nq,) and other starts, even through everything.
-
-        Where several descents without contacts, from postures all over the limits, come to rest at the same distance
-        and none comes nearer, it is the least that limits and constraints allow. Local minima differ.
-        """
+        """Whether the goals are out of reach of q (nq,): descents through everything all rest at the same distance."""
+        # It is then the least that limits and constraints allow, if no relaxed probe came nearer. Local minima differ.
         if not (self.problem.goals and self.problem.scene.model.nv):
             return False
         tolerance, ends = self.budget.tolerance, list[LocalSolution]()
@@ -326,7 +312,8 @@ class Multistart:
             if local.violation.hold > SEARCH.held * local.violation.left:
                 continue  # from there the constraints alone are too far
             ends.append(local)
-            most = SEARCH.agree * min(end.violation.total for end in ends) + tolerance
+            least = min(self._nearest_through, *(end.violation.total for end in ends))
+            most = SEARCH.agree * least + tolerance
             if sum(end.violation.total <= most for end in ends) == agreeing:
                 return True
         near = (1.0 - SEARCH.nearer) * self.best.violation.left

@@ -104,11 +104,8 @@ class PlainChain:
         return self._rooms[rows]
 
     def branches(self, goals: Goals, nearest: Array) -> Branches:
-        """The branches of the closed form for the placement of one frame; `nearest` as in `closed_form_kernel.sampled`.
-
-        With six joints these are all postures. With seven they are samples, where one joint has values all over its
-        limits, but not farther than half a turn from the nearest posture: more where none of a few is within limits.
-        """
+        """The branches of the closed form for one frame's placement; `nearest` as in `closed_form_kernel.sampled`."""
+        # With six joints these are all postures; with seven samples of one joint, within half a turn of the nearest.
         count = 0
         for samples in self.samples:
             if not count:
@@ -137,11 +134,8 @@ class PlainChain:
         return found if effort < np.inf else None
 
     def loosely_met(self, goals: Goals, seed: int) -> Array:
-        """Postures (k, n) that six joints meet a placement or one nearby with, or nearly so; none is a proof.
-
-        Limits are wider and links longer by a hundredth, and the placement is moved to and fro by a hundred times what
-        a solve is off by: where it is singular, other postures meet these.
-        """
+        """Postures (k, n) that six joints meet a placement or one nearby with, or nearly so; none is a proof."""
+        # Limits and links are longer by a hundredth, and singular placements moved by a hundred times a solve's error.
         assert self.arm is not None
         arm, rng, found = with_values(self.arm, slack=LOOSE), np.random.default_rng(seed), list[Array]()
         lower, upper = self.chain.lower, self.chain.upper
@@ -165,19 +159,8 @@ class PlainChain:
     def descents(
         self, tables: Array, goals: Goals, nearest: Array, asked: Array, ends: Array, seeds: int = 0
     ) -> tuple[Array, Indices]:
-        """Descend for each of k problems from the branches of the closed form, or from so many given seeds.
-
-        Args:
-            tables: (k, e, 36) floats of the goals.
-            goals: of one of them.
-            nearest: (k, 2, n) see `chain_kernel.reach`.
-            asked: (5,) see `chain_kernel.reach`.
-            ends: (k, m, n) seeds where there are given ones; written.
-            seeds: how many; 0 for the branches.
-
-        Returns:
-            What was found (k, m, 4) at the ends, and how many there are (k,); -1 for more than there is room for.
-        """
+        """Descend for k problems from branches of the closed form, or `seeds` given ones; writes `ends` (k, m, n)."""
+        # `tables` (k, e, 36) of goals. What was found (k, m, 4), how many (k,); -1 for more than there is room for.
         room = self.room(sum(3 * int(each[3] + each[4]) for each in goals.entries))
         found, counts = np.empty((*ends.shape[:2], 4)), np.full(len(ends), seeds)
         arm = _NO_ARM if seeds or self.arm is None else self.arm
@@ -194,11 +177,8 @@ class PlainChain:
         return found.reshape(-1, len(self.idx_v))
 
     def seeds(self, start: Array, seed: int, count: int) -> Iterator[Array]:
-        """Batches (count, n) of values all over the limits, but not farther from a start (n,) than half a turn.
-
-        The first batch has the start, and values half as far from it, where ends of little effort are. Joints that
-        slide without limits begin within a metre.
-        """
+        """Batches (count, n) of values all over the limits, but not farther from a start (n,) than half a turn."""
+        # The first has the start, and values half as far, where ends of little effort are. Slides begin within a metre.
         lower, upper = np.maximum(self.chain.lower - start, -self._far), np.minimum(self.chain.upper - start, self._far)
         for batch in range(SEEDS.batches):
             directions = _directions(seed, batch, count, len(start))

@@ -51,10 +51,7 @@ class QuadraticProgram(NamedTuple):
 
     @property
     def is_computable(self) -> bool:
-        """Whether its numbers can be computed with: finite ones, also squared, of weights above 0, a box in order.
-
-        A term of somebody's own may be NaN, infinite or enormous at a posture.
-        """
+        """Whether its numbers are finite, also squared, weights above 0, and the box in order: own terms may be NaN."""
         with np.errstate(all="ignore"):
             curvature = self.diagonal + self.weight @ self.rows**2 + self.elastic_weight @ self.elastic**2
             targets = self.weight @ self.target**2 + self.elastic_weight @ self.least**2
@@ -94,10 +91,7 @@ class QuadraticProgram(NamedTuple):
         return result
 
     def optimality(self, x: Array) -> float:
-        """How far x is from the answer: largest entry of x - clip(x - gradient / scale), in units of x.
-
-        The scale of an entry is the curvature there, so the figure reads as the Newton step that is still to be made.
-        """
+        """Largest entry of x - clip(x - gradient / scale), in units of x; the scale is the curvature there."""
         violated = self.least - self.elastic @ x > 0.0
         scale = self.diagonal + self.weight @ self.rows**2 + (self.elastic_weight * violated) @ self.elastic**2
         moved = np.clip(x - self.gradient(x) / scale, self.lower, self.upper)

@@ -1,7 +1,4 @@
-"""What the programs of a descent and of a tracker are made of: rows, their weights, and how far a step may go.
-
-These are records, which compiled loops take as they are.
-"""
+"""Records of the programs of a descent and of a tracker: rows, their weights, and how far a step may go."""
 
 from __future__ import annotations
 

@@ -18,10 +18,7 @@ WHOLE = 1e-9  # a step this near to the whole way is the whole way but for round
 def minimise(
     program: QuadraticProgram, iterations: int, tolerance: float, active: ActiveSet, work: Array, x: Array
 ) -> int:
-    """Lower the objective from x (n,), in place, until its minimum, or for so many iterations; returns how many.
-
-    `tolerance` is that of rows, metres. `active` becomes the active set at x; `work` is room.
-    """
+    """Lower the objective from x (n,), in place, until its minimum, or for so many iterations; returns how many."""
     diagonal, lower, upper = program.diagonal, program.lower, program.upper
     at_lower, at_upper, pushing = active.lower, active.upper, active.elastic
     n, m, k = len(diagonal), len(program.target), len(program.least)

@@ -1,11 +1,20 @@
-"""The numbers of the QP method; what each trades stands at its name.
-
-They are frozen records, one for each part of the method, which compiled loops take as they are.
-"""
+"""The numbers of the QP method, as frozen records; what each trades stands at its name."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
+
+
+class Budget(NamedTuple):
+    """What a search is bounded by; see `QP`."""
+
+    tolerance: float
+    iterations: int
+    programs: int
+    restarts: int
+    seed: int
+    measures: bool
+    restarts_for_measure: int = 0
 
 
 class Weights(NamedTuple):

@@ -88,10 +88,8 @@ class SQP(Stage):
         return LocalSolution(here.at.q, here.violation, here.at.measure, converged, count)
 
     def _feasible_before(self, here: Iterate) -> Iterate | None:
-        """The best feasible posture, where the descent ended at an infeasible one after it and may return.
-
-        Not with an offset: goals out of reach are held at a singular posture, where every descent ends so.
-        """
+        """The best feasible posture, where the descent ended at an infeasible one after it and may return."""
+        # Not with an offset: goals out of reach are held at a singular posture, where every descent ends so.
         lost = self.offset is None and here.violation.worst > self.tolerance
         return self._kept if lost and self._width > self.tolerance else None
 
@@ -126,10 +124,7 @@ class SQP(Stage):
         return lagrangian(self._multipliers, here.at.measure, with_values(here.rows, elastic_violation=beyond))
 
     def _bent(self, here: Iterate) -> Linearisation:
-        """With the second derivatives of goals and equalities, times their multipliers, as squares of the measures.
-
-        The Hessian of the Lagrangian (Nocedal and Wright 2006, section 18.1), its positive part.
-        """
+        """With the positive part of the Lagrangian's Hessian (Nocedal and Wright 2006, 18.1) in the measures."""
         planes = here.at.planes
         if planes is None or self._tension is None or not len(planes.bend) or not self.measures:
             return here.at
@@ -137,11 +132,8 @@ class SQP(Stage):
         return with_values(here.at, squares=np.vstack([here.at.squares, np.sqrt(pull)[:, None] * planes.bend]))
 
     def _shortened(self, program: QuadraticProgram, soft: int) -> QuadraticProgram:
-        """With the measures' curvature such that the part of the answer along the constraints is `_gain` times as long.
-
-        Joints keep their shares of it. A shorter radius would let those with much gradient go as far as those with
-        little, although the constraints cancel most of the gradient.
-        """
+        """With such curvature of the measures that the answer's part along the constraints is `_gain` times as long."""
+        # Joints keep their shares of it, which a shorter radius would not let them.
         if self._gain == 1.0:
             return program
         weight = program.weight.copy()
@@ -248,11 +240,8 @@ class SQP(Stage):
         self, here: Iterate, there: Iterate, program: QuadraticProgram, step: Step, way: Array,
         acceptance: StepAcceptance,
     ) -> Iterate:  # fmt: skip
-        """Accept a step, and adapt the radius and the share of the next.
-
-        The residual of the rows after the program's own answer, which the measures cause, is asked for in the next one
-        (method of multipliers).
-        """
+        """Accept a step, and adapt the radius and the share of the next."""
+        # The residual that the measures cause is asked for in the next one (method of multipliers).
         if self._full_step and there.violation.total > (1.0 - DESCENT.full_step_gain) * here.violation.total:
             self._full_step, self._damping = False, 0.0
         if not self._full_step and here.violation.left > self._pull and there.longest < 0.25 * self._radius:

@@ -1,11 +1,8 @@
-"""The program of a tracking step: built and solved by one compiled call, in arrays made once.
-
-What the compiled call does not settle, and what other solvers are to solve, goes to the working set as any program.
-"""
+"""The program of a tracking step, built and solved by one compiled call in arrays made once, and its answers."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from math import sqrt
 from typing import Any, NamedTuple
@@ -14,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array, with_values
+from wholebody.base.arrays import Array, brief, with_values
 from wholebody.figures.state import State
 from wholebody.methods.qp.quadratic_program import QuadraticProgram, work_size
 from wholebody.methods.qp.rows import NUMBERS, Rows, StepParts, StepRoom, StepSize, Terms
@@ -25,10 +22,10 @@ from wholebody.methods.qp.turning import Turning
 from wholebody.methods.qp.turning import compiled_kernel as compiled_turning
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
+from wholebody.scene.moving_obstacles import Collision
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.base import Constraint
-from wholebody.terms.constraint_values import ConstraintValues
-from wholebody.terms.linearisation import PackedLinearisation
+from wholebody.terms.linearisation import ConstraintValues, PackedLinearisation
 
 
 class Answer(NamedTuple):
@@ -49,21 +46,10 @@ class Answer(NamedTuple):
 
 
 class StepProgram:
-    """Builds and solves the programs of one tracker.
-
-    Attributes:
-        goals: number of the goals' rows.
-    """
+    """Builds and solves the programs of one tracker; `goals` is the number of the goals' rows."""
 
     def __init__(self, problem: Problem, workspace: Workspace, working_set: WorkingSet, dt: float) -> None:
-        """Take the terms of a problem.
-
-        Args:
-            problem: to be solved.
-            workspace: of the run; its state is moved to the problem's start.
-            working_set: solves what the compiled call does not.
-            dt: seconds a step.
-        """
+        """Take the terms of a problem, for steps of `dt` s; `working_set` solves what the compiled call does not."""
         state, self._working_set = workspace.state, working_set
         self.turning, self._subproblem, self._kernel = Turning(workspace), Subproblem(problem, state), compiled_kernel()
         self._given = terms = self._subproblem.terms
@@ -98,24 +84,13 @@ class StepProgram:
         self._fixed[4] = gain
 
     def hold(self, constraints: Sequence[Constraint]) -> bool:
-        """Take others in place of the problem's constraints, with the same bounds; the last step is forgotten.
-
-        Returns:
-            Whether they are of the same classes and frames; if not, nothing is done.
-        """
+        """Take constraints of the same classes and frames, or do nothing; whether it did. The last step is lost."""
         self._before[-1], self._curving, self._bend = 0.0, False, 0.0
         return self._holds.take([constraints[k] for k in self._holding])
 
     def solve(self, at: PackedLinearisation, measures: bool) -> Answer:
-        """The answer of the step from where the workspace's state is, and its pieces' placements.
-
-        Goals weigh alike, so that light ones do not wait for heavy ones. Where that would reduce light ones at the
-        expense of heavy ones, which conflict then, weights count.
-
-        Args:
-            at: linearisation there.
-            measures: whether the measures count; without them the nearest posture to the goals is sought.
-        """
+        """The answer of the step from where the workspace's state is, and its pieces' placements."""
+        # Goals weigh alike, so that light ones do not wait; weights count where they conflict.
         answer, damping = self._damped(at, measures, self._even)
         given = self._even
         if self._mixed and self._trades(answer.x):
@@ -129,13 +104,7 @@ class StepProgram:
         return answer
 
     def ended(self, q: Array, displacement: Array, whole: bool) -> None:
-        """Remember a step.
-
-        Args:
-            q: (nq,) the posture where it ended.
-            displacement: (nv,).
-            whole: whether that is the last program's answer as it was.
-        """
+        """Remember a step that ended at q (nq,) by a displacement (nv,), the last program's answer if `whole`."""
         if not (whole and self._settled):
             rows, program, after = self._parts.rows, self._parts.program, self._after
             gone = rows.soft @ displacement
@@ -175,10 +144,8 @@ class StepProgram:
         return answer, damping
 
     def _trades(self, x: Array) -> bool:
-        """Whether the displacement x (nv,) reduces light goals at the expense of heavy ones.
-
-        It does where the weighted error decreases by a smaller share than half of that of the error without weights.
-        """
+        """Whether the displacement x (nv,) reduces light goals at the expense of heavy ones."""
+        # The weighted error falls by a smaller share than half of that of the error without weights.
         rows = self._parts.rows
         error = rows.soft_error[: self.goals]
         after = error + rows.soft[: self.goals] @ x
@@ -189,11 +156,7 @@ class StepProgram:
     def _once(
         self, at: PackedLinearisation, measures: bool, given: Terms, least_damping: float
     ) -> tuple[Answer, float, float]:
-        """An answer, the damping of its program, and what it asks for.
-
-        Raises:
-            InputError: the terms have other numbers of rows than at the start.
-        """
+        """An answer, the damping of its program, and what it asks for."""
         own, working, contacts = self._subproblem, self._working_set, at.contacts
         own.check_rows(at.goals, len(at.value) - at.goals)
         k = own.one_sided + len(at.gap)
@@ -231,11 +194,7 @@ class StepProgram:
         return Answer(answer.x, motion, turn, worst, spare, missed, least, *answered), damping, asked
 
     def _predict_curving(self, at: PackedLinearisation, displacement: Array) -> bool:
-        """Have what is held run ahead of as this displacement (nv,) is curved, not as that of the last step was.
-
-        Returns:
-            Whether that is another curve than the last program ran ahead of.
-        """
+        """Have what is held run ahead as this displacement (nv,) is curved; whether the last program's differs."""
         state, rows = self._there.update(pin.integrate(self._there.model, at.q, displacement)), self._parts.rows
         there = self._holds.at(state)[self._among] - self._asked
         curved = there - (rows.soft_error + rows.soft @ displacement)[self.goals :]
@@ -274,12 +233,7 @@ def _holding(problem: Problem, state: State, held: NDArray[np.intp]) -> tuple[li
 
 
 def numbers_of(scale: float) -> Array:
-    """The numbers of a tracker's programs, (29,).
-
-    They are those of `StepSize`, in which a step replaces its damping and whether measures count, of `ProgramNumbers`,
-    `Corrections` and `Weights`; the scale of the measures; damping of the pull of goals out of reach; error below which
-    a goal rests; and how far what is held is run ahead of at most.
-    """
+    """The numbers of a tracker's programs, (29,), in the order in which `tracking_kernel` reads them."""
     size = StepSize(STEP.radius, PROGRAM.error_clamp * STEP.radius, 0.0, True)
     return np.concatenate([
         size, PROGRAM, CORRECTIONS, WEIGHTS, (scale, STEP.damping, STEP.resting, STEP.curved),
@@ -300,3 +254,37 @@ def compiled_kernel() -> Any:
     )  # fmt: skip
     tracking_kernel.run_ahead(none, none, 0, none, STEP, np.zeros(2))
     return tracking_kernel
+
+
+class QPStep(NamedTuple):
+    """Answer of one step."""
+
+    q: Array  # (nq,) the next posture
+    displacement: Array  # (nv,) tangent displacement to it, radians and metres
+    velocity: Array  # (nv,) displacement / dt
+    contacts: int  # how many pairs had rows
+    rows: int  # how many contact rows
+    exact: bool  # whether the program was solved to rounding
+    iterations: int  # iterations of the QP solver
+    by: str  # what closed the last program, see `QPSolution`
+    programs: Mapping[str, int]  # how many programs each closed: one a step, and more where it was looked at twice
+    # how much of the program's displacement was gone: less than 1 where it was longer than what was looked at
+    share: float
+    # what things that move (`Scene.move` with `over`) passed through, or are inside of; empty if nothing.
+    collisions: tuple[Collision, ...] = ()
+    # shares of the step, from 0 to 1, and the postures (nq,) there, if things moved; otherwise empty
+    path: tuple[tuple[float, Array], ...] = ()
+    # which term of one's own is not finite where the step would have ended, so that it was cut; else empty
+    note: str = ""
+
+    def __repr__(self) -> str:
+        return brief(self)
+
+
+class FrameStep(NamedTuple):
+    """Answer of one frame."""
+
+    q: Array  # (nq,) the next posture
+    iterations: int  # programs
+    collisions: tuple[Collision, ...] = ()  # see `QPStep`
+    path: tuple[tuple[float, Array], ...] = ()

@@ -25,10 +25,7 @@ _NONE = np.zeros(0)
 
 
 def _with_planes(rows: Rows, planes: TermPlanes) -> Rows:
-    """Rows with the terms' supporting planes, which give way as the terms do and count for no violation of their own.
-
-    The gap itself counts, and is violated wherever a plane is.
-    """
+    """Rows with the terms' supporting planes, which give way as the terms do and are no violation of their own."""
     count = len(planes.value)
     weights = np.append(rows.soft_weight[: rows.goals], WEIGHTS.hold)
     # keys of supporting planes are below this, apart from all others
@@ -51,12 +48,7 @@ class Subproblem:
     """
 
     def __init__(self, problem: Problem, state: State) -> None:
-        """Read off which constraint rows are equalities.
-
-        Args:
-            problem: to be solved.
-            state: of the run; it is moved to the problem's start.
-        """
+        """Read off which constraint rows are equalities; the state is moved to the problem's start."""
         lower, upper, weight = [], [], []
         state.update(problem.start)
         for constraint in problem.constraints:
@@ -89,11 +81,7 @@ class Subproblem:
         self._numbers, self._kernel = np.array(PROGRAM), compiled_kernel()
 
     def rows(self, at: Linearisation) -> Rows:
-        """Sort the rows of a linearisation.
-
-        Raises:
-            InputError: the terms have other numbers of rows than when this was set up.
-        """
+        """Sort the rows of a linearisation; InputError for other numbers of rows than when this was set up."""
         goals = len(at.goal_error)
         self.check_rows(goals, len(at.value))
         nv, soft, elastic = len(at.gradient), goals + len(self._equal), self.one_sided + len(at.gap)
@@ -143,16 +131,7 @@ class Subproblem:
         return 0.5 * float(bent) / self.scale
 
     def program(self, at: Linearisation, rows: Rows, step: StepSize, shift: Array | None = None) -> QuadraticProgram:
-        """The program of one step.
-
-        The squares that measures are the sum of are soft rows, after those of `rows`.
-
-        Args:
-            at: where.
-            rows: its rows.
-            step: its size.
-            shift: (soft rows,) added to the errors so that weights need not be infinite (method of multipliers).
-        """
+        """The program of one step; `shift` (soft rows,) is added to the errors (method of multipliers)."""
         squares = at.squares if step.measures else at.squares[:0]
         curvature = at.curvature - at.squared if len(squares) else at.curvature
         columns = np.array([curvature, at.gradient, at.lower, at.upper])
@@ -174,14 +153,7 @@ class Subproblem:
 
 
 def multipliers_of(program: QuadraticProgram, answer: QPSolution, rows: Rows, scale: float) -> Multipliers:
-    """The multipliers of a program.
-
-    Args:
-        program: of a step.
-        answer: its answer.
-        rows: that it was made of.
-        scale: what measures are multiplied by in it.
-    """
+    """The multipliers of the answer to a program of `rows`, in which measures are multiplied by `scale`."""
     m, x = len(rows.soft_error), answer.x
     soft = program.weight[:m] * (program.rows[:m] @ x - program.target[:m]) / scale
     violated = np.where(answer.active.elastic, program.least - program.elastic @ x, 0.0)

@@ -62,10 +62,7 @@ def fill_rows(there: LinearRows, given: Terms, rows: Rows) -> None:
 
 @compiled()
 def violation(rows: Rows, share: Array, displacement: Array) -> tuple[float, float, float, float]:
-    """The figures of `Violation` after a displacement: (nv,), or empty for none.
-
-    `share` (g,) are the goals' weights. Elastic rows of the contact -1 do not count.
-    """
+    """The figures of `Violation` after a displacement (nv,), or empty for none; `share` (g,) are the goals' weights."""
     soft, soft_error, elastic = rows.soft, rows.soft_error, rows.elastic
     violations, contact, contacts = rows.elastic_violation, rows.contact, rows.contacts
     goals, moves = len(share), len(displacement) > 0
@@ -96,15 +93,8 @@ def fill_program(
 ) -> None:
     """Fill in the numbers of a program that are not rows or weights.
 
-    Args:
-        columns: (4, nv) curvature and gradient of the measures, and bounds of the step; they become diagonal, linear,
-            lower and upper.
-        rows: of the program.
-        target: (m,) what is added to the errors; it becomes the targets of the soft rows.
-        least: (k,) becomes the least values of the elastic rows.
-        step: its size.
-        given: (9,) `settings.ProgramNumbers`.
-        scale: what the measures are multiplied by.
+    `columns` (4, nv), curvature and gradient of the measures and bounds of the step, become diagonal, linear, lower and
+    upper; `target` (m,) and `least` (k,) those of the rows. `given` (9,) are `settings.ProgramNumbers`.
     """
     numbers = ProgramNumbers(given[0], given[1], given[2], given[3], given[4], given[5], given[6], given[7], given[8])
     diagonal, linear, lower, upper = columns[0], columns[1], columns[2], columns[3]
@@ -158,11 +148,7 @@ def _middle(values: Array) -> float:
 def work(
     soft: Array, elastic: Array, key: Indices, soft_error: Array, there: Indices, elastic_violation: Array
 ) -> float:
-    """Sum of multipliers times the errors (m,) and the violations of a posture.
-
-    `soft` (m,), `elastic` and `key` (k,) are those of `Multipliers`. Elastic rows of the posture are those with the
-    same keys, `there`; the ones that are not there add nothing.
-    """
+    """Sum of multipliers `soft` (m,), `elastic` of `key` (k,) times errors and violations; see `Multipliers`."""
     total = 0.0
     for r in range(len(soft_error)):
         total += soft[r] * soft_error[r]
@@ -179,16 +165,8 @@ def work(
 def add_kinematic_hessian(
     total: Array, columns: Array, support: Array, point: Array, force: Array, moment: Array
 ) -> None:
-    """Add the second derivative of force times place and moment times angle to a total.
-
-    Args:
-        total: (n, n) symmetric; it is changed.
-        columns: (n, 6) of the joint Jacobian at the world's origin: linear, then angular velocity.
-        support: (n,) nonzero for columns that move the point.
-        point: (3,) where the force pulls, metres.
-        force: (3,) what it pulls with.
-        moment: (3,) what turns the body.
-    """
+    """Add the second derivative of force times place and moment times angle (3,) to a total (n, n)."""
+    # `columns` (n, 6) at the world's origin, linear then angular; `support` (n,) where they move the point (3,).
     n = total.shape[0]
     px, py, pz = point
     fx, fy, fz = force

@@ -28,16 +28,10 @@ class Parts(NamedTuple):
 
 
 def parts_of(program: QuadraticProgram, answer: QPSolution, shift: Array, work: Array) -> Parts | None:
-    """The parts of the answer of a program; None where its face has no normal part.
+    """The normal and tangential part of the answer of a program; None where its face has no normal part.
 
-    Where the answer went to a bound that was some way off, it is the measures that pull there. The way to that bound
-    belongs to the tangential part, so the bound does not hold the normal one, unless that comes to the bound too.
-
-    Args:
-        program: of a step.
-        answer: its answer.
-        shift: (s,) what the method of multipliers added to the first errors; it makes up for g, which n does not have.
-        work: room; see `active_set.room_for`.
+    A bound that was some way off and now holds belongs to the measures, so to the tangential part, unless the normal
+    one comes to it too. `shift` (s,), of the method of multipliers, makes up for g in the first errors.
     """
     target = program.target.copy()
     target[: len(shift)] += shift
@@ -66,10 +60,7 @@ class Extrapolation:
         self._as_plain = False  # whether the last proposal would have been the program's own step
 
     def propose(self, parts: Parts, program: QuadraticProgram) -> Array | None:
-        """The extrapolated step (n,) within the box of the program.
-
-        None while too little is known, and where it would be the program's own step.
-        """
+        """The extrapolated step (n,) in the program's box; None while too little is known, or where it is its own."""
         plain = parts.tangential
         fast, self._as_plain = self._memory.propose(plain, self._longest), False
         if fast is None:

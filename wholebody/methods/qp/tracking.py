@@ -20,8 +20,7 @@ from wholebody.methods.qp.escaping import ProjectionRows, free_end, projection_r
 from wholebody.methods.qp.escaping import compiled_kernel as compiled_escape
 from wholebody.methods.qp.settings import ESCAPE, TRACKING
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.step_program import StepProgram
-from wholebody.methods.qp.steps import FrameStep, QPStep
+from wholebody.methods.qp.step_program import FrameStep, QPStep, StepProgram
 from wholebody.methods.qp.turning import least_unseen, predicted_distances, unseen_by_rows
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
@@ -151,11 +150,8 @@ class QPTracker(NotCopyable):
         return ()
 
     def _among_moving(self, q: Array, measures: bool, motion: FrameMotion) -> QPStep:
-        """A step in which things move, or did and are still in the figure: they advance by shares, and it gives way.
-
-        Bounds on speeds are bounds on the way of the whole step. Where a frame's budget ends before, things go the rest
-        of their way while the figure stays.
-        """
+        """A step in which things move, or did and are still in the figure: they advance by shares, and it gives way."""
+        # Where a frame's budget ends before, things go the rest of their way while the figure stays.
         workspace, model = self.workspace, self.workspace.model
         q = posture(q, model.nq)
         most = at_speeds(self.problem.bounds, workspace.state.update(q), self.dt)
@@ -261,17 +257,7 @@ class QPTracker(NotCopyable):
     def _corrected(
         self, at: PackedLinearisation, displacement: Array, share: float, midway: bool
     ) -> tuple[Array, float, Array]:
-        """A step that turns far is looked at where it ends: what turning brought nearer is asked for, or the step cut.
-
-        Args:
-            at: where the step begins.
-            displacement: (nv,) of the step.
-            share: of the program's own displacement.
-            midway: whether to look half way too.
-
-        Returns:
-            The displacement (nv,), its share, and the posture (nq,) where it ends.
-        """
+        """Displacement (nv,), its share, and posture (nq,) of a step that turns far, looked at where it ends."""
         contacts, asked = at.contacts, at.clearance[: len(at.contacts.distance)]
         began, unseen = np.minimum(contacts.distance, asked), unseen_by_rows(asked)
         rows, groups = self._program.rows, None
@@ -299,11 +285,8 @@ class QPTracker(NotCopyable):
     def _shortfall(
         self, at: PackedLinearisation, displacement: Array, kept: Array, began: Array, midway: bool
     ) -> tuple[Array, Array]:
-        """By how much each contact (k,) is nearer after a displacement (nv,) than the distances (k,) it should keep.
-
-        And the posture (nq,) after it. Half way it should keep these or what it began with, whichever is less; what is
-        missing there has to be twice as much at the end.
-        """
+        """By how much contacts (k,) are nearer after a displacement (nv,) than they should be, and the posture."""
+        # Half way it should keep less of these and what it began with; what is missing there counts twice.
         model, short = self.workspace.model, np.zeros(len(kept))
         if midway:
             half = pin.integrate(model, at.q, 0.5 * displacement)

@@ -144,11 +144,7 @@ def solve(
 def _run_ahead_of(
     before: Array, q: Array, rows: Rows, shift: Array, size: StepSize, numbers: Array, error: float
 ) -> float:
-    """Write what is added to the errors of the soft rows, as the last step was curved; returns the damping.
-
-    `numbers` are damping, error below which a goal rests, and how far what is held is run ahead of at most; `error` is
-    the norm of the goals' errors.
-    """
+    """Write what is added to the soft rows' errors, as the last step was curved; the damping. `error`: the goals'."""
     damping, rest, curved = numbers[0], numbers[1], numbers[2]
     soft_error, goals = rows.soft_error, rows.goals
     last, m = len(q), len(soft_error)
@@ -195,19 +191,7 @@ def _sorted_keys(key: Indices, pushing: Mask, keys: Indices) -> int:
 
 @compiled()
 def run_ahead(curved: Array, soft_error: Array, goals: int, q: Array, numbers: StepNumbers, before: Array) -> bool:
-    """Write into `before` what makes the next program run ahead of what is held as a displacement curves it.
-
-    Args:
-        curved: (held,) by how much what is held ends elsewhere than its rows say.
-        soft_error: (m,) errors of the last program's soft rows.
-        goals: how many of them are goals'.
-        q: (nq,) the posture.
-        numbers: of steps.
-        before: (nq + m + 2,) see `solve`.
-
-    Returns:
-        Whether a row is to run ahead by more than `straight` farther, or less far, than it did.
-    """
+    """Write into `before` what the next program runs ahead by, from `curved` (held,); whether it is much."""
     most, moved = numbers.curved, 2.0 * numbers.resting  # a goal that was not known does not count as one that rests
     last, known = len(q), _is_known(before, q)
     if not known:  # its goals are asked for as without a step before

@@ -53,16 +53,7 @@ class Turning:
         return way, turn
 
     def linearisation_error(self, at: PackedLinearisation, rows: Rows, displacement: Array) -> float:
-        """Largest share of `unseen_by_rows` by which a pair that may end too near can be nearer than its rows say.
-
-        Args:
-            at: where the step begins, and the workspace's state is.
-            rows: of its program.
-            displacement: (nv,) of the step.
-
-        Returns:
-            0 where every pair keeps its distance to that, and more than 1 where one may not.
-        """
+        """Largest share of `unseen_by_rows` by which a pair can be nearer after `displacement` than its rows say."""
         contacts = at.contacts
         bodies = self._workspace.state.columns, *self.joints, contacts.placements, self._reach, self._twists
         near = contacts.pair, contacts.distance, contacts.normal, at.clearance

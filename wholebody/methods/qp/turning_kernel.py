@@ -142,11 +142,8 @@ class Moved(NamedTuple):
 def _seen_from(
     piece: Moved, carrier: Array, carrier_change: Array, normal: Array, sign: float, off: float, vectors: Array
 ) -> tuple[float, float]:
-    """Longest way of the points of a piece as seen from another body, and by how much it can bow towards it.
-
-    `carrier` (6,) is the twist of that body, `normal` (3,) times `sign` points to it and may be `off` by so many
-    radians. `vectors` (5, 3) is room.
-    """
+    """Longest way of a piece's points as seen from a carrier's twist (6,), and by how much it can bow towards it."""
+    # `normal` (3,) times `sign` points to that body and may be `off` by so many radians. `vectors` (5, 3) is room.
     place, reach, own, own_change = piece.place, piece.reach, piece.twist, piece.change
     speed, bow, spin, own_speed, carrier_speed = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4]
     turn_square, speed_square, bow_square, spin_square = 0.0, 0.0, 0.0, 0.0

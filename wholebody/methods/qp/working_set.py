@@ -31,14 +31,8 @@ class WorkingSet:
         self.reset()
 
     def solve(self, program: QuadraticProgram, key: NDArray[np.intp]) -> QPSolution:
-        """Solve a program from the active set of the one before; the solver does where that does not settle.
-
-        The set of elastic rows grows until no other row is violated: rows left out are satisfied, and would not push.
-
-        Args:
-            program: the full program.
-            key: (k,) names of its elastic rows.
-        """
+        """Solve a program with elastic rows named `key` (k,) from the last active set, or else by the solver."""
+        # The set of elastic rows grows until no other row is violated: rows left out would not push.
         answer = self._corrected(program, key) if self.solver.hot_start else None
         if answer is None:
             answer = self.solver.solve(program)

@@ -45,15 +45,7 @@ class Reach:
     """Bounds on the positions of the pieces of a model within its joint limits."""
 
     def __init__(self, model: pin.Model, start: Array, resting: Balls, joint: Indices, frozen: Iterable[int]) -> None:
-        """Read the joints.
-
-        Args:
-            model: the model.
-            start: (nq,) posture that counts as possible even if it is beyond a limit.
-            resting: a ball around every piece in the frame of the joint that carries it, in the order of the pieces.
-            joint: (n,) that joint.
-            frozen: degrees of freedom (tangent indices) that stay as at the start.
-        """
+        """Read the joints; `start` (nq,) counts as possible, `resting` are balls around pieces in their joints (n,)."""
         self._model, self._start, self._frozen = model, start, set(frozen)
         data = model.createData()
         pin.forwardKinematics(model, data, start)
@@ -149,10 +141,7 @@ def still_dofs(problem: Problem) -> list[int]:
 
 
 def reachable_pairs(problem: Problem, still: Iterable[int], numbers: Indices) -> Mask:
-    """Which pairs (k,), by their numbers, are not proven to stay farther apart than their clearance.
-
-    The degrees of freedom `still` stay as at the start. Frames that are held in the world bound all pieces.
-    """
+    """Which pairs (k,), by number, are not proven to stay apart, with the degrees `still` and held frames fixed."""
     scene = problem.scene
     pieces, table, clearances = scene.geometry.geometryObjects, scene.pair_table, problem.clearances[numbers]
     joint, pairs = table.joint, table.pairs[numbers]

@@ -298,10 +298,7 @@ class Group(NamedTuple):
 
 
 def collision_groups(bad: Mask, low: int, high: int, share: float = 0.0, least: int = 1) -> list[Group]:
-    """Groups of the frames (n,) that collide strictly between two that stay; those that overlap or touch are one.
-
-    A run is widened to each side by a share of its number of frames, and to `least` frames where there is room.
-    """
+    """Groups of colliding frames (n,) between two that stay, widened by a share and to `least`, and merged."""
     first, last = low + 1, high - 1
     found: list[tuple[int, int]] = []
     for run in runs(bad[first : last + 1]):
@@ -353,11 +350,8 @@ def fill(model: pin.Model, q: Array, a: int, m: int, b: int, kind: Kind) -> None
 
 
 def key_frames(model: pin.Model, q: Array, moving: Mask, deviation: float) -> tuple[int, ...]:
-    """Frames of q (n, nq) between which linear interpolation misses no frame by more than a deviation, rad and m.
-
-    An interval is split at the frame that is missed most (Ramer 1972; Douglas and Peucker 1973), from the whole motion
-    on; `moving` (nv,) marks the degrees of freedom that count. The first and the last frame are among them.
-    """
+    """Frames of q (n, nq) between which interpolation misses no frame by more than a deviation, rad and m."""
+    # Split where it is missed most (Ramer 1972; Douglas and Peucker 1973); `moving` (nv,) counts.
     found, waiting = {0, len(q) - 1}, [(0, len(q) - 1)]
     while waiting:
         a, b = waiting.pop()

@@ -22,11 +22,7 @@ from wholebody.tasks.distance import DistanceMeasure, SquaredDistance
 
 
 def path_planes(figure: Figure, q: Array, frame: int, joints: Sequence[str], state: State) -> list[Plane]:
-    """Planes through the places of joints at a frame of q (n, nq), normal to their paths there (eqs. 3.2 and 3.3).
-
-    The normal is the direction from the place at this frame to the next one, at the last frame from the one before.
-    What does not move there has none. The state is moved.
-    """
+    """Planes through the places of joints at a frame of q (n, nq), normal to their paths there (eqs. 3.2 and 3.3)."""
     if len(q) < 2:
         return []
     numbers = [figure.frame_id(joint) for joint in joints]
@@ -83,11 +79,8 @@ class Predictor:
         effort_from: Array | None = None,
         most: int | None = None,
     ) -> Prediction:
-        """Predict the posture of a frame, from a start (nq,) and within further planes.
-
-        Holds and the effort refer to the original posture of the frame, the effort to `effort_from` (nq,) where that
-        is given. After `most` iterations of the method its best posture so far is taken.
-        """
+        """Predict the posture of a frame, from a start (nq,), within further planes, by `most` iterations."""
+        # Holds refer to the original posture of the frame, and the effort too, or to `effort_from` (nq,).
         scene, terms = self.run.scene, self.run.terms
         asked = terms.asked(frame)
         goals = [term for term in asked if isinstance(term, Goal)]
@@ -112,11 +105,8 @@ class Predictor:
         return Prediction(solution.q, self.good(frame, solution.q))
 
     def _together(self, frame: int) -> Mask:
-        """(pairs,) which pairs are of pieces that are held at each other in a frame, or both in the world.
-
-        No posture has more room between them, so none is asked for: hands at one weapon, a foot on the floor, feet side
-        by side. Otherwise what is held by its place alone may turn, and has its room.
-        """
+        """(pairs,) which pairs are of pieces that are held at each other in a frame, or both in the world."""
+        # No posture has more room between them: hands at one weapon, a foot on the floor.
         number = np.arange(self.run.scene.model.njoints)
         stands = np.zeros(len(number), dtype=bool)
         for term in self.run.terms.held(frame):

@@ -8,7 +8,7 @@ import tokenize
 import zipfile
 import zlib
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,14 @@ VERSION = 1  # of the layout of the arrays
 
 
 def write(motion: Motion, path: Path) -> Path:
-    """Write a clip as npz: `wholebody_clip` (version), `q`, `dt`, `name`, `joints`, `figure`; see `robot_arrays`."""
+    """Write a clip as npz: `wholebody_clip` (version), `q`, `dt`, `name`, `joints`, `figure`; see `robot_arrays`.
+
+    Of things that move it has names, `things` (k,), and placements, `thing_placements` (k, n, 7).
+    """
     data = io.BytesIO()
+    moving: dict[str, Any] = {}
+    if motion.things:
+        moving = {"things": np.array(list(motion.things)), "thing_placements": np.array(list(motion.things.values()))}
     np.savez_compressed(
         data,
         wholebody_clip=np.array(VERSION),
@@ -35,6 +41,7 @@ def write(motion: Motion, path: Path) -> Path:
         name=np.array(motion.name),
         joints=np.array(motion.figure.joints, dtype=np.str_),
         figure=np.array(motion.figure.name),
+        **moving,
         **robot_arrays(motion),
     )
     return write_file(path, data.getvalue())
@@ -62,7 +69,19 @@ def read(path: Path, figure: Figure) -> Frames:
         )
     name = str(arrays["name"])
     name = name if name.strip() and name.isprintable() else title_of(path)
-    return Frames(q.astype(np.float64, copy=False), float(dt), name)
+    return Frames(q.astype(np.float64, copy=False), float(dt), name, _things(path, arrays, len(q)))
+
+
+def _things(path: Path, arrays: dict[str, NDArray[np.generic]], frames: int) -> dict[str, NDArray[np.float64]]:
+    """Placements (n, 7) of what moves beside the figure."""
+    names, placed = arrays.get("things"), arrays.get("thing_placements")
+    if names is None and placed is None:
+        return {}
+    if names is None or placed is None or names.ndim != 1 or placed.shape != (len(names), frames, 7):
+        raise FileFormatError(f"{path.name}: things and thing_placements do not fit; write the clip anew")
+    if placed.dtype.kind not in "fiu":
+        raise FileFormatError(f"{path.name}: thing_placements are no numbers; write the clip anew")
+    return dict(zip(map(str, names), placed.astype(np.float64), strict=True))
 
 
 def _check_joints(path: Path, joints: list[str], figure: Figure) -> None:

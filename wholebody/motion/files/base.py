@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -14,7 +14,7 @@ from wholebody.base.errors import FileFormatError, one_line
 from wholebody.tracking.tracks import LARGEST, MOST_FRAMES
 
 Motion: TypeAlias = Any
-"""What is written, a `Clip`: `figure`, `q` (n, nq), `dt` and `name`; the module of clips imports this one."""
+"""What is written, a `Clip`: `figure`, `q` (n, nq), `dt`, `name` and `things`; the module of clips imports this one."""
 
 
 class Frames(NamedTuple):
@@ -23,6 +23,7 @@ class Frames(NamedTuple):
     q: Array  # (n, nq) one posture for each frame
     dt: float  # seconds from frame to frame
     name: str  # name of the clip
+    things: Mapping[str, Array] = {}  # placements (n, 7) of what moves beside the figure
 
 
 LARGEST_FILE = 500_000_000  # bytes of a text file of motion: an hour of 75 joints at 120 frames a second

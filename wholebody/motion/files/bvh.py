@@ -132,11 +132,8 @@ def _from_the_world(
 
 
 def _begins_with_rest(angles: Array) -> bool:
-    """Whether the first frame is a rest posture, and the second is not.
-
-    No joint but the root turns in it; or few do, and a jump leads to the second frame: in CMU's converted files some
-    joints of the rest posture turn by whole degrees. Angles (frames, joints, 3), radians, are without the root's.
-    """
+    """Whether only the first frame is a rest posture, by angles (frames, joints, 3) without the root's."""
+    # No joint turns in it, or few do and a jump follows: in CMU's files some of its joints turn by whole degrees.
     if len(angles) < 2:
         return False
     still = 1e-3  # rad
@@ -183,10 +180,7 @@ def _offsets(found: BvhText) -> tuple[Array, Array, list[str]]:
 
 
 def _rotations(found: BvhText) -> tuple[Array, Array]:
-    """Angles (n, moving joints, 3), radians, and rotations of all joints in their parents (n, joints, 3, 3).
-
-    Rotations that a joint lacks are zero.
-    """
+    """Angles (n, moving joints, 3), radians, and rotations of all joints in their parents (n, joints, 3, 3)."""
     angles, local = list[Array](), np.tile(np.eye(3), (len(found.table), len(found.joints), 1, 1))
     for k, (joint, values) in enumerate(zip(found.joints, _columns(found), strict=True)):
         if joint.channels:
@@ -199,10 +193,7 @@ def _rotations(found: BvhText) -> tuple[Array, Array]:
 
 
 def _up(joints: Sequence[str], parents: Indices, offsets: Array, root: int = 0) -> str:
-    """The axis that is up in the rest posture: towards the head, or else of the largest extent; "y" for any but z.
-
-    What moves the root, or stands above it, says nothing.
-    """
+    """The axis that is up in the rest posture: towards the head, or else of the largest extent; "y" for any but z."""
     rest = np.zeros_like(offsets)
     for k in range(root + 1, len(parents)):
         rest[k] = rest[parents[k]] + offsets[k]

@@ -1,7 +1,4 @@
-"""Clips as glTF animations (.glb): one node a joint, the body's surface as one skinned mesh, for Blender and three.js.
-
-Robots have the visuals of their links, and where there are none the figure's pieces.
-"""
+"""Clips as glTF animations (.glb): a node a joint, the surface as one skinned mesh, or a robot's visuals."""
 
 from __future__ import annotations
 
@@ -59,11 +56,7 @@ def write(motion: Motion, path: Path) -> Path:
 
 
 class JointTree:
-    """A file with a node for each joint of a model, placed in its parent's, that moves as postures (n, nq) say.
-
-    Attributes:
-        builder: of the file.
-    """
+    """A file with a node for each joint of a model, placed in its parent's, that moves as postures (n, nq) say."""
 
     def __init__(self, model: Any, q: Array, dt: float, *, clip: bool = False) -> None:
         """Place the joints; one posture is no animation, but a `clip` of one frame has its keyframe."""
@@ -112,11 +105,7 @@ class JointTree:
         self, name: str, surface: Surface, places: Sequence[tuple[str, Array]], prefix: str = "",
         color: Color | None = None,
     ) -> None:  # fmt: skip
-        """Add one mesh that bones bend, a primitive for each colour.
-
-        The places are the joints that carry the bones, by names that a prefix precedes in the model, and the
-        placements (4, 4) of the bones there. `color` is that of all of it; each patch has its own if None.
-        """
+        """Add one mesh that bones bend, a primitive a colour; `places`: joints after a prefix, (4, 4) of bones."""
         bones: list[int] = []
         held = [(joint_in(self._model, prefix, joint), offset) for joint, offset in places]
         whole = {number: (first, second) for number, first, second in surface.halves}
@@ -159,11 +148,8 @@ class JointTree:
         self.builder.node(f"body {name}", mesh=mesh, skin=skin)
 
     def _bound(self, known: Mapping[int, Array]) -> list[Array]:
-        """Placements (4, 4) of the joints where a skin is bound: as they carry bones, others as in the first frame.
-
-        No vertex follows a joint itself. But Blender takes the posture of rest from the parts that a skin names, and
-        moves the vertices where a parent is not among them.
-        """
+        """Placements (4, 4) of the joints where a skin is bound: as they carry bones, others as in the first frame."""
+        # Blender takes the rest posture from the parts that a skin names, and moves vertices where one is missing.
         found = [np.eye(4)]
         for joint in range(1, self._model.njoints):
             above = found[self._model.parents[joint]]

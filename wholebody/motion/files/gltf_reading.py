@@ -131,10 +131,7 @@ def skeleton_of(animated: Animated, unit: str | None = None, up: str | None = No
 
 
 def _bound(document: GltfDocument, skin: int, rest: Array) -> Array:
-    """(k, 4, 4) placements of the nodes in the posture to which a skin is bound; those of no joints keep their place.
-
-    The matrices of a skin leave open where the whole body is: where it is nearest to the posture of the nodes.
-    """
+    """(k, 4, 4) placements of the nodes where a skin is bound, the body nearest to the posture of the nodes."""
     joints = document.tree["skins"][skin]["joints"]
     bind = np.linalg.inv(document.inverse_binds(skin))
     if np.ptp(bind[:, :3, 3], axis=0).max() < 1e-9:  # no matrices: the mesh is bound by the nodes as they rest

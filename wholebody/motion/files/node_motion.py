@@ -26,10 +26,7 @@ class NodeMotion(NamedTuple):
     notes: tuple[str, ...] = ()  # sentences on what was chosen
 
     def skeleton(self, joints: Collection[int], title: str, unit: str | None, up: str | None) -> SkeletonMotion:
-        """The skeleton of some nodes and those between them, in metres with z up; see `read_skeleton`.
-
-        In the binding posture all its rotations are the identity.
-        """
+        """The skeleton of some nodes and those between them, metres, z up; its binding posture has no rotations."""
         kept = _joined(self.parents, joints)
         parents = np.array([kept.index(int(self.parents[node])) if at else -1 for at, node in enumerate(kept)])
         turn, notes = UP[up or "y"], list(self.notes)

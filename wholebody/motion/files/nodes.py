@@ -1,8 +1,4 @@
-"""A figure as a tree of nodes that rotate, as files of skeletons hold it, and back.
-
-Joints at one place become one node: the three of a hip are one rotation. All axes of nodes are those of the world where
-the posture is zero, as in BVH.
-"""
+"""A figure as a tree of nodes that rotate about axes of the world at zero; joints at one place are one node."""
 
 from __future__ import annotations
 
@@ -19,12 +15,8 @@ from wholebody.figures.figure import Figure
 
 
 def angles_about(turned: Rotation, axes: Array) -> Array:
-    """Angles (n, 3) of rotations about axes (3, 3), rows, each turned by the ones before; radians.
-
-    In gimbal lock only the sum or the difference of the first and the third angle is known. The third one is then that
-    of the nearest frame without, so that no angle jumps for a frame; zero where all frames are locked. The second axis
-    is orthogonal to both others.
-    """
+    """Angles (n, 3) of rotations about axes (3, 3), rows, each turned by the ones before; radians."""
+    # In gimbal lock the third is that of the nearest frame without, zero if there is none: no angle jumps for a frame.
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Gimbal lock", UserWarning)
         found: Array = turned.as_davenport(axes, "intrinsic")

@@ -13,15 +13,8 @@ from wholebody.base.compiled import compiled
 
 @compiled(fastmath=True)
 def add_rows(band: Array, first: Indices, begins: Indices, values: Array, weights: Array) -> None:
-    """Add the sum over rows r of w_r a_r a_r' to a symmetric band matrix.
-
-    Args:
-        band: (n, k) entry (j, i) is that of row j + i and column j of the matrix; it is changed.
-        first: (m,) column of the first value of each row.
-        begins: (m + 1,) where the values of each row begin; its columns follow each other.
-        values: of all rows, zeros between them included.
-        weights: (m,) of the rows.
-    """
+    """Add the sum over rows r of w_r a_r a_r' to a symmetric band matrix."""
+    # `band` (n, k): entry (j, i) is at row j + i, column j; `first` (m,) columns, `begins` (m + 1,) into `values`.
     for row in range(len(first)):
         begin, end = begins[row], begins[row + 1]
         for at in range(begin, end):
@@ -37,11 +30,7 @@ def add_sums(
     band: Array, first: Indices, begins: Indices, values: Array, factors: Array, members: Indices, groups: Indices,
     weights: Array,
 ) -> None:  # fmt: skip
-    """Add the sum over groups g of w_g v_g v_g', where v_g is the sum of the rows of the group times their factors.
-
-    `factors` (m,) are of the rows; `members` are rows of one group after the other, and those of each group begin at
-    `groups` (g + 1,); `weights` (g,) are of the groups. Else as `add_rows`.
-    """
+    """Add the sum over groups g of w_g v_g v_g', v_g the group's rows times their factors; see `add_rows`."""
     total = np.zeros(band.shape[0])
     for group in range(len(groups) - 1):
         least, most = band.shape[0], 0

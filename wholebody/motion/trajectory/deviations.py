@@ -111,16 +111,7 @@ class Objective:
     def __init__(
         self, frames: int, weights: Array, time: float, dt: float, seams: tuple[bool, bool], ends: Array | None = None
     ) -> None:  # fmt: skip
-        """Lay out the bands.
-
-        Args:
-            frames: of the window.
-            weights: (nv,) positive.
-            time: tau, seconds.
-            dt: seconds from frame to frame.
-            seams: whether the clip goes on before and after the window.
-            ends: (4, nv) deviations of the two frames before it and the two after it; None for none.
-        """
+        """Lay out the bands, for weights (nv,) and tau `time` [s]; `ends` (4, nv): deviations beside the window."""
         full, scale = second_differences(frames, *seams), (time / dt) ** 4
         inside, ends = full[:, 2:-2], np.zeros((4, len(weights))) if ends is None else ends
         beyond = full[:, [0, 1, -2, -1]] @ ends

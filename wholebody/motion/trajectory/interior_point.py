@@ -52,14 +52,8 @@ class Answer(NamedTuple):
 
 
 def minimise(program: BandedQP, accuracy: float = 1e-5, gap: float = 1e-6) -> Answer:
-    """Solve a program; see the module.
-
-    Args:
-        program: what is minimised.
-        accuracy: by which rows may be missed, and ten times of it, in parts of the largest derivative, the condition
-            of stationarity: a tenth of what a step is judged by; less costs an iteration.
-        gap: of the objective, in parts of it where it is over 1; more leaves deviations 3e-4 rad from the optimum.
-    """
+    """Solve a program to an accuracy of its rows (ten times of it for stationarity) and a gap of its objective."""
+    # Less accuracy costs an iteration; a larger gap leaves deviations 3e-4 rad from the optimum.
     z, solved, iterations = _iterated(program, accuracy, gap)
     finite = bool(np.isfinite(z).all())
     return Answer(np.clip(z if finite else 0.0, program.least, program.most), solved and finite, iterations)

@@ -137,11 +137,8 @@ class ClipLoads:
         return ClipLoads(clip, self.dynamics, [self.stands[frame] for frame in frames], bounds, q)
 
     def corrected(self, q: Array) -> ClipLoads:
-        """The same with rows whose loads at postures (n, nq) are those that `wb.motion.torques` measures.
-
-        Rows see a change of the recording as it is, and the feet where they stood. The measurement filters the sum, and
-        looks at which feet stand then. The difference of both is nearly the same for postures nearby.
-        """
+        """The same with rows whose loads at postures (n, nq) are those that `wb.motion.torques` measures."""
+        # The measurement filters and sees which feet stand; the difference is nearly the same for postures nearby.
         own, clip = self.of(q), Clip(self.figure, q, self.dt)
         steady, marks = smoothed(clip, CUTOFF).q, standing_feet(clip, self.dynamics.feet)
         torque, place = np.zeros((len(q), self.figure.model.nv)), np.zeros((len(q), 2))
@@ -287,22 +284,16 @@ class WindowLoads:
 
 
 def on_filtered(figure: Figure, original: Array, changed: Array, dt: float) -> Array:
-    """(n, nq) postures whose loads are those of changed postures of a recording.
-
-    Differences of a recording amplify its noise, so it is filtered. Filtering what was changed would hide how fast it
-    changes; so the change is taken as it is, on top of the filtered recording.
-    """
+    """(n, nq) postures whose loads are those of changed postures: the change on top of the filtered recording."""
+    # Filtering what was changed would hide how fast it changes.
     model, steady = figure.model, smoothed(Clip(figure, original, dt), CUTOFF).q
     each = zip(steady, original, changed, strict=True)
     return np.array([pin.integrate(model, base, pin.difference(model, was, now)) for base, was, now in each])
 
 
 def standing_frames(places: Array, feet: Array) -> Indices:
-    """(m,) frames of a clip whose standing feet are those at places (m,) between its frames; `feet` (n,) count them.
-
-    A foot stands between two frames if it stands in both: one that leaves the ground after a frame bears nothing a
-    quarter of a frame later. So of two frames it is the one in which fewer feet stand, or else the nearer one.
-    """
+    """(m,) frames of a clip whose standing feet are those at places (m,) between frames; `feet` (n,) count them."""
+    # A foot stands between frames if it stands in both: of two it is the one with fewer feet, or the nearer.
     near, below, above = (np.clip(to(places).astype(int), 0, len(feet) - 1) for to in (np.rint, np.floor, np.ceil))
     fewer = np.where(feet[below] < feet[above], below, above)
     found: Indices = np.where(feet[below] == feet[above], near, fewer)

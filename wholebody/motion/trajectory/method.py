@@ -90,11 +90,8 @@ class Trajectory(Checked):
         return MethodResult(q, message="; ".join((*missed, *left)), times=new.times, stretch=new.largest)
 
     def _measured(self, run: Run, reference: Array, q: Array, loads: ClipLoads | None, rate: float) -> Array:
-        """The best postures (n, nq) whose loads keep to their bounds as `torques` measures them, from free ones q.
-
-        Rows are corrected by what the measurement of the present postures is more than theirs, and the frames around
-        what is beyond its bounds are computed again. `rate` is the factor of the speed limits.
-        """
+        """The best postures (n, nq) whose loads keep to their bounds as `torques` measures them, from free ones q."""
+        # Rows are corrected by what is measured more, and frames around what is beyond are computed again.
         if loads is None:
             return q
         faults, corrected = run.faults(reference), loads.corrected(q)
@@ -162,10 +159,7 @@ class Trajectory(Checked):
 def _in_parts(
     run: Run, windows: ClipRun, window: Window, reference: Array, faults: Faults, told: Callable[[float], bool]
 ) -> WindowResult:
-    """A window freed part by part, each from where the one before it is; at once where a part is not freed.
-
-    What is tried again is then a part, and not all of a long window.
-    """
+    """A window freed part by part, each from where the one before it is; at once where a part is not freed."""
     length, shared = run.frames(LONG, 2), run.frames(LONG / 4.0, 1)
     q, first = np.array(reference), window.first
 

@@ -89,25 +89,15 @@ class Layout(NamedTuple):
 
 
 class Step(NamedTuple):
-    """A step from deviations: what its program is made of.
+    """A step from deviations: what its program is made of."""
 
-    Attributes:
-        x: (n, nv) deviations.
-        rows: of all nodes at x, in the order of their frames.
-        dofs: (a,) degrees of freedom that may change, ascending.
-        radius: largest change of any deviation, radians and metres.
-        penalty: of a metre or radian of shortfall.
-        multipliers: of the equalities of each node.
-        kept: for each node which of its rows the program gets.
-    """
-
-    x: Array
-    rows: Sequence[Rows]
-    dofs: Indices
-    radius: float
-    penalty: float
-    multipliers: Sequence[Array]
-    kept: Sequence[Mask]
+    x: Array  # (n, nv) deviations
+    rows: Sequence[Rows]  # of all nodes at x, in the order of their frames
+    dofs: Indices  # (a,) degrees of freedom that may change, ascending
+    radius: float  # largest change of any deviation, radians and metres
+    penalty: float  # of a metre or radian of shortfall
+    multipliers: Sequence[Array]  # of the equalities of each node
+    kept: Sequence[Mask]  # for each node which of its rows the program gets
 
 
 def lay_out(objective: Objective, limits: Limits, step: Step) -> Layout:
@@ -268,11 +258,8 @@ def _speed_part(step: Step, place: Indices, limits: Limits, size: int) -> tuple[
 
 
 def _brought_back(x: Array, past: Array, radius: float) -> Array:
-    """(a,) share of what changes (n - 1, a) pass their bounds by that a step within the trust region can take back.
-
-    It can shift all later frames by what is passed in all, or take a share of every deviation away, for the original
-    keeps to the bounds.
-    """
+    """(a,) share of what changes (n - 1, a) pass their bounds by that a step within the trust region can take back."""
+    # It can shift all later frames, or take a share of every deviation away.
     shifted = radius / np.maximum(np.abs(past).sum(axis=0), radius)
     shrunk = min(0.5, radius / max(float(np.abs(x).max(initial=0.0)), 1e-9))
     found: Array = np.maximum(shifted, shrunk)

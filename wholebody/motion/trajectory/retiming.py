@@ -33,11 +33,8 @@ class TimedRows(NamedTuple):
 
 
 def slowed(most: Array, dt: float, stretch: float, loads: TimedRows | None = None) -> Array:
-    """(n,) squares of the rate at which each frame is passed: 1 where the timing stays, else less.
-
-    Speed limits bound it by `most` (n,), and `stretch` is by how much the clip may be slowed, more than 1. What cannot
-    be met of further rows is missed by as little as can be.
-    """
+    """(n,) squares of the rate at which each frame is passed, 1 where the timing stays, within 1/stretch^2."""
+    # Speed limits bound it by `most` (n,); what cannot be met of other rows is missed by as little as can be.
     count = len(most)
     least = 1.0 / stretch**2
     if loads is None and (most >= 1.0).all():

@@ -137,11 +137,7 @@ class _Filter:
 
 
 class WindowProgram:
-    """One window: what is minimised, what holds, and the iterations.
-
-    Attributes:
-        nodes: where rows hold: every frame, and places between frames; more may be added before another `run`.
-    """
+    """One window: what is minimised, the `nodes` where rows hold, to which more may be added, and the iterations."""
 
     def __init__(self, evaluator: NodeEvaluator, objective: Objective, limits: Limits, iterations: int) -> None:
         """Take what is needed; a run has at most so many steps, of one to three programs each."""
@@ -163,15 +159,9 @@ class WindowProgram:
         self, x: Array, cancel: Cancel, radius: float | None = None, largest: float | None = None,
         early: bool = False, rough: bool = False,
     ) -> SQPResult:  # fmt: skip
-        """Iterate from deviations x (n, nv).
+        """Iterate from deviations x (n, nv), in trust regions from `radius` to `largest`.
 
-        Args:
-            x: (n, nv) deviations.
-            cancel: told how far it is.
-            radius: first trust region; None for that of the settings.
-            largest: largest trust region; None for that of the settings.
-            early: end where much is missed after ten steps, or no longer less, as there are other beginnings.
-            rough: end as soon as little is missed, however much less the objective could be.
+        `early` ends where much is missed after ten steps, as there are other beginnings; `rough` as soon as little is.
         """
         here, ways, programs, missed = self._at(x), _Filter(radius, largest), 0, list[float]()
         multipliers = [np.zeros(len(one.equal)) for one in here.rows]
@@ -210,11 +200,8 @@ class WindowProgram:
         return SQPResult(here.x, here.objective, here.worst, programs)
 
     def _step(self, here: _At, dofs: Indices, ways: _Filter, multipliers: Sequence[Array]) -> tuple[Array, int]:
-        """Deviations (n, nv) after the step of a program, and how many programs were solved for it.
-
-        Most rows within reach stay far from being missed. So a program begins with the near ones. Those that its step
-        would miss are added, and it is solved again; the third time it gets all that are within reach.
-        """
+        """Deviations (n, nv) after the step of a program, and how many programs were solved for it."""
+        # It begins with the near rows; those that its step would miss are added, the third time all within reach.
         possible = [within_reach(one, dofs, ways.radius) for one in here.rows]
         kept = [mask & likely(one, ways.radius) for one, mask in zip(here.rows, possible, strict=True)]
         solved = 0

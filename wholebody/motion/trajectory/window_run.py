@@ -116,15 +116,9 @@ class ClipRun:
         self, run: Run, reference: Array, time: float | None, rate: float | None = 1.0,
         loads: ClipLoads | None = None, near: float = NEARLY,
     ) -> None:  # fmt: skip
-        """Take what is needed.
+        """Take postures (n, nq) that deviations are from, and what a push spreads over [s] or None, by its jerk.
 
-        Args:
-            run: of the clip.
-            reference: (n, nq) postures that the deviations are from.
-            time: seconds that a push spreads over; None for what the jerk of the answer asks for.
-            rate: factor of the speed limits, for a clip that will be slowed by as much; None for no limits.
-            loads: of the reference postures, if they are to keep to their bounds.
-            near: trust region of windows that are begun with given postures, radians and metres.
+        `rate` is the factor of speed limits, None for none; `near` the trust region of windows with given postures.
         """
         self._run, self._reference = run, reference
         self._time, self._rate, self._loads, self._near = time, rate, loads, near
@@ -133,16 +127,10 @@ class ClipRun:
         self, window: Window, found: Faults, cancel: Callable[[float], bool], begun: Array | None = None,
         around: Array | None = None, whole: bool = True,
     ) -> WindowResult:  # fmt: skip
-        """Free one window.
+        """Free one window; a `cancel` that says so leaves it as it was.
 
-        Args:
-            window: which frames.
-            found: what is wrong with the original postures of the clip.
-            cancel: told the share done; true ends the attempt, and the window stays as it was.
-            begun: (n, nq) postures of the clip to begin with, of which those beyond the window stay; None for the
-                original ones, and others after them.
-            around: (n, nq) postures of the clip, of which those beyond the window stay; None for the original ones.
-            whole: False for a part of a window that goes on after it: its last frame is free.
+        `begun` (n, nq) has postures to begin with, `around` those that stay beyond the window, the originals if
+        None; with `whole` false the last frame of a part is free.
         """
         around = begun if around is None else around
         own = self._of(window, found, cancel, around, (window.first > 0, whole and window.end < len(self._reference)))
@@ -228,11 +216,7 @@ class ClipRun:
         return jerk_ratio(Clip(figure, before, dt), Clip(figure, after, dt))
 
     def _starts(self, own: _Window, depths: Array) -> Iterable[Array]:
-        """Deviations (n, nv) to begin with.
-
-        None; frames kept on one side of what motions between them pass; what following gives from the deepest frame and
-        from both ends.
-        """
+        """Deviations (n, nv) to begin with: none; kept on one side; followed from the deepest frame and both ends."""
         window, none = own.window, np.zeros((len(own.window), self._run.workspace.model.nv))
         yield none
         if not (own.limits.lower < own.limits.upper).any():
@@ -284,10 +268,8 @@ class ClipRun:
         return _Attempt(x, found.worst, dipping, found.objective, between=program.between)
 
     def _dips(self, own: _Window, x: Array, dipped: set[int], met: bool) -> list[Node]:
-        """Places between frames with deviations x (n, nv) where motions dip, and beside; everywhere in gaps `dipped`.
-
-        Those that dip now join these. Where nothing is missed in frames (`met`) what nearly dips is told too.
-        """
+        """Places between frames with deviations x (n, nv) where motions dip, and beside; all in gaps `dipped`."""
+        # Those that dip now join these. Where nothing is missed in frames (`met`) what nearly dips is told too.
         q, gaps = own.chart.postures(x), own.moved(x)
         swept = dips(self._run.workspace, q, gaps)
         places = [(gap, at + side) for gap, shares in swept.items() for at in shares for side in (0.0, -0.005, 0.005)]

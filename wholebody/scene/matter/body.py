@@ -136,14 +136,7 @@ class MassProperties(NamedTuple):
 
 
 def mass_properties(shape: Shape, body: Body, name: str = "a body") -> MassProperties:
-    """Mass, centre and inertia of a shape with the density or the mass of a body.
-
-    A closed mesh counts as it is; of one that is not closed the convex pieces count, each whole, also where they
-    overlap.
-
-    Raises:
-        InputError: a shape without a finite volume, or a mass that is too small or too large.
-    """
+    """Mass, centre and inertia of a shape with the density or the mass of a body; of an open mesh its pieces count."""
     unit, note = _of_density_one(shape, name)
     density = body.density if body.mass is None else body.mass / unit.mass
     mass = float(unit.mass * density)

@@ -96,10 +96,7 @@ def material(value: object, what: str) -> Material:
 
 
 def surface(first: Material, second: Material) -> Surface:
-    """Restitution and friction of two materials: as one of them says of the other, or else of those it does not name.
-
-    An InputError if neither of them knows the other.
-    """
+    """Restitution and friction of two materials; InputError if neither of them knows the other."""
     found = first.against.get(second.name, second.against.get(first.name))
     found = found or first.others or second.others
     if found is None:

@@ -95,10 +95,7 @@ Built = TypeVar("Built")
 
 
 class Outside(SolvesAnew, ABC, Generic[Built]):
-    """A tool as a method: refuses what it cannot express, and keeps what it builds while that is right.
-
-    `kinds` are the terms that it can express; None as `iterations` is the tool's own default.
-    """
+    """A tool as a method: refuses terms other than `kinds`, and keeps what it builds while that is right."""
 
     name: ClassVar[str]
     kinds: ClassVar[tuple[type, ...]]

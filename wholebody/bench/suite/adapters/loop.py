@@ -133,10 +133,7 @@ def size(figure: Figure) -> float:
 
 
 def margins(problem: Problem, most: float) -> Array:
-    """What each pair keeps beyond its clearance (pairs,) [m]: at most so much, and no more than the start allows.
-
-    Rows are linear, and steps have a length: a pair that is asked for its clearance exactly ends nearer.
-    """
+    """What each pair keeps beyond its clearance (pairs,) [m]: at most so much, and no more than the start allows."""
     found = np.full(len(problem.clearances), most)
     if most <= 0.0:
         return found
@@ -169,11 +166,8 @@ class Pair(NamedTuple):
 
 
 def kept_apart(problem: Problem, margin: float, held: bool = True) -> list[Pair]:
-    """Pairs that can move against each other, with margins of at most `margin` metres.
-
-    `held` says whether hard tasks hold what the problem holds. The pair of a held foot and the floor is left out: with
-    the task it would leave a program no solution, since the two differ to second order.
-    """
+    """Pairs that can move against each other, with margins of at most `margin` metres."""
+    # The pair of a held foot and the floor would leave a program no solution: both differ to second order.
     pieces = problem.scene.geometry.geometryObjects
     still = {0}
     for term in problem.constraints:

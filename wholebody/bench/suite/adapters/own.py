@@ -21,7 +21,7 @@ from wholebody.methods.qp.method import QP
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver
-from wholebody.methods.qp.steps import QPStep
+from wholebody.methods.qp.step_program import QPStep
 from wholebody.tasks.base import Goal, Surroundings, filled
 from wholebody.tasks.residuals import point_rows
 

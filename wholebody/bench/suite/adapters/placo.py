@@ -1,7 +1,4 @@
-"""placo: our method of that name, and `KinematicsSolver` with its documented tasks for a reach.
-
-placo knows collisions of a robot with itself only, so the objects are added to its collision model.
-"""
+"""placo: our method of that name, and `KinematicsSolver`; it knows collisions of a robot with itself only."""
 
 from __future__ import annotations
 

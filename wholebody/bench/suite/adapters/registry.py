@@ -42,12 +42,10 @@ class _Row(NamedTuple):
 
 
 def adapters(names: Iterable[str] | None = None, starts: bool = False) -> tuple[Adapter, ...]:
-    """The adapters of these names, in the order given; where None, one of each algorithm that is installed.
+    """The adapters of these names, in order; where None, one of each algorithm that is installed.
 
-    "newton", a method with several adapters, means all that are installed; "all" means every method that is installed,
-    "module:Class" a method of one's own. Methods that differ from another in their starts alone are among several only
-    if `starts` is true. Raises UnknownNameError, MissingPackageError, or InputError where a method of one's own cannot
-    be imported.
+    "newton" means all of the method, "all" every method, "module:Class" one's own. Methods that differ from another in
+    their starts alone are among several only if `starts`.
     """
     rows = _rows()
     if names is None:

@@ -33,10 +33,7 @@ STARTS, ONE = "starts", "one_start"
 
 
 class Restarted:
-    """A method with one start that starts again elsewhere where it ends without an answer, and the best answer counts.
-
-    The last start that began within so many seconds of the processor is finished.
-    """
+    """A method that starts again elsewhere, by so many seconds of the processor, where it ends without an answer."""
 
     def __init__(self, method: Any, prepare: Callable[[Any, Problem], None], seconds: float = 1.5) -> None:
         """Take a method with one start, and what builds its model."""

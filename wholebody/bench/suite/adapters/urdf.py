@@ -50,12 +50,8 @@ def piece_name(number: int) -> str:
 
 
 def write_urdf(scene: Scene, frames: Mapping[str, tuple[int, pin.SE3]], folder: Path) -> Path:
-    """Write a scene as URDF, with a file for each hull, and return its path.
-
-    Every piece and every frame is a link of its own, fixed to the link that carries it, without mass. Objects are fixed
-    to the root. A half-space is the top of a box. `frames` has names of further links, our joint and the placement in
-    it. Raises InputError for a joint or a shape that this translation does not know.
-    """
+    """Write a scene as URDF, a link a piece or frame, with a file for each hull, and return its path."""
+    # Objects are fixed to the root, a half-space is the top of a box; `frames` has our joint and the placement in it.
     model = scene.model
     top = ElementTree.Element("robot", name="figure")
     for index in range(model.njoints):
@@ -144,11 +140,8 @@ def _slab(scene: Scene, piece: Any, depth: float) -> pin.SE3:
 
 
 def mjcf(scene: Scene, frames: Mapping[str, tuple[int, pin.SE3]] = MappingProxyType({})) -> str:
-    """Return a scene as MJCF: bodies are named after the joint that moves them, geoms after their pieces.
-
-    Links without mass get a millionth of a kilogram, because MuJoCo refuses none. `frames` has names of sites, our
-    joint and the placement in it. Raises InputError for a joint or a shape that this translation does not know.
-    """
+    """Return a scene as MJCF: bodies named after joints, geoms after pieces, sites after `frames`."""
+    # Links without mass get a millionth of a kilogram, because MuJoCo refuses none.
     model, geometry = scene.model, scene.geometry
     top = ElementTree.Element("mujoco", model=scene.figure.name)
     settings = {"angle": "radian", "autolimits": "true", "boundmass": "1e-6", "boundinertia": "1e-9"}

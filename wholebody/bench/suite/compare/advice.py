@@ -1,8 +1,4 @@
-"""Which method to choose when, from the figures alone.
-
-Methods are compared on the problems that both were given, by the ratio of two figures with its interval; a ratio whose
-interval holds 1 names no winner.
-"""
+"""Which method to choose when: ratios of figures on problems that both were given, with their intervals."""
 
 from __future__ import annotations
 
@@ -23,11 +19,7 @@ Figures = Mapping[tuple[str, int], float]
 
 
 def best(found: Mapping[str, Figures]) -> tuple[str, ...]:
-    """Return the methods with the least figure, as many as cannot be told apart; the least of all first.
-
-    A method that has too few problems in common with the least is left out. Where the least itself has too few, nobody
-    is told apart.
-    """
+    """Return the methods with the least figure, as many as cannot be told apart; the least of all first."""
     order = sorted((name for name in found if found[name]), key=lambda name: middle(list(found[name].values())))
     if order and len(found[order[0]]) < LEAST:
         return tuple(order)

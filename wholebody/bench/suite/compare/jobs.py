@@ -108,10 +108,7 @@ def work(task: Task) -> Chunk:
 def _sweep(
     child: Child, adapter: Adapter, ladder: Iterable[Budget], task: Task, first: Record, ended: bool
 ) -> list[Record]:
-    """All further budgets; where the process has ended over one, the rest count as what they would have been.
-
-    Budgets of feasibility only are cheaper than all others, and count for themselves.
-    """
+    """All further budgets; those after one over which the process has ended count as what they would have been."""
     records: list[Record] = []
     if first.outcome == REFUSED:
         return records

@@ -30,11 +30,7 @@ AMOUNTS = ("cases", "sweep", "levels", "seed", "cap", "minutes")
 
 @dataclass(frozen=True)
 class Locked:
-    """A comparison as it was published.
-
-    `figures` are by set, method and name: "solved", as a share, and "median time" of an answer, in kernels, by the
-    processor.
-    """
+    """A comparison as published: `figures` by set, method and name, "solved" and "median time" in kernels."""
 
     sets: tuple[str, ...]
     methods: tuple[str, ...]

@@ -27,10 +27,7 @@ REPEATS = 5  # warm solves, of which the median counts
 def compared(
     path: Path, adapters: Iterable[Adapter], cap: float = 20.0, tell: Callable[[str], None] = lambda name: None
 ) -> list[Row]:
-    """Every method on the problem of a task file: what solves it first, by time; then by the worst error.
-
-    A solve is ended after `cap` seconds of the processor. Raises WholebodyError where the task file cannot be read.
-    """
+    """Every method on the problem of a task file, for `cap` s of the processor: solved ones by time, then by error."""
     read_task(path)
     rows = []
     for adapter in adapters:

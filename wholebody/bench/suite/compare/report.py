@@ -23,11 +23,7 @@ from wholebody.bench.tables import publish_text, write_rows, write_text
 
 
 def curve(results: Results, family: str, adapter: str, quantity: Quantity) -> tuple[list[float], list[float]]:
-    """Median milliseconds and values of a method in a set at its budgets, from the fastest on.
-
-    Without the budgets than which another is both faster and more accurate, and those of which more than half of the
-    answers are none.
-    """
+    """Median milliseconds and values of a method at its budgets, from the fastest on, without dominated ones."""
     cases = results.swept(family, adapter)
     found: tuple[list[float], list[float]] = [], []
     for level in results.levels(family, adapter):
@@ -121,10 +117,7 @@ def publish(
     missing: Mapping[str, str],
     say: Callable[[str], None] = lambda text: None,
 ) -> Material:
-    """Write everything that is made from a run into a folder.
-
-    `missing` are methods that are not installed, and what installs them.
-    """
+    """Write everything that is made from a run into a folder; `missing`: methods, and what installs them."""
     given = material(settings, store.chunks, facts, missing)
     write_rows(folder / "solves.csv", facts, store.records)
     write_summary(given.rows, facts, folder)
@@ -142,10 +135,7 @@ def publish(
 
 
 def to_docs(given: Material, folder: Path, docs: Path, section: str = "compare") -> None:
-    """Write the report, its charts and its lock file into the documentation, and its table into the page of results.
-
-    Only the section "compare" has a place on the page; FileFormatError where the page lacks it.
-    """
+    """Write report, charts and lock file into the documentation, the table of "compare" into the page of results."""
     pictures = [
         f"![Every set: {', '.join(methods)}](assets/bench/{chart_name('overview', number)}.svg)"
         for number, methods in enumerate(groups(given.results.adapters))

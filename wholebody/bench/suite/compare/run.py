@@ -104,11 +104,7 @@ class Plan:
 
 
 def share_out(one: Array, sweep: Array, most: Array, most_swept: Array, total: float) -> tuple[Array, Array]:
-    """Cases (n,) and sweeps (n,) of every method, at least one case, and a sweep where its share allows one.
-
-    `one` and `sweep` are seconds of a case at the default budget and at all others, `most` and `most_swept` what is
-    wanted.
-    """
+    """Cases (n,) and sweeps (n,) of every method in a total time; `one` and `sweep` [s]: of a case and a sweep."""
 
     def parts(share: float) -> tuple[Array, Array]:
         once = np.where((share - one >= sweep) & (most_swept > 0), sweep, 0.0)
@@ -146,11 +142,7 @@ def run(
     cluster: str | None = None,
     tell: Callable[[Progress], None] = lambda progress: None,
 ) -> Store:
-    """Compare, or go on with a comparison that was ended; `cluster` is the address of a dask scheduler.
-
-    Raises InputError where the folder holds a run with other settings, WholebodyError for a set whose cases cannot be
-    built.
-    """
+    """Compare, or go on with a comparison that was ended; `cluster` is the address of a dask scheduler."""
     store, plan = Store(folder, settings.described()), Plan(settings, jobs)
     for chunk in store.chunks:
         plan.note(chunk)
@@ -169,10 +161,7 @@ def run(
 
 
 def _tasks(settings: Settings, plan: Plan, done: set[tuple[str, int]], end: float) -> Iterator[Task]:
-    """Cases in turn over all sets, each with those methods that there is time for when it is begun.
-
-    After the time `end` only sets are begun of which there is no case yet.
-    """
+    """Cases in turn over all sets, with those methods that there is time for; after `end` only of sets without one."""
     for number in range(settings.cases):
         for family in settings.sets:
             late = number > 0 and time.perf_counter() > end

@@ -60,10 +60,7 @@ class Settings(Checked):
         return self.cases, self.sweep // 4 if family.moving else self.sweep
 
     def ladder(self, adapter: Adapter, moving: bool = False) -> list[Budget]:
-        """Budgets beside the default one, from cheap to exact, evenly chosen where there are more than `levels`.
-
-        Budgets of feasibility only are chosen among themselves, as many as their share.
-        """
+        """Budgets beside the default one, from cheap to exact, evenly chosen where there are more than `levels`."""
         unused = FEASIBILITY_ONLY if moving else 0
         listed = [level for level in adapter.loose if level != DEFAULT and level[1] != unused]
         # A case whose goals move is hundreds of solves.

@@ -154,10 +154,7 @@ def held(problem: wb.Problem) -> list[wb.Goal]:
 
 
 def fitted(figure: wb.Figure, q: Array, goals: Sequence[wb.Goal], dofs: Indices) -> Array | None:
-    """Return the posture (nq,) that Newton's method finds from q, or None where it finds none within the limits.
-
-    `goals` are resolved; `dofs`: places in the tangent of what may move.
-    """
+    """Return the posture (nq,) within limits that Newton's method finds for resolved goals from q, moving `dofs`."""
     model, state = figure.model, _state(figure)
     for _ in range(25):
         state.update(q)

@@ -142,11 +142,9 @@ class Axis(NamedTuple):
 
 
 def arm(kind: str, rng: np.random.Generator) -> tuple[wb.Figure, Array]:
-    """Return an arm with links of random lengths, and the posture (nq,) it is ready in, elbow bent, the tool in front.
+    """An arm with links of random lengths, and the posture (nq,) it is ready in, elbow bent, the tool in front.
 
-    `kind`: "seven axes": a shoulder, an elbow and a wrist that turn as a person's do; "industrial": six axes, the elbow
-    beside the shoulder's plane, the last three crossing; "parallel": six axes, three of them parallel, no three of the
-    last crossing.
+    `kind`: "seven axes" as a person's arm; "industrial", the last three of six crossing; "parallel", three parallel.
     """
     lengths = [round(float(length), 3) for length in rng.uniform(*of_arm.lengths_m)]
     lower, upper, fore, hand = lengths

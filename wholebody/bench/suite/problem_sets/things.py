@@ -51,10 +51,7 @@ def just_outside(gap: Callable[[float], float], inside: float, outside: float) -
 
 
 def shape_of(geometry: Any) -> tuple[str, list[float]]:
-    """Kind of a shape of coal and its lengths in metres, full ones and radii; the name of its class where not known.
-
-    Half-spaces n . x <= d have n and d, hulls nothing.
-    """
+    """Kind of a shape of coal and its lengths [m], full ones and radii; n and d of a half-space n . x <= d."""
     known: dict[Any, tuple[str, Callable[[Any], Any]]] = {
         coal.Box: ("box", lambda shape: 2.0 * np.array(shape.halfSide)),
         coal.Sphere: ("sphere", lambda shape: (shape.radius,)),
@@ -137,11 +134,7 @@ def add_things(
     space: Sequence[Sequence[float]] = ((-0.6, -1.0, 0.1), (1.2, 1.0, 2.0)),
     make: Callable[[int, np.random.Generator], tuple[str, wb.Shape]] | None = None,
 ) -> None:
-    """Put random things into a box of space [m], turned at random, clear of what is taken up; they may cross.
-
-    `make` gives the kind and the shape of a thing by its number. Raises InputError where no place was found for one of
-    them.
-    """
+    """Put random things into a box of space [m], clear of what is taken up; they may cross. `make`: kind and shape."""
     for number in range(count):
         for _ in range(5000):  # many times what the most crowded postures have needed
             kind, shape = (make or household_thing)(number, rng)

@@ -49,10 +49,7 @@ class Answering:
         self._warm: set[bool] = set()
 
     def answer(self, family: str, number: int) -> None:
-        """Solve a problem from both seeds.
-
-        The problem is posed anew from its set, number and seed, and FileFormatError says where the files have another.
-        """
+        """Solve a problem, posed anew, from both seeds; FileFormatError says where the files have another."""
         case = ready(problem_set(family), number, int(self._index["seed"])).case
         rebuilt = Rebuilt(self._folder, self._index["sets"][family]["problems"][number])
         body = self._body(case, rebuilt)

@@ -42,11 +42,7 @@ class Answers:
 
 
 def read_answers(path: Path, folder: Path) -> Answers:
-    """Read a file of answers to the problems of an export.
-
-    Raises FileFormatError whose message names the entry and how to correct it, UnknownNameError for an unknown problem,
-    InputError where there is no export in the folder.
-    """
+    """Read a file of answers to an export; errors name the entry and how to correct it."""
     index = read_index(folder)
     known = {name for family in index["sets"].values() for name in family["problems"]}
     content = loaded(path, "file of answers")

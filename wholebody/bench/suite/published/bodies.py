@@ -72,10 +72,7 @@ class BodyFiles:
 
 
 def body_files(figure: Figure, name: str, meshes: Meshes) -> BodyFiles:
-    """Write a figure; convex pieces go to the meshes.
-
-    Raises InputError where a joint is neither a hinge, nor a slide, nor a free root; or joints follow each other.
-    """
+    """Write a figure of hinges, slides and a free root; convex pieces go to the meshes."""
     one_figure(figure, f"{name}: a published body; the figure")
     if figure.followers:
         raise InputError(f"{name}: joints of it follow others, which a published body does not say; leave it out")

@@ -62,11 +62,7 @@ class _Export:
 def export(
     sets: Sequence[ProblemSet], per_set: int, seed: int, folder: Path, say: Callable[[str], None] = lambda text: None
 ) -> Path:
-    """Write problems of some sets into a folder, and return the index; the same arguments give the same files.
-
-    The folder must not exist yet, or be empty (InputError); WholebodyError for a witness that the judge does not
-    confirm.
-    """
+    """Write problems of some sets into an empty folder; the index. The same arguments give the same files."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder}: is not an empty folder; name one that does not exist yet")
     done = _Export(folder)

@@ -98,11 +98,7 @@ class Verdict:
 
 
 def judge(answers: Answers, folder: Path) -> Verdict:
-    """Judge answers to the problems of an export.
-
-    Every problem of a set counts if the answers take part in the set from that seed: what is left out is not solved.
-    Raises FileFormatError or InputError where the folder holds no whole export.
-    """
+    """Judge answers to an export; of a set that they take part in, what is left out is not solved."""
     index = read_index(folder)
     given = {(answer.problem, answer.seed): answer for answer in answers.answers}
     judged, rows = [], []

@@ -23,11 +23,7 @@ PAGE = "leaderboard.html"
 
 
 def judge_folder(folder: Path, problems: Path) -> list[Verdict]:
-    """Judge every file of answers in a folder.
-
-    Raises InputError where there is no such folder, it has no answers, or two files have one method; FileFormatError
-    for a malformed file.
-    """
+    """Judge every file of answers in a folder; InputError for no answers, or two files of one method."""
     if not is_folder(folder):
         raise InputError(f"{folder}: there is no such folder; give one with files of answers")
     paths = [path for path in sorted(folder.glob("*.json")) if not path.name.endswith(".verdict.json")]

@@ -24,11 +24,7 @@ def problem_name(family: str, number: int) -> str:
 
 
 def problem_content(case: Case, body: BodyFiles, far: Array, meshes: Meshes) -> dict[str, Any]:
-    """A case as the content of its file, with the far seed (nq,); hulls of things go to the meshes.
-
-    Of the measures that a problem has by default the effort is published. Raises InputError where the case asks for
-    something that the files have no word for.
-    """
+    """A case as the content of its file, with the far seed (nq,); hulls of things go to the meshes."""
     problem, name = case.problem, problem_name(case.set, case.number)
     if problem.bounds or problem.measures_given:
         raise InputError(f"{name}: only problems without bounds and measures of their own are published")
@@ -88,10 +84,7 @@ def _balance(term: wb.Balance) -> dict[str, Any]:
 
 
 def _things(case: Case, body: BodyFiles, meshes: Meshes) -> tuple[list[dict[str, Any]], list[list[str]]]:
-    """Pieces of all things, and the pairs that are not tested although the rule would.
-
-    The rule: every piece of a thing against every piece of the body, and carried things against those in the world.
-    """
+    """Pieces of all things, and the pairs not tested although the rule would: thing and body, carried and world."""
     geometry = case.problem.scene.geometry
     own = case.problem.scene.figure.geometry.ngeoms
     pieces = list(geometry.geometryObjects)
@@ -140,11 +133,8 @@ def _listed(values: Sequence[float] | Array) -> list[float]:
 
 
 def far_seed(case: Case, rng: np.random.Generator) -> Array:
-    """A random posture (nq,) from which solving is hard: the first draw in which nothing overlaps, or the least does.
-
-    Joints that carry what is held in the world stay as they are at the start; all others are drawn uniformly within
-    their limits, and two frames that hold each other are brought together again by Newton's method.
-    """
+    """A random posture (nq,), hard to solve from: the first of some draws in which nothing, or least, overlaps."""
+    # What carries things held in the world stays; frames that hold each other are brought together by Newton's method.
     problem = case.problem
     free, closing = _free(problem), [term for term in held(problem) if _is_relative(term)]
     best, least = np.array(problem.start), np.inf

@@ -1,7 +1,4 @@
-"""A published problem, rebuilt from its files by Pinocchio and coal alone, and what a posture is worth for it.
-
-Nothing of the package's scenes, terms or methods is used, so that no fault of theirs is judged by itself.
-"""
+"""A published problem, rebuilt from its files by Pinocchio and coal alone, and what a posture is worth for it."""
 
 from __future__ import annotations
 

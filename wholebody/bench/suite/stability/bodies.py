@@ -26,10 +26,7 @@ class Builder:
     def joint(
         self, kind: str, name: str, *, parent: int = 0, at: Any = (0.0, 0.0, 0.0), limits: Sequence[float] | None = None
     ) -> int:
-        """Add a joint and the segment that it carries, which has the joint's name; return its index.
-
-        The kind has the axis in it: "rx" turns about x, "px" slides along it.
-        """
+        """Add a joint, "rx" turns about x, "px" slides along it, and the segment that it carries; return its index."""
         most = 2.9 if kind[0] == "r" else 2.0  # rad, m: limit of a joint if nothing else is said
         low, high = (-most, most) if limits is None else limits
         bounds = [np.array([value]) for value in (100.0, 10.0, low, high)]

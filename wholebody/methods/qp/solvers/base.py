@@ -37,12 +37,7 @@ class QPSolver(ABC):
         self._programs: dict[str, int] = {}
 
     def solve(self, program: QuadraticProgram) -> QPSolution:
-        """Minimise, without an active set that is known.
-
-        Returns:
-            The answer; `exact` is False where only an approximation was found. Never NaN, always inside the box. No
-            solver gets a program that is not computable: its answer is to stay, as far as the box has zero.
-        """
+        """Minimise without a known active set: never NaN, inside the box; `exact` False for an approximation."""
         if not program.is_computable:
             stay = np.clip(np.zeros(program.size), program.lower, program.upper)
             return QPSolution(np.where(np.isfinite(stay), stay, 0.0), violated_set(program), False, 0, NOT_EXACT)

@@ -1,7 +1,4 @@
-"""OSQP with a workspace that lives on: set up once for a sparsity, warm from program to program, finished exactly.
-
-A second solver asks it only where active sets, corrected from the violated rows, are not right after many corrections.
-"""
+"""OSQP with a workspace that lives on: set up once for a sparsity, warm from program to program."""
 
 from __future__ import annotations
 
@@ -188,10 +185,7 @@ def _structure(n: int, m: int, slots: int, pattern: bytes) -> tuple[Any, Any, ND
 
 @lru_cache(maxsize=1)
 def extension() -> Any:
-    """OSQP's compiled module, without the package around it, which loads jinja2 and asyncio to write C code.
-
-    The package's Python class takes five times as long as 25 iterations.
-    """
+    """OSQP's compiled module, without the package, which loads jinja2 and asyncio; its class is five times as slow."""
     package = find_spec("osqp")
     found = None if package is None else PathFinder.find_spec(EXTENSION, package.submodule_search_locations)
     if EXTENSION in sys.modules or found is None or found.loader is None:

@@ -37,12 +37,7 @@ def scaled_split(program: QuadraticProgram) -> SplitForm:
 
 
 def read_active(box: Array, push: Array) -> ActiveSet:
-    """The active set that multipliers tell.
-
-    Args:
-        box: (n,) of the box; positive where an upper bound holds, negative where a lower one does.
-        push: (k,) of the elastic rows, positive where they push.
-    """
+    """The active set of multipliers `box` (n,), positive at an upper bound, and `push` (k,) of the elastic rows."""
     return ActiveSet(box < -1e-9, box > 1e-9, push > 1e-9)
 
 

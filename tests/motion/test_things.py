@@ -1,0 +1,155 @@
+"""Hands that go with things: a made-up person lifts a box, which figures of other sizes lift too."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from tests.motion.test_retargeting import person
+from wholebody.base.errors import InputError
+from wholebody.motion.skeleton import SkeletonMotion
+
+SIZE = (0.25, 0.30, 0.2)  # m: of the box, whose sides are 3 cm inwards of the wrists
+
+
+def lifting(frames: int = 30) -> tuple[SkeletonMotion, list[pin.SE3]]:
+    """A person of 1.75 m whose arms lift a box between the wrists, and where the box is."""
+    motion, turns = person(frames), []
+    local = np.tile(np.eye(3), (frames, len(motion.names), 1, 1))
+    for k in range(frames):
+        turns.append(pin.utils.rotate("y", 1.0 - 0.45 * (1.0 - np.cos(np.pi * k / (frames - 1)))))
+        for side, sign in (("left", 1.0), ("right", -1.0)):
+            forward = pin.utils.rotate("z", -0.5 * sign * np.pi)
+            local[k, motion.names.index(f"{side}_shoulder")] = turns[-1] @ forward
+            bent = forward.T @ pin.utils.rotate("y", -0.9) @ forward
+            local[k, motion.names.index(f"{side}_elbow")] = bent
+    root = np.tile([0.0, 0.0, 0.94], (frames, 1))
+    motion = SkeletonMotion.moved(motion.names, motion.parents, motion.offsets, local, root, 1 / 30, "lifting")
+    wrists = [motion.positions[:, motion.names.index(f"{side}_wrist")] for side in ("left", "right")]
+    return motion, [pin.SE3(turn, place) for turn, place in zip(turns, 0.5 * (wrists[0] + wrists[1]), strict=True)]
+
+
+def among(figure: wb.Figure, at: pin.SE3) -> wb.Scene:
+    return wb.Scene(figure).add(wb.HalfSpace(), name="floor").add(wb.Box(SIZE), name="box", at=at)
+
+
+def gaps(clip: wb.Clip, side: str) -> np.ndarray:
+    """(n,) distance of a hand's pieces to the box of the clip, by coal; and (n, 3) the wrist in the box's axes."""
+    figure, found = clip.figure, []
+    data, placed = figure.model.createData(), figure.geometry.createData()
+    box, joint = coal.Box(*SIZE), figure.model.frames[figure.frame_id(f"{side}_hand")].parentJoint
+    for q, at in zip(clip.q, clip.things["box"], strict=True):
+        pin.updateGeometryPlacements(figure.model, data, figure.geometry, placed, q)
+        where = pin.XYZQUATToSE3(at)
+        apart = [
+            coal.distance(
+                piece.geometry, coal.Transform3s(own.rotation, own.translation), box,
+                coal.Transform3s(where.rotation, where.translation), coal.DistanceRequest(), coal.DistanceResult(),
+            )
+            for piece, own in zip(figure.geometry.geometryObjects, placed.oMg, strict=True)
+            if joint in figure.model.supports[piece.parentJoint]
+        ]  # fmt: skip
+        wrist = where.actInv(np.array(data.oMi[joint].translation))
+        found.append([min(apart), *wrist])
+    return np.array(found)
+
+
+@pytest.mark.parametrize("stature", [1.4, 1.75])
+def test_hands_stay_at_their_places_of_a_box_that_they_lift(stature: float) -> None:
+    motion, track = lifting()
+    figure = wb.load("human", stature=stature)
+    scene = among(figure, track[0])
+    clip = wb.retarget(motion, figure, scene, things={"box": track})
+    lifted = clip.things["box"][:, 2]
+    legs = np.ptp(lifted) / np.ptp([at.translation[2] for at in track])
+    assert 0.9 * stature / 1.75 < legs < 1.1 * stature / 1.75  # a smaller person lifts it less high
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        off = gaps(clip, side)
+        assert np.abs(off[:, 0]).max() < 2e-3
+        assert np.ptp(off[:, 1:], axis=0).max() < 1e-3
+        assert np.abs(off[:, [1, 3]]).max() < 1e-2
+        assert sign * off[0, 2] > 0.5 * SIZE[1]
+    assert wb.check(clip, scene).free
+    if stature > 1.5:  # nearly of the skeleton's size
+        return
+    alone = wb.retarget(motion, figure, ground=None)  # without the box the hands are inside it
+    assert np.abs(gaps(wb.Clip(figure, alone.q, alone.dt, things=clip.things), "left")[:, 0]).min() > 5e-3
+
+
+def test_what_is_out_of_reach_is_said_and_let_go_of(recwarn: pytest.WarningsRecorder) -> None:
+    motion, track = lifting()
+    figure = wb.load("human", stature=1.4)
+    scene = among(figure, track[0]).add(wb.Box((0.1, 0.1, 0.1)), name="post", at=(3.0, 3.0, 0.05))
+    clip = wb.retarget(motion, figure, scene, things={"box": track})  # beside the post the box keeps its way
+    assert clip.things["box"][:, :3] == pytest.approx(np.array([at.translation for at in track]))
+    assert any("left_wrist does not reach box" in str(one.message) for one in recwarn)
+    assert wb.check(clip, scene).free
+    assert np.abs(clip.q[:, :3] - clip.q[0, :3]).max() < 0.1  # the body does not go after it
+
+
+def test_hands_stay_on_a_table_that_stands() -> None:
+    motion, track = lifting(2)
+    motion = SkeletonMotion(
+        motion.names, motion.parents, motion.offsets, np.repeat(motion.rotations[:1], 20, axis=0),
+        np.repeat(motion.positions[:1], 20, axis=0), 1 / 30,
+    )  # fmt: skip
+    figure = wb.load("human", stature=1.65)
+    scene = among(figure, track[0])
+    held = wb.retarget(motion, figure, scene)
+    off = gaps(wb.Clip(figure, held.q, held.dt, things={"box": np.tile(pin.SE3ToXYZQUAT(track[0]), (20, 1))}), "right")
+    assert np.abs(off[:, 0]).max() < 2e-3
+    loose = wb.retarget(motion, figure, scene, ground=None)  # holds nothing, and is free all the same
+    off = gaps(
+        wb.Clip(figure, loose.q, loose.dt, things={"box": np.tile(pin.SE3ToXYZQUAT(track[0]), (20, 1))}), "right"
+    )
+    assert off[:, 0].min() > 5e-3
+
+
+def test_check_moves_the_things_of_a_clip() -> None:
+    figure = wb.load("human")
+    q = np.tile(figure.posture("standing"), (3, 1))
+    scene = wb.Scene(figure).add(wb.Sphere(0.1), name="ball", at=(3.0, 0.0, 1.2))
+    assert wb.check(wb.Clip(figure, q, 0.1), scene).free
+    through = wb.Clip(figure, q, 0.1, things={"ball": np.array([(3.0, 0.0, 1.2), (1.0, 0.0, 1.2), (-1.0, 0.0, 1.2)])})
+    found = wb.check(through, scene)
+    assert found.colliding == 0
+    assert found.deepest_between > 0.1
+    assert {each.second for each in found.contacts} | {each.first for each in found.contacts} >= {"ball"}
+    with pytest.raises(InputError, match="ball of clip moves"):
+        wb.avoid(through, scene)
+
+
+def test_things_go_with_their_clips(tmp_path: Path) -> None:
+    figure = wb.load("human")
+    q = np.tile(figure.posture("standing"), (3, 1))
+    places = np.tile([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], (3, 1))
+    places[1, 0] = 1.0
+    places[2] = pin.SE3ToXYZQUAT(pin.SE3(pin.utils.rotate("z", 1.0), np.array([1.0, 0.5, 0.0])))
+    clip = wb.Clip(figure, q, 0.1, "with a ball", {"ball": places})
+    half = clip.resampled(0.05).things["ball"]
+    assert half[1] == pytest.approx([0.5, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])
+    assert half[3] == pytest.approx([1.0, 0.25, 0.5, 0.0, 0.0, np.sin(0.25), np.cos(0.25)])
+    assert clip[1:].things["ball"] == pytest.approx(clip.things["ball"][1:])
+    assert clip.joined(clip).things["ball"].shape == (6, 7)
+    assert clip.mirrored().things["ball"][2] == pytest.approx([1.0, -0.5, 0.0, 0.0, 0.0, -np.sin(0.5), np.cos(0.5)])
+    read = wb.read_clip(clip.write(tmp_path / "ball.npz"), figure)
+    assert read.things["ball"] == pytest.approx(clip.things["ball"], abs=0.0)
+
+
+def test_wrong_things_are_refused_before_anything_is_computed() -> None:
+    motion, track = lifting(4)
+    figure = wb.load("human")
+    scene = among(figure, track[0])
+    with pytest.raises(InputError, match="things move in a scene"):
+        wb.retarget(motion, figure, things={"box": track})
+    with pytest.raises(InputError, match="box has 3 placements for 4 frames"):
+        wb.retarget(motion, figure, scene, things={"box": track[:3]})
+    with pytest.raises(wb.WholebodyError, match="bux"):
+        wb.retarget(motion, figure, scene, things={"bux": track})
+    with pytest.raises(InputError, match="frame 1"):
+        wb.retarget(motion, figure, scene, things={"box": [track[0], (0.0, np.nan, 0.0), *track[2:]]})

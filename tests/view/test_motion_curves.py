@@ -1,0 +1,86 @@
+"""Curves of motions beside their recording, in a browser: what is drawn, and a film that a click in a chart moves."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from tests.motion.test_retargeting import person
+from wholebody.base.errors import InputError
+from wholebody.cli.main import main
+from wholebody.view.motion_curves import motion_curves
+
+INSIDE = "document.querySelector('iframe').contentWindow"
+
+
+@pytest.fixture(scope="module")
+def page() -> str:
+    """A person that lifts its arms, and an answer whose right elbow is bent by 0.1 rad more."""
+    motion = person(12)
+    clip = wb.retarget(motion, wb.load("human"))
+    q = np.array(clip.q)
+    q[:, clip.figure.model.joints[clip.figure.joint_id("right_elbow_flexion")].idx_q] += 0.1
+    return motion_curves(motion, {"retargeted": clip, "freed": clip.with_q(q)}, wb.Scene(clip.figure))
+
+
+def lines(page: str, title: str) -> dict[tuple[str, str], list[float]]:
+    """Values of the lines of a chart, by name and motion."""
+    data = json.loads(re.findall(r"const data = (.*);", page)[-1])
+    (chart,) = [each for each in data["charts"] if title in each["title"]]
+    return {(line["name"], line["of"]): line["values"] for line in chart["lines"]}
+
+
+def test_the_lines_are_those_of_the_motions(page: str) -> None:
+    joints = lines(page, "joints")
+    before, after = (np.array(joints["right_elbow_flexion", name]) for name in ("retargeted", "freed"))
+    assert after - before == pytest.approx(0.1, abs=1e-3)
+    bones = lines(page, "bones")
+    assert {name for name, _ in bones} == {"median", "greatest"}
+    assert all(len(values) == 12 for values in bones.values())
+    feet = lines(page, "foot")
+    assert max(feet["feet", "recording"]) == 0.0  # its feet stand
+    assert max(value for value in feet["feet", "retargeted"] if value is not None) < 5.0
+    assert "http://" not in re.sub(r"http://www\.w3\.org/\S*", "", page.split("srcdoc=")[0])
+
+
+def test_a_click_brings_the_film_there(browser: Any, page: str, tmp_path: Path) -> None:
+    file = tmp_path / "page.html"
+    file.write_text(page, encoding="utf-8")
+    browser.open(file.as_uri())
+    assert browser.evaluate("document.querySelectorAll('canvas').length") == 4
+    browser.evaluate(
+        "(() => { const chart = document.querySelector('canvas'), box = chart.getBoundingClientRect();"
+        "chart.setPointerCapture = () => {};"
+        "const x = box.left + 62 + 0.5 * (box.width - 72);"
+        "const at = { clientX: x, clientY: box.top + 30, pointerId: 1 };"
+        "chart.dispatchEvent(new PointerEvent('pointerdown', at)); })()"
+    )
+    assert browser.evaluate(f"{INSIDE}.viewer.animator.actions[0].time") == pytest.approx(0.5 * 11 / 30, abs=1e-3)
+
+
+def test_motions_of_other_lengths_are_refused() -> None:
+    motion = person(4)
+    clip = wb.retarget(motion, wb.load("human"), ground=None)
+    with pytest.raises(InputError, match="retargeted 3, the recording 4"):
+        motion_curves(motion, {"retargeted": clip[:3]}, wb.Scene(clip.figure))
+
+
+def test_the_commands_write_pages(tmp_path: Path) -> None:
+    figure = wb.load("human")
+    clip = wb.Clip(figure, np.tile(figure.posture("standing"), (5, 1)), 0.1, "stands")
+    made, out = clip.write(tmp_path / "stands.npz"), tmp_path / "page.html"
+    assert main(["clip", "avoid", str(made), "--out", str(tmp_path / "free.npz"), "--html", str(out)]) == 0
+    assert lines(out.read_text("utf-8"), "overlap").keys() == {
+        ("deepest overlap", "before"),
+        ("deepest overlap", "freed"),
+    }
+    film = tmp_path / "film.html"
+    assert main(["clip", "play", str(tmp_path / "free.npz"), "--beside", str(made), "--out", str(film)]) == 0
+    assert film.is_file()
+    assert main(["clip", "avoid", str(made), "--html", str(out), "--stretch", "2"]) == 2

@@ -1,0 +1,142 @@
+"""Where a recorded person holds, leans on or sits on things: found by distance and speed relative to the thing.
+
+A joint of the skeleton touches a thing while it is as near to it as the flesh around the joint is thick, and slow in
+the thing's axes. The place on the thing's surface that is nearest to it is what the figure touches too, of whatever
+size: relations to things are kept, not distances to the trunk.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array, Mask
+from wholebody.geometry.pieces import swept_points
+from wholebody.geometry.shapes import HalfSpace
+from wholebody.motion.footholds import RestLimits, slow
+from wholebody.motion.skeleton import SkeletonMotion
+from wholebody.motion.windows import long_runs, runs
+from wholebody.scene.scene import Scene
+
+NEAR = {"hand": 0.05, "wrist": 0.06, "elbow": 0.07, "knee": 0.09, "pelvis": 0.16}
+"""Metres from a joint of these parts to what touches the skin over it, at most; feet stand on the ground."""
+
+GOES_ON = 1.4  # times as far away as a contact may begin, it ends
+
+
+class ThingContact(NamedTuple):
+    """A part of the body at one place of a thing."""
+
+    role: str  # part of the body, such as "left_hand"
+    # first and end: frames, without the last
+    first: int
+    end: int
+    thing: str
+    place: Array  # (3,) on the thing's surface, in its axes, metres
+    normal: Array  # (3,) of unit length, out of the thing, in its axes
+
+
+def still_things(scene: Scene) -> list[str]:
+    """Things of a scene that stand in the world, without floors."""
+    standing = (name for name, each in scene.objects.items() if each.segment is None)
+    return [name for name in standing if not isinstance(scene.objects[name].shape, HalfSpace)]
+
+
+class Piece(NamedTuple):
+    """A piece of a thing."""
+
+    shape: coal.CollisionGeometry
+    at: pin.SE3  # in the thing's axes
+    reach: float  # metres from its origin to its farthest point
+
+
+class Things:
+    """Things of a scene, and where they are in each frame."""
+
+    def __init__(self, scene: Scene, tracks: Mapping[str, Array]) -> None:
+        """Take the things that stand in the world; `tracks` (n, 7) has placements of those that move."""
+        self.tracks = tracks
+        self._moving = {name: [pin.XYZQUATToSE3(one) for one in track] for name, track in tracks.items()}
+        self._still = {name: scene.objects[name].placement for name in still_things(scene) if name not in tracks}
+        pieces, reach = scene.geometry.geometryObjects, scene.pair_table.reach
+        self._pieces: dict[str, list[Piece]] = {
+            name: [
+                Piece(pieces[index].geometry, local, float(reach[index]))
+                for index, local in scene.built.pieces_of[name]
+            ]
+            for name in (*self._moving, *self._still)
+        }
+        self._ball = coal.Sphere(1e-6)
+        self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
+
+    def scaled(self, name: str, scale: float) -> Array:
+        """Placements (n, 7) of a thing that moves, on a way of another scale.
+
+        Its lowest point is as many times as high above z = 0 as the scale says; below that it stays as it is.
+        """
+        track = np.array(self.tracks[name])
+        lowest = np.full(len(track), np.inf)
+        for shape, local, _ in self._pieces[name]:
+            swept = swept_points(shape)
+            own = swept.points @ local.rotation.T + local.translation
+            for frame, at in enumerate(self._moving[name]):
+                low = float((own @ at.rotation[2]).min()) + at.translation[2] - swept.radius
+                lowest[frame] = min(lowest[frame], low)
+        track[:, :2] *= scale
+        track[:, 2] += (scale - 1.0) * np.maximum(lowest, 0.0)
+        return track
+
+    def at(self, name: str, frame: int) -> pin.SE3:
+        """Where a thing is in a frame."""
+        return self._moving[name][frame] if name in self._moving else self._still[name]
+
+    def moved(self, frame: int) -> dict[str, pin.SE3]:
+        """Where the things that move are in a frame."""
+        return {name: track[frame] for name, track in self._moving.items()}
+
+    def contacts(self, motion: SkeletonMotion, joints: Mapping[str, str]) -> list[ThingContact]:
+        """What the skeleton touches; `joints` are those of roles."""
+        found = []
+        for role, joint in joints.items():
+            part = role.split("_")[-1]
+            if part not in NEAR or (part == "wrist" and role.replace("wrist", "hand") in joints):
+                continue
+            path = motion.positions[:, motion.names.index(joint)]
+            free: Mask = np.ones(len(motion), dtype=bool)
+            for name, pieces in self._pieces.items():
+                places = [self.at(name, frame).actInv(place) for frame, place in enumerate(path)]
+                local = np.array(places).reshape(-1, 3)
+                mask = self._touching(pieces, local, NEAR[part], motion.dt) & free
+                for run in runs(long_runs(mask, max(1, round(RestLimits().least / motion.dt)))):
+                    middle = local[run.first : run.end].mean(axis=0)
+                    _, place, normal = self._nearest(pieces, middle, np.inf)
+                    found.append(ThingContact(role, *run, name, place, normal))
+                    free[run.first : run.end] = False
+        return sorted(found, key=lambda one: one.first)
+
+    def _touching(self, pieces: Sequence[Piece], local: Array, most: float, dt: float) -> Mask:
+        """(n,) when a point (n, 3) in a thing's axes is near and slow."""
+        away = np.array([self._nearest(pieces, place, GOES_ON * most)[0] for place in local])
+        near: Mask = np.zeros(len(local), dtype=bool)
+        for run in runs(away <= GOES_ON * most):
+            near[run.first : run.end] = bool((away[run.first : run.end] <= most).any())
+        return slow(local, dt, RestLimits()) & near
+
+    def _nearest(self, pieces: Sequence[Piece], point: Array, within: float) -> tuple[float, Array, Array]:
+        """Signed distance of a point (3,) to a thing, the nearest place on its surface, and its normal out of it."""
+        best = np.inf, point, np.array([0.0, 0.0, 1.0])
+        ball = coal.Transform3s(np.eye(3), point)
+        for shape, at, reach in pieces:
+            if np.linalg.norm(at.translation - point) - reach > min(within, best[0]):
+                continue
+            self._result.clear()
+            where = coal.Transform3s(at.rotation, at.translation)
+            gap = float(coal.distance(shape, where, self._ball, ball, self._request, self._result))
+            normal = np.array(self._result.normal)
+            if gap < best[0] and np.isfinite(normal).all() and normal.any():
+                best = gap, np.array(self._result.getNearestPoint1()), normal
+        return best

@@ -1,0 +1,120 @@
+"""Curves of a retargeted or freed motion over time, and a film beside its recording: one HTML page."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from wholebody.base.arrays import Array
+from wholebody.base.files import Scratch, templates
+from wholebody.motion.checking import check
+from wholebody.motion.clip import Clip
+from wholebody.motion.footholds import speeds
+from wholebody.motion.retargeting import bone_errors
+from wholebody.motion.roles import skeleton_roles
+from wholebody.motion.skeleton import SkeletonMotion
+from wholebody.motion.stance import paths, standing_points
+from wholebody.motion.standing_ground import ground
+from wholebody.scene.scene import Scene
+from wholebody.view.side_by_side import beside
+
+Names: TypeAlias = str | os.PathLike[str] | Mapping[str, Mapping[str, str]]
+"""Which joint and frame are which part of a body, as `wb.retarget` takes it."""
+
+JOINTS = 8  # that are drawn: those that move most, or that are changed most
+RECORDING = "recording"
+
+
+def motion_curves(
+    motion: SkeletonMotion | None, clips: Mapping[str, Clip], scene: Scene, names: Names | None = None
+) -> str:
+    """HTML of curves and a film of motions, which makes no network requests.
+
+    Args:
+        motion: the recorded skeleton; None where there is none.
+        clips: name to a clip, such as "retargeted" and "freed", of as many frames as the skeleton.
+        scene: what the figures carry, and what stands around.
+        names: as for `wb.retarget`.
+
+    Raises:
+        InputError: motions of other numbers of frames.
+    """
+    first = next(iter(clips.values()))
+    with Scratch() as folder, beside(motion, clips, scene, first.name) as viewer:
+        page = viewer.save(folder / "film.html").read_text("utf-8")
+    charts = [*_joints(clips), *_distances(clips, scene), *_slides(motion, clips, names), *_bones(motion, clips, names)]
+    data = {"dt": first.dt, "frames": len(first), "charts": charts}
+    named = ([] if motion is None else [RECORDING]) + list(clips)
+    text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
+    page_of = templates(Path(__file__).parent).get_template("motion_curves.html.jinja")
+    return page_of.render(clip=first, named=named, data=text, page=page)
+
+
+def _chart(title: str, unit: str, lines: Sequence[tuple[str, str, Array]]) -> dict[str, Any]:
+    """What the page draws: lines with a name, the motion that they are of, and a value a frame; NaN breaks a line."""
+    rows = [
+        {"name": name, "of": of, "values": [None if np.isnan(value) else round(float(value), 4) for value in values]}
+        for name, of, values in lines
+    ]
+    return {"title": title, "unit": unit, "lines": rows}
+
+
+def _joints(clips: Mapping[str, Clip]) -> list[dict[str, Any]]:
+    first, lines = next(iter(clips.values())), []
+    model = first.figure.model
+    places = {name: int(model.joints[first.figure.joint_id(name)].idx_q) for name in first.names}
+    ends = first.q, list(clips.values())[-1].q
+    ranges, changes = np.ptp(ends[0], axis=0), np.abs(ends[1] - ends[0]).max(axis=0)
+    columns = list(places.values())
+    telling = ranges / max(ranges[columns].max(), 1e-9) + changes / max(changes[columns].max(), 1e-9)
+    for joint in sorted(places, key=lambda name: -telling[places[name]])[:JOINTS]:
+        for name, clip in clips.items():
+            lines.append((joint, name, clip.q[:, places[joint]]))
+    return [_chart("joints that move or change most", "rad, m", lines)]
+
+
+def _distances(clips: Mapping[str, Clip], scene: Scene) -> list[dict[str, Any]]:
+    lines = []
+    for name, clip in clips.items():
+        found = check(clip, scene)
+        between = np.append(found.between, 0.0)
+        lines.append(("deepest overlap", name, 1e3 * np.maximum(found.depth, between)))
+    return [_chart("deepest overlap in each frame and until the next", "mm", lines)]
+
+
+def _slides(motion: SkeletonMotion | None, clips: Mapping[str, Clip], names: Names | None) -> list[dict[str, Any]]:
+    lines = []
+    if motion is not None:
+        joints, rests = skeleton_roles(motion, names), ground(motion, names).rests
+        feet = [role for role in rests if role.split("_")[-1] in ("ankle", "toe")]
+        lines.append(("feet", RECORDING, _fastest(
+            motion.positions[:, [motion.names.index(joints[role]) for role in feet]],
+            np.array([rests[role] for role in feet]).reshape(len(feet), -1).T, motion.dt,
+        )))  # fmt: skip
+    for name, clip in clips.items():
+        standing = standing_points(clip.figure, clip.q, clip.dt)
+        if standing:
+            marks = np.array(list(standing.values())).T
+            lines.append(("feet", name, _fastest(paths(clip.figure, clip.q, tuple(standing)), marks, clip.dt)))
+    return [_chart("fastest point of a foot that stands", "mm/s", lines)] if lines else []
+
+
+def _fastest(places: Array, marks: Array, dt: float) -> Array:
+    """(n,) greatest speed of points (n, p, 3) that are marked (n, p), mm/s; NaN where none is."""
+    fast = np.where(marks, 1e3 * speeds(places, dt), -1.0).max(axis=1, initial=-1.0)
+    return np.where(fast < 0.0, np.nan, fast)
+
+
+def _bones(motion: SkeletonMotion | None, clips: Mapping[str, Clip], names: Names | None) -> list[dict[str, Any]]:
+    if motion is None:
+        return []
+    lines = []
+    for name, clip in clips.items():
+        errors = np.degrees(np.array(list(bone_errors(motion, clip, names).values())))
+        lines += [("median", name, np.median(errors, axis=0)), ("greatest", name, errors.max(axis=0))]
+    return [_chart("angle of bones to the recording's", "degrees", lines)]

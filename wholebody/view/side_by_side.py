@@ -1,0 +1,110 @@
+"""Motions beside each other in one scene: a recorded skeleton as bones, and clips, each a figure of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
+from wholebody.geometry.shapes import Capsule, HalfSpace
+from wholebody.motion.clip import Clip
+from wholebody.motion.skeleton import SkeletonMotion
+from wholebody.scene.scene import Scene
+from wholebody.view.viewed_scene import ViewedWorld
+from wholebody.view.viewer import Viewer
+
+APART, RADIUS = 1.4, 0.022  # m: from one motion to the next, least; of a bone
+SHORT = 0.01  # m: shorter bones are not drawn
+
+
+def beside(motion: SkeletonMotion | None, clips: Mapping[str, Clip], scene: Scene, title: str) -> Viewer:
+    """A viewer that plays motions side by side, from the left to the right as they are given.
+
+    Args:
+        motion: the recorded skeleton, on the left; None for clips alone.
+        clips: name to a clip, of as many frames as the skeleton.
+        scene: what the figures carry, and what stands around, which every motion gets.
+        title: of the page.
+
+    Raises:
+        InputError: motions of other numbers of frames.
+    """
+    counts = {name: len(clip) for name, clip in clips.items()} | (
+        {} if motion is None else {"the recording": len(motion)}
+    )
+    if len(set(counts.values())) > 1:
+        told = ", ".join(f"{name} {count}" for name, count in counts.items())
+        raise InputError(f"side by side: motions have different numbers of frames ({told}); give the same ones")
+    wide = max(APART, 0.5 + max(_across(clip) for clip in clips.values()))
+    count = len(clips) + (motion is not None)
+    first = -0.5 * wide * (count - 1)  # what looks against the x axis has y on its right
+    aside = {name: first + wide * (number + (motion is not None)) for number, name in enumerate(clips)}
+    world = Scene({_figure(name): clip.figure for name, clip in clips.items()})
+    around = [each for each in scene.objects.values() if each.segment is None]
+    for name in clips:
+        for each in scene.objects.values():
+            if each.segment is not None:
+                to, rests = f"{_figure(name)}/{each.segment}", [f"{_figure(name)}/{one}" for one in each.rests_on]
+                rests = [one for one in rests if one in world.figure.segments]
+                label = f"{each.name} of {name}"
+                world.attach(each.shape, to=to, name=label, at=each.placement, rests_on=rests, color=each.color)
+        for each in around:
+            if not isinstance(each.shape, HalfSpace):
+                at = pin.SE3(each.placement.rotation, each.placement.translation + [0.0, aside[name], 0.0])
+                world.add(each.shape, name=f"{each.name} by {name}", at=at, color=each.color)
+    if not any(isinstance(each.shape, HalfSpace) for each in around):
+        world.add(HalfSpace(), name="floor")
+    for each in around:
+        if isinstance(each.shape, HalfSpace):
+            world.add(each.shape, name=each.name, at=each.placement, color=each.color)
+    tracks = {} if motion is None else _bones(world, motion, first)
+    for name, clip in clips.items():
+        for thing, track in clip.things.items():
+            tracks[f"{thing} by {name}"] = [pin.XYZQUATToSE3(at + np.eye(7)[1] * aside[name]) for at in track]
+    viewed = ViewedWorld(world, tracks, between_things=False)
+    moved = [clip.q + np.eye(clip.q.shape[1])[1] * aside[name] for name, clip in clips.items()]
+    parts = np.concatenate(moved, axis=1)
+    postures = [
+        viewed.configuration(q, {name: track[frame] for name, track in tracks.items()}) for frame, q in enumerate(parts)
+    ]
+    dt = next(iter(clips.values())).dt
+    viewer = Viewer(viewed, title=title, contact_distance=-1e-4)  # overlaps alone are shown
+    middle = np.mean([clip.q[:, :3] for clip in clips.values()], axis=(0, 1))
+    away = 1.2 + 1.1 * wide * count
+    viewer.look(tuple(middle + away * np.array([0.9, 0.1, 0.25])), tuple(middle))
+    viewer.play(postures, dt)
+    return viewer
+
+
+def _figure(name: str) -> str:
+    return name.replace("/", " ")
+
+
+def _across(clip: Clip) -> float:
+    """Metres that a clip goes to the left and right."""
+    return float(np.ptp(clip.q[:, 1])) if clip.figure.root == "free" else 0.0
+
+
+def _bones(world: Scene, motion: SkeletonMotion, aside: float) -> dict[str, list[pin.SE3]]:
+    """Add the bones of a skeleton to a scene as things; where each of them is in each frame."""
+    tracks, places = {}, motion.positions + [0.0, aside, 0.0]
+    for joint, parent in enumerate(motion.parents):
+        if parent < 0 or np.linalg.norm(motion.offsets[joint]) < SHORT:
+            continue
+        ways = places[:, joint] - places[:, parent]
+        length = float(np.median(np.linalg.norm(ways, axis=1)))
+        middles = 0.5 * (places[:, joint] + places[:, parent])
+        track = [pin.SE3(_along(way), middle) for way, middle in zip(ways, middles, strict=True)]
+        name = f"bone {motion.names[joint]}"
+        world.add(Capsule(RADIUS, max(length, SHORT)), name=name, at=track[0], color=(0.25, 0.28, 0.33, 1.0))
+        tracks[name] = track
+    return tracks
+
+
+def _along(way: Array) -> Array:
+    """(3, 3) a rotation that brings z along a direction."""
+    found: Array = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), way).toRotationMatrix()
+    return found
