@@ -98,7 +98,7 @@ def hand_into_box(number: int) -> Question:
 
 
 def _placed(figure: wb.Figure, posture: str, at: pin.SE3) -> Array:
-    q = figure.posture(posture).copy()
+    q: Array = figure.posture(posture).copy()
     q[:7] = pin.SE3ToXYZQUAT(at)
     return q
 

@@ -110,7 +110,7 @@ def _by_ompl(problem: wb.Problem, end: Any, seeds: int) -> list[Attempt]:
 def _row(name: str, planner: str, attempts: list[Attempt]) -> Row:
     seconds = np.array([one.seconds for one in attempts])
     ratios = np.array([one.length for one in attempts if one.solved])
-    figures = {
+    figures: dict[str, Any] = {
         "solved": f"{sum(one.solved for one in attempts)} of {len(attempts)}",
         "median s": float(np.median(seconds)),
         "p95 s": float(np.quantile(seconds, 0.95)),
