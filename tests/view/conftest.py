@@ -105,20 +105,26 @@ def chromium() -> str:
     return found
 
 
-_RARELY = "window.requestAnimationFrame = draw => setTimeout(() => draw(performance.now()), 100)"
-
-
 @pytest.fixture(scope="session")
-def draw_rarely() -> Callable[[Browser], None]:
-    """Return a function: pages that a browser opens from now on draw ten times a second.
+def draw_rarely() -> Callable[..., str]:
+    """Return a function: pages that a browser opens from now on have a frame each so many milliseconds, ten a second.
 
-    Without a GPU sixty times keep a core busy, and no test asks for them.
+    Without a GPU sixty keep a core busy, and a first drawing takes half a second: the pages of a `Viewer` move what
+    they show in a frame, and draw it where a test captures it. The function returns the number of the script.
     """
-    return lambda browser: browser._call("Page.addScriptToEvaluateOnNewDocument", source=_RARELY) and None
+
+    def draw(browser: Browser, pause: int = 100) -> str:
+        source = f"""window.requestAnimationFrame = draw => setTimeout(() => {{
+          if (window.viewer) Object.assign(viewer, {{ needs_render: false, set_dirty: () => {{}} }});
+          draw(performance.now());
+        }}, {pause})"""
+        return str(browser._call("Page.addScriptToEvaluateOnNewDocument", source=source)["identifier"])
+
+    return draw
 
 
 @pytest.fixture(scope="session")
-def _browser(chromium: str, draw_rarely: Callable[[Browser], None]) -> Iterator[Browser]:
+def _browser(chromium: str, draw_rarely: Callable[..., str]) -> Iterator[Browser]:
     with screenshot.Browser() as browser:  # one that drew pictures before, if there is one
         draw_rarely(browser)
         yield browser

@@ -31,11 +31,19 @@ def page(tmp_path: Path) -> Iterator[LivePage]:
     made.stop()
 
 
-def until(true: Callable[[], Any], seconds: float = 150.0) -> Any:
+@pytest.fixture(autouse=True)
+def drawn_more_rarely(browser: Browser, draw_rarely: Callable[[Browser, int], str]) -> Iterator[None]:
+    """Pages draw twice a second: a frame of all the meshes takes a core a third of a second without a GPU."""
+    script = draw_rarely(browser, 600)
+    yield
+    browser._call("Page.removeScriptToEvaluateOnNewDocument", identifier=script)
+
+
+def until(true: Callable[[], Any], seconds: float = 150.0, pause: float = 0.05) -> Any:
     end = time.monotonic() + seconds
     while not (found := true()):
         assert time.monotonic() < end, "it did not happen in time"
-        time.sleep(0.05)
+        time.sleep(pause)
     return found
 
 
@@ -94,7 +102,7 @@ def test_mouse_drags_holds_undoes_and_saves(
     until(lambda: np.allclose(client.camera.position, EYE, atol=1e-3))
     before = drag.place("right_palm")
     x, y = pixel(before, client.camera.fov)
-    until(lambda: reached(browser, x, y))
+    until(lambda: reached(browser, x, y), pause=0.3)  # the page looks through all it shows at each move
     mouse(browser, "mousePressed", x, y, pressed=True)
     for share in np.linspace(0.0, 1.0, 4)[1:]:
         mouse(browser, "mouseMoved", x + 12 * share, y - 24 * share, pressed=True)
@@ -109,7 +117,7 @@ def test_mouse_drags_holds_undoes_and_saves(
     assert np.linalg.norm(drag.place("left_sole") - drag.place_at(start, "left_sole")) < 2e-3
     seen = pixel(drag.place("right_palm"), client.camera.fov)
 
-    until(lambda: reached(browser, *seen))
+    until(lambda: reached(browser, *seen), pause=0.3)
     mouse(browser, "mousePressed", *seen, pressed=True)
     mouse(browser, "mouseReleased", *seen)
     until(lambda: "right_palm" in drag.held)

@@ -86,11 +86,8 @@ class AllPairs:
             with self._built.lock:
                 distances.place(self._built.model, self.state.data)
             joints[k], placed[k] = self.state.joints, distances.placed
-        first, second = table.pairs.T
         within = np.maximum(clearances, 0.0)
-        away = placed[:, second, 3] - placed[:, first, 3]
-        apart = np.sqrt(np.einsum("kpi,kpi->kp", away, away)) - table.reach[table.pairs].sum(axis=1) >= within
-        row, number = np.nonzero(~apart)  # those whose bound is not a number too
+        row, number = np.nonzero(~(self._gaps(placed[:, :, 3]) >= within))  # those whose bound is not a number too
         pair = table.pairs[number]
         near = ~(_between_boxes(placed[row[:, None], pair], table.half[pair]) >= within[row, number])
         row, number = row[near], number[near]
@@ -101,6 +98,15 @@ class AllPairs:
             found = _numbers(distances.measured(asked))[:, 0]
             depth[k], short[k] = max(0.0, -found.min()), max(0.0, (clearances[k, asked] - found).max())
         return joints, depth, short
+
+    def _gaps(self, centres: Array) -> Array:
+        """Gaps (k, pairs) between balls about pieces with centres (k, n, 3)."""
+        if self._bounds is not None:
+            return np.array([self._bounds.gaps(centre).copy() for centre in centres])
+        (first, second), reach = self._built.table.pairs.T, self._built.table.reach
+        away = centres[:, second] - centres[:, first]
+        gaps: Array = np.sqrt(np.einsum("kpi,kpi->kp", away, away)) - (reach[first] + reach[second])
+        return gaps
 
     def ask(self, within: Array | float) -> None:
         """Let `distance` be exact for all pairs that are nearer than `within` metres, (pairs,) or one for all."""

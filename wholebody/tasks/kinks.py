@@ -9,6 +9,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.figures.state import State
+from wholebody.geometry.pieces import SweptPoints
 from wholebody.tasks.axis import across
 from wholebody.tasks.surfaces import ACCURACY, Nearest, Surface, between_pieces, outermost
 
@@ -41,13 +42,19 @@ def faces_met(
     corners = swept.points @ theirs.rotation.T + theirs.translation
     faces = swept.faces[:, 3] + normals[: len(swept.faces)] @ theirs.translation
     offsets = np.append(faces, (corners @ edges[:, 0].T).max(axis=0))
-    points = np.array([*(_behind(first, i, ours, normal) for normal in normals[: len(faces)]), *edges[:, 1]])
+    points = np.vstack([_behind(first, i, ours, normals[: len(faces)]), edges[:, 1]])
     values = np.einsum("ij,ij->i", normals, points) - offsets
-    found = []
     # most faces of a piece that are looked at, those first that are nearest or passed
-    for key in np.argsort(-values)[:8].tolist():
+    keys, found = np.argsort(-values)[:8], []
+    places = [second.placed(other, state) for other in range(len(second.shapes))]
+    apart = np.array([place.translation for place in places]) - points[keys, None]
+    # m: pieces of one thing that are farther away do not continue its surface
+    near = np.sqrt(np.einsum("ijk,ijk->ij", apart, apart)) < np.add(second.reach, 0.05)
+    near[:, j] = False
+    for key, others in zip(keys.tolist(), near, strict=True):
         plane = FacePlane(float(values[key]), normals[key], points[key], key)
-        if not _goes_on(second, j, plane, first.shapes[i], ours, state):
+        beside = [(second.shapes[k], places[k], second.swept[k]) for k in np.flatnonzero(others)]
+        if not any(_goes_on(*piece, plane, (first.shapes[i], ours)) for piece in beside):
             found.append(plane)
     return found
 
@@ -99,25 +106,19 @@ def _roundness(surface: Surface, number: int) -> float:
     return float(swept.radius) if len(swept.points) or not np.isfinite(swept.reach) else 0.5 * float(swept.width)
 
 
-def _behind(surface: Surface, number: int, placement: pin.SE3, normal: Array) -> Array:
-    """The point (3,) of a piece that is farthest against a direction (3,)."""
-    points = outermost(surface.shapes[number], placement, -normal, surface.swept[number])
-    return np.asarray(points[int(np.argmin(points @ normal))])
+def _behind(surface: Surface, number: int, placement: pin.SE3, normals: Array) -> Array:
+    """The points (k, 3) of a piece that are farthest against directions (k, 3)."""
+    swept = surface.swept[number]
+    if len(swept.points) == 0:
+        return np.vstack([outermost(surface.shapes[number], placement, -normal, swept) for normal in normals])
+    placed = swept.points @ placement.rotation.T + placement.translation
+    return np.asarray(placed[np.argmin(normals @ placed.T, axis=1)] - swept.radius * normals)
 
 
-def _goes_on(thing: Surface, number: int, plane: FacePlane, shape: Any, placed: pin.SE3, state: State) -> bool:
-    """Whether another piece than `number` reaches beyond a plane near its point, and a placed shape touches it."""
+def _goes_on(own: Any, place: pin.SE3, swept: SweptPoints, plane: FacePlane, met: tuple[Any, pin.SE3]) -> bool:
+    """Whether a piece reaches beyond a plane, and a shape at its placement touches it."""
     offset = float(plane.normal @ plane.point) - plane.value
-    for other, own in enumerate(thing.shapes):
-        if other != number:
-            place = thing.placed(other, state)
-            # m: pieces of one thing that are farther away do not continue its surface
-            if float(np.linalg.norm(place.translation - plane.point)) < thing.reach[other] + 0.05:
-                beyond = (
-                    not np.isfinite(thing.reach[other])
-                    or float((outermost(own, place, plane.normal, thing.swept[other]) @ plane.normal).max())
-                    > offset + ACCURACY
-                )
-                if beyond and between_pieces(shape, placed, own, place).min_distance <= STEP:
-                    return True
-    return False
+    beyond = not np.isfinite(swept.reach) or (
+        float((outermost(own, place, plane.normal, swept) @ plane.normal).max()) > offset + ACCURACY
+    )
+    return beyond and between_pieces(*met, own, place).min_distance <= STEP

@@ -12,7 +12,6 @@ import pytest
 from tests.csv_rows import csv_rows
 from wholebody.base.errors import InputError
 from wholebody.bench import plot_style
-from wholebody.bench.plot_style import method_style
 from wholebody.bench.suite.compare import report as publishing
 from wholebody.bench.suite.compare.results import ANSWERED, OVERTIME, REFUSED, Chunk, Record, Store
 from wholebody.bench.suite.compare.settings import Settings
@@ -110,10 +109,6 @@ def test_the_page_of_results_gets_its_part(folder: Path) -> None:
     assert "\nold\n" not in page
     for name in re.findall(r"\]\((assets/bench/[^)]+)\)", page):
         assert (folder / "docs" / name).is_file()
-
-
-def test_settings_of_one_solver_have_one_colour() -> None:
-    assert method_style("qp/some_solver") == method_style("qp/some_solver")
 
 
 def test_settings_are_checked(fakes: ModuleType) -> None:
