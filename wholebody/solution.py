@@ -78,7 +78,7 @@ class Solution(Shown):
         chart, axes = new_chart(1, 2, (8.0, 2.8))
         missed, cost = axes[0]
         numbers = range(1, len(self.trace) + 1)
-        # a search of many descents jumps from one to the next: lines would hide where each of them leads
+        # a search jumps from descent to descent; lines would hide where each of them leads
         look = {"marker": "."} if len(self.trace) <= FEW else {"marker": ".", "markersize": 2, "linestyle": "none"}
         for name, word in (("goal_error", "goal error"), ("violation", "violation")):
             values = [max(getattr(entry, name), SMALLEST) for entry in self.trace]

@@ -76,7 +76,7 @@ class AllPairs:
     def shortfalls(self, q: Array, clearances: Array) -> tuple[Array, Array, Array]:
         """Joints (k, njoints, 4, 3), deepest overlap and shortfall (k,) at q (k, nq), for clearances (k, pairs).
 
-        As `move` and `ask` tell them; coal is asked for pairs alone that neither balls nor boxes keep apart.
+        These are as in `move` and `ask`; coal is asked only for pairs that neither balls nor boxes separate.
         """
         table, distances, depth, short = self._built.table, self._distances, *np.zeros((2, len(q)))
         joints = np.empty((len(q), self._built.model.njoints, 4, 3))

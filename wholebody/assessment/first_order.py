@@ -69,7 +69,7 @@ class _Asked(NamedTuple):
 
 
 class FirstOrder:
-    """Optimality and blockers of a judged posture, computed when first asked for; `fits`: nothing is in the way."""
+    """Optimality and blockers of a judged posture, computed at the first request; `fits`: nothing blocks it."""
 
     def __init__(self, problem: Problem, pairs: AllPairs, fits: bool) -> None:
         self.fits = fits
@@ -137,7 +137,7 @@ def _residual(asked: _Asked, state: State, active: _Active) -> Array:
 
 
 def _blockers(asked: _Asked, state: State, near: NearPairs, clearances: Array) -> tuple[Blocker, ...]:
-    """What keeps a posture from the constraints, or if they hold, from the goals; the hardest first."""
+    """What keeps a posture from meeting the constraints or, if these hold, the goals; the strongest first."""
     nv = state.model.nv
     signed, one_sided, rows, numbers = _active(asked, state, near)
     gradient = np.zeros(nv)

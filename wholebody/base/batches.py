@@ -1,4 +1,4 @@
-"""Many jobs beside each other: in child processes, which are kept from call to call, or on a dask cluster."""
+"""Many jobs in parallel: in child processes, which are kept from call to call, or on a dask cluster."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ _Sent = tuple[int, Callable[..., Any], tuple[Any, ...], float]
 
 
 def run_batch(work: Iterable[Job], jobs: int = 1, cluster: str | None = None) -> Iterator[Outcome]:
-    """Do jobs, asked for one by one, beside each other, and give their outcomes as they end.
+    """Request jobs one by one, run them in parallel, and yield their outcomes as they end.
 
     `cluster` is the address of a dask scheduler, else processes of this machine, which compute on one core each.
-    Closing the iterator ends those that are busy. MissingPackageError without dask, WholebodyError without an answer.
+    Closing the iterator ends running jobs. MissingPackageError without dask, WholebodyError without an answer.
     """
     asked = iter(work)
     if cluster is None:
@@ -56,7 +56,7 @@ def run_batch(work: Iterable[Job], jobs: int = 1, cluster: str | None = None) ->
 def shared(
     items: Sequence[T], jobs: int, here: Callable[[T], Any], there: Callable[[list[T], bool], Job]
 ) -> Iterator[tuple[T, Any, EndedError | None]]:
-    """Do work in this process, and beside it in `jobs - 1` others, which get ready meanwhile; answers or errors.
+    """Do work in this process and in `jobs - 1` others, which start meanwhile; returns answers or errors.
 
     `here` does one item, `there` makes the job that does several, or None if the process lacks something: it is asked
     again with True. Where all is done before the others are ready, they go on for the next call.
@@ -211,7 +211,7 @@ def _client(address: str) -> AbstractContextManager[Any]:
 
 
 def reporter(value: Callable[..., Any] | bool | None, what: str) -> Callable[..., Any] | None:
-    """The function to call with the number done and of all: a given one, a line on the error output, or None."""
+    """The function to call with the numbers of finished and of all jobs: a given one, a line on stderr, or None."""
     return checks.function({True: _Line(), False: None}[value] if isinstance(value, bool) else value, what)
 
 

@@ -236,7 +236,7 @@ def path(value: object, what: str) -> Path:
 
 
 def array(value: object, what: str, wanted: str) -> Array:
-    """Real numbers as an array, infinite ones and NaN too; `wanted`: "corners, shape (k, 3), metres"."""
+    """Real numbers as an array, including infinities and NaN; `wanted`: "corners, shape (k, 3), metres"."""
     if type(value) is np.ndarray and value.dtype == np.float64:
         return value
     if isinstance(value, np.ma.MaskedArray) and value.dtype.kind in NUMERIC:

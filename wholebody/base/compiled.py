@@ -48,7 +48,7 @@ Each module has a function `compiled_kernel`, which compiles or loads its loops.
 """
 
 BESIDE = {"wholebody.terms.linearisation": "wholebody.terms.kernel"}
-"""What a first solve needs last, half of what it compiles: modules of `TOGETHER`, and where their loops are."""
+"""Modules of `TOGETHER` that a first solve needs last, half of all that it compiles, and where their loops are."""
 
 LOOPS = tuple(name for names in TOGETHER for name in names)
 
@@ -91,7 +91,7 @@ def compile_all(names: Sequence[str] = LOOPS) -> None:
 
 
 def compile_in_processes(processes: int, groups: Sequence[Sequence[str]] = TOGETHER) -> None:
-    """Compile groups of modules in parallel processes, as far as not cached; this one does what those leave."""
+    """Compile groups of modules in parallel processes unless they are cached; this process compiles the others."""
     if processes > 1:
         from concurrent.futures import ProcessPoolExecutor
         from concurrent.futures.process import BrokenProcessPool
@@ -170,7 +170,7 @@ def _loop_type() -> Any:
 
         def compile(self, sig: Any) -> Any:
             if _beside and self.__module__ in BESIDE.values() and isinstance(self._cache, Kept):
-                # another process compiles it: what it keeps is read, sooner than compiling it here too would end
+                # another process compiles it; reading its cache is faster than compiling it here too
                 while _beside[0].poll() is None and self._cache.load_overload(sig, self.targetctx) is None:
                     time.sleep(0.05)
             return super().compile(sig)

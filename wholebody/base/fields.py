@@ -182,7 +182,7 @@ def _hints(kind: Any) -> Iterator[tuple[Field[Any], Any]]:
     for field in fields(kind):
         if field.init:
             one = SimpleNamespace(__annotations__={field.name: field.type})
-            # the first class that has it; from Python 3.14 on a class need not have its annotations
+            # the first class that has it; since Python 3.14 a class may lack its annotations
             having = (
                 base for base in reversed(kind.__mro__) if field in vars(base).get("__dataclass_fields__", {}).values()
             )

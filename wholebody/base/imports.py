@@ -29,7 +29,7 @@ def exported(package: str, file: str) -> tuple[Callable[[str], object], Callable
 
 
 def end_quietly() -> None:
-    """From here on Ctrl-C ends the process of the command at once; a handler of somebody else stays."""
+    """Let Ctrl-C end the process of the command at once; the handler of another package is kept."""
     # Libraries that are half imported make other errors of a KeyboardInterrupt, or print its traceback.
     if _is_command(sys.orig_argv) and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -39,7 +39,7 @@ class StepStart:
 
 
 class PassingCheck(NamedTuple):
-    """Whether no pieces can have been deeper than `PASSING` on the way, else shares `meetings` where they may meet."""
+    """Whether no pieces overlap by over `PASSING` on the way; else shares `meetings` where they may meet."""
 
     free: bool
     meetings: tuple[float, ...] = ()

@@ -246,7 +246,7 @@ class ContactFinder:
 
 @compiled()
 def needed(contact: Indices, count: int, normal: Array, point: Array, gap: Array, within: float) -> Mask:
-    """Points (m,) but the witness points, which come first, between touching ends of a patch, to `within` [m]."""
+    """All points (m,) except witness points (they come first) between touching ends of a patch, to `within` [m]."""
     # Ends alone bear a face on a face, as in Bullet, MuJoCo and ODE: friction at a witness point would not stop a spin.
     found, first, arm = np.ones(len(contact), dtype=np.bool_), count, np.empty((len(contact) - count, 3))
     while first < len(contact):

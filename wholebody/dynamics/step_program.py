@@ -216,7 +216,7 @@ class StepProgram:
         return found
 
     def remembered(self, time: float) -> Impulses:
-        """What the next program starts from; the impulses of bodies pushed together would grow for ever."""
+        """The start of the next program; the impulses of bodies that are pushed together would grow without bound."""
         kept, count = np.flatnonzero(self._bearing() & ~self._jammed), len(self.points.gap)
         return Impulses(
             self.points.pair[kept], self._local[kept], self.world_impulse()[kept], self.impulse[count:].copy(), time

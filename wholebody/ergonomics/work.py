@@ -1,4 +1,4 @@
-"""What a posture does not tell: load, repetition, grip, support; and whether somebody sits."""
+"""Data beside the posture: load, repetition, grip, support; and whether the person sits."""
 
 from __future__ import annotations
 

@@ -131,7 +131,7 @@ class Person:
         return self.segment(segment, "mass") / total * self.mass
 
     def source_length(self, segment: str) -> float:
-        """Length [m] of a segment as de Leva's landmarks have it, which differ most for the thighs of women."""
+        """Length [m] of a segment between de Leva's landmarks; these differ most for the thighs of women."""
         fraction = named_row("segments", segment, "segment")[f"source_length_{self.column}"]
         return float(fraction) * self.stature if fraction else self.length(segment)
 

@@ -79,7 +79,7 @@ class Population:
     def unlikely(
         self, values: Mapping[str, float], size: Mapping[str, float]
     ) -> tuple[str, float, float, float] | None:
-        """Which dimension makes a person of a size nobody (`RARE`), by how many deviations, its likely range."""
+        """The dimension that makes a person too rare (`RARE`), by how many deviations, and its likely range."""
         from scipy.special import chdtri  # loading it takes longer than loading a person, and few are asked for so
 
         which, given = self.deviates({**size, **values})
@@ -111,7 +111,7 @@ class Population:
         return self.values(np.full(len(self.names), NormalDist().inv_cdf(share)))[name]
 
     def sample(self, count: int, rng: np.random.Generator) -> list[dict[str, float]]:
-        """Draw people: their dimensions; shares of few people are nearer to those of all than at random."""
+        """Draw people's dimensions; small samples represent the population better than independent draws."""
         # Scrambled Sobol along principal components (Acworth, Broadie, Glasserman 1998), then ranks as normal scores,
         # which leaves correlations (Iman and Conover 1982); of fewer than `RANKED` people they stay.
         from scipy.special import ndtri

@@ -119,7 +119,7 @@ def grounded(model: pin.Model, segments: tuple[str, ...], q: Array, scene: Any, 
         gap = _least(soles, things, shift)
         if abs(gap) <= 1e-7:  # m: gap that counts as standing
             break
-        shift -= gap  # into what it overlaps the figure is no deeper than that, so it comes out after a few steps
+        shift -= gap  # the figure overlaps by no more than this gap, so a few steps move it out
         if abs(shift) > 10.0:
             raise InputError("grounded: nothing is below the figure within 10 m; add wb.HalfSpace()")
     result = np.array(q, dtype=float)

@@ -163,7 +163,7 @@ def _smallest_basis(points: Array, candidates: list[int], scale: float) -> tuple
 
 def simplified_hull(points: Array, max_vertices: int) -> Array:
     """Vertices (k, 3) of a convex polytope around points (n, 3) with at most `max_vertices`, 8 or more."""
-    # A box along principal axes, cut each time by the hull's plane that cuts most off the farthest vertex.
+    # A box along principal axes; each cut uses the hull's plane that removes most at the farthest vertex.
     from scipy.spatial import ConvexHull, QhullError
 
     hull = ConvexHull(points)

@@ -126,8 +126,8 @@ def _children(
 
 
 def _nearest_on_rows(new: Sides, normals: Array, offsets: Array) -> Array:
-    """Least t under the old rows and each new row, which the old answer violates: (k, 3), NaN where none exists."""
-    # The new row is active then, with at most two old ones: all such sets are tried at once.
+    """Least t subject to the old rows and one new row that the old answer violates: (k, 3), NaN if infeasible."""
+    # The new row is then active, with at most two old rows; all such sets are tried at once.
     count = len(new.offsets)
     best, answers = np.full(count, np.inf), np.full((count, 3), np.nan)
     for size in (0, 1, 2):
@@ -173,7 +173,7 @@ def _first_free(pairs: ObjectPair, direction: Array, reach: float) -> Array | No
 
 def _descent(pairs: ObjectPair, translation: Array) -> Array:
     """Shorten a translation that separates, keeping every pair on its sides of the plane that now separates it."""
-    # Each plane is a sufficient condition: the QP under all has an answer, never a longer one, which separates.
+    # Each plane is a sufficient condition: the QP with all is feasible, and its answer separates and is no longer.
     for _ in range(MOST_DESCENTS):
         sides = pairs.between(translation)
         if sides is None:

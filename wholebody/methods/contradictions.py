@@ -299,7 +299,7 @@ def least_left(found: tuple[Contradiction, ...]) -> float | None:
 
 
 def proven(status: Status, found: tuple[Contradiction, ...], holds: bool) -> Status:
-    """The status of an answer to a contradictory problem; one that does not hold is never `unreachable`."""
+    """The status of an answer to a contradictory problem; an infeasible answer is never `unreachable`."""
     if status == "stalled" and found and (holds or found[0].status == "infeasible"):
         return found[0].status
     return status

@@ -63,7 +63,7 @@ def resting(places: Array, dt: float, limits: RestLimits, kinds: Sequence[int]) 
 
 
 def slow(places: Array, dt: float, limits: RestLimits) -> Mask:
-    """(n,) frames of rests of a point (n, 3) by speed alone; where it goes on slowly, its fastest frames part them."""
+    """(n,) rest frames of a point (n, 3) by speed alone; the fastest frames of a slow motion separate two rests."""
     speed = speeds(places, dt)
     low, high = speed <= 2.0 / 3.0 * limits.speed, speed <= limits.speed
     kept = np.zeros(len(speed), dtype=bool)

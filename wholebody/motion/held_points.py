@@ -35,8 +35,8 @@ STEP = 0.3  # m: a surface higher than this above the recording's ground is not 
 SOLE = 0.002  # m: what is lower than this above a foot's lowest point is its sole
 FACING = 0.3  # least cosine of the angle from up to the normal of a sole that faces the ground
 FOLLOW = 0.8  # share of the body's shift that a new place keeps; the rest goes back with time
-KEPT_OFF = 0.03  # m: by which a thing keeps a point off the place where it would touch it, at most
-LOST = 0.02  # m: what is farther than this from where it is to touch a thing cannot reach it
+KEPT_OFF = 0.03  # m: largest distance at which a thing keeps a point from its place of contact
+LOST = 0.02  # m: points farther than this from their place on a thing cannot reach it
 THICKEST = 0.25  # m: of a part from its joint to its skin
 OVER = 0.2  # s: in which a point goes over to where it rests
 
@@ -225,7 +225,7 @@ class Holds:
                     places[number, first] = own
             self._stands[number] = kept
         self._gone.clear()
-        self._places = places if told else self._places  # where feet come down is decided anew too
+        self._places = places if told else self._places  # recompute where feet come down
         return "; ".join(told)
 
     def moved(self, frame: int) -> Mapping[str, pin.SE3]:

@@ -63,7 +63,7 @@ class FrameMotion:
         return {name: self._scene.placement(at, name) for name in self._scene.names}
 
     def next_share(self, share: float, near: Contacts, within: float) -> float:
-        """The share of the frame up to which things may move before the figure is asked again."""
+        """The share of the frame up to which things may move before the figure's next step."""
         # Until then no pair, `near` or beyond `within` metres, comes nearer than it is now, and a part of its width.
         pairs, table = near.pair, self._both.table
         coming = self.way[pairs].sum(axis=1)

@@ -32,7 +32,7 @@ Run = tuple[Any, Sequence[Make]]
 """The posture (nq,) from which the first of some problems is tried, None for its own start; and the problems."""
 
 
-LARGEST = 256  # problems of a batch. More: fewer calls; less: progress is told sooner, and processes end together.
+LARGEST = 256  # problems of a batch. Larger: fewer calls; smaller: earlier progress, processes end together.
 
 
 @dataclass(frozen=True)

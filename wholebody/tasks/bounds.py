@@ -129,7 +129,7 @@ def at_speeds(bounds: Sequence[Bound], state: State, dt: float | None) -> Array 
 
 
 def clipped(model: pin.Model, begin: Array, q: Array, most: Array | None) -> Array:
-    """The posture q, or the nearest whose displacement from `begin`, both (nq,), is within `most` (2, nv)."""
+    """The posture q, or the nearest one with a displacement from `begin` within `most` (2, nv); both are (nq,)."""
     if most is None:
         return q
     gone = pin.difference(model, begin, q)

@@ -32,7 +32,7 @@ _effort = Effort()
 def default_measures(
     scene: Surroundings, start: Array, stances: Sequence[tuple[str, ...]], *, ranges: bool
 ) -> tuple[Measure, ...]:
-    """`Effort`, for a person `Rhythm`, resolved, and the `Stance` of feet that may slide; who kneels spares effort."""
+    """Resolved `Effort`, a person's `Rhythm`, `Stance` of sliding feet; kneelers count them from a kneeling posture."""
     if not (ranges and scene.figure.ranges and inputs.once(scene, "girdles", lambda: girdles_of(scene.figure))):
         return (_effort.resolve(scene, start),)
     shanks = {side for sides in stances for side in sides if side.endswith("_shank")}
@@ -42,7 +42,7 @@ def default_measures(
 
 
 def stances(scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal]) -> tuple[tuple[str, ...], ...]:
-    """The feet of each who stands and balances, or is to kneel, but does not sit, lean or hold on."""
+    """The feet of each person that stands and balances, or kneels, but does not sit, lean or hold on."""
 
     def kneels(stand: Stand) -> bool:
         at_start = stand.value(State(scene.model).update(start))

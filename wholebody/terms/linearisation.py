@@ -187,7 +187,7 @@ class Lineariser:
 
     def at(self, q: Array, within: float, planes: bool = False) -> Linearisation:
         """Everything at q (nq,), with the pairs nearer than `within` plus their clearance, and planes if asked for."""
-        # Pairs that cannot come as near as their clearance are left out, where speeds are bounded and `dt` is given.
+        # With bounded speeds and `dt`, pairs that cannot come as near as their clearance are omitted.
         nv, rows = self.state.model.nv, len(self._value)
         squares = np.empty((self._plan.squares, nv))
         value, box, measure = np.empty(rows), np.empty((2, nv)), np.empty((3 if len(squares) else 2, nv + 1))
@@ -357,7 +357,7 @@ class ConstraintValues:
         return plan is not None
 
     def at(self, state: State) -> Array:
-        """The values (c,) where a state is; overwritten by the next call."""
+        """The values (c,) at a state; the next call overwrites them."""
         plan, value = self._plan, self._value
         self._kernel.linearise(
             (state.joints, state.columns, state.q, NO_PIECES), plan[:4], *NO_CONTACTS,

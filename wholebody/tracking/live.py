@@ -230,7 +230,7 @@ class LiveDrag:
             self._drag, self._trouble = None, str(trouble)
 
     def _rehearse(self) -> None:
-        """Make frames that are forgotten, so that what is loaded or set up at the first of a kind is there then."""
+        """Make frames and discard them, so that everything that a first frame loads or sets up is ready."""
         q, remembered = self.q, self._subject.remembered(self.q)
         name = next(iter(self.handles))
         place = self.place(name)

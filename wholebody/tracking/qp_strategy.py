@@ -151,7 +151,7 @@ def largest_motions(scene: Scene, dt: float) -> Array:
 
 
 class Entanglement:
-    """Looks whether two limbs hold each other, and which gives way; `largest_motion` (nv,) in a frame."""
+    """Determines whether two limbs block each other, and which yields; `largest_motion` (nv,) in a frame."""
 
     def __init__(self, scene: Scene, workspace: Workspace, largest_motion: Array) -> None:
         self._model, self._workspace, self._largest_motion = scene.model, workspace, largest_motion
@@ -170,7 +170,7 @@ class Entanglement:
         factors = np.ones(self._model.nv)
         if self._holding is not None and self._free(tracked):
             away = np.abs(pin.difference(self._model, shown, tracked))
-            if not self._frames:  # the limb that is nearer to where it belongs has less to lose
+            if not self._frames:  # the limb nearer to its tracked posture yields
                 self._giving = int(np.argmin([away[self._dofs[limb]].max() for limb in self._holding]))
             elif not self._frames % 10:  # frames after which the other limb gives way instead
                 self._giving = 1 - self._giving

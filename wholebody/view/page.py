@@ -92,14 +92,14 @@ def static_page(commands: list[Command], title: str = "wholebody") -> str:
 
 
 _carriers: dict[str, tuple[str, str]] = {}
-"""Of each part that scenes share: the cell of a notebook whose output has it, and the run of it that put it there."""
+"""For each shared part: the notebook cell whose output has it, and the run of that cell."""
 
 
 def notebook_frame(commands: list[Command], title: str = "wholebody") -> str:
     """HTML of a frame with the page of a scene, for the output of a notebook's cell.
 
     The first cell that shows a scene has the player, whenever it is run; the frames of the others take it from there.
-    So they do with what is large and the same, such as a person's skin.
+    They do so with large, equal parts, such as a person's skin.
     """
     cell = _cell()
     for name, carrier in [*_carriers.items()]:

@@ -45,7 +45,7 @@ CASES = {
 def attack(
     cases: Iterator[Case], jobs: int, going: Callable[[], bool], deadline: float = 60.0
 ) -> Iterator[tuple[Case, Verdict]]:
-    """Run cases, `jobs` at a time, as they end, while `going`; over the deadline [s of the processor] run twice."""
+    """Run `jobs` cases at a time, while `going`; a case over the deadline [s of the processor] runs twice."""
     again: deque[Case] = deque()
     repeated: set[Case] = set()
 
@@ -81,7 +81,7 @@ def _attacked(case: Case, deadline: float) -> Verdict:
 
 
 def run(case: Case, folder: Path) -> Verdict:
-    """Run a case in a folder; "wrong" for an error that is none of ours, or anything on the standard output."""
+    """Run a case in a folder; "wrong" for an error that is not the package's, or any text on standard output."""
     if case.kind not in CASES:
         raise UnknownNameError("kind of case", case.kind, KINDS)
     with _printed(folder) as lines:

@@ -22,7 +22,7 @@ ROBOTS, MESHES, SKELETONS = (
 
 
 def read(folder: Path, frames: int) -> Iterator[Row]:
-    """A row for each file below a folder of a kind that is read; `frames`: most of a motion that are retargeted."""
+    """A row for each readable file below a folder; `frames`: largest number of frames of a motion to retarget."""
     human = wb.load("human")
     for path in sorted(path for path in folder.rglob("*") if path.is_file()):
         ending = path.suffix.lower()

@@ -133,7 +133,7 @@ def loop_report(rows: Sequence[Row], facts: Mapping[str, str]) -> str:
 def world_rows(
     scene: str, overlap: str, frames: Sequence[WorldFrame], drawing: Sequence[float], pairs: Sequence[int]
 ) -> tuple[Row, list[Row]]:
-    """A run among moving things, and its frames; `drawing` [s] a frame, `pairs` that the wanted posture was in."""
+    """A run among moving things, and its frames; `drawing` [s] a frame, `pairs` that overlap in the wanted posture."""
     engines = [frame.engine for frame in frames]
     spent, drawn = 1e3 * np.array([frame.seconds for frame in frames]), 1e3 * np.array(drawing)
     loops = [frame.loop for frame in frames]

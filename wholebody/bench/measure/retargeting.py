@@ -27,7 +27,7 @@ from wholebody.motion.standing_ground import ground
 from wholebody.scene.scene import Scene
 
 TOOLS = ("wholebody", "mink, GMR's weights")
-SLOWEST = 60.0  # Hz: recordings of more than twice as many frames a second are thinned out
+SLOWEST = 60.0  # Hz: recordings at more than twice this rate are subsampled
 
 
 def compare(folder: Path, figures: Sequence[Figure], frames: int) -> Iterator[Row]:
@@ -44,7 +44,7 @@ def compare(folder: Path, figures: Sequence[Figure], frames: int) -> Iterator[Ro
         motion = motion.part(0, min(frames, len(motion)))
         for figure in figures:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # what is not known of a recording is the same for both
+                warnings.simplefilter("ignore")  # warnings about a recording are the same for both tools
                 roles = matched(motion, figure, None)
                 for tool in TOOLS:
                     began = time.process_time()
@@ -69,7 +69,7 @@ def _followed(tool: str, motion: SkeletonMotion, figure: Figure, roles: Roles) -
 
 
 def judged(motion: SkeletonMotion, clip: Clip, roles: Roles) -> dict[str, Value]:
-    """Figures of a clip that follows a recording: what `wb.check` finds on a floor, bones, slides, jerk."""
+    """Figures of a clip that follows a recording: findings of `wb.check` on a floor, bones, slides, jerk."""
     found = check(clip, Scene(clip.figure).add(HalfSpace(), name="floor"))
     errors = np.degrees(np.concatenate(list(errors_of(motion, clip, roles).values())))
     shared = [role for role in roles.frames if role in roles.joints]

@@ -79,7 +79,7 @@ def _deepest(throw: Throw, path: Path, way: tuple[pin.SE3, pin.SE3], parts: int)
 
 def throws(thing: str, speed: float, person: str, swift: bool, count: int) -> Row:
     """Throw a thing at a person who is posed by "qp", several times."""
-    # Deep: an end deeper than 0.1 mm. Silent: 0.12 mm at an end or 0.4 mm on every way, and nothing is named.
+    # Deep: overlap over 0.1 mm at an end. Silent: 0.12 mm at an end or 0.4 mm on every way without a report.
     rng = np.random.default_rng([0, *map(ord, thing + person), int(10.0 * speed)])
     depths, spent, named, silent = [], [], 0, 0
     for _ in range(count):

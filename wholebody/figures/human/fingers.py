@@ -41,7 +41,7 @@ SIDES = ("left", "right")
 def finger_effort(joint: str) -> float:
     """Weight of a finger's joint in a person's effort, beside 1 of an elbow.
 
-    From how people type, where 1.6 for flexion is the best fit; half of it is taken, since with more grasps are found
+    Fitted to typing, where 1.6 for flexion is best; half of it is used, because with more, grasps are found
     less often. Of the thumb an ESTIMATE: it moves before an arm.
     """
     if "thumb" in joint:
@@ -85,7 +85,7 @@ def finger_angles(shape: str, side: str | None = None) -> dict[str, float]:
 
 def opened_for_a_bar(sides: Sequence[str]) -> Iterator[dict[str, float]]:
     """Angles [rad] of fingers from which hands take a bar: no thumb, a fist's, a hook's; nothing without sides."""
-    # Fingers that bend at their roots first lay their first parts on the bar before it meets the palm.
+    # Fingers that first bend at their roots touch the bar with their first phalanges before the palm does.
     hook, fist = ({name: angle for side in sides for name, angle in finger_angles(shape, side).items()}
                   for shape in ("hook", "fist"))  # fmt: skip
     fingers = {name: angle for name, angle in hook.items() if "thumb" not in name}

@@ -96,8 +96,8 @@ class Compiled:
 
     @cached_property
     def robots(self) -> tuple[int, ...]:
-        """Bodies on the world below which something moves; else those that go about freely; else all."""
-        # Those without a shape are none where others have some: files of a robot's kinds park joints that one lacks.
+        """Bodies on the world with joints below them; otherwise bodies with a free joint; otherwise all."""
+        # Bodies without a shape are left out if others have one: families of robots park unused joints there.
         tops = self.children[0]
         inner = [top for top in tops if any(self._moves(body) for body in self.tree(top))]
         inner = list(filter(self.has_shape, inner)) or inner

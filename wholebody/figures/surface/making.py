@@ -143,8 +143,8 @@ def strongest(weights: Array) -> tuple[NDArray[np.uint8], Array]:
 
 
 def divided(bound: Bound, faces: NDArray[np.int64]) -> tuple[Bound, NDArray[np.int64], NDArray[np.int64]]:
-    """Cut the triangles (m, 3) between segments: vertices, (k, 3) triangles, and (k,) the segment of each."""
-    # An edge whose ends two segments move most is cut where both move it alike, so that no crack opens.
+    """Cut the triangles (m, 3) between segments; returns vertices, triangles (k, 3) and the segment (k,) of each."""
+    # An edge between two segments is cut where both have equal weight, so that no crack opens.
     owner = bound.strength.argmax(axis=1)
     theirs = owner[faces]
     after = np.roll(theirs, -1, axis=1)
@@ -192,5 +192,5 @@ def divided(bound: Bound, faces: NDArray[np.int64]) -> tuple[Bound, NDArray[np.i
 
 
 def _lead(bound: Bound, owner: NDArray[np.int64], here: NDArray[np.int64], there: NDArray[np.int64]) -> Array:
-    """(k,) by how much the segment of one end moves that end more than the segment of the other end does."""
+    """(k,) strength at one end of that end's segment, less that of the other end's segment."""
     return np.asarray(bound.strength[here, owner[here]] - bound.strength[here, owner[there]])

@@ -56,7 +56,7 @@ class Queries(Protocol):
 def is_free(
     queries: Queries, before: Array, after: Array, unswept: float, over: Callable[[], bool] = bool
 ) -> bool:  # fmt: skip
-    """Whether a motion is known to penetrate nothing; one shorter than `unswept` is not swept."""
+    """Whether a motion counts as free; one shorter than `unswept` is not swept."""
     if np.isinf(unswept) or np.abs(pin.difference(queries.model, before, after)).max(initial=0.0) <= unswept:
         return True
     return queries.sweep.first_contact(before, after, tolerance=GRAZE, over=over) is None
@@ -73,7 +73,7 @@ class Entered(NamedTuple):
 def entered(
     sweep: Sweep, depths: SweptDepth, path: Sequence[Array], watched: NDArray[np.bool_]
 ) -> list[Entered]:  # fmt: skip
-    """The pairs that motions lead through each other, or that overlap at their end; none where one way is free.
+    """The pairs that penetrate on a path or at its end; none if the path or the direct motion is free.
 
     They get deeper on the way by `OVERLAP`, or overlap at the end by `INSIDE`, for pairs not watched (pairs,) more than
     at the beginning. The path has one configuration (nq,) or more.

@@ -136,13 +136,13 @@ class ChainResolver:
                 return
 
     def _kept(self, link: Link, push: Vector, tracked: Tracked | None) -> Array | None:
-        """(3, 3) axes, one a row, that a link keeps which moves out by translation; None for one that turns."""
-        # Translated is a link parallel to the surface, in its tracked direction if near to that, and while it is held.
+        """(3, 3) axes, one a row, that a translated link keeps; None for a link that rotates."""
+        # A link is translated if parallel to the surface, or near its tracked direction and parallel there or held.
         there, bone = _columns(self.limbs.frames[link.node]).copy(), self._bone(link)
         if tracked is not None:
             wanted = np.ascontiguousarray(tracked.placed[self.limbs.joints[link.node]].rotation.T)
             turned = float(np.abs(wanted - there).max())
-            most = 2.0 * PARALLEL if turned < 0.02 else PARALLEL  # one that is tracked rather moves aside than turns
+            most = 2.0 * PARALLEL if turned < 0.02 else PARALLEL  # wider for a link in its tracked direction
             parallel = _parallel(wanted.T @ (there @ bone), push, most)
             if turned < PARALLEL and (parallel or self._held(link, tracked)):
                 self.translated.update(self.limbs.joints[node] for node in link.nodes)
@@ -162,7 +162,7 @@ class ChainResolver:
 
     def _translate(self, link: Link, push: Vector, inner: Sequence[int], there: Array) -> None:
         """Move the link by pure translation: its joint's origin moves, and its axes become `there` (3, 3)."""
-        # An upper arm's rotation moves no elbow; an elbow moves on a sphere, so aside too.
+        # The rotation of an upper arm cannot move its own elbow. An elbow moves on a sphere, so it also moves aside.
         limbs = self.limbs
         own = tuple(node for node in link.nodes if node not in inner)
         own_origin = own[-1]

@@ -102,7 +102,7 @@ class Attraction:
         return np.asarray(pin.integrate(self._model, q, way)), shares
 
     def keep_gains(self, q: Array, trial: Array, wanted: Array, shares: Array, settled: list[bool]) -> Array:
-        """Undo changes that brought a part no nearer to the wanted posture; move joints of blocked parts one by one."""
+        """Undo changes that moved a part no nearer to the wanted posture; then move joints of blocked parts singly."""
         # A shoulder can move the arm back although the wrist cannot straighten. A part that gains nothing is settled.
         before = np.asarray(pin.difference(self._model, q, wanted))
         after = np.asarray(pin.difference(self._model, trial, wanted))
@@ -263,7 +263,7 @@ class FrameResolver:
         return way
 
     def _toward(self, q0: Array, q1: Array) -> Array | None:
-        """The direct motion from q0 towards q1, by each part's share or the least of them; None if that is not free."""
+        """The direct motion from q0 towards q1, by each part's share or by the least share; None if it is not free."""
         way = np.asarray(pin.difference(self._model, q0, q1))
         shares = np.minimum(1.0, self._largest_motion / np.maximum(np.abs(way), 1e-12))
         for dofs, _ in self._parts:

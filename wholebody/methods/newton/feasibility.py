@@ -70,7 +70,7 @@ def _restore(run: Iteration, iterations: int, improve_goals: bool) -> None:
 
 
 def _leave_saddle(run: Iteration, nudges: int, iterations: int, improve_goals: bool) -> None:
-    """Go on from states nearby, as a stationary one may be a saddle: a straight chain, its goal on its own line."""
+    """Continue from nearby states: a stationary one may be a saddle (a straight chain, its goal on its line)."""
     saddle = best = run.mark()
     least, rng = _missed(run), np.random.default_rng(0)
     size = np.sqrt(run.system.weight.reshape(-1, 7))

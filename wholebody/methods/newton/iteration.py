@@ -120,7 +120,7 @@ class Iteration:
         return error
 
     def iterate(self, iterations: int, *, goals: bool, measures: Measures, early_exit: bool = False) -> None:
-        """Step until everything holds, nothing moves, or iterations are spent; `early_exit`: or a step gains little."""
+        """Step until convergence, stagnation or the iteration limit; `early_exit`: also until a step gains little."""
         self.stationary, active, norms = False, self.active_system, self._norms(self.residual)
         trust = _Trust(self.least_damping, max(STEPS.funnel * norms[1], self.tolerance))
         least, stagnant = sum(norms), 0

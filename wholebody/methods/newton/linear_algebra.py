@@ -324,7 +324,7 @@ def dense_columns(pattern: Pattern) -> Indices:
 
 def linear_algebra(pattern: Pattern, name: str = "auto") -> LinearAlgebra:
     """The factorisation of this name for a pattern; "auto" splits off up to fifty dense columns."""
-    # With hundreds of them, as of a body near everything, the small dense systems of a step took 2 s.
+    # With hundreds of dense columns (a body near everything), the small dense systems of a step took 2 s.
     known(name, NAMES, "linear algebra")
     dense = dense_columns(pattern)
     if name == "schur" or (name == "auto" and 0 < len(dense) <= 50):

@@ -188,7 +188,7 @@ class FigureSystem(ActiveSystem):
     """A problem's equations, renewed from posture to posture: every iterate is a posture."""
 
     def __init__(self, problem: Problem, workspace: Workspace, algebra: str, *, yielding: bool = False) -> None:
-        """Build the equations, for the violation of the constraints in place of the goals where `yielding`."""
+        """Build the equations; with `yielding`, the violation of the constraints replaces the goals."""
         self.problem, self.workspace, self._yielding = problem, workspace, yielding
         self.bodies = bodies = FigureBodies(problem.scene.figure, problem.start)
         held = [Unit(bodies.names), bodies.limits, *bodies.equations.batches()]

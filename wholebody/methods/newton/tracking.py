@@ -121,8 +121,8 @@ class NewtonTracker(NotCopyable):
             active_system.even = False
 
     def _trades(self, before: Array, after: Array) -> bool:
-        """Whether light goals were reduced at the expense of heavy ones, from one posture (nq,) to another."""
-        # So where the weighted error fell by a smaller share than half of that of the error without weights.
+        """Whether goals of small weight improved at the expense of goals of large weight between two postures (nq,)."""
+        # True if the weighted error fell relatively by less than half as much as the unweighted error.
         goals = self.problem.goals
         weights = np.sqrt([goal.weight for goal in goals])
         errors = []

@@ -137,7 +137,7 @@ class Robot:
 
     def add_pieces(self, problem: Problem, pairs: Indices) -> None:
         """Add the pieces of pairs of a problem, by their numbers (pairs,) in the scene."""
-        # placo has one margin for all pairs, so a pair's first piece is enlarged by each clearance that it has.
+        # placo has one margin for all pairs, so the first piece of a pair is enlarged by its clearances.
         scene, model = problem.scene.geometry, self.wrapper.collision_model
         self._clearances, self._pairs = problem.clearances.copy(), pairs.copy()
         made: dict[tuple[int, float], int] = {}

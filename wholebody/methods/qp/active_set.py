@@ -40,7 +40,7 @@ def violated_set(program: QuadraticProgram) -> ActiveSet:
 
 
 def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) -> QPSolution | None:
-    """Exact answer by at most so many corrections of a guess of the active set; None when they did not settle."""
+    """Exact answer by a bounded number of corrections of a guessed active set; None if it does not settle."""
     program.check_shapes(guess)
     x = np.empty(program.size)
     active = ActiveSet(guess.lower.copy(), guess.upper.copy(), guess.elastic.copy())

@@ -66,7 +66,7 @@ def primal_dual_active_set(
     program: QuadraticProgram, places: Indices, active: ActiveSet, most: int, limits: Corrections, room: Room, x: Array
 ) -> bool:
     """Correct an active set for the rows `places` (c,), in place; x (n,) becomes the minimiser. Whether it is right."""
-    # The first corrections put right all that is wrong, the others only the worst entry.
+    # The first corrections change all wrong entries, later ones only the worst.
     elastic, lower, upper = program.elastic, program.lower, program.upper
     pushing = active.elastic
     n, m, k = len(program.diagonal), len(program.target), len(places)

@@ -40,8 +40,8 @@ IN_FRONT = 0.01  # m: how far surfaces are in front of faces; more: reached by f
 def before_contact(
     problem: Problem, shared: Run, seed: int, most: int, *, grips: bool = False
 ) -> Iterator[LocalSolution]:
-    """Descents through everything to where surfaces are in front of their faces, or bars of palms with `grips`."""
-    # The measures count: nothing is in the way, so what the terms leave open is as the figure likes it.
+    """Descents that ignore contacts, to surfaces in front of their faces or, with `grips`, bars in front of palms."""
+    # The measures count: without contacts, they determine what the terms leave free.
     terms = (*problem.goals, *problem.constraints)
     faces = any(has_face(term) for term in terms)
     if faces == grips or (grips and not any(takes_bar(term) for term in terms)):

@@ -48,7 +48,7 @@ def along(
 def beside(
     arm: Arm, goal: Array, limits: tuple[Array, Array], nearest: Array, value: float, q: Array, posture: Array
 ) -> float:  # fmt: skip
-    """Effort of the branch nearest to q (n,), written, where the held joint has a value; inf if over a radian off."""
+    """Effort of the branch nearest to q (n,), written, for a value of the held joint; inf if over 1 rad away."""
     found, best, chosen = np.empty((1, BRANCHES, len(q))), np.inf, -1
     branches(arm, goal, np.array([value]), found)
     for b in range(BRANCHES):

@@ -34,7 +34,7 @@ class _Group(NamedTuple):
 
 
 def posture_apart(problem: Problem, workspace: Workspace, q: Array) -> Array | None:
-    """A posture (nq,) in which objects are apart whose normals cancel at q; None where none do or nothing separates."""
+    """A posture (nq,) that separates objects whose normals cancel at q; None if none cancel or none separates them."""
     near = workspace.near(q, 0.0)
     for group in _groups(workspace, near):
         depth = -near.distance[group.rows]

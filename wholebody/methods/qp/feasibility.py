@@ -74,7 +74,7 @@ class Feasibility(Stage):
         return self.shared.subproblem.program(here.at, here.rows, size)
 
     def _turned_on(self, here: Iterate, program: QuadraticProgram, step: Array, wrapped: set[int]) -> Array | None:
-        """The way (nv,) of the joint that presses hardest at a limit to its other limit, once each; None for none."""
+        """Displacement (nv,) to its other limit of the joint pressed hardest at a limit, once each; None if none."""
         limits, q, model = self.figure.limits, here.at.q, self.figure.model
         turning = [joint.idx_v for joint in model.joints if joint.shortname().startswith("JointModelR")]
         pushed = program.gradient(step)[limits.idx_v]

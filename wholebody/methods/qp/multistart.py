@@ -211,8 +211,8 @@ class Multistart:
         return self.best.measure < SEARCH.moved * before
 
     def _descend_again(self) -> bool:
-        """Where contacts are met, descend at their place, then from beside a kink; whether the end is no minimum."""
-        # At a kink two points touch at once, and the one that counts as the contact should leave.
+        """If contacts are met, descend at their place, then from beside a kink; whether the end is not a minimum."""
+        # At a kink two points touch at once; the point that counts as the contact should leave.
         problem, tolerance = self.problem, self.budget.tolerance
         touches = any(hasattr(term, "touches") for term in (*problem.goals, *problem.constraints))
         if not (touches and self.budget.measures and self.best.violation.worst <= tolerance):

@@ -51,7 +51,7 @@ class QuadraticProgram(NamedTuple):
 
     @property
     def is_computable(self) -> bool:
-        """Whether its numbers are finite, also squared, weights above 0, and the box in order: own terms may be NaN."""
+        """Whether numbers and squares are finite, weights positive and bounds ordered; user terms may give NaN."""
         with np.errstate(all="ignore"):
             curvature = self.diagonal + self.weight @ self.rows**2 + self.elastic_weight @ self.elastic**2
             targets = self.weight @ self.target**2 + self.elastic_weight @ self.least**2

@@ -1,4 +1,4 @@
-"""The numbers of the QP method, as frozen records; what each trades stands at its name."""
+"""Constants of the QP method, as frozen records; each name states its trade-off."""
 
 from __future__ import annotations
 

@@ -88,8 +88,8 @@ class SQP(Stage):
         return LocalSolution(here.at.q, here.violation, here.at.measure, converged, count)
 
     def _feasible_before(self, here: Iterate) -> Iterate | None:
-        """The best feasible posture, where the descent ended at an infeasible one after it and may return."""
-        # Not with an offset: goals out of reach are held at a singular posture, where every descent ends so.
+        """The best feasible posture, if the descent later ended at an infeasible one and may return."""
+        # Not with an offset: goals out of reach end at a singular posture, where every descent ends infeasible.
         lost = self.offset is None and here.violation.worst > self.tolerance
         return self._kept if lost and self._width > self.tolerance else None
 
@@ -132,8 +132,8 @@ class SQP(Stage):
         return with_values(here.at, squares=np.vstack([here.at.squares, np.sqrt(pull)[:, None] * planes.bend]))
 
     def _shortened(self, program: QuadraticProgram, soft: int) -> QuadraticProgram:
-        """With such curvature of the measures that the answer's part along the constraints is `_gain` times as long."""
-        # Joints keep their shares of it, which a shorter radius would not let them.
+        """Scale the curvature of the measures so that the tangential part of the answer is `_gain` times as long."""
+        # The joints keep their shares of it; a smaller radius would change them.
         if self._gain == 1.0:
             return program
         weight = program.weight.copy()

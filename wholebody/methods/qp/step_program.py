@@ -90,7 +90,7 @@ class StepProgram:
 
     def solve(self, at: PackedLinearisation, measures: bool) -> Answer:
         """The answer of the step from where the workspace's state is, and its pieces' placements."""
-        # Goals weigh alike, so that light ones do not wait; weights count where they conflict.
+        # Goals have equal weights, so that all progress; their own weights count in a conflict.
         answer, damping = self._damped(at, measures, self._even)
         given = self._even
         if self._mixed and self._trades(answer.x):
@@ -144,8 +144,8 @@ class StepProgram:
         return answer, damping
 
     def _trades(self, x: Array) -> bool:
-        """Whether the displacement x (nv,) reduces light goals at the expense of heavy ones."""
-        # The weighted error falls by a smaller share than half of that of the error without weights.
+        """Whether the displacement x (nv,) improves goals of small weight at the expense of goals of large weight."""
+        # True if the weighted error falls relatively by less than half as much as the unweighted error.
         rows = self._parts.rows
         error = rows.soft_error[: self.goals]
         after = error + rows.soft[: self.goals] @ x
@@ -194,7 +194,7 @@ class StepProgram:
         return Answer(answer.x, motion, turn, worst, spare, missed, least, *answered), damping, asked
 
     def _predict_curving(self, at: PackedLinearisation, displacement: Array) -> bool:
-        """Have what is held run ahead as this displacement (nv,) is curved; whether the last program's differs."""
+        """Correct held terms for the curvature of a displacement (nv,); whether the last program's differs."""
         state, rows = self._there.update(pin.integrate(self._there.model, at.q, displacement)), self._parts.rows
         there = self._holds.at(state)[self._among] - self._asked
         curved = there - (rows.soft_error + rows.soft @ displacement)[self.goals :]
@@ -266,8 +266,8 @@ class QPStep(NamedTuple):
     rows: int  # how many contact rows
     exact: bool  # whether the program was solved to rounding
     iterations: int  # iterations of the QP solver
-    by: str  # what closed the last program, see `QPSolution`
-    programs: Mapping[str, int]  # how many programs each closed: one a step, and more where it was looked at twice
+    by: str  # the solver that closed the last program, see `QPSolution`
+    programs: Mapping[str, int]  # programs that each solver closed: one a step, more if it was checked twice
     # how much of the program's displacement was gone: less than 1 where it was longer than what was looked at
     share: float
     # what things that move (`Scene.move` with `over`) passed through, or are inside of; empty if nothing.

@@ -150,8 +150,8 @@ class QPTracker(NotCopyable):
         return ()
 
     def _among_moving(self, q: Array, measures: bool, motion: FrameMotion) -> QPStep:
-        """A step in which things move, or did and are still in the figure: they advance by shares, and it gives way."""
-        # Where a frame's budget ends before, things go the rest of their way while the figure stays.
+        """A step with things that move or are still in the figure: they advance by shares, and the figure yields."""
+        # If the frame's budget ends first, things move the rest of their way while the figure stays.
         workspace, model = self.workspace, self.workspace.model
         q = posture(q, model.nq)
         most = at_speeds(self.problem.bounds, workspace.state.update(q), self.dt)

@@ -16,7 +16,7 @@ from wholebody.figures.figure import Figure
 
 def angles_about(turned: Rotation, axes: Array) -> Array:
     """Angles (n, 3) of rotations about axes (3, 3), rows, each turned by the ones before; radians."""
-    # In gimbal lock the third is that of the nearest frame without, zero if there is none: no angle jumps for a frame.
+    # In gimbal lock the third angle is that of the nearest regular frame, or zero, so that no angle jumps for a frame.
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Gimbal lock", UserWarning)
         found: Array = turned.as_davenport(axes, "intrinsic")

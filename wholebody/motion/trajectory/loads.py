@@ -285,7 +285,7 @@ class WindowLoads:
 
 def on_filtered(figure: Figure, original: Array, changed: Array, dt: float) -> Array:
     """(n, nq) postures whose loads are those of changed postures: the change on top of the filtered recording."""
-    # Filtering what was changed would hide how fast it changes.
+    # Filtering the change would hide its accelerations.
     model, steady = figure.model, smoothed(Clip(figure, original, dt), CUTOFF).q
     each = zip(steady, original, changed, strict=True)
     return np.array([pin.integrate(model, base, pin.difference(model, was, now)) for base, was, now in each])

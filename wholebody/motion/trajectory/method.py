@@ -91,7 +91,7 @@ class Trajectory(Checked):
 
     def _measured(self, run: Run, reference: Array, q: Array, loads: ClipLoads | None, rate: float) -> Array:
         """The best postures (n, nq) whose loads keep to their bounds as `torques` measures them, from free ones q."""
-        # Rows are corrected by what is measured more, and frames around what is beyond are computed again.
+        # Rows are corrected by the measured excess, and frames around violations are recomputed.
         if loads is None:
             return q
         faults, corrected = run.faults(reference), loads.corrected(q)

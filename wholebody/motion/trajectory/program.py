@@ -259,7 +259,7 @@ def _speed_part(step: Step, place: Indices, limits: Limits, size: int) -> tuple[
 
 def _brought_back(x: Array, past: Array, radius: float) -> Array:
     """(a,) share of what changes (n - 1, a) pass their bounds by that a step within the trust region can take back."""
-    # It can shift all later frames, or take a share of every deviation away.
+    # It can shift all later frames, or reduce every deviation by a share.
     shifted = radius / np.maximum(np.abs(past).sum(axis=0), radius)
     shrunk = min(0.5, radius / max(float(np.abs(x).max(initial=0.0)), 1e-9))
     found: Array = np.maximum(shifted, shrunk)

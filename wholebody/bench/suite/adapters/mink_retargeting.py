@@ -29,8 +29,8 @@ WEIGHTS = {
     "knee": ((0.0, 10.0), (10.0, 5.0)), "ankle": ((50.0, 10.0), (50.0, 10.0)), "shoulder": ((0.0, 100.0), (5.0, 100.0)),
     "elbow": ((0.0, 10.0), (10.0, 5.0)), "wrist": ((0.0, 10.0), (10.0, 5.0)),
 }  # fmt: skip
-DAMPING, MOST, GAIN = 0.5, 10, 1e-3  # of a step; steps more than one; by which the error falls in each of them
-FIRST = 20  # times that the first frame is followed before the motion begins, so that its way there is not judged
+DAMPING, MOST, GAIN = 0.5, 10, 1e-3  # of a step; largest number of further steps; least decrease of the error in each
+FIRST = 20  # iterations for the first frame before the motion begins, so that the way there is not judged
 
 
 class MinkRetargeting:
@@ -45,7 +45,7 @@ class MinkRetargeting:
             raise MissingPackageError("mink is not installed; install: pip install 'wholebody[compare]'") from None
         self._mink = mink
         roles_used = [role for role in roles.frames if role.split("_")[-1] in WEIGHTS and role in roles.joints]
-        segments = {row["role"]: row["wholebody"] for row in ROWS}  # which carry limbs of a person
+        segments = {row["role"]: row["wholebody"] for row in ROWS}  # those that carry limbs of a person
         self._turned = {
             role: segments[role] if segments[role] in figure.segments else roles.turns[role] for role in roles_used
         }

@@ -33,7 +33,7 @@ STARTS, ONE = "starts", "one_start"
 
 
 class Restarted:
-    """A method that starts again elsewhere, by so many seconds of the processor, where it ends without an answer."""
+    """A method that restarts elsewhere if it ends without an answer, until a limit of processor seconds."""
 
     def __init__(self, method: Any, prepare: Callable[[Any, Problem], None], seconds: float = 1.5) -> None:
         """Take a method with one start, and what builds its model."""

@@ -141,7 +141,7 @@ def _slab(scene: Scene, piece: Any, depth: float) -> pin.SE3:
 
 def mjcf(scene: Scene, frames: Mapping[str, tuple[int, pin.SE3]] = MappingProxyType({})) -> str:
     """Return a scene as MJCF: bodies named after joints, geoms after pieces, sites after `frames`."""
-    # Links without mass get a millionth of a kilogram, because MuJoCo refuses none.
+    # Links without mass get a millionth of a kilogram, because MuJoCo refuses moving bodies without mass.
     model, geometry = scene.model, scene.geometry
     top = ElementTree.Element("mujoco", model=scene.figure.name)
     settings = {"angle": "radian", "autolimits": "true", "boundmass": "1e-6", "boundinertia": "1e-9"}

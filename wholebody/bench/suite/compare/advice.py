@@ -19,7 +19,7 @@ Figures = Mapping[tuple[str, int], float]
 
 
 def best(found: Mapping[str, Figures]) -> tuple[str, ...]:
-    """Return the methods with the least figure, as many as cannot be told apart; the least of all first."""
+    """Return the methods with the least figure and those not distinguishable from them; the least first."""
     order = sorted((name for name in found if found[name]), key=lambda name: middle(list(found[name].values())))
     if order and len(found[order[0]]) < LEAST:
         return tuple(order)

@@ -108,7 +108,7 @@ def work(task: Task) -> Chunk:
 def _sweep(
     child: Child, adapter: Adapter, ladder: Iterable[Budget], task: Task, first: Record, ended: bool
 ) -> list[Record]:
-    """All further budgets; those after one over which the process has ended count as what they would have been."""
+    """All further budgets; those after one at which the process ended get the record of that budget."""
     records: list[Record] = []
     if first.outcome == REFUSED:
         return records

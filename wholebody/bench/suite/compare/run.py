@@ -161,7 +161,7 @@ def run(
 
 
 def _tasks(settings: Settings, plan: Plan, done: set[tuple[str, int]], end: float) -> Iterator[Task]:
-    """Cases in turn over all sets, with those methods that there is time for; after `end` only of sets without one."""
+    """Cases of all sets in turn, with the methods that time allows; after `end` only the first case of a set."""
     for number in range(settings.cases):
         for family in settings.sets:
             late = number > 0 and time.perf_counter() > end

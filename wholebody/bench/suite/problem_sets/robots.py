@@ -142,7 +142,7 @@ class Axis(NamedTuple):
 
 
 def arm(kind: str, rng: np.random.Generator) -> tuple[wb.Figure, Array]:
-    """An arm with links of random lengths, and the posture (nq,) it is ready in, elbow bent, the tool in front.
+    """An arm with links of random lengths, and its ready posture (nq,): elbow bent, tool in front.
 
     `kind`: "seven axes" as a person's arm; "industrial", the last three of six crossing; "parallel", three parallel.
     """

@@ -98,7 +98,7 @@ class Verdict:
 
 
 def judge(answers: Answers, folder: Path) -> Verdict:
-    """Judge answers to an export; of a set that they take part in, what is left out is not solved."""
+    """Judge answers to an export; a missing answer to a problem of an attempted set counts as not solved."""
     index = read_index(folder)
     given = {(answer.problem, answer.seed): answer for answer in answers.answers}
     judged, rows = [], []

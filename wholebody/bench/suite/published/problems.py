@@ -133,8 +133,8 @@ def _listed(values: Sequence[float] | Array) -> list[float]:
 
 
 def far_seed(case: Case, rng: np.random.Generator) -> Array:
-    """A random posture (nq,), hard to solve from: the first of some draws in which nothing, or least, overlaps."""
-    # What carries things held in the world stays; frames that hold each other are brought together by Newton's method.
+    """A random, difficult start posture (nq,): the first of some draws without overlap, or that of least overlap."""
+    # Joints that carry frames held in the world stay; Newton's method joins frames that hold each other.
     problem = case.problem
     free, closing = _free(problem), [term for term in held(problem) if _is_relative(term)]
     best, least = np.array(problem.start), np.inf

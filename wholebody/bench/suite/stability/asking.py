@@ -118,7 +118,7 @@ class Cell:
 
 
 def run(asked: Iterable[tuple[HardCase, Adapter]], jobs: int = 1, cap: float = 20.0) -> Iterator[Cell]:
-    """Cases, each by a method, as they end, in `jobs` processes; after `cap` s of the processor a method hangs."""
+    """Cases as they end, each by a method, in `jobs` processes; over `cap` s of the processor a method hangs."""
     _warm()
     left = (Job((case, adapter.name), _cell, (case, adapter, cap), BY_THE_CLOCK * cap) for case, adapter in asked)
     for outcome in run_jobs(lambda: next(left, None), [Child(forked=True) for _ in range(jobs)]):

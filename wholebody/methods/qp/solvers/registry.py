@@ -98,7 +98,7 @@ class QpsolversSolver(QPSolver):
                     Problem(hessian, form.linear, rows, most, equal if m else None, form.least[:m] if m else None),
                     solver=self.name,
                 )
-            except Exception:  # each of them has its own; all programs here have an answer
+            except Exception:  # each solver has its own exceptions; all programs here are feasible
                 found = None
         if found is None or found.x is None or not np.isfinite(found.x).all():
             return np.zeros(n), np.zeros(len(most)), np.zeros(len(most))
