@@ -10,6 +10,6 @@ from pathlib import Path
 
 def unpacked(path: str | Path) -> str:
     """The commands that draw the scene, among them names as they are."""
-    packed = re.search(r'<script id="picture"[^>]*>(.*?)</script>', Path(path).read_text(encoding="utf-8"))
+    packed = re.search(r'<script data-part="scene"[^>]*>(.*?)</script>', Path(path).read_text(encoding="utf-8"))
     assert packed
     return gzip.decompress(base64.b64decode(packed[1])).decode("latin-1")

@@ -11,6 +11,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.charts import Shown, new_chart
 
 SMALLEST = 1e-9  # m or rad: what is drawn of a zero on a logarithmic axis
+FEW = 60  # entries that a chart joins by lines
 Status = Literal["solved", "unreachable", "infeasible", "stalled"]
 
 
@@ -43,7 +44,8 @@ class Solution(Shown):
         seconds: wall time of the call.
         iterations: iterations of the method.
         assessment: the independent judgement of q.
-        trace: one entry an iteration.
+        trace: one entry for each iteration that judged a step, in order. An iteration that ends a descent judges none,
+            so there may be fewer entries than iterations.
         method: name of the method and of its solver.
         message: one sentence that explains the status.
         programs: number of quadratic programs that each solver closed, such as {"osqp": 1, "active set": 7}. There,
@@ -72,17 +74,24 @@ class Solution(Shown):
         return self.status == "solved"
 
     def plot(self) -> Any:
-        """Draw the trace, a matplotlib figure: goal error and violation, and the measures, by iteration."""
-        chart, axes = new_chart(1, 2, (8.0, 2.6))
+        """Draw the trace, a matplotlib figure: goal error and violation, and the measures, of each entry."""
+        chart, axes = new_chart(1, 2, (8.0, 2.8))
         missed, cost = axes[0]
         numbers = range(1, len(self.trace) + 1)
+        # a search of many descents jumps from one to the next: lines would hide where each of them leads
+        look = {"marker": "."} if len(self.trace) <= FEW else {"marker": ".", "markersize": 2, "linestyle": "none"}
         for name, word in (("goal_error", "goal error"), ("violation", "violation")):
             values = [max(getattr(entry, name), SMALLEST) for entry in self.trace]
-            missed.semilogy(numbers, values, marker=".", label=f"{word} [m, rad]")
-        cost.plot(numbers, [entry.measure for entry in self.trace], marker=".", color="C2", label="measures")
+            missed.semilogy(numbers, values, label=word, **look)
+        cost.plot(numbers, [entry.measure for entry in self.trace], color="C2", label="measures", **look)
+        missed.set_ylabel("largest [m, rad]")
+        cost.set_ylabel("measures, weighted sum")
         for axis in axes[0]:
-            axis.set_xlabel("iteration")
-            axis.legend(fontsize="small")
+            axis.set_xlabel("entry of the trace")
+            axis.xaxis.get_major_locator().set_params(integer=True)
+        chart.legend(
+            *missed.get_legend_handles_labels(), loc="outside upper left", fontsize="small", ncols=2, markerscale=2
+        )
         return chart
 
     def __repr__(self) -> str:

@@ -26,7 +26,7 @@ def test_a_solution_draws_its_trace_and_notebooks_show_it() -> None:
     assert next(told.iter("td")).text == "Point(right_index_tip)"
     solution = wb.solve(problem)
     drawn = lines_of(solution)
-    assert drawn["goal error [m, rad]"] == pytest.approx([max(entry.goal_error, 1e-9) for entry in solution.trace])
+    assert drawn["goal error"] == pytest.approx([max(entry.goal_error, 1e-9) for entry in solution.trace])
     assert lines_of(solution, 1)["measures"] == pytest.approx([entry.measure for entry in solution.trace])
     page = ElementTree.fromstring(f"<body>{solution._repr_html_()}</body>")
     assert repr(solution) == page.findtext("pre")
@@ -55,6 +55,9 @@ def test_names_with_dollars_are_no_formulas() -> None:
     scene = wb.Scene(figure).add(wb.Sphere(0.2), name=r"$\ball$", at=(0.0, 0.0, 0.0))
     found = wb.check(wb.Clip(figure, np.array([figure.neutral] * 2), 0.02), scene)
     assert any("ball" in each.names for each in found.contacts)
+    inside = lines_of(found)[r"thumb and \$\ball\$".replace("thumb", found.contacts[0].first)]
+    assert len(inside) == 3  # two frames, and what is between them
+    assert inside == pytest.approx(np.full(3, 1e3 * found.contacts[0].deepest), abs=0.01)  # nothing moves
     assert "<svg" in found._repr_html_()
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 import gc
 import importlib
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -168,6 +170,27 @@ def test_all_loops_are_compiled_by_one_call() -> None:
         assert any(loop.signatures for loop in loops if hasattr(loop, "signatures")), name
 
 
+def slices_filled_with_arrays(source: str) -> list[str]:
+    """Assignments to slices in compiled functions whose value may be an array."""
+    found = []
+    for function in ast.walk(ast.parse(source)):
+        if isinstance(function, ast.FunctionDef) and "compiled(" in "".join(map(ast.unparse, function.decorator_list)):
+            for node in ast.walk(function):
+                if isinstance(node, ast.Assign) and any(":" in ast.unparse(target) for target in node.targets):
+                    value = ast.unparse(node.value)
+                    if not re.fullmatch(r"-?(\d+(\.\d*)?|np\.(inf|nan)|(max|min)\(.*\))", value):
+                        found.append(ast.unparse(node))
+    return found
+
+
+def test_no_loop_copies_an_array_into_a_slice(root: Path) -> None:
+    """For that numba compiles how Python writes the shapes in a message: three seconds of a first answer."""
+    wrong = "@compiled(inner=True)\ndef f(a, b):\n    a[:] = 0.0\n    a[:] = b\n"
+    assert slices_filled_with_arrays(wrong) == ["a[:] = b"]
+    for path in (root / "wholebody").rglob("*_kernel.py"):
+        assert slices_filled_with_arrays(path.read_text()) == [], path
+
+
 WORK = """
 import json, sys
 import wholebody as wb
@@ -295,4 +318,4 @@ def test_another_process_compiles_the_longest_loop_where_there_are_cores(monkeyp
         monkeypatch.setattr("wholebody.base.compiled.usable_cores", lambda cores=cores: cores)
         importlib.import_module("wholebody.base.compiled").compile_beside()
         assert len(asked) == count
-    assert asked[0][1:] == ["-m", "wholebody.base.compiled", "wholebody.terms.linearisation"]
+    assert asked[0][1:] == ["-m", "wholebody.base.compiled", *compiled.BESIDE]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import MISSING, dataclass, fields
+from importlib import import_module
+from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
@@ -52,6 +54,21 @@ def test_a_value_out_of_its_field_is_refused_in_one_sentence(given: dict[str, ob
     with pytest.raises(InputError) as refused:
         Bench("park", **given)  # type: ignore[arg-type]
     assert told in str(refused.value)
+
+
+def test_a_module_without_texts_for_annotations_is_read_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Python 3.14 keeps no annotations beside the fields of a class, unless its module asks for texts."""
+    (tmp_path / "plain_module.py").write_text(
+        "from dataclasses import dataclass\nfrom typing import Annotated\nimport wholebody as wb\n"
+        "from wholebody.base.fields import Range\n@dataclass(frozen=True)\nclass Low(wb.Point):\n"
+        "    depth: Annotated[float, Range(0.0, 2.0, 'm')] = 0.5\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    kind = import_module("plain_module").Low
+    assert kind("right_palm", (0.0, 0.0, 0.0)).depth == 0.5
+    for wrong, told in (({"depth": 3.0}, "a number between 0 and 2 m"), ({"weight": "much"}, "weight is 'much'")):
+        with pytest.raises(InputError, match=told):
+            kind("right_palm", (0.0, 0.0, 0.0), **wrong)
 
 
 def test_values_are_kept_in_the_form_in_which_they_are_used() -> None:

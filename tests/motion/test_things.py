@@ -153,3 +153,25 @@ def test_wrong_things_are_refused_before_anything_is_computed() -> None:
         wb.retarget(motion, figure, scene, things={"bux": track})
     with pytest.raises(InputError, match="frame 1"):
         wb.retarget(motion, figure, scene, things={"box": [track[0], (0.0, np.nan, 0.0), *track[2:]]})
+
+
+@pytest.mark.parametrize("stature", [1.5, 1.75])
+def test_people_of_other_sizes_sit_on_the_seat_of_the_recording(stature: float) -> None:
+    motion = person(8)
+    local = np.tile(np.eye(3), (8, len(motion.names), 1, 1))
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        local[:, motion.names.index(f"{side}_hip")] = pin.utils.rotate("y", -0.5 * np.pi)
+        local[:, motion.names.index(f"{side}_knee")] = pin.utils.rotate("y", 0.5 * np.pi)
+        local[:, motion.names.index(f"{side}_shoulder")] = pin.utils.rotate("x", -1.3 * sign)
+    root = np.tile([0.0, 0.0, 0.51], (8, 1))
+    motion = SkeletonMotion.moved(motion.names, motion.parents, motion.offsets, local, root, 1 / 30, "sitting")
+    figure, top = wb.load("human", stature=stature), 0.37
+    scene = wb.Scene(figure).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Box((0.4, 0.45, 0.05)), name="seat", at=(-0.02, 0.0, top - 0.025))
+    clip = wb.retarget(motion, figure, scene)
+    assert wb.check(clip, scene).free
+    seat = [
+        each for each in scene.contacts(clip.q[-1], within=2e-3).pair if "seat" in {scene.piece_owner[k] for k in each}
+    ]
+    assert seat  # the pelvis or the thighs are on it
+    assert np.ptp(clip.q[:, :3], axis=0).max() < 1e-3

@@ -6,6 +6,7 @@ The page on the person states these figures. Rotations are those of pinocchio's 
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 import pinocchio as pin
@@ -46,10 +47,15 @@ def arms(scene: wb.Scene) -> Array:
     return np.array(found)
 
 
+@cache
+def scratch(figure: wb.Figure) -> pin.Data:
+    return figure.model.createData()
+
+
 def turn(figure: wb.Figure, q: Array, ball: str) -> Array:
     """(3, 3) rotation of the last of a ball joint's hinges against what carries the first."""
     ids = [figure.joint_id(f"{ball}_{name}") for name in BALLS[ball]]
-    data = figure.model.createData()
+    data = scratch(figure)
     pin.forwardKinematics(figure.model, data, q)
     return np.asarray(data.oMi[figure.model.parents[ids[0]]].rotation.T @ data.oMi[ids[-1]].rotation)
 

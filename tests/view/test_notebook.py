@@ -15,7 +15,7 @@ import wholebody as wb
 from wholebody.view import page
 from wholebody.view.browser import Browser
 
-PLAYER = "id=&quot;player&quot; type"
+PLAYER = "data-part=&quot;player&quot; type=&quot;application/octet-stream&quot;&gt;H4s"  # how packed data begins
 
 
 class Kernel:
@@ -36,7 +36,7 @@ class Kernel:
 def kernel(monkeypatch: pytest.MonkeyPatch) -> Kernel:
     made = Kernel()
     monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: made))
-    monkeypatch.setattr(page, "_carrier", ("", ""))
+    monkeypatch.setattr(page, "_carriers", {})
     return made
 
 
@@ -63,6 +63,27 @@ def test_the_first_cell_has_the_player_whenever_it_is_run(kernel: Kernel, viewer
 
 def test_without_a_kernel_every_scene_has_the_player(viewers: list[wb.Viewer]) -> None:
     assert all(PLAYER in viewer._repr_html_() for viewer in viewers)
+
+
+def test_a_second_view_of_a_person_has_no_skin_of_its_own(kernel: Kernel) -> None:
+    """But again where the cell that had it shows it no more."""
+    scene = wb.Scene(wb.load("human"))
+    with wb.Viewer(scene) as viewer:
+        viewer.show(scene.figure.neutral)
+        sizes = []
+        for cell, run in (("a", "1"), ("b", "2"), ("b", "3"), ("a", "4")):
+            kernel.run(cell, run)
+            sizes.append(len(viewer._repr_html_()))
+        with wb.Viewer(wb.Scene(wb.load("hand"))) as other:
+            other.show(wb.load("hand").neutral)
+            kernel.run("a", "5")
+            other._repr_html_()
+        kernel.run("b", "6")
+        sizes.append(len(viewer._repr_html_()))
+    whole, second, again, first, anew = sizes
+    assert max(second, again) < 100_000
+    assert first == whole > 10 * second
+    assert second + 300_000 < anew < whole  # the skin, without the player
 
 
 @pytest.mark.browser

@@ -47,14 +47,18 @@ TOGETHER = (
 Each module has a function `compiled_kernel`, which compiles or loads its loops.
 """
 
-LONGEST = "wholebody.terms.linearisation"
-"""Half of what a first solve compiles, and the last."""
+BESIDE = {
+    "wholebody.terms.linearisation": "wholebody.terms.kernel",
+    "wholebody.methods.qp.subproblem": "wholebody.methods.qp.subproblem_kernel",
+}
+"""What a first solve needs last, half of what it compiles: modules of `TOGETHER`, and where their loops are."""
 
 LOOPS = tuple(name for names in TOGETHER for name in names)
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 _compiling = {"depth": 0, "since": 0.0, "seconds": 0.0, "collects": True, "alone": False}
+_beside: list[subprocess.Popen[bytes]] = []
 
 
 def compiled(*, inner: bool = False, **options: Any) -> Callable[[F], F]:
@@ -107,14 +111,15 @@ def compile_in_processes(processes: int, groups: Sequence[Sequence[str]] = TOGET
 
 
 def compile_beside() -> None:
-    """Let another process compile the longest loop, which a first solve needs last, unless there is one core."""
+    """Let another process compile what is needed last, unless there is one core or this process is itself another's."""
     if _compiling["alone"] or usable_cores() < 2 or parent_process() is not None:
         return
     with suppress(OSError):  # no process may be started here
         nothing = subprocess.DEVNULL
         child = subprocess.Popen(
-            [sys.executable, "-m", __name__, LONGEST], stdin=nothing, stdout=nothing, stderr=nothing
+            [sys.executable, "-m", __name__, *BESIDE], stdin=nothing, stdout=nothing, stderr=nothing
         )
+        _beside.append(child)
         atexit.register(child.kill)
 
 
@@ -165,6 +170,13 @@ def _loop_type() -> Any:
     class Loop(CPUDispatcher):  # type: ignore[misc]
         def enable_caching(self) -> None:
             self._cache = Kept(self.py_func)
+
+        def compile(self, sig: Any) -> Any:
+            if _beside and self.__module__ in BESIDE.values() and isinstance(self._cache, Kept):
+                # another process compiles it: what it keeps is read, sooner than compiling it here too would end
+                while _beside[0].poll() is None and self._cache.load_overload(sig, self.targetctx) is None:
+                    time.sleep(0.05)
+            return super().compile(sig)
 
         def get_call_template(self, args: Any, kws: Any) -> Any:
             args = tuple(unliteral(kind) for kind in args)

@@ -179,10 +179,13 @@ def _names(kind: Any) -> tuple[str, ...]:
 
 def _hints(kind: Any) -> Iterator[tuple[Field[Any], Any]]:
     """The fields that are given, with their annotations; those of each class are read in its module."""
-    owners = {name: base for base in reversed(kind.__mro__) for name in vars(base).get("__annotations__", ())}
     for field in fields(kind):
         if field.init:
             one = SimpleNamespace(__annotations__={field.name: field.type})
-            scope = getattr(sys.modules.get(owners[field.name].__module__), "__dict__", {})
+            # the first class that has it; from Python 3.14 on a class need not have its annotations
+            having = (
+                base for base in reversed(kind.__mro__) if field in vars(base).get("__dataclass_fields__", {}).values()
+            )
+            scope = getattr(sys.modules.get(next(having).__module__), "__dict__", {})
             with suppress(NameError):  # what only a type checker resolves asks for nothing
                 yield field, get_type_hints(one, scope, include_extras=True)[field.name]

@@ -25,7 +25,7 @@ from wholebody.dynamics.frame import EngineFrame
 from wholebody.dynamics.pieces import HUMAN
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
 from wholebody.dynamics.step_program import SKIN
-from wholebody.geometry.contact_rows import ContactRowBuilder
+from wholebody.geometry.contact_rows import ContactRowBuilder, compiled_kernel
 from wholebody.scene.matter.materials import surface
 from wholebody.scene.scene import Scene
 
@@ -82,6 +82,7 @@ class Articulated:
         free = [joint for joint in self._model.joints if joint.nq == joint.nv == 1]
         self._limited: Indices = np.array([(joint.idx_q, joint.idx_v) for joint in free], dtype=np.intp).reshape(-1, 2)
         impulse_kernel.compiled_kernel()
+        compiled_kernel()
 
     def advance(self, tracked: Array, dt: float, moved: Moved, segments: Mapping[str, int]) -> None:
         """Go on by a frame, towards the tracked posture (nq,) at its end; the things go on with it."""

@@ -110,10 +110,10 @@ def turn_freely(rotation: Array, inertia: Array, inverse: Array, spin: Array, ti
             for k in range(3):
                 turn[k] = 0.5 * change / square * pull[k]
             _turned(turn, now, middle)
-            now[:] = middle
+            _copy(middle, now)
             _spin(now, inverse, momentum, spin)
         _orthonormal(now)
-        rotation[:] = now
+        _copy(now, rotation)
 
 
 @compiled(inner=True)
@@ -163,7 +163,15 @@ def drift(bodies: Bodies, pushed: Mask, gravity: Array, time: float) -> None:
             for k in range(3):
                 turn[k] = time * bodies.twist[b, 3 + k]
             _turned(turn, bodies.rotation[b], now)
-            bodies.rotation[b] = now
+            _copy(now, bodies.rotation[b])
+
+
+@compiled(inner=True)
+def _copy(source: Array, target: Array) -> None:
+    """Copy a rotation number by number: for `target[:] = source` numba compiles how Python writes strings."""
+    for i in range(3):
+        for k in range(3):
+            target[i, k] = source[i, k]
 
 
 @compiled()
@@ -175,7 +183,7 @@ def displace(bodies: Bodies, way: Array) -> None:
             for k in range(3):
                 bodies.position[b, k] += way[b, k]
             _turned(way[b, 3:], bodies.rotation[b], now)
-            bodies.rotation[b] = now
+            _copy(now, bodies.rotation[b])
 
 
 @compiled()

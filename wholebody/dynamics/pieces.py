@@ -12,7 +12,7 @@ from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
 from wholebody.base.errors import InputError
 from wholebody.dynamics import motion_kernel
-from wholebody.geometry.contact_rows import ContactRowBuilder
+from wholebody.geometry.contact_rows import ContactRowBuilder, compiled_kernel
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 from wholebody.scene.matter.body import MassProperties, mass_properties
@@ -212,6 +212,7 @@ class ContactFinder:
         # six points of a contact beside its witness points: a box on a box has four, two crossed planks have six;
         # normals within 0.1 rad are the same: coal's are off by some 0.02 rad where pieces are 50 um apart
         self._rows = ContactRowBuilder(pieces.table, 6, 0.995)
+        compiled_kernel()  # not in the middle of a motion
         self._bodies = pieces.body[pieces.table.pairs]
 
     @property

@@ -59,7 +59,6 @@ class ContactRowBuilder:
             flat[table.pairs].all(axis=1), table.joint, lengths, table.points, table.first_point, table.faces,
             table.first_face, table.radius, table.axis,
         )  # fmt: skip
-        self._kernel = compiled_kernel()
 
     def rows(self, contacts: Contacts, clearance: Array | float = 0.0) -> ContactRows:
         """Rows of all contacts among the same pieces, to which `clearance` metres are asked, (k,) or one for all.
@@ -76,7 +75,7 @@ class ContactRowBuilder:
         wrench, gap = np.empty((most, 6)), np.empty(most)
         contact, joints = np.empty(most, dtype=np.intp), np.empty((most, 2), dtype=np.intp)
         asked = np.full(contacts.distance.shape, clearance, dtype=float)  # not a view: numba takes it for another type
-        count: int = self._kernel.contact_rows(contacts[:], asked, self.arrays, (wrench, gap, contact, joints))
+        count: int = compiled_kernel().contact_rows(contacts[:], asked, self.arrays, (wrench, gap, contact, joints))
         return ContactRows(
             gap[:count].copy(), wrench[:count].copy(), contact[:count].copy(), joints[:count, 0].copy(),
             joints[:count, 1].copy(),

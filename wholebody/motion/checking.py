@@ -142,11 +142,16 @@ class ClipCheck(Shown):
         )
 
     def plot(self) -> Any:
-        """Draw the depth of the eight deepest pairs over time, a matplotlib figure; of a free clip all at zero."""
+        """Draw the depth of the eight deepest pairs over time, a matplotlib figure; of a free clip none.
+
+        Between two frames stands the greatest depth of the motion from one to the other.
+        """
         chart, axes = new_chart(1, 1, (8.0, 2.6))
-        axis, times = axes[0, 0], self.clip.times
+        axis, times = axes[0, 0], 0.5 * self.clip.dt * np.arange(2 * len(self.clip) - 1)
         for each in self.contacts[:8]:
-            axis.plot(times, 1e3 * each.depth, label=plain(each.names))
+            depth = np.empty(len(times))
+            depth[::2], depth[1::2] = each.depth, each.between
+            axis.plot(times, 1e3 * depth, label=plain(each.names))
         axis.axhline(1e3 * self.tolerance, color="0.6", linestyle="--", label="tolerance")
         axis.set(xlabel="time [s]", ylabel="depth [mm]", xlim=(0.0, max(self.clip.duration, self.clip.dt)))
         chart.legend(loc="outside right upper", fontsize="x-small")

@@ -40,7 +40,7 @@ class Clip(Shown):
         dt: seconds from frame to frame.
         name: name of the clip in messages and files.
         things: name to placements (n, 7) of what moves beside the figure, such as a box that it carries: x, y, z,
-            metres, and a quaternion x, y, z, w. `wb.check` moves the things of its scene so.
+            metres, and a quaternion x, y, z, w. `wb.check` moves its scene so; of files only .npz has them.
 
     Raises:
         InputError: no frame, another number of values than the figure has, a value that is not finite, a quaternion
@@ -301,7 +301,7 @@ class Clip(Shown):
                 axes[0, 0].plot(
                     self.times, self.q[:, one.idx_q + k], label=plain(name if one.nq == 1 else f"{name}[{k}]")
                 )
-        axes[0, 0].set(xlabel="time [s]", ylabel="joint [rad, m]", title=plain(self.name))
+        axes[0, 0].set(xlabel="time [s]", ylabel="value [rad, m]", title=plain(self.name))
         chart.legend(loc="outside right upper", fontsize="x-small")
         return chart
 

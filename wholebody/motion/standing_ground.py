@@ -107,22 +107,32 @@ class Ground:
     def chart(self, path: str | os.PathLike[str]) -> str:
         """Draw footholds seen from above and their heights over time into a picture; returns its path."""
         from matplotlib.figure import Figure as Drawing
+        from matplotlib.transforms import ScaledTranslation
 
         target = checked_target(path, "chart: path", "a chart", (".png", ".svg", ".pdf"))
-        drawing = Drawing(figsize=(10, 6), layout="constrained")
-        seen, timed = drawing.subplots(1, 2)
+        drawing = Drawing(figsize=(9, 6), layout="constrained")
+        seen, timed = drawing.subplots(2, 1)
         for number, role in enumerate(self.rests):
             mine = [each for each in self.footholds if each.role == role]
             if not mine:
                 continue
             color, places = f"C{number}", np.array([each.place for each in mine])
-            seen.scatter(places[:, 0], places[:, 1], color=color, label=role, s=12)
+            seen.scatter(places[:, 0], places[:, 1], color=color, label=role.replace("_", " "), s=20)
+            # what rests at one height at one time lies beside each other
+            beside = ScaledTranslation(0.0, 5.0 * number / 72.0, drawing.dpi_scale_trans)
             for each in mine:
                 times = self.dt * np.array([each.first, each.end])
-                timed.plot(times, 2 * [each.height], color=color, linewidth=3)
-        seen.set(xlabel="x [m]", ylabel="y [m]", aspect="equal", title="footholds from above")
-        timed.set(xlabel="time [s]", ylabel="height of the ground [m]", title="rests")
-        seen.legend(fontsize=7)
+                timed.plot(times, 2 * [each.height], color=color, linewidth=3, transform=timed.transData + beside)
+        heights = [each.height for each in self.footholds] or [0.0]
+        seen.set(xlabel="x [m]", ylabel="y [m]", title="footholds from above")
+        seen.set_aspect("equal", adjustable="datalim")
+        timed.set(
+            xlabel="time [s]", ylabel="height of the ground [m]", title="when each part rests, and at what height"
+        )
+        timed.set_ylim(min(heights) - 0.1, max(heights) + 0.1)  # lines that are moved count for no limits
+        timed.set_xlim(0.0, self.dt * max([1, *(each.end for each in self.footholds)]))
+        if self.footholds:
+            drawing.legend(loc="outside right upper", fontsize="small")
         drawing.savefig(target)
         return os.fspath(target)
 

@@ -202,7 +202,9 @@ def balls(tables: Array, places: Integers, q: Array, measure: Array, squares: Ar
                 part[0, j] = cosine * a + sine * (y * c - z * b) + along * x
                 part[1, j] = cosine * b + sine * (z * a - x * c) + along * y
                 part[2, j] = cosine * c + sine * (x * b - y * a) + along * z
-            turn[:] = part
+            for i in range(3):
+                for j in range(3):
+                    turn[i, j] = part[i, j]
             at[k] = places[e, 3 + k]
         for i in range(3):
             for j in range(3):

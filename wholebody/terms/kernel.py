@@ -228,12 +228,13 @@ def _mass_centers(
         first, last, end = entries[begin, 1], entries[begin, 2], begin
         while end < len(tables) and entries[end, 1] == first and entries[end, 2] == last:
             end += 1
-        whole[:] = moment[0]
+        for i in range(4):
+            whole[i] = moment[0, i]
         if first > 1 or last < count:
             whole[:] = 0.0
             for j in range(first, last):
-                if parents[j, 0] == 0:
-                    whole += moment[j]
+                for i in range(4 if parents[j, 0] == 0 else 0):
+                    whole[i] += moment[j, i]
         total = whole[0]
         for e in range(begin, end):
             inner = tables[e, 0] * whole[1] + tables[e, 1] * whole[2] + tables[e, 2] * whole[3]

@@ -7,7 +7,10 @@ import gzip
 import html
 import importlib.util
 import sys
+from collections.abc import Iterable
 from functools import lru_cache
+from hashlib import sha256
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -46,26 +49,30 @@ body {{ margin: 0; background: #dfe3e7; }}
 """
 
 
+LARGE = 2_000  # bytes of a command that scenes of a notebook share
+
 _UNPACK = """
 (async function () {
   async function unpacked(packed) {
     packed = Uint8Array.from(atob(packed), c => c.charCodeAt(0));
     return new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
   }
-  const text = id => document.getElementById(id)?.textContent;
   const around = (() => { try { parent.document; return parent; } catch { return window; } })();
-  async function player() { // of this page, or of the first scene in the notebook around it
-    const wait = document.createElement("p");
-    for (let tries = 0; !text("player") && !around.wholebodyPlayer; tries++) {
-      wait.textContent = "The player is in the first scene of this notebook: scroll to it, or run its cell again.";
+  const known = around.wholebodyParts ??= {};
+  async function part(script) { // of this page, or of a scene before it in the notebook around it
+    const name = script.dataset.part, wait = document.createElement("p");
+    known[name] = script.textContent || known[name];
+    for (let tries = 0; !known[name]; tries++) {
+      wait.textContent = "A part is in the first scene of this notebook: scroll to it, or run the cells again.";
       if (tries === 10) document.body.prepend(wait);
       await new Promise(done => setTimeout(done, 200));
     }
     wait.remove();
-    return around.wholebodyPlayer = text("player") || around.wholebodyPlayer;
+    return unpacked(known[name]);
   }
-  window.picture = new Uint8Array(await unpacked(text("picture")));
-  for (const text of new TextDecoder().decode(await unpacked(await player())).split("\\0")) {
+  const [player, ...scene] = document.querySelectorAll("script[data-part]");
+  window.picture = new Uint8Array(await new Blob(await Promise.all(scene.map(part))).arrayBuffer());
+  for (const text of new TextDecoder().decode(await part(player)).split("\\0")) {
     const script = document.createElement("script");
     script.textContent = text;
     document.body.append(script);
@@ -81,23 +88,35 @@ def live_page(title: str = "wholebody") -> str:
 
 def static_page(commands: list[Command], title: str = "wholebody") -> str:
     """HTML of a page that contains its scene, compressed, and makes no network requests."""
-    scene = _data("picture", bundle([command.payload for command in commands]))
-    return _page(title, scene + player() + _script(_UNPACK))
+    return _page(title, player() + _data("scene", _bundled(commands)) + _script(_UNPACK))
 
 
-_carrier = ("", "")  # the cell of a notebook whose output has the player, and the run of it that put it there
+_carriers: dict[str, tuple[str, str]] = {}
+"""Of each part that scenes share: the cell of a notebook whose output has it, and the run of it that put it there."""
 
 
 def notebook_frame(commands: list[Command], title: str = "wholebody") -> str:
-    """HTML of a frame with a scene for a notebook's cell; the first has the player, others take it from there."""
-    global _carrier
+    """HTML of a frame with the page of a scene, for the output of a notebook's cell.
+
+    The first cell that shows a scene has the player, whenever it is run; the frames of the others take it from there.
+    So they do with what is large and the same, such as a person's skin.
+    """
     cell = _cell()
-    shared = cell is not None and _carrier[0] != "" and (cell[0] != _carrier[0] or cell == _carrier)
-    if cell is not None and not shared:
-        _carrier = cell
-    page = static_page(commands, title)
-    page = html.escape(page.replace(player(), "") if shared else page, quote=True)
+    for name, carrier in [*_carriers.items()]:
+        if cell is not None and carrier[0] == cell[0] and carrier != cell:  # what an earlier run of this cell had
+            del _carriers[name]
+    parts = [player() if _is_first(cell, "player") else _data("player")]
+    for large, some in groupby(commands, lambda command: len(command.payload) > LARGE):
+        content = _bundled(some)
+        name = sha256(content).hexdigest()[:16] if large else f"scene {len(parts)}"
+        parts.append(_data(name, content if not large or _is_first(cell, name) else None))
+    page = html.escape(_page(title, "".join(parts) + _script(_UNPACK)), quote=True)
     return f'<iframe srcdoc="{page}" style="width: 100%; height: 480px; border: 0"></iframe>'
+
+
+def _is_first(cell: tuple[str, str] | None, name: str) -> bool:
+    """Whether a part is in no output of the notebook yet, so that this cell has it from now on."""
+    return cell is None or (name not in _carriers and _carriers.setdefault(name, cell) == cell)
 
 
 def _cell() -> tuple[str, str] | None:
@@ -128,9 +147,14 @@ def _script(text: str) -> str:
     return f"<script>{text}</script>\n"
 
 
-def _data(name: str, content: bytes) -> str:
-    packed = base64.b64encode(gzip.compress(content, mtime=0)).decode("ascii")
-    return f'<script id="{name}" type="application/octet-stream">{packed}</script>\n'
+def _bundled(commands: Iterable[Command]) -> bytes:
+    return bundle([command.payload for command in commands])
+
+
+def _data(name: str, content: bytes | None = None) -> str:
+    """A part of a page; without content it is taken from another scene of the notebook."""
+    packed = "" if content is None else base64.b64encode(gzip.compress(content, mtime=0)).decode("ascii")
+    return f'<script data-part="{name}" type="application/octet-stream">{packed}</script>\n'
 
 
 def _page_script() -> str:

@@ -14,7 +14,7 @@ from wholebody.base.files import make_folder
 from wholebody.bench.rows import Panel, Row, across, chart, only, report, texts
 from wholebody.bench.tables import machine, write_rows
 from wholebody.cli.bench.command import Chart, listed, measuring, publish
-from wholebody.cli.command import count, option
+from wholebody.cli.command import count, flag, option
 
 
 def chosen(wanted: Sequence[str] | None, known: Iterable[str], flag: str) -> tuple[str, ...]:
@@ -205,6 +205,8 @@ def _world(arguments: argparse.Namespace) -> dict[str, Iterable[Row]]:
     "was read, the sentence by which the rest is refused, the errors of bones, and the processor's time.",
     option("folder", type=Path, metavar="FOLDER", help="of the files"),
     count("--frames", 60, "frames of each recording that are retargeted"),
+    flag("--compare", "recordings alone (BVH): by wholebody, and by mink frame by frame with GMR's weights"),
+    listed("--figure", "with --compare: figures that follow (default: the person)", "FIGURE"),
 )
 def files(arguments: argparse.Namespace) -> int:
     """Read; 1 where a file ends in anything but an answer or a sentence."""
@@ -212,6 +214,10 @@ def files(arguments: argparse.Namespace) -> int:
 
     if not arguments.folder.is_dir():
         raise InputError(f"{arguments.folder}: is no folder; give one with files")
+    if arguments.compare:
+        return _compared(arguments)
+    if arguments.figure is not None:
+        raise InputError("--figure is for --compare; recordings are read for the person")
     rows = []
     for row in read(arguments.folder, 5 if arguments.quick else arguments.frames):
         rows.append(row)
@@ -222,3 +228,23 @@ def files(arguments: argparse.Namespace) -> int:
     about += f"retargeted, {sum(error < 5.0 for error in known)} of them with a median error of bones below 5 degrees."
     publish("files", report(about, {"": rows}, facts), arguments, facts=facts, tables={"files": rows}, page=None)
     return int(any(row["read"] == "FAULT" for row in rows))
+
+
+def _compared(arguments: argparse.Namespace) -> int:
+    """Follow recordings by both tools; figures of files may go about freely."""
+    from wholebody.bench.measure.retargeting import compare, totals
+    from wholebody.figures import load
+
+    names = arguments.figure or ["human"]
+    figures = [load(name, root="free") if Path(name).suffix == ".urdf" else load(name) for name in names]
+    rows = []
+    for row in compare(arguments.folder, figures, 20 if arguments.quick else arguments.frames):
+        rows.append(row)
+        print(
+            f"{row.case}, {row.tool}: {', '.join(f'{name} {value}' for name, value in row.figures.items())}", flush=True
+        )
+    facts = machine() | {"frames": str(arguments.frames)}
+    tables = {"All clips": totals(rows), "Each": rows}
+    text = report(texts()["clips"], tables, facts)
+    publish("clips", text, arguments, facts=facts, tables={"clips": rows}, page=None)
+    return 0

@@ -7,6 +7,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.compiled import compiled
 from wholebody.methods.qp.closed_form_kernel import BRANCHES, SLACK, Arm, branches, within
+from wholebody.methods.qp.dense_kernel import copy
 
 
 @compiled(error_model="numpy")
@@ -27,16 +28,19 @@ def along(
     while high - low > 1e-6:
         new = 0 if effort[0] <= effort[1] else 1
         if new == 0:
-            high, at[1], effort[1], posture[1] = at[1], at[0], effort[0], posture[0]
+            high, at[1], effort[1] = at[1], at[0], effort[0]
+            copy(posture[0], posture[1])
             at[0] = high - golden * (high - low)
         else:
-            low, at[0], effort[0], posture[0] = at[0], at[1], effort[1], posture[1]
+            low, at[0], effort[0] = at[0], at[1], effort[1]
+            copy(posture[1], posture[0])
             at[1] = low + golden * (high - low)
         effort[new] = beside(arm, goal, limits, nearest, at[new], q, posture[new])
     for side in range(2):
         if effort[side] < best:
-            best, end[:] = effort[side], posture[side]
-    q[:] = end
+            best = effort[side]
+            copy(posture[side], end)
+    copy(end, q)
     return best
 
 
@@ -55,5 +59,5 @@ def beside(
             best, chosen, most = away, b, effort
     if chosen < 0:
         return np.inf
-    posture[:] = found[0, chosen]
+    copy(found[0, chosen], posture)
     return most

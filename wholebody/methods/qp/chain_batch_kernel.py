@@ -9,6 +9,7 @@ from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
 from wholebody.methods.qp.chain_kernel import Chain, Goals, Room, reach
 from wholebody.methods.qp.closed_form_kernel import BRANCHES, Arm, foreseen, sampled
+from wholebody.methods.qp.dense_kernel import copy
 
 
 @compiled(error_model="numpy", nogil=True)
@@ -46,8 +47,10 @@ def reach_all(
                 number = sampled(arm, tables[p, 0], limits, nearest[p], branch[:v], effort[:v], order)
                 for k in range(number):
                     at, b = order[k] // BRANCHES, order[k] % BRANCHES
-                    seeds[k], expected[k] = branch[at, b], foreseen(effort[:v], at, b)
+                    copy(branch[at, b], seeds[k])
+                    expected[k] = foreseen(effort[:v], at, b)
         taken = reach(chain, one, room, seeds[:number], nearest[p], asked, expected, met)
         counts[p] = taken if taken <= most else -1
         for k in range(min(taken, most)):
-            ends[p, k], found[p, k] = seeds[k], met[k]
+            copy(seeds[k], ends[p, k])
+            copy(met[k], found[p, k])

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
-from wholebody.methods.qp.dense_kernel import solve
+from wholebody.methods.qp.dense_kernel import copy, solve
 from wholebody.terms.entries import Integers
 from wholebody.terms.residual_kernel import residuals
 
@@ -97,7 +97,7 @@ def reach(
             asked_of = tolerance, CLEARLY * best if asked[4] > 0.0 else np.inf
             found[k, 3] += _least_effort(chain, goals, room, q, nearest, asked_of, found[k])
             if found[k, 2] == 0.0:
-                q[:] = before
+                copy(before, q)
         if found[k, 2] >= 0.0:
             found[k, 1] = 0.0
             for i in range(len(q)):

@@ -14,6 +14,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
+from wholebody.methods.qp.dense_kernel import copy
 
 CROSSING, PARALLEL, THREE_PARALLEL = range(3)
 """Axes 4 to 6 cross in o_6, and axes 1 and 2 in o_1, or axes 2 and 3 are parallel; or axes 2 to 4 are parallel, and
@@ -212,7 +213,8 @@ def branches(arm: Arm, goal: Array, values: Array, found: Array) -> None:
     _target(arm, goal, place, asked)
     for number in range(len(values)):
         k = 0
-        place[:] = asked
+        for i in range(4):
+            copy(asked[i], place[i])
         for i in range(len(arm.joints)):
             axis, point = _vector(arm.axes, i), _vector(arm.points, i)
             if i == arm.held:  # e_i e_j ... = (e_i e_j e_i^-1) ... e_i: those behind it are turned as it is

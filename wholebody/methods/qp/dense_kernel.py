@@ -21,6 +21,13 @@ def dot(a: Array, b: Array) -> float:
 
 
 @compiled(inner=True)
+def copy(source: Array, target: Array) -> None:
+    """Copy a vector number by number: for `target[:] = source` numba compiles how Python writes strings."""
+    for i in range(len(target)):
+        target[i] = source[i]
+
+
+@compiled(inner=True)
 def add(factor: float, row: Array, total: Array) -> None:
     """Add a multiple of a row to a vector, in place."""
     for i in range(len(total)):

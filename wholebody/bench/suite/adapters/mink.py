@@ -104,7 +104,7 @@ class _MinkStepper(TaskStepper):
     def _made_limits(self) -> list[Any]:
         mink, problem, model, loop = self._package, self._problem, self._mujoco, self._loop
         figure = problem.scene.figure
-        self._order = _Order(figure, model)
+        self._order = Order(figure, model)
         most, reach = longest_moves(figure, loop.longest), size(figure)
         speeds = {name: float(most[figure.dofs([name])[0]]) for name in figure.joints}
         limits = [mink.ConfigurationLimit(model, gain=1.0), mink.VelocityLimit(model, speeds)]
@@ -131,7 +131,7 @@ def _root_limit(mink: Any, model: Any, speed: float, turn: float) -> Any:
     return mink.FreeJointVelocityLimit(model, speed, turn, joint_name="root_joint")
 
 
-class _Order:
+class Order:
     """Postures in the order of MuJoCo's model, and its place `dof` (nv,) of each of our degrees of freedom."""
 
     def __init__(self, figure: Figure, model: Any) -> None:
@@ -178,7 +178,7 @@ class MinkTool(TaskTool):
         figure, pieces = track.scene.figure, track.scene.geometry.geometryObjects
         sites = {name: own_frame(figure, name) for name in (track.tip, *track.feet)}
         model = self._mujoco = mujoco.MjModel.from_xml_string(mjcf(track.scene, sites))
-        self._order = _Order(figure, model)
+        self._order = Order(figure, model)
         self.begin(track)
         apart = mink.CollisionAvoidanceLimit(
             model,
