@@ -151,6 +151,8 @@ def test_wrong_things_are_refused_before_anything_is_computed() -> None:
         wb.retarget(motion, figure, scene, things={"box": track[:3]})
     with pytest.raises(wb.WholebodyError, match="bux"):
         wb.retarget(motion, figure, scene, things={"bux": track})
+    with pytest.raises(InputError, match="floor is a half-space, which stands"):
+        wb.retarget(motion, figure, scene, things={"floor": track})
     with pytest.raises(InputError, match="frame 1"):
         wb.retarget(motion, figure, scene, things={"box": [track[0], (0.0, np.nan, 0.0), *track[2:]]})
 
