@@ -18,6 +18,7 @@ from wholebody.cli.main import main
 from wholebody.view import side_by_side
 from wholebody.view.motion_curves import motion_curves
 from wholebody.view.viewed_scene import ViewedWorld
+from wholebody.view.viewer import Viewer
 
 INSIDE = "document.querySelector('iframe').contentWindow"
 
@@ -110,7 +111,7 @@ def test_arms_on_fixed_bases_stand_beside_each_other_in_their_postures(monkeypat
         return ViewedWorld(world, *given, **named)
 
     monkeypatch.setattr(side_by_side, "ViewedWorld", viewed)
-    monkeypatch.setattr(side_by_side.Viewer, "play", lambda viewer, postures, dt: played.extend(postures))
+    monkeypatch.setattr(Viewer, "play", lambda viewer, postures, dt: played.extend(postures))
     q = np.linspace(0.1, 0.6, arm.model.nq)
     clip = wb.Clip(arm, np.tile(q, (2, 1)), 0.1, "arm")
     side_by_side.beside(None, {"before": clip, "after": clip}, wb.Scene(arm), "arms")

@@ -316,12 +316,12 @@ class Holds:
         own = self._touching.setdefault(key, self._places[key].copy())
         if stand.first in self._gone.get(number, {}):  # nothing keeps it off
             if stand.first > 0:
-                return own.copy()
+                return np.array(own)
             self._beside.add(number)  # the first frame is solved again, to where there is room for the part
             return np.asarray(own + KEPT_OFF * stand.normal)
         if number in self._beside:  # and then from there to the thing itself
             self._beside.discard(number)
-            return own.copy()
+            return np.array(own)
         off = float(stand.normal @ (at.actInv(place) - own))  # beside the place that is touched nothing moves
         return np.asarray(own + min(max(off, 0.0), KEPT_OFF) * stand.normal)
 

@@ -108,7 +108,7 @@ def _middle(clip: Clip) -> Array:
         return np.asarray(clip.q[:, :3].mean(axis=0))
     data = clip.figure.model.createData()
     pin.forwardKinematics(clip.figure.model, data, clip.q[0])
-    return np.mean([at.translation for at in data.oMi], axis=0)
+    return np.asarray(np.mean([at.translation for at in data.oMi], axis=0))
 
 
 def _bones(world: Scene, motion: SkeletonMotion, aside: float) -> dict[str, list[pin.SE3]]:
