@@ -282,20 +282,26 @@ def pen(arguments: argparse.Namespace) -> None:
 
 @measuring(
     "plans",
-    "planned motions by set, beside RRT-Connect of OMPL where it is installed",
-    "Plan the motions from the starts to the goals of problem sets with several seeds.",
-    listed("--sets", "problem sets (default: arms_among_things, clutter, passage)"),
-    count("--cases", 12, "problems a set"),
-    count("--seeds", 3, "plans of each"),
+    "planned motions by scene, beside RRT-Connect of OMPL where it is installed",
+    "Plan motions of arms, people, a G1 (in the folder WHOLEBODY_ROBOTS) and a hand with several seeds.",
+    listed("--scenes", "names of scenes (default: all)"),
+    count("--cases", 8, "questions a scene"),
+    count("--seeds", 10, "plans of each"),
 )
 def plans(arguments: argparse.Namespace) -> None:
-    """Measure plans."""
-    from tests.audits.plans import gap_row, rows
+    """Measure plans; --quick takes one question a scene with one seed."""
+    from tests.audits.plan_scenes import SCENES
+    from tests.audits.plans import rows
 
-    sets = arguments.sets or ("arms_among_things", "clutter", "passage")
+    names = chosen(arguments.scenes, SCENES, "--scenes")
     cases, seeds = (1, 1) if arguments.quick else (arguments.cases, arguments.seeds)
-    facts, found = machine(), [*rows(sets, cases, seeds), gap_row(2 if arguments.quick else 10)]
-    text = report("Motions from starts to goals; lengths by the shortest of each problem.", {"": found}, facts)
+    facts, found = machine(), []
+    for row in rows(names, cases, seeds):
+        found.append(row)
+        print(
+            f"{row.case}, {row.tool}: {', '.join(f'{name} {value}' for name, value in row.figures.items())}", flush=True
+        )
+    text = report("Motions from starts to goals; lengths by the shortest of each question.", {"": found}, facts)
     publish("plans", text, arguments, facts=facts, tables={"plans": found}, page=None)
 
 

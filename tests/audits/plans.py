@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
 
 import wholebody as wb
+from tests.audits.plan_scenes import Question, questions
+from wholebody.assessment.motion import frames_passed_through
 from wholebody.base.runner import processor_time
 from wholebody.bench.rows import Row
-from wholebody.bench.suite.problem_sets.registry import problem_set
 from wholebody.planning.local_planner import Geodesics
+from wholebody.planning.planner import PASSED
 from wholebody.planning.smoothing import length
 
 RESOLUTION = 0.02  # rad: between the postures of an edge that OMPL tests; ours proves edges free
+
+ONE_END = ", one end"  # planners to the same posture: their lengths count against the shortest of all of them
 
 
 class Attempt(NamedTuple):
@@ -26,55 +30,48 @@ class Attempt(NamedTuple):
     length: float
 
 
-def gap() -> tuple[wb.Scene, Any, Any]:
-    """A person before two walls with a gap of 0.42 m between them, and the same person behind it."""
-    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor", at=(0.0, 0.0, -0.01))
-    for name, side in (("left wall", 1.0), ("right wall", -1.0)):
-        scene.add(wb.Box((0.1, 1.5, 2.2)), name=name, at=(0.9, 0.96 * side, 1.1))
-    start = scene.figure.posture("standing")
-    end = start.copy()
-    end[0] += 1.8
-    return scene, start, end
-
-
-def gap_row(seeds: int) -> Row:
-    """The row of the person at the gap."""
-    scene, start, end = gap()
-    plans = [wb.plan(scene, start, end, seed=seed) for seed in range(seeds)]
-    least = min((plan.length for plan in plans if plan.solved), default=np.nan)
-    return _row("person at a gap", "wholebody", [Attempt(one.solved, one.seconds, one.length / least) for one in plans])
-
-
-def rows(sets: Sequence[str], cases: int, seeds: int) -> list[Row]:
-    """A row for each set and planner."""
-    found = []
-    for name in sets:
+def rows(names: Sequence[str], cases: int, seeds: int) -> Iterator[Row]:
+    """A row for each scene and planner; scenes whose files are missing say so."""
+    for name in names:
         tried: dict[str, list[Attempt]] = {}
-        for number in range(cases):
-            for planner, attempts in _attempts(name, number, seeds).items():
-                least = min((one.length for one in attempts if one.solved), default=np.nan)
-                tried.setdefault(planner, []).extend(one._replace(length=one.length / least) for one in attempts)
-        found += [_row(name, planner, attempts) for planner, attempts in tried.items()]
-    return found
+        try:
+            for question in questions(name, cases):
+                made = _attempts(question, seeds)
+                for planner, attempts in made.items():
+                    ends = (
+                        [mine for name, mine in made.items() if ONE_END in name] if ONE_END in planner else [attempts]
+                    )
+                    least = min((one.length for mine in ends for one in mine if one.solved), default=np.nan)
+                    tried.setdefault(planner, []).extend(one._replace(length=one.length / least) for one in attempts)
+        except LookupError as missing:
+            print(missing)
+        yield from (_row(name, planner, attempts) for planner, attempts in tried.items())
 
 
-def _attempts(name: str, number: int, seeds: int) -> dict[str, list[Attempt]]:
-    problem = problem_set(name).make(number, 0).problem
-    scene, given = problem.scene, problem.stated
-    ours = []
-    for seed in range(seeds):
-        plan = wb.plan(scene, problem.start, list(problem.goals), constraints=given, seed=seed)
-        ours.append(Attempt(plan.solved, plan.seconds, plan.length))
-    free = wb.Problem(scene, problem.start, goals=problem.goals, constraints=given)
-    if free.constraints or not find_spec("ompl"):
+def _attempts(asked: Question, seeds: int) -> dict[str, list[Attempt]]:
+    scene, start, goal, given = asked
+    plans = [wb.plan(scene, start, goal, constraints=given, seed=seed) for seed in range(seeds)]
+    ours = [Attempt(plan.solved, plan.seconds, plan.length) for plan in plans]
+    free = wb.Problem(scene, start, goals=goal if isinstance(goal, list) else (), constraints=given)
+    if free.constraints or scene.figure.roots or not find_spec("ompl"):
         return {"wholebody": ours}
-    return {"wholebody": ours, "ompl": _by_ompl(free, wb.solve(free).q, seeds)}
+    # OMPL looks for a way to one posture; ours to any of several that meet the goals, and beside it to the same one.
+    end = wb.solve(free).q
+    same = [wb.plan(scene, start, end, seed=seed) for seed in range(seeds)]
+    alike = [Attempt(plan.solved, plan.seconds, plan.length) for plan in same]
+    return {"wholebody": ours, f"wholebody{ONE_END}": alike, f"ompl{ONE_END}": _by_ompl(free, end, seeds)}
+
+
+def _free(problem: wb.Problem, path: list[Any]) -> bool:
+    """Whether the sweep that judges our plans finds nothing that straight motions between postures pass through."""
+    return bool(path) and not frames_passed_through(problem.scene, np.array(path), PASSED)
 
 
 def _by_ompl(problem: wb.Problem, end: Any, seeds: int) -> list[Attempt]:
     """RRT-Connect and path simplification of OMPL for a posture, whose states our compiled query tests."""
-    from ompl import base, geometric
+    from ompl import base, geometric, util
 
+    util.setLogLevel(util.LOG_NONE)
     limits, size = problem.scene.figure.limits, len(end)
     space, bounds = base.RealVectorStateSpace(size), base.RealVectorBounds(size)
     for joint, (low, high) in enumerate(zip(limits.lower, limits.upper, strict=True)):
@@ -105,14 +102,15 @@ def _by_ompl(problem: wb.Problem, end: Any, seeds: int) -> list[Attempt]:
             path = setup.getSolutionPath() if solved else None
             states = [] if path is None else [path.getState(k) for k in range(path.getStateCount())]
             places = [np.array([at[joint] for joint in range(size)]) for at in states]
-            found.append(Attempt(solved, spent, length(problem.scene.model, places) if solved else np.nan))
+            free = _free(problem, places)
+            found.append(Attempt(free, spent, length(problem.scene.model, places) if free else np.nan))
     return found
 
 
 def _row(name: str, planner: str, attempts: list[Attempt]) -> Row:
     seconds = np.array([one.seconds for one in attempts])
     ratios = np.array([one.length for one in attempts if one.solved])
-    figures = {
+    figures: dict[str, Any] = {
         "solved": f"{sum(one.solved for one in attempts)} of {len(attempts)}",
         "median s": float(np.median(seconds)),
         "p95 s": float(np.quantile(seconds, 0.95)),

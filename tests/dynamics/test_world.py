@@ -84,6 +84,33 @@ def test_an_arm_pushes_a_ball_and_never_is_in_it(planar_arm, overlap: str, give_
     assert made.time == pytest.approx(1.5)
 
 
+def test_a_ball_goes_on_from_where_half_an_overlap_has_put_it(planar_arm, monkeypatch) -> None:
+    world, scene = arm_world(planar_arm, give_way="both")
+    engine, shown, moved = world.engine, world.scene.objects["ball"].placement, 0.0
+    advance = engine.advance
+
+    def watched(*given: object) -> object:
+        nonlocal moved
+        moved = max(moved, float(np.linalg.norm(scene.objects["ball"].placement.translation - shown.translation)))
+        assert engine.placement("ball").isApprox(scene.objects["ball"].placement, 1e-9)
+        return advance(*given)
+
+    monkeypatch.setattr(engine, "advance", watched)
+    for frame in range(30):
+        shown = world.step(np.array([0.02 * frame, 0.0, 0.0])).placements["ball"]
+    assert moved > 1e-4  # by the half of an overlap
+
+
+def test_a_figure_of_springs_refuses_half_an_overlap(planar_arm) -> None:
+    scene = arm_world(planar_arm)[1]
+    soft = wb.Actuated(scene.figure)
+    with pytest.raises(wb.InputError, match=r"give_way \"both\" is for a figure without wb\.Actuated"):
+        wb.World(scene, np.zeros(3), spring=soft, give_way="both")
+    world = wb.World(scene, np.zeros(3), spring=soft)
+    with pytest.raises(wb.InputError, match=r"without wb\.Actuated"):
+        world.give_way = "both"
+
+
 def test_the_same_seed_gives_the_same_motion(planar_arm) -> None:
     runs = []
     for _ in range(2):

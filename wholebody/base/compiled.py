@@ -47,10 +47,7 @@ TOGETHER = (
 Each module has a function `compiled_kernel`, which compiles or loads its loops.
 """
 
-BESIDE = {
-    "wholebody.terms.linearisation": "wholebody.terms.kernel",
-    "wholebody.methods.qp.subproblem": "wholebody.methods.qp.subproblem_kernel",
-}
+BESIDE = {"wholebody.terms.linearisation": "wholebody.terms.kernel"}
 """What a first solve needs last, half of what it compiles: modules of `TOGETHER`, and where their loops are."""
 
 LOOPS = tuple(name for names in TOGETHER for name in names)

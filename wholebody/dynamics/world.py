@@ -124,7 +124,7 @@ class World(NotCopyable):
             spring: between tracker and figure, K 1000, R 40 and 0.4 kg by default; or a `wb.Actuated` of the figure,
                 whose joints then yield to what they meet.
             give_way: who takes an overlap of the figure with a thing that moves by itself, "figure" or "both", half and
-                half; see `FrameLoop`. A `wb.Actuated` figure yields by its springs.
+                half; see `FrameLoop`. A `wb.Actuated` figure yields by its springs, and takes "figure" alone.
 
         Raises:
             InputError: no posture near the start is free, a thing that moves by itself overlaps another thing at the
@@ -139,8 +139,9 @@ class World(NotCopyable):
         self._loop = FrameLoop(
             scene, first, overlap=overlap, dt=self.dt, seed=seed, touching=self._bodies, give_way=give_way
         )  # fmt: skip
+        _check_yielding(spring, give_way)
         self.engine = RigidBodies(scene, start=self._loop.shown) if self._bodies else None
-        self._articulated = None
+        self._articulated, self._spring = None, spring
         if isinstance(spring, Actuated):
             self._articulated, spring = Articulated(scene, self._loop.shown, spring, self.engine), None
         self._coupling = Coupling(scene.model, self._loop.shown, spring)
@@ -175,6 +176,7 @@ class World(NotCopyable):
 
     @give_way.setter
     def give_way(self, give_way: str) -> None:
+        _check_yielding(self._spring, give_way)
         self._loop.give_way = choice(give_way, GIVE_WAY, "World: give_way")
 
     @property
@@ -297,6 +299,13 @@ class World(NotCopyable):
     def _check_fresh(self) -> None:
         if self.scene.revision != self._revision:
             raise InputError("objects of the scene were added or removed; make a new world")
+
+
+def _check_yielding(spring: Spring | Actuated | None, give_way: str) -> None:
+    if isinstance(spring, Actuated) and give_way == "both":
+        raise InputError(
+            'World: give_way "both" is for a figure without wb.Actuated, whose springs say how much it yields'
+        )
 
 
 def _scene_instead(given: object) -> str:

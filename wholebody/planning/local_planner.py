@@ -14,6 +14,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 import pinocchio as pin
 
+from wholebody.assessment.posture import largest_violation
 from wholebody.base.arrays import Array, Mask
 from wholebody.geometry.continuous.motion_bounds import largest_approach
 from wholebody.methods.qp.method import QP
@@ -28,6 +29,7 @@ MARGIN = 2e-3  # m: distance that motions keep beyond the clearance, where their
 NOISE = 1e-5  # m: by which distances of one posture differ from query to query
 REACHED = 1e-3  # rad, m: difference from a posture that counts as reached by steps of the tracker
 JUMP = 1.5  # of the distance of two postures: above it their projections are on two sides of something
+ALLOWED = 1e-5  # m, rad: by which postures of a geodesic may miss constraints
 GAIN = 5e-3  # rad, m: by which a step comes nearer at least; smaller = longer motions along things
 
 
@@ -35,12 +37,19 @@ class LocalPlanner(Protocol):
     """Makes the edges of trees."""
 
     searches: ClassVar[int]  # how many paths are looked for, of which the shortest counts; more = shorter, later
+    tries: ClassVar[int]  # shortcuts in a row that fail; more = shorter paths, later
 
     def admit(self, q: Array) -> None:
         """Let motions be as near to things as the posture q (nq,) is, which is an end of the whole motion."""
 
-    def towards(self, q: Array, target: Array, most: float = np.inf) -> tuple[list[Array], bool]:
-        """Postures (nq,) from q to a target, without q, no longer than `most` rad and m, and whether it comes there."""
+    def towards(self, q: Array, target: Array) -> tuple[list[Array], bool]:
+        """Postures (nq,) of the motion from q towards a target (nq,), without q, and whether it gets there."""
+
+    def joined(self, q: Array, target: Array, most: float) -> list[Array]:
+        """Postures (nq,) of a motion from q to a target (nq,), without q, of at most so many radians and metres.
+
+        Empty where there is none.
+        """
 
     def settled(self, path: Array) -> tuple[Array, Mask]:
         """Postures (n, nq) near those of a path that keep constraints, and which of the motions between are blocked."""
@@ -50,6 +59,7 @@ class Geodesics:
     """Geodesics of Pinocchio, for figures that hold nothing."""
 
     searches: ClassVar[int] = 8
+    tries: ClassVar[int] = 30
 
     def __init__(self, problem: Problem, workspace: Workspace, resolution: float = 0.2) -> None:
         """Take a problem without constraints, and the length of a part of a motion, radians."""
@@ -68,39 +78,70 @@ class Geodesics:
 
     def free(self, q: Array) -> bool:
         """Whether a posture (nq,) keeps the distances."""
-        near = self._workspace.near_views(q, WITHIN)
-        return not (near.distance < self._required[near.number]).any()
+        return self._room(q) is not None
 
-    def towards(self, q: Array, target: Array, most: float = np.inf) -> tuple[list[Array], bool]:
+    def towards(self, q: Array, target: Array) -> tuple[list[Array], bool]:
+        """See `LocalPlanner`."""
+        motion, way = np.asarray(pin.difference(self._model, q, target)), list[Array]()
+        parts, room, here = self._parts(motion), None, q
+        for part in range(1, parts + 1):
+            there = target if part == parts else np.asarray(pin.integrate(self._model, q, part / parts * motion))
+            ahead = self._room(there)  # most motions end here, so the room at q is asked for afterwards
+            room = self._room(q) if ahead is not None and room is None else room
+            if not self._joins(here, motion / parts, room, ahead):
+                return way, False
+            way.append(there)
+            here, room = there, ahead
+        return way, True
+
+    def joined(self, q: Array, target: Array, most: float) -> list[Array]:
         """See `LocalPlanner`."""
         motion = np.asarray(pin.difference(self._model, q, target))
-        if np.linalg.norm(motion) > most:
-            return [], False
-        share = self._free_share(q, motion)
-        parts = max(1, int(np.ceil(share * np.abs(motion).max(initial=0.0) / self._resolution)))
-        shares = (share * part / parts for part in range(1, parts + 1) if share > 0.0)
-        way = [np.asarray(pin.integrate(self._model, q, part * motion)) for part in shares]
-        return ([*way[:-1], target], True) if share >= 1.0 else (way, False)
+        if np.linalg.norm(motion) > most or not self._joins(q, motion, self._room(q), self._room(target)):
+            return []
+        parts = self._parts(motion)
+        return [*(np.asarray(pin.integrate(self._model, q, k / parts * motion)) for k in range(1, parts)), target]
 
     def settled(self, path: Array) -> tuple[Array, Mask]:
         """See `LocalPlanner`."""
-        motions = [np.asarray(pin.difference(self._model, *pair)) for pair in pairwise(path)]
-        return path, np.array([self._free_share(*way) < 1.0 for way in zip(path[:-1], motions, strict=True)])
+        rooms, blocked = [self._room(q) for q in path], []
+        for k, pair in enumerate(pairwise(path)):
+            blocked.append(not self._joins(path[k], np.asarray(pin.difference(self._model, *pair)), *rooms[k : k + 2]))
+        return path, np.array(blocked)
 
-    def _free_share(self, q: Array, motion: Array) -> float:
-        """How much of the motion by a tangent (nv,) from q (nq,) keeps the required distances."""
-        speed = self._approach @ np.abs(motion) + 1e-12
-        most, free, now = WITHIN / float(speed.max(initial=1e-12)), 0.0, 0.0
-        while True:
-            near = self._workspace.near_views(np.asarray(pin.integrate(self._model, q, now * motion)), WITHIN)
-            room = near.distance - self._required[near.number]
-            if (room < 0.0).any():
-                return free
-            free = now
-            if now >= 1.0:
-                return 1.0
-            safe = (room + MARGIN) / speed[near.number]
-            now = min(now + min(most, float(safe.min(initial=np.inf))), 1.0)
+    def _parts(self, motion: Array) -> int:
+        return max(1, int(np.ceil(np.abs(motion).max(initial=0.0) / self._resolution)))
+
+    def _room(self, q: Array) -> Array | None:
+        """(pairs,) by how much distances exceed what is required at least, metres; None where one does not."""
+        near, room = self._workspace.near_views(q, WITHIN), WITHIN - self._required
+        room[near.number] = near.distance - self._required[near.number]
+        return None if (room[near.number] < 0.0).any() else room
+
+    def _joins(self, q: Array, motion: Array, room: Array | None, ahead: Array | None) -> bool:
+        return (
+            room is not None
+            and ahead is not None
+            and self._clear(q, motion, (room, ahead, self._approach @ np.abs(motion)))
+        )
+
+    def _clear(self, q: Array, motion: Array, known: tuple[Array, Array, Array]) -> bool:
+        """Whether the motion by a tangent (nv,) from q (nq,) is free, by halves, the longest ones first.
+
+        `known` (pairs,) is the room at both ends, and by how much it can change in between. The least room on the way
+        is half of what the ends have together less that change.
+        """
+        asked = [(q, motion, *known)]
+        for here, whole, first, last, change in asked:  # grows while it is read
+            if (first + last + 2.0 * MARGIN >= change).all():
+                continue
+            half = 0.5 * whole
+            middle = np.asarray(pin.integrate(self._model, here, half))
+            room = self._room(middle)
+            if room is None:
+                return False
+            asked += [(here, half, first, room, 0.5 * change), (middle, half, room, last, 0.5 * change)]
+        return True
 
 
 def holds(problem: Problem) -> bool:
@@ -116,9 +157,11 @@ class TrackedMotions:
     """
 
     searches: ClassVar[int] = 2
+    tries: ClassVar[int] = 12
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, workspace: Workspace) -> None:
         """Take a problem whose constraints and bounds hold on the way."""
+        self._geodesics = Geodesics(problem, workspace)
         self._problem = problem.with_start(problem.start)
         self._model = problem.scene.model
         self._goal = Posture(problem.start).resolve(problem.scene, problem.start)
@@ -134,13 +177,23 @@ class TrackedMotions:
 
     def admit(self, q: Array) -> None:
         """See `LocalPlanner`."""
+        self._geodesics.admit(q)
         least = np.array(self._problem.clearances)
         near = self._tracker.workspace.near(q, float(least.max(initial=0.0)) + NOISE)
         least[near.number] = np.minimum(least[near.number], np.maximum(near.distance - NOISE, 0.0))
         self._problem.clearances = self._resting.clearances = least
 
+    def joined(self, q: Array, target: Array, most: float) -> list[Array]:
+        """See `LocalPlanner`; a geodesic if it may be, as it costs a tenth of steps."""
+        way = [] if self._held else self._geodesics.joined(q, target, most)
+        states = (self._problem.scene.state(at) for at in way)
+        if way and all(largest_violation(self._problem, at) <= ALLOWED for at in states):
+            return way
+        way, met = self.towards(q, target, most)
+        return way if met else []
+
     def towards(self, q: Array, target: Array, most: float = np.inf) -> tuple[list[Array], bool]:
-        """See `LocalPlanner`."""
+        """See `LocalPlanner`; ends where the motion is longer than `most`, radians and metres."""
         way, left, gone = list[Array](), self._apart(q, target), 0.0
         self._attraction.toward(target)
         if self._held:

@@ -33,7 +33,7 @@ KEPT = 1e-4  # m, rad: by which limits, constraints and clearances may be missed
 PASSED = 5e-4  # m: overlap between two frames that counts
 OVER = 1.001  # of the limits of velocity and acceleration: the last slowing may end a little above them
 ENDS = 8  # postures that meet goals; more = ends that are reached more easily, for a solve each
-ENOUGH = 1500  # postures of all trees, after which no other search begins
+ENOUGH = 1500  # samples of all trees, after which no other search begins; more = shorter motions, later
 ROOM = 1.0  # m: by which samples move a free root along each axis
 ROUNDS = 50  # of the trees, until they get another end
 
@@ -119,7 +119,7 @@ def plan(
     found = None
     with problem.borrow() as workspace:
         tracked = bool(problem.constraints or problem.bounds or scene.figure.followers)
-        local: LocalPlanner = TrackedMotions(problem) if tracked else Geodesics(problem, workspace)
+        local: LocalPlanner = TrackedMotions(problem, workspace) if tracked else Geodesics(problem, workspace)
         ready = processor_time()  # what is compiled or built at the first plan is no part of the search
 
         def ended() -> bool:
@@ -233,19 +233,18 @@ class _Search:
         self._reached: list[Array] = []
         self._said = ""
         free_root = bool(problem.scene.figure.roots) and not holds(problem)
-        tracked = (0.0,) * free_root + (0.1, 0.3, 1.0)
-        self._spreads = tracked if isinstance(local, TrackedMotions) else (1.0,)
+        self._spreads = (0.0,) * free_root + (0.1, 0.3, 1.0)
         local.admit(problem.start)
 
     def shortest(self) -> tuple[list[Array] | None, str]:
         """The shortest of some paths, with shortcuts, and how it was found; or None and why there is none."""
-        model, best, most, size, runs = self._problem.scene.model, None, np.inf, 0, 0
-        while not runs or (runs < self._local.searches and size < ENOUGH and not self._ended()):
+        model, best, most, samples, runs = self._problem.scene.model, None, np.inf, 0, 0
+        while not runs or (runs < self._local.searches and samples < ENOUGH and not self._ended()):
             path, trees = self._path()
-            runs, size = runs + 1, size + trees.size
+            runs, samples = runs + 1, samples + trees.samples
             if path is None:
                 break
-            if not trees.size:
+            if not trees.samples:
                 return path, "the straight motion"
             path = shortcut(model, path, self._local, self._rng, self._ended)
             if (found := length(model, path)) < most:

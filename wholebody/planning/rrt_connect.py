@@ -49,28 +49,33 @@ class Tree:
 
 
 class RRTConnect:
-    """A tree from the start and one from the ends, which `local` lets grow."""
+    """A tree from the start and one from the ends, which `local` lets grow.
+
+    Attributes:
+        samples: how many they were extended towards.
+    """
 
     def __init__(self, local: LocalPlanner, model: pin.Model, start: Array) -> None:
         """Take the posture (nq,) at which the motion begins."""
         self._local = local
         self._trees = [Tree(model, start), Tree(model, start)]
         self._trees[0].add(start)
-        self._turn = 0
-
-    @property
-    def size(self) -> int:
-        """How many postures the trees have beyond their roots."""
-        return sum(tree.grown for tree in self._trees)
+        self.samples = 0
 
     def add_end(self, end: Array) -> None:
         """Add a posture (nq,) at which the motion may end."""
         self._trees[1].add(end)
 
     def grow(self, sample: Array) -> list[Array] | None:
-        """Extend trees in turn to a sample (nq,) and to what was reached: postures from start to end if they meet."""
-        here, there = self._turn, 1 - self._turn
-        self._turn = there
+        """Extend the smaller tree towards a sample (nq,), and the other one towards what was reached.
+
+        A tree in a narrow place, from which most samples are out of reach, gets them all until it is out of there.
+
+        Returns postures from the start to an end if the trees meet.
+        """
+        self.samples += 1
+        here = int(self._trees[1].grown < self._trees[0].grown)
+        there = 1 - here
         number, _ = self._extend(self._trees[here], sample)
         if number is None:
             return None

@@ -12,7 +12,6 @@ from scipy.ndimage import gaussian_filter1d
 from wholebody.base.arrays import Array
 from wholebody.planning.local_planner import LocalPlanner
 
-TRIES = 20  # shortcuts in a row that fail; more = shorter paths, later
 WORTH = 0.98  # of the length of a part: a shortcut is at most as long
 CORNER = 2.0  # points: width of the filter of what is left of corners; larger = rounder, less exact
 MIXTURES = 8  # of the filtered path and the free one; more = smoother beside things, and later
@@ -30,11 +29,11 @@ def shortcut(
 ) -> list[Array]:
     """A shorter path: parts of it are replaced by motions of the local planner, until several tries in a row fail."""
     failed = 0
-    while failed < TRIES and len(path) > 2 and not ended():
+    while failed < local.tries and len(path) > 2 and not ended():
         first, last = sorted(rng.choice(len(path), 2, replace=False).tolist())
-        way, met = local.towards(path[first], path[last], WORTH * length(model, path[first : last + 1]))
-        path = [*path[: first + 1], *way, *path[last + 1 :]] if met else path
-        failed = 0 if met else failed + 1
+        way = local.joined(path[first], path[last], WORTH * length(model, path[first : last + 1]))
+        path = [*path[: first + 1], *way, *path[last + 1 :]] if way else path
+        failed = 0 if way else failed + 1
     return path
 
 

@@ -18,7 +18,6 @@ from wholebody.dynamics.live_world import LiveWorld
 from wholebody.motion.files.gltf import triangles
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.live import LiveDrag, LiveFrame
-from wholebody.tracking.overlaps import GIVE_WAY
 from wholebody.view.style import LOOK
 from wholebody.view.viser_server import viser_server
 
@@ -182,7 +181,7 @@ class LivePage:
             self._boxes[name].on_update(partial(self._ticked, name))
         again = "start again"
         if isinstance(self.drag, LiveWorld):
-            self._give_way = gui.add_dropdown("gives way", GIVE_WAY, initial_value=self.drag.give_way)
+            self._give_way = gui.add_dropdown("gives way", self.drag.ways, initial_value=self.drag.give_way)
             self._give_way.on_update(partial(self._shared, self.drag))
         if isinstance(self.drag, LiveDrag):
             again = "undo"

@@ -63,6 +63,12 @@ def among(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     turned = number // (len(of_known.arms) * len(of_known.kinds)) % 2 == 1
     if kind == "clutter":
         return _among_random(figure, start, rng, turned)
+    return into(kind, number, rng, turned)
+
+
+def into(kind: str, number: int, rng: np.random.Generator, turned: bool = False) -> tuple[wb.Problem, Array]:
+    """The arms in turn, into furniture of a kind of `sets.toml`."""
+    figure, start = known_arm(of_known.arms[number % len(of_known.arms)])
     reach, dofs, model = _reach(figure), np.arange(figure.model.nv), figure.model
 
     def attempt() -> tuple[wb.Scene, Array] | None:
@@ -113,7 +119,7 @@ def _reach(figure: wb.Figure) -> float:
 
 
 def _furnished(figure: wb.Figure, kind: str, reach: float, rng: np.random.Generator) -> tuple[wb.Scene, Array]:
-    """A scene with a shelf, a bin or a table around an arm, and a place (3,) to reach in, over or under it."""
+    """Furniture around an arm, and a place (3,) to reach in, over or under it."""
     given = getattr(of_known, kind)
     scene, turn = floor_scene(figure), pin.utils.rotate("z", float(rng.uniform(-of_known.turn_rad, of_known.turn_rad)))
     at = pin.SE3(turn, turn @ (reach * rng.uniform(*given.at)))
