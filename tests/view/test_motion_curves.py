@@ -13,8 +13,12 @@ import pytest
 import wholebody as wb
 from tests.motion.test_retargeting import person
 from wholebody.base.errors import InputError
+from wholebody.bench.suite.stability.bodies import spatial_arm
 from wholebody.cli.main import main
+from wholebody.view import side_by_side
 from wholebody.view.motion_curves import motion_curves
+from wholebody.view.viewed_scene import ViewedWorld
+from wholebody.view.viewer import Viewer
 
 INSIDE = "document.querySelector('iframe').contentWindow"
 
@@ -64,6 +68,19 @@ def test_a_click_brings_the_film_there(browser: Any, page: str, tmp_path: Path) 
     assert browser.evaluate(f"{INSIDE}.viewer.animator.actions[0].time") == pytest.approx(0.5 * 11 / 30, abs=1e-3)
 
 
+def test_curves_of_long_recordings_are_drawn(browser: Any, page: str, tmp_path: Path) -> None:
+    """Of 24,000 frames, more values than a function of a browser takes arguments."""
+    (told,) = re.findall(r"const data = (.*);", page)[-1:]
+    data = json.loads(told)
+    data["frames"] *= 2000
+    for line in (line for chart in data["charts"] for line in chart["lines"]):
+        line["values"] *= 2000
+    file = tmp_path / "long.html"
+    file.write_text(page.replace(told, json.dumps(data)), encoding="utf-8")
+    browser.open(file.as_uri())
+    assert browser.evaluate("document.querySelectorAll('canvas').length") == 4
+
+
 def test_motions_of_other_lengths_are_refused() -> None:
     motion = person(4)
     clip = wb.retarget(motion, wb.load("human"), ground=None)
@@ -84,3 +101,33 @@ def test_the_commands_write_pages(tmp_path: Path) -> None:
     assert main(["clip", "play", str(tmp_path / "free.npz"), "--beside", str(made), "--out", str(film)]) == 0
     assert film.is_file()
     assert main(["clip", "avoid", str(made), "--html", str(out), "--stretch", "2"]) == 2
+
+
+def test_arms_on_fixed_bases_stand_beside_each_other_in_their_postures(monkeypatch: pytest.MonkeyPatch) -> None:
+    arm, worlds, played = spatial_arm(), list[wb.Scene](), list[Any]()
+
+    def viewed(world: wb.Scene, *given: Any, **named: Any) -> ViewedWorld:
+        worlds.append(world)
+        return ViewedWorld(world, *given, **named)
+
+    monkeypatch.setattr(side_by_side, "ViewedWorld", viewed)
+    monkeypatch.setattr(Viewer, "play", lambda viewer, postures, dt: played.extend(postures))
+    q = np.linspace(0.1, 0.6, arm.model.nq)
+    clip = wb.Clip(arm, np.tile(q, (2, 1)), 0.1, "arm")
+    side_by_side.beside(None, {"before": clip, "after": clip}, wb.Scene(arm), "arms")
+    own = np.asarray(arm.placement(q, "tip").translation)
+    left, right = (
+        np.asarray(worlds[0].figure.placement(played[0], f"{k}/tip").translation) for k in ("before", "after")
+    )
+    assert 0.5 * (left + right) == pytest.approx(own)
+    assert right - left == pytest.approx([0.0, side_by_side.APART, 0.0])
+
+
+def test_things_that_cannot_be_drawn_are_refused() -> None:
+    figure = wb.load("human")
+    moving = {"box": np.tile([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], (2, 1))}
+    clip = wb.Clip(figure, np.tile(figure.posture("standing"), (2, 1)), 0.1, "carries", moving)
+    with pytest.raises(wb.WholebodyError, match="side by side: scene: no thing is called 'box'"):
+        side_by_side.beside(None, {"after": clip}, wb.Scene(figure), "without")
+    with pytest.raises(InputError, match="box of carries moves; a half-space"):
+        side_by_side.beside(None, {"after": clip}, wb.Scene(figure).add(wb.HalfSpace(), name="box"), "floor")

@@ -189,6 +189,8 @@ class Holds:
         ]
         self._down: Mask | None = None
         self._places: dict[tuple[int, int], Array] = {}
+        self._touching: dict[tuple[int, int], Array] = {}  # in things' axes, before these keep parts off
+        self._beside: set[int] = set()  # points that were let go of in the first frame
         self._gone: dict[int, dict[int, float]] = {}  # by point and frame the metres to what it is to touch
 
     def lost(self, frame: int, places: Array, held: tuple[Array, Array]) -> bool:
@@ -218,13 +220,15 @@ class Holds:
                     continue
                 off = max(gone.get(frame, 0.0) for frame in range(stand.first, stand.end))
                 told.append(f"{self.points[number].role} does not reach {stand.thing} by {1e3 * off:.0f} mm at most")
-                own = self._places[number, stand.first]
+                came = self._places if reached[0] else self._touching
+                own = came[number, stand.first]
                 for part in runs(long_runs(reached, self.over)):
                     first = stand.first + part.first
                     kept.append(with_values(stand, first=first, end=stand.first + part.end))
-                    places[number, first] = own
+                    places[number, first] = own.copy()  # each part lands by itself
             self._stands[number] = kept
         self._gone.clear()
+        self._beside.clear()
         self._places = places if told else self._places  # recompute where feet come down
         return "; ".join(told)
 
@@ -301,12 +305,25 @@ class Holds:
         for number, stands in enumerate(self._stands):
             stand = next((each for each in stands if each.first == frame), None)
             if isinstance(stand, ThingContact) and self._touched is not None:
-                # beside the place that is touched nothing moves: the thing may only keep the point farther off
-                own, at = self._places[number, frame], self._touched.things.at(stand.thing, frame)
-                off = float(stand.normal @ (at.actInv(places[number]) - own))
-                own += min(max(off, 0.0), KEPT_OFF) * stand.normal
+                self._places[number, frame] = self._kept_off(number, stand, places[number])
             elif stand is not None:
                 self._places[number, frame][:2] = places[number, :2]
+
+    def _kept_off(self, number: int, stand: ThingContact, place: Array) -> Array:
+        """(3,) where a point, now at a place (3,), is held in a thing's axes: the thing may keep it farther off."""
+        assert self._touched is not None
+        key, at = (number, stand.first), self._touched.things.at(stand.thing, stand.first)
+        own = self._touching.setdefault(key, self._places[key].copy())
+        if stand.first in self._gone.get(number, {}):  # nothing keeps it off
+            if stand.first > 0:
+                return np.array(own)
+            self._beside.add(number)  # the first frame is solved again, to where there is room for the part
+            return np.asarray(own + KEPT_OFF * stand.normal)
+        if number in self._beside:  # and then from there to the thing itself
+            self._beside.discard(number)
+            return np.array(own)
+        off = float(stand.normal @ (at.actInv(place) - own))  # beside the place that is touched nothing moves
+        return np.asarray(own + min(max(off, 0.0), KEPT_OFF) * stand.normal)
 
     def _place(self, number: int, stand: Foothold | ThingContact, paths: Array, shift: Array, frame: int) -> Array:
         """(3,) where a point rests, decided when it is first asked for; on a thing, where that is in the frame."""

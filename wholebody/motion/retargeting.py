@@ -141,6 +141,8 @@ def _tracks(
     standing = [name for name, thing in scene.objects.items() if thing.segment is None]
     for name in named:
         known(name, standing, "thing", "retarget: things")
+        if isinstance(scene.objects[name].shape, HalfSpace):
+            raise InputError(f"retarget: things: {name} is a half-space, which stands; give a box that moves")
     return thing_tracks(named, len(motion), "retarget")
 
 

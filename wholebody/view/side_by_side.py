@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
+from wholebody.base.checks import known
 from wholebody.base.errors import InputError
 from wholebody.geometry.shapes import Capsule, HalfSpace
 from wholebody.motion.clip import Clip
@@ -42,8 +43,19 @@ def beside(motion: SkeletonMotion | None, clips: Mapping[str, Clip], scene: Scen
     count = len(clips) + (motion is not None)
     first = -0.5 * wide * (count - 1)  # what looks against the x axis has y on its right
     aside = {name: first + wide * (number + (motion is not None)) for number, name in enumerate(clips)}
-    world = Scene({_figure(name): clip.figure for name, clip in clips.items()})
     around = [each for each in scene.objects.values() if each.segment is None]
+    for clip in clips.values():
+        for thing in clip.things:
+            known(thing, [one.name for one in around], "thing", "side by side: scene")
+            if isinstance(scene.objects[thing].shape, HalfSpace):
+                raise InputError(f"side by side: {thing} of {clip.name} moves; a half-space is drawn where it is")
+    fixed = [name for name, clip in clips.items() if clip.figure.root == "fixed"]
+    world = Scene(
+        {
+            _figure(name): (clip.figure, (0.0, aside[name], 0.0)) if name in fixed else clip.figure
+            for name, clip in clips.items()
+        }
+    )
     for name in clips:
         for each in scene.objects.values():
             if each.segment is not None:
@@ -65,14 +77,16 @@ def beside(motion: SkeletonMotion | None, clips: Mapping[str, Clip], scene: Scen
         for thing, track in clip.things.items():
             tracks[f"{thing} by {name}"] = [pin.XYZQUATToSE3(at + np.eye(7)[1] * aside[name]) for at in track]
     viewed = ViewedWorld(world, tracks, between_things=False)
-    moved = [clip.q + np.eye(clip.q.shape[1])[1] * aside[name] for name, clip in clips.items()]
+    moved = [
+        clip.q if name in fixed else clip.q + np.eye(clip.q.shape[1])[1] * aside[name] for name, clip in clips.items()
+    ]
     parts = np.concatenate(moved, axis=1)
     postures = [
         viewed.configuration(q, {name: track[frame] for name, track in tracks.items()}) for frame, q in enumerate(parts)
     ]
     dt = next(iter(clips.values())).dt
     viewer = Viewer(viewed, title=title, contact_distance=-1e-4)  # overlaps alone are shown
-    middle = np.mean([clip.q[:, :3] for clip in clips.values()], axis=(0, 1))
+    middle = np.mean([_middle(clip) for clip in clips.values()], axis=0)
     away = 1.2 + 1.1 * wide * count
     viewer.look(tuple(middle + away * np.array([0.9, 0.1, 0.25])), tuple(middle))
     viewer.play(postures, dt)
@@ -86,6 +100,15 @@ def _figure(name: str) -> str:
 def _across(clip: Clip) -> float:
     """Metres that a clip goes to the left and right."""
     return float(np.ptp(clip.q[:, 1])) if clip.figure.root == "free" else 0.0
+
+
+def _middle(clip: Clip) -> Array:
+    """(3,) about which a clip is: its root's way, or the joints of what stands on a fixed base."""
+    if clip.figure.root == "free":
+        return np.asarray(clip.q[:, :3].mean(axis=0))
+    data = clip.figure.model.createData()
+    pin.forwardKinematics(clip.figure.model, data, clip.q[0])
+    return np.asarray(np.mean([at.translation for at in data.oMi], axis=0))
 
 
 def _bones(world: Scene, motion: SkeletonMotion, aside: float) -> dict[str, list[pin.SE3]]:
