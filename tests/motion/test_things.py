@@ -139,6 +139,8 @@ def test_things_go_with_their_clips(tmp_path: Path) -> None:
     assert clip.mirrored().things["ball"][2] == pytest.approx([1.0, -0.5, 0.0, 0.0, 0.0, -np.sin(0.5), np.cos(0.5)])
     read = wb.read_clip(clip.write(tmp_path / "ball.npz"), figure)
     assert read.things["ball"] == pytest.approx(clip.things["ball"], abs=0.0)
+    with pytest.warns(UserWarning, match="holds postures alone, without ball"):
+        clip.write(tmp_path / "ball.csv")
 
 
 def test_wrong_things_are_refused_before_anything_is_computed() -> None:
