@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.geometry.pieces import swept_points
+from wholebody.figures.postures import support
 from wholebody.geometry.shapes import HalfSpace
 from wholebody.motion.footholds import RestLimits, slow
 from wholebody.motion.skeleton import SkeletonMotion
@@ -81,10 +81,8 @@ class Things:
         track = np.array(self.tracks[name])
         lowest = np.full(len(track), np.inf)
         for shape, local, _ in self._pieces[name]:
-            swept = swept_points(shape)
-            own = swept.points @ local.rotation.T + local.translation
             for frame, at in enumerate(self._moving[name]):
-                low = float((own @ at.rotation[2]).min()) + at.translation[2] - swept.radius
+                low = -support(shape, at * local, np.array((0.0, 0.0, -1.0)))
                 lowest[frame] = min(lowest[frame], low)
         track[:, :2] *= scale
         track[:, 2] += (scale - 1.0) * np.maximum(lowest, 0.0)
