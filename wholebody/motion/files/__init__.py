@@ -41,9 +41,7 @@ def write_motion(motion: Motion, path: str | os.PathLike[str], *, bare: bool = F
     if ending != ".npz":
         one_figure(motion.figure, f"{one_line(path.name)} holds one figure, and the clip's figure")
         if motion.things:
-            warn(
-                f"{one_line(path.name)} holds postures, without {', '.join(motion.things)}, which move; write .npz"
-            )
+            warn(f"{one_line(path.name)} holds postures, without {', '.join(motion.things)}, which move; write .npz")
     return columns.write(motion, path, bare=True) if bare else WRITERS[ending](motion, path)
 
 
