@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.ergonomics.vision import COMFORTABLE
 
 FEET = [wb.Hold("left_foot"), wb.Hold("right_foot")]
 
@@ -39,6 +40,16 @@ def test_the_floor_a_metre_ahead_is_looked_at_with_eyes_down_by_thirty_degrees(s
     way = at - scene.figure.placement(q, "gaze").translation
     below = np.degrees(np.arctan2(-way[2], way[0]))
     assert below - pitch(scene, q) == pytest.approx(30.0, abs=0.1)
+
+
+@pytest.mark.parametrize("at", [(-2.0, 0.0, 1.5), (-2.0, 1.0, 1.0), (0.5, 0.0, 3.0)])
+def test_what_the_head_turned_to_is_seen(scene: wb.Scene, at: tuple[float, float, float]) -> None:
+    for view in (wb.ergonomics.FieldOfView(), COMFORTABLE):
+        solution = wb.solve(wb.Problem(scene, constraints=[wb.ergonomics.Look(at, view=view), *FEET]))
+        found = wb.ergonomics.sight(scene, solution.q, np.array(at))
+        assert solution.solved
+        assert found.seen
+    assert found.comfortable
 
 
 def test_who_sees_a_point_keeps_the_head(scene: wb.Scene) -> None:

@@ -13,6 +13,7 @@ import wholebody as wb
 from tests.motion.test_retargeting import person
 from wholebody.base.errors import InputError
 from wholebody.motion.skeleton import SkeletonMotion
+from wholebody.motion.thing_contacts import Things
 
 SIZE = (0.25, 0.30, 0.2)  # m: of the box, whose sides are 3 cm inwards of the wrists
 
@@ -92,6 +93,14 @@ def test_what_is_out_of_reach_is_said_and_let_go_of(recwarn: pytest.WarningsReco
     assert np.abs(clip.q[:, :3] - clip.q[0, :3]).max() < 0.1  # the body does not go after it
 
 
+def test_round_things_rise_by_the_scale_of_what_is_below_them() -> None:
+    scene = wb.Scene(wb.load("human")).add(wb.Ellipsoid((0.3, 0.2, 0.1)), name="egg", at=(1.0, 0.0, 1.0))
+    upright = pin.SE3ToXYZQUAT(pin.SE3(pin.utils.rotate("y", 0.5 * np.pi), np.array([1.0, 0.0, 1.0])))
+    track = np.array([[1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], upright])
+    scaled = Things(scene, {"egg": track}).scaled("egg", 0.5)
+    assert scaled[:, :3] == pytest.approx(np.array([[0.5, 0.0, 0.1 + 0.45], [0.5, 0.0, 0.3 + 0.35]]))
+
+
 def test_hands_stay_on_a_table_that_stands() -> None:
     motion, track = lifting(2)
     motion = SkeletonMotion(
@@ -139,6 +148,8 @@ def test_things_go_with_their_clips(tmp_path: Path) -> None:
     assert clip.mirrored().things["ball"][2] == pytest.approx([1.0, -0.5, 0.0, 0.0, 0.0, -np.sin(0.5), np.cos(0.5)])
     read = wb.read_clip(clip.write(tmp_path / "ball.npz"), figure)
     assert read.things["ball"] == pytest.approx(clip.things["ball"], abs=0.0)
+    with pytest.warns(UserWarning, match="holds postures, without ball"):
+        clip.write(tmp_path / "ball.csv")
 
 
 def test_wrong_things_are_refused_before_anything_is_computed() -> None:

@@ -26,6 +26,7 @@ TINY = 1e-12  # m^2, m^3: no direction is straight up or down exactly
 BLURRED = 0.05  # m: nearer points are not seen
 
 
+BORDER = 1e-3  # share by which a point may be beyond a field's border, which who turns the head meets to a tolerance
 NEAREST = 1e-3  # m: a nearer point has no direction from the eyes
 
 
@@ -110,7 +111,7 @@ class Sight:
     @property
     def seen(self) -> bool:
         """Whether the point is seen without turning the head."""
-        return self.off <= 1.0 and not self.hidden_by and self.distance >= BLURRED
+        return self.off <= 1.0 + BORDER and not self.hidden_by and self.distance >= BLURRED
 
 
 def sight(scene: Scene, q: Array, point: Array, field: FieldOfView = LARGEST, *, eyes: str = EYES) -> Sight:
@@ -146,7 +147,7 @@ def sight(scene: Scene, q: Array, point: Array, field: FieldOfView = LARGEST, *,
         return Sight(0.0, False, distance, "")
     own = tuple(eyes.removesuffix(EYES) + part for part in ("head", "neck"))  # which do not hide anything from them
     hidden = _between(scene, q, np.asarray(between.translation), target, own)
-    return Sight(field.off(local), COMFORTABLE.off(local) <= 1.0, distance, hidden)
+    return Sight(field.off(local), COMFORTABLE.off(local) <= 1.0 + BORDER, distance, hidden)
 
 
 def _between(scene: Scene, q: Array, eyes: Array, target: Array, own: tuple[str, ...]) -> str:

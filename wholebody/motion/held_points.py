@@ -23,7 +23,7 @@ from wholebody.motion.roles import Roles
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.motion.standing_ground import Foothold, Ground
 from wholebody.motion.structure import upright
-from wholebody.motion.thing_contacts import ThingContact, Things
+from wholebody.motion.thing_contacts import ThingContact, Things, thickness
 from wholebody.motion.windows import long_runs, runs
 from wholebody.scene.scene import Scene
 
@@ -37,7 +37,6 @@ FACING = 0.3  # least cosine of the angle from up to the normal of a sole that f
 FOLLOW = 0.8  # share of the body's shift that a new place keeps; the rest goes back with time
 KEPT_OFF = 0.03  # m: largest distance at which a thing keeps a point from its place of contact
 LOST = 0.02  # m: points farther than this from their place on a thing cannot reach it
-THICKEST = 0.25  # m: of a part from its joint to its skin
 OVER = 0.2  # s: in which a point goes over to where it rests
 
 
@@ -148,21 +147,6 @@ class Touched:
         into = at.rotation.T @ self.things.at(contact.thing, contact.first).rotation @ -contact.normal
         pieces = [piece for piece in self._figure.geometry.geometryObjects if piece.parentJoint == point.joint]
         return contact.place + (thickness(pieces, point.place, into) + CLEARANCE) * contact.normal
-
-
-def thickness(pieces: Sequence[pin.GeometryObject], start: Array, along: Array) -> float:
-    """Metres from a place (3,) in a joint's axes along a direction (3,) to where the last of its pieces ends."""
-    ball, request, result = coal.Sphere(1e-6), coal.DistanceRequest(), coal.DistanceResult()
-    last = 0.0
-    for piece in pieces:
-        where, far = coal.Transform3s(piece.placement.rotation, piece.placement.translation), 0.0
-        while far < THICKEST:  # goes on by the distance to the surface, inside and outside, so it misses nothing thick
-            center = coal.Transform3s(np.eye(3), start + far * along)
-            gap = float(coal.distance(ball, center, piece.geometry, where, request, result))
-            if gap < 0.0:
-                last = max(last, far - gap)
-            far += max(abs(gap), 1e-3)
-    return last
 
 
 class Holds:

@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.geometry.pieces import swept_points
+from wholebody.figures.postures import support
 from wholebody.geometry.shapes import HalfSpace
 from wholebody.motion.footholds import RestLimits, slow
 from wholebody.motion.skeleton import SkeletonMotion
@@ -26,6 +26,7 @@ NEAR = {"hand": 0.05, "wrist": 0.06, "elbow": 0.07, "knee": 0.09, "pelvis": 0.16
 """Metres from a joint of these parts to what touches the skin over it, at most; feet stand on the ground."""
 
 GOES_ON = 1.4  # times as far away as a contact may begin, it ends
+THICKEST = 0.25  # m: of a part from its joint to its skin
 
 
 class ThingContact(NamedTuple):
@@ -81,10 +82,8 @@ class Things:
         track = np.array(self.tracks[name])
         lowest = np.full(len(track), np.inf)
         for shape, local, _ in self._pieces[name]:
-            swept = swept_points(shape)
-            own = swept.points @ local.rotation.T + local.translation
             for frame, at in enumerate(self._moving[name]):
-                low = float((own @ at.rotation[2]).min()) + at.translation[2] - swept.radius
+                low = -support(shape, at * local, np.array((0.0, 0.0, -1.0)))
                 lowest[frame] = min(lowest[frame], low)
         track[:, :2] *= scale
         track[:, 2] += (scale - 1.0) * np.maximum(lowest, 0.0)
@@ -140,3 +139,18 @@ class Things:
             if gap < best[0] and np.isfinite(normal).all() and normal.any():
                 best = gap, np.array(self._result.getNearestPoint1()), normal
         return best
+
+
+def thickness(pieces: Sequence[pin.GeometryObject], start: Array, along: Array) -> float:
+    """Metres from a place (3,) in a joint's axes along a direction (3,) to where the last of its pieces ends."""
+    ball, request, result = coal.Sphere(1e-6), coal.DistanceRequest(), coal.DistanceResult()
+    last = 0.0
+    for piece in pieces:
+        where, far = coal.Transform3s(piece.placement.rotation, piece.placement.translation), 0.0
+        while far < THICKEST:  # goes on by the distance to the surface, inside and outside, so it misses nothing thick
+            center = coal.Transform3s(np.eye(3), start + far * along)
+            gap = float(coal.distance(ball, center, piece.geometry, where, request, result))
+            if gap < 0.0:
+                last = max(last, far - gap)
+            far += max(abs(gap), 1e-3)
+    return last

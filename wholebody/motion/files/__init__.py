@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Collection
 from pathlib import Path
 
-from wholebody.base.checks import flag
+from wholebody.base.checks import flag, warn
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, InputError, one_line
 from wholebody.figures.figure import Figure
@@ -40,6 +40,8 @@ def write_motion(motion: Motion, path: str | os.PathLike[str], *, bare: bool = F
     ending = path.suffix.lower()
     if ending != ".npz":
         one_figure(motion.figure, f"{one_line(path.name)} holds one figure, and the clip's figure")
+        if motion.things:
+            warn(f"{one_line(path.name)} holds postures, without {', '.join(motion.things)}, which move; write .npz")
     return columns.write(motion, path, bare=True) if bare else WRITERS[ending](motion, path)
 
 
