@@ -57,7 +57,7 @@ class Judged(NamedTuple):
 
 
 def judged(problem: Problem, numbers: Numbers, q: Array) -> Judged:
-    """Judge postures q (k, nq), each with its own numbers of one problem without constraints and bounds."""
+    """Judge postures q (k, nq) of one problem without constraints and bounds, each with its own numbers."""
     model, built, figure = problem.scene.model, problem.scene.built, problem.scene.figure
     with all_pairs(built).borrow() as pairs:
         step = max(1, TOGETHER // max(1, len(built.table.pairs)))

@@ -216,7 +216,7 @@ def reporter(value: Callable[..., Any] | bool | None, what: str) -> Callable[...
 
 
 class _Line:
-    """A line that is written anew from its beginning, at most ten times a second."""
+    """A line that is rewritten at most ten times a second."""
 
     def __init__(self) -> None:
         self._began, self._told = time.perf_counter(), 0.0

@@ -40,7 +40,7 @@ class Piece(NamedTuple):
 
 def box_corners(geometry: Any) -> Array:
     """Corners (8, 3) of the axis-aligned box around a coal shape in its own axes, metres; endless for a half-space."""
-    # coal writes the box into the shape: it is computed of a copy, as pickles of scenes would change.
+    # coal writes the box into the shape. A copy is used, because pickles of scenes would change otherwise.
     own = geometry.clone()
     own.computeLocalAABB()
     sides = np.array([own.aabb_local.min_, own.aabb_local.max_])

@@ -195,7 +195,7 @@ class Proximity:
 
     def query(self, data: Any, within: float, most: Array | None = None) -> Contacts:
         """Every pair nearer than `within` metres, or its `most` (pairs,) where less, at Pinocchio's `data`."""
-        # Results of pairs that were culled are never read: coal leaves old numbers in them.
+        # Results of culled pairs are never read, because coal leaves old numbers in them.
         index, placed = self.ask(data, within, most)
         return self._gathered(ContactBuffer(len(index)), np.array(placed), index, within, most)
 

@@ -210,8 +210,8 @@ def clip_torques(
 
 
 def smoothed(clip: Clip, cutoff: float | None = CUTOFF) -> Clip:
-    """The clip without what is faster than a cutoff [Hz]: Butterworth, forward and backward (Winter)."""
-    # A clip whose frame rate is less than four times the cutoff, or of one frame, stays as it is.
+    """The clip without frequencies above a cutoff [Hz]: Butterworth filter, forward and backward (Winter)."""
+    # A clip of one frame, or with a frame rate below four times the cutoff, is not changed.
     rate = 1.0 / clip.dt
     if cutoff is None or rate < 4.0 * cutoff:
         return clip

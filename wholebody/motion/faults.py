@@ -137,7 +137,7 @@ class Faults(NamedTuple):
 
 def faults(workspace: Workspace, terms: FrameTerms, q: Array, clearance: float = 0.0, first: int = 0) -> Faults:
     """What is wrong with postures (n, nq) from frame `first` of a clip on, and gaps that dip."""
-    # Nearer than the clearance by 0.05 mm, beyond a limit by 1e-6 rad or m, off what is held by 1e-4 m or rad.
+    # Violations: clearance by 0.05 mm, a limit by 1e-6 rad or m, a hold by 1e-4 m or rad.
     limits = terms.scene.figure.limits
     depths = np.array([depth(workspace, posture, clearance) for posture in q])
     values = q[:, limits.idx_q]

@@ -69,12 +69,12 @@ def _exchange(figure: Figure) -> tuple[Indices, Array]:
             raise InputError(f"{figure.name} cannot be mirrored: {name!r} is no joint of one degree of freedom")
         here = MIRROR @ data.oMi[joint.id].translation
         apart = np.linalg.norm(here - data.oMi[other.id].translation)
-        if apart > 0.01:  # m: descriptions of robots have their digits cut off
+        if apart > 0.01:  # m: robot descriptions have rounded digits
             raise InputError(f"{figure.name} cannot be mirrored: {name!r} and {partner!r} are not symmetric to y = 0")
         along = _along(data.J[:, joint.idx_v], data.J[:, other.idx_v])
         if abs(along) < np.cos(0.05):
             raise InputError(f"{figure.name} cannot be mirrored: {name!r} and {partner!r} turn about other axes")
-        for k in range(joint.nq):  # an unlimited joint holds cosine and sine; the sine alone changes its sign
+        for k in range(joint.nq):  # an unlimited joint has cosine and sine; only the sine changes its sign
             source[joint.idx_q + k] = other.idx_q + k
             sign[joint.idx_q + k] = np.sign(along) if k == joint.nq - 1 else 1.0
     return source, sign

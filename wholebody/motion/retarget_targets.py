@@ -282,7 +282,7 @@ def soled(
         lengths, own = np.linalg.norm(ways, axis=1), places[toe] - places[ankle]
         heading = ways[flat] * (1.0, 1.0, 0.0)
         along = np.linalg.norm(heading, axis=1)
-        if not flat.any() or along.min() < 0.5 * np.median(lengths):  # a foot that hangs says nothing
+        if not flat.any() or along.min() < 0.5 * np.median(lengths):  # a hanging foot gives no information
             continue
         rise = float(own[2] / np.linalg.norm(own))
         wanted = heading / along[:, None] * np.sqrt(1.0 - rise**2) + (0.0, 0.0, rise)

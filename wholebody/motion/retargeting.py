@@ -90,7 +90,7 @@ def retarget(
         )
     tracks = _tracks(motion, scene, things)
     found = _ground(motion, figure, ground, names)
-    # where nothing but floors stands, the ways of things are as long for the figure as its own way is
+    # without things but floors, the paths of moving things are scaled like the figure's own path
     still = [] if scene is None else [name for name in still_things(scene) if name not in tracks]
     wanted = targets(motion, figure, roles, found, path=None if scene is None or (tracks and not still) else 1.0)
     if not wanted.points:

@@ -124,7 +124,7 @@ def usual_feet(figure: Figure, constraints: Iterable[object]) -> tuple[str, ...]
 
 
 def standing_feet(clip: Clip, feet: Sequence[str]) -> dict[str, Mask]:
-    """In which frames (n,) each foot stands: one of its points does; none of a root that is fixed."""
+    """Frames (n,) in which each foot stands, that is, one of its points rests; none with a fixed root."""
     figure = clip.figure
     found: dict[str, Mask] = {}
     if figure.root != "free":

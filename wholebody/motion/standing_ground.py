@@ -118,7 +118,7 @@ class Ground:
                 continue
             color, places = f"C{number}", np.array([each.place for each in mine])
             seen.scatter(places[:, 0], places[:, 1], color=color, label=role.replace("_", " "), s=20)
-            # what rests at one height at one time lies beside each other
+            # points that rest at one height at one time are drawn beside each other
             beside = ScaledTranslation(0.0, 5.0 * number / 72.0, drawing.dpi_scale_trans)
             for each in mine:
                 times = self.dt * np.array([each.first, each.end])
@@ -129,7 +129,7 @@ class Ground:
         timed.set(
             xlabel="time [s]", ylabel="height of the ground [m]", title="when each part rests, and at what height"
         )
-        timed.set_ylim(min(heights) - 0.1, max(heights) + 0.1)  # lines that are moved count for no limits
+        timed.set_ylim(min(heights) - 0.1, max(heights) + 0.1)  # moved lines do not affect the limits
         timed.set_xlim(0.0, self.dt * max([1, *(each.end for each in self.footholds)]))
         if self.footholds:
             drawing.legend(loc="outside right upper", fontsize="small")

@@ -147,7 +147,7 @@ def thickness(pieces: Sequence[pin.GeometryObject], start: Array, along: Array) 
     last = 0.0
     for piece in pieces:
         where, far = coal.Transform3s(piece.placement.rotation, piece.placement.translation), 0.0
-        while far < THICKEST:  # goes on by the distance to the surface, inside and outside, so it misses nothing thick
+        while far < THICKEST:  # advances by the distance to the surface, inside and outside, so it misses no thick part
             center = coal.Transform3s(np.eye(3), start + far * along)
             gap = float(coal.distance(ball, center, piece.geometry, where, request, result))
             if gap < 0.0:

@@ -64,7 +64,7 @@ class FrameMotion:
 
     def next_share(self, share: float, near: Contacts, within: float) -> float:
         """The share of the frame up to which things may move before the figure's next step."""
-        # Until then no pair, `near` or beyond `within` metres, comes nearer than it is now, and a part of its width.
+        # Until then no pair, `near` or beyond `within` metres, overlaps by more than a part of its width.
         pairs, table = near.pair, self._both.table
         coming = self.way[pairs].sum(axis=1)
         # Share of the width of two pieces by which one may come into the other before the figure gives way. More =

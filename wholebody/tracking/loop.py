@@ -160,7 +160,7 @@ class FrameLoop(NotCopyable):
 
     def _kept_from_passing(self, resolution: Resolution) -> Resolution:
         """The first posture to which the motion is free; else a share of the motion, or the posture shown."""
-        # Algorithm 1, step 4. Motions up to a contact are not taken, because they would creep into it.
+        # Algorithm 1, step 4. Motions up to a contact are rejected, because they would creep into it.
         if resolution.swept:
             return resolution
         began = time.perf_counter()

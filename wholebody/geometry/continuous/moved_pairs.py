@@ -41,7 +41,7 @@ def far_moved(table: PairTable, before: QueryResult, after: QueryResult) -> Indi
 
 def separated(table: PairTable, before: QueryResult, after: QueryResult, pairs: Indices, overlap: float) -> Mask:
     """Which pairs (k,) the plane between their pieces before a motion, fixed to either, still separates after it."""
-    # The heights of the arcs that points describe are allowed for; a pair not near before is not separated.
+    # The sagittas of the points' arcs are included; a pair that was not near before counts as not separated.
     known = before.contacts
     near = known.number, known.pair, known.normal, known.point_a, known.point_b
     outline = table.points, table.first_point, table.radius, table.reach

@@ -118,7 +118,7 @@ def last_free(model: pin.Model, free: Array, q: Array, overlaps: Callable[[Array
 
 def passes_through(queries: Queries, before: QueryResult, after: QueryResult, q0: Array, q1: Array) -> bool:
     """Whether some pair has changed sides during a motion from q0 to q1 (nq,); the state of `queries` is moved."""
-    # Halving decides most pairs at a tenth of a sweep's cost. A pair that touches at the end is seen by its distance.
+    # Halving decides most pairs at a tenth of a sweep's cost. The distance shows a pair that touches at the end.
     table = queries.table
     moved = far_moved(table, before, after)
     if not len(moved):
@@ -179,7 +179,7 @@ def _passing_by(
     queries: Queries, before: QueryResult, after: QueryResult, q0: Array, q1: Array, pairs: Indices
 ) -> NDArray[np.bool_]:
     """The pairs whose bounding spheres stay separate during the motion, estimated from its middle."""
-    # The centres' path is taken as two chords; twice the deviation of a parabola from them is allowed for.
+    # The centres' path is approximated by two chords, with twice the deviation of a parabola as a margin.
     table = queries.table
     halfway = queries.placements(np.asarray(pin.interpolate(queries.model, q0, q1, 0.5)))
     first, second = table.pairs[pairs, 0], table.pairs[pairs, 1]

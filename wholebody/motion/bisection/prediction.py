@@ -106,7 +106,7 @@ class Predictor:
 
     def _together(self, frame: int) -> Mask:
         """(pairs,) which pairs are of pieces that are held at each other in a frame, or both in the world."""
-        # No posture has more room between them: hands at one weapon, a foot on the floor.
+        # No posture separates them farther: hands at one weapon, a foot on the floor.
         number = np.arange(self.run.scene.model.njoints)
         stands = np.zeros(len(number), dtype=bool)
         for term in self.run.terms.held(frame):

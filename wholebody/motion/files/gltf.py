@@ -149,7 +149,7 @@ class JointTree:
 
     def _bound(self, known: Mapping[int, Array]) -> list[Array]:
         """Placements (4, 4) of the joints where a skin is bound: as they carry bones, others as in the first frame."""
-        # Blender takes the rest posture from the parts that a skin names, and moves vertices where one is missing.
+        # Blender takes the rest posture from the joints that a skin names, and displaces vertices if one is missing.
         found = [np.eye(4)]
         for joint in range(1, self._model.njoints):
             above = found[self._model.parents[joint]]
