@@ -127,6 +127,8 @@ def test_things_that_cannot_be_drawn_are_refused() -> None:
     figure = wb.load("human")
     moving = {"box": np.tile([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], (2, 1))}
     clip = wb.Clip(figure, np.tile(figure.posture("standing"), (2, 1)), 0.1, "carries", moving)
+    with pytest.raises(wb.InputError, match="need to differ"):
+        side_by_side.beside(None, {"a/b": clip, "a b": clip}, wb.Scene(figure), "names")
     with pytest.raises(wb.WholebodyError, match="side by side: scene: no thing is called 'box'"):
         side_by_side.beside(None, {"after": clip}, wb.Scene(figure), "without")
     with pytest.raises(InputError, match="box of carries moves; a half-space"):

@@ -31,8 +31,12 @@ def beside(motion: SkeletonMotion | None, clips: Mapping[str, Clip], scene: Scen
         title: of the page.
 
     Raises:
-        InputError: motions of other numbers of frames.
+        InputError: motions of other numbers of frames, or two names that differ in "/" and " " alone.
     """
+    if len({_figure(name) for name in clips}) < len(clips):
+        raise InputError(
+            f"side by side: the names {', '.join(map(repr, clips))} need to differ in more than '/' and ' '"
+        )
     counts = {name: len(clip) for name, clip in clips.items()} | (
         {} if motion is None else {"the recording": len(motion)}
     )
