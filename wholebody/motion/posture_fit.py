@@ -55,7 +55,7 @@ class Layout(NamedTuple):
 
 
 class Fitter:
-    """Fits postures of a figure in its own workspace, so each thread needs its own one."""
+    """Fits postures of a figure in its own workspace, so each thread needs its own."""
 
     def __init__(self, figure: Figure, layout: Layout, workspace: Workspace) -> None:
         """Choose what goals are of."""
