@@ -148,7 +148,7 @@ def test_mouse_drags_holds_undoes_and_saves(
         there = before + wanted
         until(partial(arrived, drag, there))
         # presses that come late, from a busy browser, are drags of their own, each with an Escape
-        until(lambda: undone(browser, drag, start), pause=2.0)
+        until(lambda: undone(browser, drag, start), pause=0.5)
     assert np.allclose(client.camera.position, EYE, atol=1e-3)  # arrow keys do not turn the camera
     assert browser.evaluate("document.body.textContent.includes('arrow keys move the chosen handle')")
     assert not browser.errors
