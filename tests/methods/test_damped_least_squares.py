@@ -159,5 +159,7 @@ class _Fickle(wb.Goal):
 def test_a_goal_that_changes_its_rows_is_refused_or_followed(arm: wb.Figure, before: int) -> None:
     goal = _Fickle()
     goal.asked = before
+    solution = None
     with suppress(TermError):
-        DampedLeastSquares().solve(wb.Problem(wb.Scene(arm), goals=[goal]))
+        solution = DampedLeastSquares().solve(wb.Problem(wb.Scene(arm), goals=[goal]))
+    assert solution is None or (np.isfinite(solution.q).all() and not solution.solved)  # it is always 0.1 off
