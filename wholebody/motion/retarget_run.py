@@ -16,6 +16,7 @@ from collections.abc import Callable
 import numpy as np
 import pinocchio as pin
 from scipy.linalg import solveh_banded
+from scipy.ndimage import correlate1d
 
 from wholebody.base.arrays import Array, with_values
 from wholebody.figures.figure import Figure
@@ -33,9 +34,9 @@ SWEEPS = 6  # more: less jerk, and slower by a tenth each
 ANCHOR = 0.3  # weight of the place of the hips; 1 is that of a bone
 STAY = 0.03  # m/rad from the neutral posture, for what no goal determines
 CHANGE = 0.3  # weight of a change of the deviation in the first pass, in metres that limbs move
-BEND = 0.5  # s, weight of an acceleration of the deviation in sweeps, over the time step
+BEND = 1.0  # s, weight of an acceleration of the deviation in sweeps, over the time step
 GOES_ON, RETURN = 0.9, 0.3  # share of the last change that goes on; s in which a deviation that nothing needs goes back
-CALM, SPREAD = 0.03, 0.04  # s over which the free fit and the deviation of the first pass are smoothed
+CALM, SPREAD = 0.02, 0.04  # s over which the free fit and the deviation of the first pass are smoothed
 LEAST_LEVER = 0.1  # m
 SPARE = 0.9  # share of the speed limits that the free fit takes, so that there is some for what deviates from it
 BONES = {"hand": 0.5, "toe": 0.7, "head": 0.7}  # weights of bones by their far ends, where it is not 1
@@ -159,11 +160,11 @@ class Run:
                 signs = np.sign((found[1:, turned] * found[:-1, turned]).sum(axis=1))
                 if joint.nq != 2:
                     found[1:, turned] *= np.cumprod(signs)[:, None]
-        found = smoothed(found, self.dt, CALM)
         for joint in self.model.joints[1:]:
             if joint.nq == joint.nv and np.isfinite(self.most[joint.idx_v : joint.idx_v + joint.nv]).all():
                 values = slice(joint.idx_q, joint.idx_q + joint.nq)
                 found[:, values] = slowed(found[:, values], SPARE * self.most[joint.idx_v : joint.idx_v + joint.nv])
+        found = smoothed(found, self.dt, CALM)
         return np.array([self.figure.clamp(pin.normalize(self.model, each)) for each in found])
 
     def _passed(self, free: Array, paths: Array, holds: Holds, done: _Progress) -> Array:
@@ -277,17 +278,19 @@ def _layout(points: list[str], turns: list[str], roles: Roles, figure: Figure, h
 
 
 def smoothed(values: Array, dt: float, time: float) -> Array:
-    """Values (n, m) of least squared changes and accelerations over a time [s] (Whittaker 1923, graduation)."""
-    count, weight = len(values), (time / dt) ** 4
-    if count < 3:
+    """Means of values (n, m) with the weights of a normal distribution over time, standard deviation `time` [s].
+
+    A mean is within the limits that the values are within, and changes no faster, so nothing has to be cut off
+    afterwards: what is cut off has corners.
+    """
+    count = len(values)
+    half = min(int(np.ceil(3.0 * time / dt)), count - 1)
+    if half < 1:
         return values
-    band = np.zeros((3, count))  # row d has the entries (i + d, i), as scipy's lower form
-    factors = (1.0, -2.0, 1.0)
-    for first, factor in enumerate(factors):
-        for second in range(first, 3):
-            band[second - first, first : count - 2 + first] += weight * factor * factors[second]
-    band[0] += 1.0
-    return np.asarray(solveh_banded(band, values, lower=True))
+    weights = np.exp(-0.5 * (np.arange(-half, half + 1) * dt / time) ** 2)
+    start, end = 2.0 * values[0] - values[half:0:-1], 2.0 * values[-1] - values[-2 : -half - 2 : -1]
+    rows = np.concatenate([start, values, end])  # odd at both ends, so that these stay where they are
+    return np.asarray(correlate1d(rows, weights / weights.sum(), axis=0)[half : half + count])
 
 
 def slowed(values: Array, most: Array) -> Array:
