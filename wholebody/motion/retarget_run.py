@@ -36,9 +36,9 @@ SWEEPS = 6  # more: less jerk, and slower by a tenth each
 ANCHOR = 0.3  # weight of the place of the hips; 1 is that of a bone
 STAY = 0.03  # m/rad from the neutral posture, for what no goal determines
 CHANGE = 0.3  # weight of a change of the deviation in the first pass, in metres that limbs move
-BEND = 1.0  # s, weight of an acceleration of the deviation in sweeps, over the time step
+BEND = 2.0  # s, weight of an acceleration of the deviation in sweeps, over the time step
 GOES_ON, RETURN = 0.9, 0.3  # share of the last change that goes on; s in which a deviation that nothing needs goes back
-CALM, SPREAD = 0.02, 0.04  # s over which the free fit and the deviation of the first pass are smoothed
+CALM, SPREAD = 0.025, 0.06  # s over which the free fit and the deviation of the first pass are smoothed
 LEAST_LEVER = 0.1  # m
 KEPT = 30  # frames before the last one that stay known, for what looks back
 SPARE = 0.9  # share of the speed limits that the free fit takes, so that there is some for what deviates from it
@@ -205,21 +205,18 @@ class Run:
         self._free[k], self._paths[k] = q, self.fitter.held(q)
 
     def _mean(self, values: dict[int, Array], k: int, weights: Array) -> Array:
-        """The mean of the values about a frame; they go on oddly beyond both ends, so that these stay.
+        """The value at a frame of the line that is nearest to those about it: inside, their mean.
 
         With positive weights a mean is within the limits that the values are within, and changes no faster: nothing is
         cut off afterwards, which would leave corners.
         """
         half, last = len(weights) // 2, self._came - 1
-        found = np.zeros_like(values[k])
-        for j, weight in enumerate(weights, k - half):
-            if j < 0:
-                found += weight * (2.0 * values[0] - values[min(-j, last)])
-            elif j > last and self.ended:
-                found += weight * (2.0 * values[last] - values[max(2 * last - j, 0)])
-            else:
-                found += weight * values[j]
-        return found
+        away = np.arange(max(-half, -k), (min(half, last - k) if self.ended else half) + 1)
+        near = weights[away + half]
+        sums = near.sum(), near @ away, near @ away**2  # beside an end the line leans
+        size = sums[0] * sums[2] - sums[1] ** 2
+        near = near * (sums[2] - sums[1] * away) / size if size > 0.0 else near / sums[0]
+        return np.asarray(near @ np.array([values[k + j] for j in away.tolist()]))
 
     def _alone(self, k: int) -> None:
         """The posture within reach cones."""
