@@ -150,6 +150,11 @@ class Touched:
         return contact.place + (thickness(pieces, point.place, into) + CLEARANCE) * contact.normal
 
 
+def _meet(rest: Foothold, contact: ThingContact) -> bool:
+    """Whether a part touches a thing while it seems to rest on the ground: then the thing is what it rests on."""
+    return rest.role == contact.role and rest.first < contact.end and contact.first < rest.end
+
+
 class Holds:
     """Where each of `points` is to be in each frame, and with which weight."""
 
@@ -168,9 +173,9 @@ class Holds:
         self.points, self._scale, self._surface, self._touched = points, scale, surface, touched
         self.over, self.ahead = max(1, round(OVER / dt)), max(1, round(AHEAD / dt))
         contacts = () if touched is None else touched.contacts
+        apart = [each for each in ground.footholds if not any(_meet(each, contact) for contact in contacts)]
         self._stands: list[list[Foothold | ThingContact]] = [
-            [each for each in (contacts if point.thing else ground.footholds) if each.role == point.role]
-            for point in points
+            [each for each in (contacts if point.thing else apart) if each.role == point.role] for point in points
         ]
         feet = sorted({point.foot for point in points if point.foot})
         self._soles = [[k for k, point in enumerate(points) if point.foot == foot] for foot in feet]

@@ -117,7 +117,6 @@ def retarget(
             touched = Touched(figure, Things(scene, tracks), contacts)
         points = held_points(figure, roles, held)
         if touched is not None and touched.contacts:
-            points = [point for point in points if point.role not in {one.role for one in touched.contacts}]
             points += touching_points(figure, roles, motion, touched.contacts, joints)
         holds = Holds(points, held, proportions.path, motion.dt, surface, touched)
     frames, lost = wanted_of(wanted, roles), ""
