@@ -164,7 +164,8 @@ class Grasp(ContactTerm):
         thumb = fingers.pop("thumb", hand)
         if others := tuple(fingers.values()):
             first = thumb if thickness >= THIN else hand
-            parts.append(Opposing(first, others, thing, rounded(thing), float(self.opposed), CLOSED, lever=0.02))
+            # m: long enough that fingers around a thick bar turn, so short that none stays where the angle does not count
+            parts.append(Opposing(first, others, thing, rounded(thing), float(self.opposed), CLOSED, lever=0.05))
         return parts
 
     def _fingers(self, scene: Surroundings, thing: Surface, state: State, where: str) -> list[Part]:
