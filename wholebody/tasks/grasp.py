@@ -164,7 +164,7 @@ class Grasp(ContactTerm):
         thumb = fingers.pop("thumb", hand)
         if others := tuple(fingers.values()):
             first = thumb if thickness >= THIN else hand
-            # m: long enough that fingers around a thick bar turn, so short that none stays where the angle does not count
+            # lever [m]: shorter, and fingers around a thick bar do not turn; longer, and one stays away from a thin bar
             parts.append(Opposing(first, others, thing, rounded(thing), float(self.opposed), CLOSED, lever=0.05))
         return parts
 
