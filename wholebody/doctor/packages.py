@@ -19,7 +19,8 @@ MODULES = {
     "qpsolvers": "qpsolvers",
     "osqp": "osqp",
     "daqp": "daqp",
-    "meshcat": "meshcat",
+    "tornado": "tornado",
+    "u-msgpack-python": "umsgpack",
     "matplotlib": "matplotlib",
     "joblib": "joblib",
     "cloudpickle": "cloudpickle",
@@ -55,7 +56,7 @@ EXTRAS = {
 }
 """Optional packages: distribution -> the extra that installs it."""
 
-OLDEST, NEWEST = (3, 10), (3, 13)
+OLDEST, NEWEST = (3, 10), (3, 14)
 LIBRARIES = ("libpinocchio", "libcoal", "libhpp-fcl", "libeigenpy", "libboost_python", "liburdfdom", "libassimp")
 """Shared libraries of which other versions break those of the wheels."""
 
@@ -140,7 +141,7 @@ def python_fault(version: tuple[int, int] = sys.version_info[:2]) -> str | None:
     """Say what is wrong with the interpreter's version, if anything."""
     if OLDEST <= version <= NEWEST:
         return None
-    return f"Python {version[0]}.{version[1]} is not one of 3.10 to 3.13, for which all packages exist"
+    return f"Python {version[0]}.{version[1]} is not one of 3.10 to 3.14, for which the required packages exist"
 
 
 def shadowing_folders(environ: Mapping[str, str], modules: Iterable[str]) -> dict[str, list[str]]:
