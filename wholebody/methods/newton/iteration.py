@@ -129,8 +129,8 @@ class Iteration:
         begun, most = self.x, FRAMES.time_share if early_exit else 1.0
         for tried in range(iterations):
             over = active.control.over or active.control.spent > most
-            # a frame gets on if it can: its budget ends it after a step, or three that failed
-            late = over and (self.x is not begun or tried >= 3)
+            # a frame gets on if it can: its budget ends it after a step, or three that failed, or at twice as much
+            late = over and (self.x is not begun or tried >= 3 or (tried and active.control.spent > 2.0 * most))
             if self._holds(goals) or active.control.reason or late:
                 return
             active.control.tell(TraceEntry(self.goal, self.hard, 0.0, 0.0))
