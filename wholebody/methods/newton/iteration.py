@@ -122,7 +122,7 @@ class Iteration:
     def iterate(self, iterations: int, *, goals: bool, measures: Measures, early_exit: bool = False) -> None:
         """Step until convergence, stagnation or the iteration limit; `early_exit`: also until a step gains little."""
         self.stationary, active, norms = False, self.active_system, self._norms(self.residual)
-        trust = _Trust(self.least_damping, max(STEPS.funnel * norms[1], self.tolerance))
+        trust = _Trust(self.least_damping, max(STEPS.funnel * min(norms[1], 1.0), self.tolerance))
         least, stagnant = sum(norms), 0
         enough = FRAMES.least_progress if early_exit else STEPS.least_progress
         patience = FRAMES.patience if early_exit else STEPS.patience
