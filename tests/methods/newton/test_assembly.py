@@ -467,7 +467,7 @@ def test_errors_are_distances_and_angles() -> None:
 @pytest.mark.parametrize("links", [6, 12])
 def test_a_goal_far_out_of_reach_of_a_chain_stretches_it_and_does_not_pull_it_open(links: int) -> None:
     along = np.array((1.0, 2.0, -1.0)) / np.sqrt(6.0)
-    made, last = wb.Assembly(), "world"
+    made, last = Assembly(), "world"
     for k in range(links):
         made.body(f"link{k}", 0.3 * (k + 0.5) * along).spherical(last, f"link{k}", at=0.3 * k * along)
         last = f"link{k}"
