@@ -52,7 +52,6 @@ EXTRAS = {
     "optik-py": "optik",
     "pytracik": "tracik",
     "eaik": "eaik",
-    "embodik": "embodik",
 }
 """Optional packages: distribution -> the extra that installs it."""
 
