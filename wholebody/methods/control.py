@@ -52,8 +52,8 @@ def within_budget(seconds: float) -> Iterator[None]:
 
 def budget_for_sweep() -> Callable[[], bool]:
     """Whether a sweep that begins now has had its share of this thread's budget."""
-    # A search ends within one budget or little more; sweeps have another two.
-    until = max(3.0, BUDGET.spent + 1.0)
+    # A search ends within one budget or little more; sweeps have another two, a late one half of one at least.
+    until = max(3.0, BUDGET.spent + 0.5)
     return lambda: BUDGET.spent > until
 
 

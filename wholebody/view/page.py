@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import gzip
 import html
+import importlib.util
 import sys
 from collections.abc import Iterable
 from functools import lru_cache
@@ -13,6 +14,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from wholebody.base.errors import MissingPackageError
 from wholebody.view.server import Command, bundle
 
 _TEMPLATE = """<!DOCTYPE html>
@@ -161,5 +163,10 @@ def _page_script() -> str:
 
 @lru_cache(maxsize=1)
 def _meshcat_script() -> str:
-    """Meshcat's viewer with three.js: of the package meshcat nothing else is used, and it would bring IPython."""
-    return (Path(__file__).with_name("meshcat") / "meshcat.min.js").read_text(encoding="utf-8")
+    """Meshcat's viewer with three.js, found without importing meshcat (which would import IPython)."""
+    found = importlib.util.find_spec("meshcat")
+    folder = Path(found.origin).parent if found is not None and found.origin else None
+    script = folder / "viewer" / "dist" / "main.min.js" if folder is not None else None
+    if script is None or not script.is_file():
+        raise MissingPackageError("looking at a scene needs the package meshcat; run: pip install meshcat==0.3.2")
+    return script.read_text(encoding="utf-8")
