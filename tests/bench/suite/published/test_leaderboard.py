@@ -27,7 +27,7 @@ def test_a_folder_of_answers_becomes_a_page(folder: Path, tmp_path: Path, arms: 
     (place / "b.json").write_text(json.dumps(poor))
     publish(judge_folder(place, folder), folder, tmp_path / "out")
     page = (tmp_path / "out" / "leaderboard.html").read_text()
-    assert "<strong>Robot arm, near:</strong> <code>good</code>, 500 ms." in page
+    assert "<strong>Robot arm, near:</strong> fastest <code>good</code>, 500 ms." in page
     assert "poor &lt;b&gt;" in page
     assert "<b>" not in page
     assert "Without an answer, and so not solved: 1, robot_arm/0001 first." in page
