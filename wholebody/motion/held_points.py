@@ -8,10 +8,9 @@ with it.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-import coal
 import numpy as np
 import pinocchio as pin
 
@@ -25,7 +24,6 @@ from wholebody.motion.standing_ground import MOST_FRAMES, Foothold, Ground
 from wholebody.motion.structure import upright
 from wholebody.motion.thing_contacts import ThingContact, Things, thickness
 from wholebody.motion.windows import long_runs, runs
-from wholebody.scene.scene import Scene
 
 STRONG, NEARING, SWING = 800.0, 30.0, 0.3  # weights of what rests, nearly does, and of a sole between; 1 of a bone
 TOUCH = 100.0  # of what touches a thing
@@ -381,34 +379,3 @@ class Holds:
         told = self._scale * stand.height
         below = None if self._surface is None else self._surface(np.array([place[0], place[1], told + STEP]))
         return CLEARANCE + (told if below is None else below)
-
-
-def surface_of(scene: Scene, moving: Collection[str]) -> Callable[[Array], float | None]:
-    """The height of the first surface of a scene's things below a place (3,), metres; None for none within 2 m.
-
-    Things that are moving are left out.
-    """
-    owners, geometry = scene.piece_owner, scene.geometry
-    still = [
-        (piece.geometry, coal.Transform3s(piece.placement.rotation, piece.placement.translation))
-        for piece, owner in zip(geometry.geometryObjects, owners, strict=True)
-        if owner in scene.objects and scene.objects[owner].segment is None and owner not in moving
-    ]
-    ball, request, result = coal.Sphere(1e-4), coal.DistanceRequest(), coal.DistanceResult()
-
-    def height(place: Array) -> float | None:
-        at = np.array(place)
-        for _ in range(100):  # goes down by the least distance, so it passes nothing
-            center = coal.Transform3s(np.eye(3), at)
-            gap = min(
-                (float(coal.distance(ball, center, shape, where, request, result)) for shape, where in still),
-                default=np.inf,
-            )
-            if gap < 1e-5:
-                return float(at[2] - 1e-4)
-            at[2] -= gap
-            if not at[2] > place[2] - 2.0:
-                break
-        return None
-
-    return height

@@ -15,7 +15,7 @@ from wholebody.figures.joined import one_figure
 from wholebody.geometry.placement import PlacementLike
 from wholebody.geometry.shapes import HalfSpace
 from wholebody.motion.clip import Clip
-from wholebody.motion.held_points import Holds, Touched, held_points, surface_of, touching_points
+from wholebody.motion.held_points import Holds, Touched, held_points, touching_points
 from wholebody.motion.retarget_run import Run, Wanted, wanted_of
 from wholebody.motion.retarget_targets import LIMBS, Proportions, known_bones, soled, soles, standing_places
 from wholebody.motion.roles import Roles, matched, skeleton_roles
@@ -23,7 +23,7 @@ from wholebody.motion.skeleton import SkeletonMotion, checked_motion
 from wholebody.motion.stance import paths
 from wholebody.motion.standing_ground import NOTHING, Ground
 from wholebody.motion.standing_ground import ground as find_ground
-from wholebody.motion.thing_contacts import Things, still_things
+from wholebody.motion.thing_contacts import Things, still_things, surface_of
 from wholebody.motion.thing_tracks import thing_tracks
 from wholebody.scene.scene import Scene
 

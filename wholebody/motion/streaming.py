@@ -14,13 +14,14 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.joined import one_figure
 from wholebody.geometry.shapes import HalfSpace
 from wholebody.motion.footholds import LiveRests
-from wholebody.motion.held_points import Holds, held_points, surface_of
+from wholebody.motion.held_points import Holds, held_points
 from wholebody.motion.retarget_run import EVERY, SLOWING, Run, wanted_of
 from wholebody.motion.retarget_targets import Proportions
 from wholebody.motion.retargeting import checked_ground, same_figure
 from wholebody.motion.roles import matched, skeleton_roles
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
 from wholebody.motion.standing_ground import FEET, Ground
+from wholebody.motion.thing_contacts import surface_of
 from wholebody.scene.scene import Scene
 
 
