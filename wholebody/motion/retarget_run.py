@@ -31,6 +31,7 @@ from wholebody.scene.workspace import Workspace
 FIRST, FREE, PASS, SWEEP = 60, 2, 3, 1  # most steps of a first frame, a free one, one of the first pass, one of a sweep
 EVERY, WORTH = 10, 0.8  # frames after which a free posture is sought anew, and the share of the cost that it is for
 SLOWING = 8  # frames before it would be too fast in which a joint begins to move
+JUMP = 0.5  # rad, m: postures of neighbouring frames that are farther apart were found otherwise
 STARTS = 4  # how often the first frame is solved, each time from where soles came down beside each other
 SWEEPS = 6  # more: less jerk, and slower by a tenth each
 ANCHOR = 0.3  # weight of the place of the hips; 1 is that of a bone
@@ -96,6 +97,7 @@ class Run:
         self._wanted, self._chain = dict[int, Wanted](), dict[int, tuple[Array, float]]()
         self._slow, self._free, self._paths = (dict[int, Array]() for _ in range(3))
         self._first, self._found, self._deviation = (dict[int, Array]() for _ in range(3))
+        self._backward = dict[int, tuple[Array, float]]()
         self._came, self.ended = 0, False
         self._front, self._latest = np.zeros(0), (np.zeros(self.model.nv), np.zeros(self.model.nv))
         self._stages: list[tuple[Callable[[int], None], int]] = [
@@ -123,6 +125,14 @@ class Run:
         self._came += 1
         return self._advanced()
 
+    def led_by(self, frames: list[Wanted]) -> None:
+        """Know frames before they come: fitted backward in time too, these may have better postures."""
+        following: tuple[Array, float] | None = None
+        for k in range(len(frames) - 1, -1, -1):
+            self._wanted[k] = frames[k]
+            following = self._fitted(k, following and following[0], (len(frames) - 1 - k) % EVERY == 0)
+            self._backward[k] = following
+
     def finish(self) -> list[Array]:
         """The postures (nq,) of the last frames."""
         self.ended = True
@@ -149,22 +159,29 @@ class Run:
         wanted = self._wanted[frame]
         return Goals(wanted.places, wanted.turns, *(held or self.none), posture, weights)
 
+    def _fitted(self, k: int, near: Array | None, anew: bool) -> tuple[Array, float]:
+        """The free posture of a frame and its cost, from a posture near to it, or anew if that is better."""
+        goals = self._goals(k, self.upright, self.stay)
+        best = (self.upright, np.inf) if near is None else self.fitter.descend(near, goals, FREE)
+        if not anew:
+            return best
+        q = np.array(self.upright)
+        if self.led:
+            hips = self._wanted[k].places[self.hips].mean(axis=0)
+            q[:7] = pin.SE3ToXYZQUAT(pin.SE3(self._wanted[k].root, hips))
+        alone = self.fitter.descend(q, goals, FIRST)
+        return alone if alone[1] < WORTH * best[1] else best
+
     def _fit(self, k: int) -> None:
-        """The free posture of a frame, from that before; now and then from upright, and then backward from it."""
-        goals, best = self._goals(k, self.upright, self.stay), (self.upright, np.inf)
-        if k:
-            best = self.fitter.descend(self._chain[k - 1][0], goals, FREE)
-        if k % EVERY == 0:
-            q = np.array(self.upright)
-            if self.led:
-                hips = self._wanted[k].places[self.hips].mean(axis=0)
-                q[:7] = pin.SE3ToXYZQUAT(pin.SE3(self._wanted[k].root, hips))
-            alone = self.fitter.descend(q, goals, FIRST)
-            if alone[1] < WORTH * best[1]:
-                self._chain[k] = alone
-                self._led_back(k)
-                return
+        """The free posture of a frame, from that before; the frames before follow one that was found otherwise."""
+        near = self._chain[k - 1][0] if k else None
+        best = self._fitted(k, near, k % EVERY == 0)
+        other = self._backward.pop(k, None)
+        if other is not None and other[1] < WORTH * best[1]:
+            best = other
         self._chain[k] = best
+        if near is not None and float(np.abs(pin.difference(self.model, near, best[0])).max()) > JUMP:
+            self._led_back(k)
 
     def _led_back(self, k: int) -> None:
         """Follow a better posture of a frame backward; the frames before take it over where it costs least."""

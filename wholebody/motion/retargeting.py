@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
@@ -132,9 +132,10 @@ def retarget(
     return clip
 
 
-def _postures(run: Run, frames: Sequence[Wanted], tell: Callable[[float], object] | None) -> Array:
+def _postures(run: Run, frames: list[Wanted], tell: Callable[[float], object] | None) -> Array:
     """Postures (n, nq) of all frames."""
     found = list[Array]()
+    run.led_by(frames)
     for number, wanted in enumerate(frames):
         found += run.push(wanted)
         if tell is not None and number % 20 == 0:
