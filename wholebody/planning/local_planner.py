@@ -18,16 +18,18 @@ from wholebody.assessment.posture import largest_violation
 from wholebody.base.arrays import Array, Mask
 from wholebody.geometry.continuous.motion_bounds import largest_approach
 from wholebody.methods.qp.method import QP
+from wholebody.planning.sampling import holds
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks import Posture
 from wholebody.tasks.base import filled
 from wholebody.tracking.qp_strategy import Attraction
 
-WITHIN = 0.08  # m: distance within which pairs are looked at; larger = fewer and dearer queries
+WITHIN = 0.02  # m: distance within which pairs are looked at; larger = fewer and dearer queries
 MARGIN = 2e-3  # m: distance that motions keep beyond the clearance, where their ends do; larger = fewer queries
 NOISE = 1e-5  # m: by which distances of one posture differ from query to query
 REACHED = 1e-3  # rad, m: difference from a posture that counts as reached by steps of the tracker
+PARTS_OF_A_STEP = (0.5, 0.25)
 JUMP = 1.5  # of the distance of two postures: above it their projections are on two sides of something
 ALLOWED = 1e-5  # m, rad: by which postures of a geodesic may miss constraints
 GAIN = 5e-3  # rad, m: by which a step comes nearer at least; smaller = longer motions along things
@@ -68,8 +70,8 @@ class Geodesics:
         self._required = problem.clearance + np.full(len(workspace.table.pairs), MARGIN)
         pieces = workspace.geometry.geometryObjects
         centres = np.array([np.linalg.norm(piece.placement.translation) for piece in pieces])
-        ways = [largest_approach(workspace.table, centres, unit) for unit in np.eye(self._model.nv)]
-        self._approach = np.array(ways).reshape(self._model.nv, -1).T.copy()  # of every pair by every freedom
+        # of every pair by every freedom
+        self._approach = np.asarray(largest_approach(workspace.table, centres, np.eye(self._model.nv)))
 
     def admit(self, q: Array) -> None:
         """See `LocalPlanner`."""
@@ -89,10 +91,19 @@ class Geodesics:
             ahead = self._room(there)  # most motions end here, so the room at q is asked for afterwards
             room = self._room(q) if ahead is not None and room is None else room
             if not self._joins(here, motion / parts, room, ahead):
-                return way, False
+                return way + self._crept(here, motion / parts, room), False
             way.append(there)
             here, room = there, ahead
         return way, True
+
+    def _crept(self, q: Array, motion: Array, room: Array | None) -> list[Array]:
+        """The longest of some parts of a motion from q that is free; nothing where none is."""
+        room = self._room(q) if room is None else room
+        for share in PARTS_OF_A_STEP:
+            there = np.asarray(pin.integrate(self._model, q, share * motion))
+            if self._joins(q, share * motion, room, self._room(there)):
+                return [there]
+        return []
 
     def joined(self, q: Array, target: Array, most: float) -> list[Array]:
         """See `LocalPlanner`."""
@@ -114,9 +125,8 @@ class Geodesics:
 
     def _room(self, q: Array) -> Array | None:
         """(pairs,) by how much distances exceed what is required at least, metres; None where one does not."""
-        near, room = self._workspace.near_views(q, WITHIN), WITHIN - self._required
-        room[near.number] = near.distance - self._required[near.number]
-        return None if (room[near.number] < 0.0).any() else room
+        room = self._workspace.proximity.least(self._workspace.state.update(q).data, WITHIN) - self._required
+        return room if room.min(initial=0.0) >= 0.0 else None
 
     def _joins(self, q: Array, motion: Array, room: Array | None, ahead: Array | None) -> bool:
         return (
@@ -142,11 +152,6 @@ class Geodesics:
                 return False
             asked += [(here, half, first, room, 0.5 * change), (middle, half, room, last, 0.5 * change)]
         return True
-
-
-def holds(problem: Problem) -> bool:
-    """Whether a constraint is an equality, such as a `Hold`, so that most postures near by are not allowed."""
-    return any(bool(np.any(term.lower == term.upper)) for term in problem.constraints)
 
 
 class TrackedMotions:

@@ -15,14 +15,14 @@ import pinocchio as pin
 from wholebody.assessment.motion import frames_passed_through
 from wholebody.assessment.posture import assess
 from wholebody.base import checks
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.base.runner import processor_time
-from wholebody.figures.self_pairs import random_postures
 from wholebody.methods.qp.method import QP
 from wholebody.motion.clip import Clip
-from wholebody.planning.local_planner import Geodesics, LocalPlanner, TrackedMotions, holds
+from wholebody.planning.local_planner import Geodesics, LocalPlanner, TrackedMotions
 from wholebody.planning.rrt_connect import RRTConnect
+from wholebody.planning.sampling import Sampler, frozen, holds
 from wholebody.planning.smoothing import SPACING, length, resampled, shortcut, smooth
 from wholebody.planning.timing import Pace, Timing
 from wholebody.problem import Problem
@@ -34,7 +34,6 @@ PASSED = 5e-4  # m: overlap between two frames that counts
 OVER = 1.001  # of the limits of velocity and acceleration: the last slowing may end a little above them
 ENDS = 8  # postures that meet goals; more = ends that are reached more easily, for a solve each
 ENOUGH = 1500  # samples of all trees, after which no other search begins; more = shorter motions, later
-ROOM = 1.0  # m: by which samples move a free root along each axis
 ROUNDS = 50  # of the trees, until they get another end
 
 
@@ -115,7 +114,8 @@ def plan(
     goals = _goals(goal)
     problem = Problem(scene, start, goals=goals, constraints=constraints, clearance=clearance)
     _check_end(problem, problem.start, "start")
-    ends = _answers(problem, rng) if goals else iter([_End(_posture(problem, goal))])
+    sampler = Sampler(problem, rng)
+    ends = _answers(problem, sampler) if goals else iter([_End(_posture(problem, goal))])
     found = None
     with problem.borrow() as workspace:
         tracked = bool(problem.constraints or problem.bounds or scene.figure.followers)
@@ -125,7 +125,7 @@ def plan(
         def ended() -> bool:
             return processor_time() - ready > limit
 
-        search = _Search(problem, local, ends, rng, ended)
+        search = _Search(problem, local, ends, (sampler, rng), ended)
         path, message = search.shortest()
         while path is not None:
             found = _smoothed(problem, local, path, pace)
@@ -165,23 +165,12 @@ def _check_end(problem: Problem, q: Array, what: str) -> None:
             raise InputError(f"plan: the {what} is {by:.3g} m or rad beyond {name}; give a posture of wb.solve")
 
 
-def _frozen(problem: Problem) -> Mask:
-    """Which degrees of freedom (nv,) the bounds keep where they start."""
-    found: Mask = np.zeros(problem.scene.model.nv, dtype=bool)
-    if problem.bounds:
-        state = problem.scene.state(problem.start)
-        for bound in problem.bounds:
-            low, high = bound.bounds(state, None)
-            found |= (low == 0.0) & (high == 0.0)
-    return found
-
-
 def _moved(problem: Problem, q: Array) -> float:
     """By how much postures (n, nq) move what is frozen, radians and metres."""
-    frozen, model = _frozen(problem), problem.scene.model
-    if not frozen.any():
+    still, model = frozen(problem), problem.scene.model
+    if not still.any():
         return 0.0
-    return float(np.max([np.abs(pin.difference(model, problem.start, each)[frozen]).max() for each in q]))
+    return float(np.max([np.abs(pin.difference(model, problem.start, each)[still]).max() for each in q]))
 
 
 class _End(NamedTuple):
@@ -191,31 +180,15 @@ class _End(NamedTuple):
     why: str = ""
 
 
-def _answers(problem: Problem, rng: np.random.Generator) -> Iterator[_End]:
+def _answers(problem: Problem, sampler: Sampler) -> Iterator[_End]:
     """Ends that meet the goals: from the start, then from random postures."""
-    solution = QP().solve(problem)
-    yield _End(solution.q if solution.solved else None, solution.message)
-    for _ in range(ENDS - 1):
-        start = problem.with_start(_drawn(problem, problem.start, 1.0, rng))
-        solution = QP(restarts=0, budget=0).solve(start)
-        yield _End(solution.q if solution.solved else None, solution.message)
-
-
-def _drawn(problem: Problem, near: Array, spread: float, rng: np.random.Generator) -> Array:
-    """A posture (nq,) whose joints are a share of the way from another one to a random one."""
-    # A free root is within `ROOM` of the other's; where nothing is held it turns about the vertical.
-    held = holds(problem)
-    figure, (drawn,) = problem.scene.figure, random_postures(problem.scene.model, 1, int(rng.integers(2**31)))
-    away = spread * np.asarray(pin.difference(figure.model, near, drawn))
-    for root in figure.roots.values():
-        joint = figure.model.joints[root]
-        here = pin.XYZQUATToSE3(near[joint.idx_q : joint.idx_q + 7])
-        turn = np.eye(3) if held else pin.exp3(np.array((0.0, 0.0, rng.uniform(-np.pi, np.pi))))
-        moved = (spread if held else 1.0) * rng.uniform(-ROOM, ROOM, 3)
-        there = pin.SE3(turn @ here.rotation, here.translation + moved)
-        away[joint.idx_v : joint.idx_v + 6] = pin.log6(here.actInv(there)).vector
-    away[_frozen(problem)] = 0.0
-    return np.asarray(pin.integrate(figure.model, near, away))
+    for number in range(ENDS):
+        if number == 0:
+            solution = QP().solve(problem)
+        else:
+            solution = QP(restarts=0, budget=0).solve(problem.with_start(sampler.near(problem.start, 1.0)))
+        end = sampler.turns.nearest(solution.q, problem.start) if solution.solved else None
+        yield _End(end, solution.message)
 
 
 class _Search:
@@ -226,10 +199,11 @@ class _Search:
         problem: Problem,
         local: LocalPlanner,
         ends: Iterator[_End],
-        rng: np.random.Generator,
+        random: tuple[Sampler, np.random.Generator],
         ended: Callable[[], bool],
     ) -> None:
-        self._problem, self._local, self._ends, self._rng, self._ended = problem, local, ends, rng, ended
+        self._problem, self._local, self._ends, self._ended = problem, local, ends, ended
+        self._sampler, self._rng = random
         self._reached: list[Array] = []
         self._said = ""
         free_root = bool(problem.scene.figure.roots) and not holds(problem)
@@ -280,7 +254,7 @@ class _Search:
             near = self._reached[self._rng.integers(len(self._reached))]
             middle = np.asarray(pin.interpolate(model, start, near, self._rng.uniform()))
             spread = self._spreads[self._rng.integers(len(self._spreads))]
-            path = trees.grow(_drawn(self._problem, middle, spread, self._rng))
+            path = trees.grow(self._sampler.near(middle, spread))
             if path is not None:
                 return path, trees
         return None, trees
