@@ -29,7 +29,6 @@ WITHIN = 0.02  # m: distance within which pairs are looked at; larger = fewer an
 MARGIN = 2e-3  # m: distance that motions keep beyond the clearance, where their ends do; larger = fewer queries
 NOISE = 1e-5  # m: by which distances of one posture differ from query to query
 REACHED = 1e-3  # rad, m: difference from a posture that counts as reached by steps of the tracker
-PARTS_OF_A_STEP = (0.5, 0.25)
 JUMP = 1.5  # of the distance of two postures: above it their projections are on two sides of something
 ALLOWED = 1e-5  # m, rad: by which postures of a geodesic may miss constraints
 GAIN = 5e-3  # rad, m: by which a step comes nearer at least; smaller = longer motions along things
@@ -91,19 +90,10 @@ class Geodesics:
             ahead = self._room(there)  # most motions end here, so the room at q is asked for afterwards
             room = self._room(q) if ahead is not None and room is None else room
             if not self._joins(here, motion / parts, room, ahead):
-                return way + self._crept(here, motion / parts, room), False
+                return way, False
             way.append(there)
             here, room = there, ahead
         return way, True
-
-    def _crept(self, q: Array, motion: Array, room: Array | None) -> list[Array]:
-        """The longest of some parts of a motion from q that is free; nothing where none is."""
-        room = self._room(q) if room is None else room
-        for share in PARTS_OF_A_STEP:
-            there = np.asarray(pin.integrate(self._model, q, share * motion))
-            if self._joins(q, share * motion, room, self._room(there)):
-                return [there]
-        return []
 
     def joined(self, q: Array, target: Array, most: float) -> list[Array]:
         """See `LocalPlanner`."""

@@ -7,22 +7,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from wholebody.assessment.motion import frames_passed_through
 from wholebody.assessment.posture import assess
 from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.base.runner import processor_time
+from wholebody.geometry.continuous.sweep import Sweep
 from wholebody.methods.qp.method import QP
+from wholebody.methods.simplification.reach import still_dofs
 from wholebody.motion.clip import Clip
 from wholebody.planning.local_planner import Geodesics, LocalPlanner, TrackedMotions
 from wholebody.planning.rrt_connect import RRTConnect
-from wholebody.planning.sampling import Sampler, frozen, holds
+from wholebody.planning.sampling import Sampler, holds
 from wholebody.planning.smoothing import SPACING, length, resampled, shortcut, smooth
 from wholebody.planning.timing import Pace, Timing
 from wholebody.problem import Problem
@@ -33,7 +35,7 @@ KEPT = 1e-4  # m, rad: by which limits, constraints and clearances may be missed
 PASSED = 5e-4  # m: overlap between two frames that counts
 OVER = 1.001  # of the limits of velocity and acceleration: the last slowing may end a little above them
 ENDS = 8  # postures that meet goals; more = ends that are reached more easily, for a solve each
-ENOUGH = 1500  # samples of all trees, after which no other search begins; more = shorter motions, later
+ENOUGH = 1000  # samples of all trees, after which no other search begins; more = shorter motions, later
 ROUNDS = 50  # of the trees, until they get another end
 
 
@@ -167,8 +169,8 @@ def _check_end(problem: Problem, q: Array, what: str) -> None:
 
 def _moved(problem: Problem, q: Array) -> float:
     """By how much postures (n, nq) move what is frozen, radians and metres."""
-    still, model = frozen(problem), problem.scene.model
-    if not still.any():
+    still, model = still_dofs(problem), problem.scene.model
+    if not still:
         return 0.0
     return float(np.max([np.abs(pin.difference(model, problem.start, each)[still]).max() for each in q]))
 
@@ -282,16 +284,19 @@ def _judged(problem: Problem, path: Array, pace: Pace) -> Plan:
     """The motion along a path (m, nq) as fast as it may be, and what it is worth, from its postures alone."""
     scene = problem.scene
     q, use = Timing(scene.figure, path, pace).within()
-    asked = _between(problem, q[-1])
-    judgements = [assess(asked, frame) for frame in q]
-    found = [(one.limit_violation, one.constraint_violation, one.clearance_violation) for one in judgements]
-    worst = max(float(np.max(found)), _moved(problem, q))
+    asked, worst = _between(problem, q[-1]), _moved(problem, q)
+    for frame in q:  # as far as the first that misses something
+        if worst <= KEPT:
+            one = assess(asked, frame)
+            worst = max(worst, one.limit_violation, one.constraint_violation, one.clearance_violation)
     faults = [
         f"a frame misses what must hold by {worst:.3g} m or rad" if not worst <= KEPT else "",
         f"velocities reach {use.velocity:.3g} of their limits" if not use.velocity <= OVER else "",
         f"accelerations reach {use.acceleration:.3g} of their limit" if not use.acceleration <= OVER else "",
     ]
-    if not any(faults) and (passed := frames_passed_through(scene, q, PASSED)):
-        faults.append(f"something is passed through before frame {passed[0]}")
+    if not any(faults):
+        ways, sweep = enumerate(pairwise(q), 1), Sweep(scene.model, scene.geometry)
+        passed = next((k for k, way in ways if sweep.first_contact(*way, tolerance=PASSED) is not None), 0)
+        faults.append(f"something is passed through before frame {passed}" if passed else "")
     said = "; ".join(fault for fault in faults if fault)
     return Plan(Clip(scene.figure, q, pace.dt, "plan"), not said, said, length(scene.model, list(q)), worst, *use)

@@ -5,24 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.self_pairs import random_postures
+from wholebody.methods.simplification.reach import still_dofs
 from wholebody.problem import Problem
 
 ROOM = 1.0  # m: by which samples move a free root along each axis
 BATCH = 256  # postures that are drawn at once, which takes a hundredth of drawing each
-
-
-def frozen(problem: Problem) -> Mask:
-    """Which degrees of freedom (nv,) the bounds keep where they start."""
-    found: Mask = np.zeros(problem.scene.model.nv, dtype=bool)
-    if problem.bounds:
-        state = problem.scene.state(problem.start)
-        for bound in problem.bounds:
-            low, high = bound.bounds(state, None)
-            found |= (low == 0.0) & (high == 0.0)
-    return found
 
 
 def holds(problem: Problem) -> bool:
@@ -57,7 +47,7 @@ class Sampler:
     def __init__(self, problem: Problem, rng: np.random.Generator) -> None:
         """Take the problem, and what draws."""
         self._figure, self._rng, self._held = problem.scene.figure, rng, holds(problem)
-        self._frozen = frozen(problem)
+        self._frozen = still_dofs(problem)
         self._roots = [self._figure.model.joints[root] for root in self._figure.roots.values()]
         self._drawn: list[Array] = []
         self.turns = Turns(self._figure)
