@@ -214,6 +214,8 @@ class Run:
             for j in range(last - 1, k - 1, -1):
                 back = np.clip(self._chain[j][0][values], back - most, back + most)
             q[values] = 0.5 * (self._front + back)
+            if k:  # a longer way than a window slows
+                q[values] = np.clip(q[values], self._slow[k - 1][values] - most, self._slow[k - 1][values] + most)
         self._slow[k] = q
 
     def _calmed(self, k: int) -> None:
