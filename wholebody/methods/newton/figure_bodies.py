@@ -140,12 +140,12 @@ class FigureBodies:
             kind = model.joints[joint]
             place, data = slice(kind.idx_v, kind.idx_v + kind.nv), kind.createData()
             kind.calc(data, pin.neutral(model)[kind.idx_q : kind.idx_q + kind.nq])
-            self._ends[0, place], self._ends[1, place] = joint - 1, int(model.parents[joint]) - 1
+            self._ends[0, place], self._ends[1, place] = self.index(joint), self.index(int(model.parents[joint]))
             subspace = np.array(data.S).reshape(6, -1)
             self._axes[:, place] = subspace.reshape(2, 3, -1).transpose(0, 2, 1)
-        columns = (7 * self._ends.T[:, :, None] + np.arange(7)).reshape(model.nv, 14)
+        columns = (7 * (self._ends.T[:, :, None] - self.first) + np.arange(7)).reshape(model.nv, 14)
         sliding = self._axes[0].any(axis=1)[:, None]
-        self._reads: Mask = (columns >= 0) & (sliding | (np.arange(14) % 7 >= 3))
+        self._reads: Mask = (columns >= 0) & (sliding | (np.arange(14) % 7 >= 3))  # nothing of the world
         self._entries = np.nonzero(self._reads)[0], columns[self._reads]
 
     def bound_step(self, q: Array, lower: Array, upper: Array) -> None:

@@ -36,7 +36,7 @@ class TangentRows(Batch):
         depends: Mask | None = None,
     ) -> None:  # fmt: skip
         """Take a function, and its rows `chosen` (size,); `depends` (size, nv) on degrees of freedom, None for all."""
-        super().__init__(np.arange(bodies.count)[None], [label])
+        super().__init__(bodies.first + np.arange(bodies.count)[None], [label])
         self._figure, (self._value, self._slope) = bodies, function
         self.chosen, self.sign, self.bound = chosen, sign, bound
         self.size = len(chosen)
