@@ -113,7 +113,7 @@ class Control:
         return (self._now() - self._began) / (self._longest if self._time_limit is None else self._time_limit)
 
     def _now(self) -> float:
-        return time.thread_time() - compile_seconds() if self._time_limit is None else time.monotonic()
+        return (time.thread_time() if self._time_limit is None else time.monotonic()) - compile_seconds()
 
     def message(self, judgement: Assessment) -> str:
         """Why the solve was ended, and the remaining errors; empty if it was not ended."""
