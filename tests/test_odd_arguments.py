@@ -27,7 +27,7 @@ from wholebody.figures.state import State
 from wholebody.geometry.compound import Compound
 from wholebody.motion import measures
 from wholebody.motion.sphere_filling import Spheres, fill_with_spheres
-from wholebody.planning.distinct import Solutions
+from wholebody.planning.distinct_solutions import Solutions
 from wholebody.view import Viewer
 from wholebody.view.timeline import timeline
 

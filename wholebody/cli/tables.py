@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -14,8 +16,6 @@ from wholebody.taskfile.result import goals_left
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from rich.progress import Progress
 
     from wholebody.assessment.posture import Assessment
     from wholebody.bench.rows import Row
@@ -33,8 +33,12 @@ NEAR = 0.01
 _COLORS = {"solved": "green", "unreachable": "yellow", "stalled": "yellow", "infeasible": "red"}
 
 
-def progress_bar(*, counted: bool = True, thread: bool = True) -> Progress:
-    """A bar on the error output that goes when it is done; `thread`: redrawn by one, which a fork must not have."""
+@contextmanager
+def bar(what: str, count: float = 1.0, *, thread: bool = True) -> Iterator[Callable[[float, str], object]]:
+    """Show on the error output how far something is: the function takes how much of `count` is done, and what it is.
+
+    The bar goes when it is done. A thread redraws it, which a fork must not have.
+    """
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -44,10 +48,12 @@ def progress_bar(*, counted: bool = True, thread: bool = True) -> Progress:
         TimeRemainingColumn,
     )
 
-    numbers = MofNCompleteColumn() if counted else TaskProgressColumn()
+    numbers = TaskProgressColumn() if count == 1.0 else MofNCompleteColumn()
     columns = TextColumn("{task.description}"), BarColumn(), numbers, TimeRemainingColumn()
     console = Console(stderr=True)
-    return Progress(*columns, console=console, transient=True, auto_refresh=thread, refresh_per_second=4)
+    with Progress(*columns, console=console, transient=True, auto_refresh=thread, refresh_per_second=4) as shown:
+        task = shown.add_task(escape(what), total=count)
+        yield lambda done, said: shown.update(task, completed=done, description=escape(said), refresh=not thread)
 
 
 def table(*columns: str, title: str = "") -> Table:

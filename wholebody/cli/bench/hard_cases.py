@@ -53,14 +53,13 @@ def stability(arguments: argparse.Namespace) -> None:
 
 def _asked(pairs: Sequence[tuple[HardCase, Adapter]], jobs: int) -> list[Cell]:
     from wholebody.bench.suite.stability.asking import run
-    from wholebody.cli.tables import progress_bar
+    from wholebody.cli.tables import bar
 
     cells = []
-    with progress_bar(thread=False) as bar:
-        work = bar.add_task("asking", total=len(pairs))
+    with bar("asking", len(pairs), thread=False) as tell:
         for cell in run(pairs, jobs):
             cells.append(cell)
-            bar.update(work, advance=1, description=f"{cell.case.name}, {cell.method}", refresh=True)
+            tell(len(cells), f"{cell.case.name}, {cell.method}")
     return cells
 
 

@@ -13,7 +13,6 @@ from wholebody.cli.clip.arguments import (
     MOTIONS,
     PAGE,
     SCENE,
-    bar,
     figure_of,
     jobs_of,
     scene_of,
@@ -83,6 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from wholebody.base.errors import InputError
     from wholebody.base.files import check_writable, checked_target, write
+    from wholebody.cli.tables import bar
     from wholebody.motion.avoidance import avoid
     from wholebody.motion.files import check_ending
     from wholebody.motion.reading import read_clip
@@ -169,6 +169,7 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
     from rich.console import Console
 
     from wholebody.base.errors import InputError
+    from wholebody.cli.tables import bar
     from wholebody.motion.batch import BatchProgress, avoid_many
     from wholebody.motion.measures import MotionBounds
 
