@@ -5,7 +5,8 @@ SHELL := /bin/bash
 
 VENV ?= .venv
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+PIP := PIP_NO_COMPILE=1 $(BIN)/python -m pip --disable-pip-version-check --quiet
+# (pip would compile thousands of files that are never imported)
 CHOOSE := $(BIN)/uv pip compile pyproject.toml --quiet --upgrade --universal --python-version 3.10 \
 	--no-header --no-annotate --no-emit-index-url --no-emit-find-links --constraint requirements/limits.in
 OUT ?= demo

@@ -51,7 +51,6 @@ EXTRAS = {
     "optik-py": "optik",
     "pytracik": "tracik",
     "eaik": "eaik",
-    "embodik": "embodik",
 }
 """Optional packages: distribution -> the extra that installs it."""
 

@@ -69,9 +69,8 @@ def contents_of(path: Path, kind: str, keys: tuple[Key, ...], known: Mapping[str
         if is_file(path) or os.path.lexists(path):
             raise
         there = sorted(file.name for file in path.parent.glob("*.toml")) if os.path.isdir(path.parent) else []
-        raise UnknownNameError(
-            kind, path.name, there, "" if path.parent == Path() else one_line(str(path.parent))
-        ) from None
+        place = "" if path.parent == Path() else one_line(str(path.parent))
+        raise UnknownNameError(kind, path.name, there, place) from None
     data, where, names = parsed_toml(text, path.name), Where(path, text), {key.name: key for key in keys}
     plain = {name: value for name, value in data.items() if name not in known}
     for name in plain:
