@@ -44,7 +44,7 @@ def console(least: int = 0) -> Console:
 
 
 @contextmanager
-def bar(what: str, count: float = 1.0, *, thread: bool = True) -> Iterator[Callable[[float, str], object]]:
+def bar(what: str, count: float = 1.0, *, thread: bool = True) -> Iterator[Callable[[float, str], Any]]:
     """Show on the error output how far something is: the function takes how much of `count` is done, and what it is.
 
     The bar goes when it is done. A thread redraws it, which a fork must not have.
