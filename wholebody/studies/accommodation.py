@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array
 from wholebody.base.charts import Shown, new_chart
 from wholebody.base.errors import InputError
 from wholebody.ergonomics.vision import sight
@@ -269,7 +268,8 @@ def accommodation(
     variants = [Variant(make, person, None, None) for person in population.values()]
     if point is not None:
         seen = tuple(  # a problem that failed is not made again
-            one.q is not None and _sees(variant, one.q, point) for variant, one in zip(variants, records, strict=True)
+            one.q is not None and sight(variant().scene, one.q, point).seen
+            for variant, one in zip(variants, records, strict=True)
         )
     persons = [who[name] for name in order]
     sizes = tuple(
@@ -294,7 +294,3 @@ def _settings(variants: Sequence[Variant], records: Records) -> dict[str, tuple[
             if joint.startswith(tuple(movable)):
                 found.setdefault(joint, [math.nan] * len(records))[k] = value
     return {joint: tuple(values) for joint, values in found.items()}
-
-
-def _sees(variant: Variant, q: Array, point: Array) -> bool:
-    return sight(variant().scene, q, point).seen
