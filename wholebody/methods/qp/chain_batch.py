@@ -211,7 +211,8 @@ class _First:
         effort = self.effort[rows, here]
         isolated = self.nearest.shape[2] <= self.rule.rows
         near = isolated | ~(self.effort[rows, self.order[:, 0]] < SEEDS.worth * effort)
-        return (effort < np.inf) & (self.known[rows, here, 2] != 0.0) & near
+        complete: Mask = near & (effort < np.inf) & (self.known[rows, here, 2] != 0.0)
+        return complete
 
     def found(self, k: int) -> tuple[Array, Array]:
         """The ends (m, n) of one problem, and what was found there (m, 4)."""
