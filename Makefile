@@ -1,18 +1,19 @@
-# What a person does with a clone. Needs make and a Python 3.10 to 3.13 with venv; `make help` lists everything.
+# What a person does with a clone. Needs make and a Python 3.10 to 3.14 with venv; `make help` lists everything.
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
 
 VENV ?= .venv
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+PIP := PIP_NO_COMPILE=1 $(BIN)/python -m pip --disable-pip-version-check --quiet
+# (pip would compile thousands of files that are never imported)
 CHOOSE := $(BIN)/uv pip compile pyproject.toml --quiet --upgrade --universal --python-version 3.10 \
 	--no-header --no-annotate --no-emit-index-url --no-emit-find-links --constraint requirements/limits.in
 OUT ?= demo
 
 # A Python is usable when it starts, is of a supported version and can make environments with pip in them.
-USABLE := import sys, venv, ensurepip; sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, 13))
-PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3.10 python3; do \
+USABLE := import sys, venv, ensurepip; sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, 14))
+PYTHON ?= $(shell for p in python3.13 python3.14 python3.12 python3.11 python3.10 python3; do \
 	"$$p" -c '$(USABLE)' >/dev/null 2>&1 && echo "$$p" && break; done)
 
 # The package itself is installed editable; only what these files say makes another installation necessary.
@@ -63,7 +64,7 @@ clean: ## remove the environment and everything that was built
 
 # Each stamp says that what its list names is installed; made again when a list changes.
 $(BIN)/python:
-	@test -n "$(PYTHON)" && "$(PYTHON)" -c '$(USABLE)' 2>/dev/null || { echo "wholebody needs a Python 3.10, 3.11, 3.12 or 3.13 with venv\
+	@test -n "$(PYTHON)" && "$(PYTHON)" -c '$(USABLE)' 2>/dev/null || { echo "wholebody needs a Python 3.10 to 3.14 with venv\
 	 ($(if $(PYTHON),$(PYTHON) is not one,none was found)): install python3 and python3-venv, or say make PYTHON=/path/to/python." >&2; exit 1; }
 	@echo "Making the environment $(VENV) with $(PYTHON) (a few minutes the first time) ..."
 	"$(PYTHON)" -m venv $(VENV)

@@ -84,10 +84,10 @@ class Solution(Shown):
             values = [max(getattr(entry, name), SMALLEST) for entry in self.trace]
             missed.semilogy(numbers, values, label=word, **look)
         cost.plot(numbers, [entry.measure for entry in self.trace], color="C2", label="measures", **look)
-        missed.set_ylabel("largest [m, rad]")
+        missed.set_ylabel("largest error [m, rad]")
         cost.set_ylabel("measures, weighted sum")
         for axis in axes[0]:
-            axis.set_xlabel("entry of the trace")
+            axis.set_xlabel("iteration")
             axis.xaxis.get_major_locator().set_params(integer=True)
         chart.legend(
             *missed.get_legend_handles_labels(), loc="outside upper left", fontsize="small", ncols=2, markerscale=2

@@ -30,7 +30,9 @@ def measured() -> dict[str, tuple[float, ...]]:
 
 
 def test_the_step_is_as_fast_as_the_first_page_says(readme: str, measured: dict[str, tuple[float, ...]]) -> None:
-    said = re.search(rf"Among 20 objects a step takes {SPAN} of placo's time in the median, in contact {SPAN}", readme)
+    said = re.search(
+        rf"step among 20 objects takes {SPAN} of placo's time \(median, 95 % interval\), in contact {SPAN}", readme
+    )
     assert said is not None
     figures = [float(figure) for figure in said.groups()]
     assert figures == [round(figure, 2) for reach in ("free", "contact") for figure in measured[reach]]

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+import wholebody.tracking
 
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
@@ -20,8 +21,8 @@ FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 def public() -> Iterator[tuple[str, Any]]:
     """Public classes and functions by name, each once."""
     seen = set[int]()
-    for name in wb.__all__:
-        found = getattr(wb, name)
+    for name in (*wb.__all__, "tracking"):
+        found = wholebody.tracking if name == "tracking" else getattr(wb, name)
         room = isinstance(found, ModuleType)
         for inner in dir(found) if room else [""]:
             each = getattr(found, inner) if room else found
@@ -37,7 +38,7 @@ PUBLIC = dict(public())
 def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """Names that the examples use: those of the package's own docstring, and some postures and files."""
     blocks = (wb.__doc__ or "").split("::\n", 1)[1].partition("\n\nWhat")[0]
-    names: dict[str, Any] = {"np": np}
+    names: dict[str, Any] = {"np": np, "wholebody": wholebody}
     exec(inspect.cleandoc(blocks), names)
     human, solution, folder = names["scene"].figure, names["solution"], tmp_path_factory.mktemp("examples")
     standing = human.posture("standing")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -204,6 +205,23 @@ def test_feet_that_are_held_inside_the_floor_are_told_before(human: wb.Figure) -
     with pytest.warns(UserWarning, match=r"left_foot stands up to 30 mm inside floor.*hold_feet=False"):
         assert not wb.avoid(clip, scene, method="frames").report.solved
     assert wb.avoid(clip, scene, method="frames", hold_feet=False).report.after.free
+
+
+def test_a_jump_that_collides_and_ends_that_overlap_are_told_before(human: wb.Figure) -> None:
+    standing = human.posture("standing")
+    inside = human.with_joints(standing, {"right_shoulder_abduction": -0.3})
+    bent = human.with_joints(inside, {"left_elbow_flexion": 1.0})
+    clip = wb.Clip(human, [inside, inside, bent, bent, standing], DT)
+    said = r"jumps from frame 1 to 2 \(left_elbow_flexion by 0.74 rad.*clip\[:2\].*first posture.*give clip\[4:\]"
+    with pytest.warns(UserWarning, match=said):
+        wb.avoid(clip, method="frames", keep_ends=True, progress=lambda _: True)
+    with pytest.warns(UserWarning, match=r"last posture overlaps by .* give clip\[:0 \+ 1\]"):
+        wb.avoid(wb.Clip(human, [standing, inside], DT), method="frames", keep_ends=True, progress=lambda _: True)
+    with warnings.catch_warnings():  # a recording that is only fast, or jumps where it is free
+        warnings.simplefilter("error")
+        wb.avoid(wb.Clip(human, [inside, inside], DT), method="frames", progress=lambda _: True)
+        fast = [human.with_joints(standing, {"left_elbow_flexion": by}) for by in (0.1, 1.3, 1.3)]
+        wb.avoid(wb.Clip(human, fast, DT), method="frames", keep_ends=True)
 
 
 def test_stance_of_a_clip_on_uneven_ground(human: wb.Figure) -> None:

@@ -50,6 +50,11 @@ def test_those_who_do_not_fit_are_told_by_their_dimension() -> None:
     assert one.value == pytest.approx(1.81, abs=0.01)
     assert one.told == 1.0
     assert "men do not fit: stature over 1.8" in repr(found)
+    (axis,) = found.plot().axes
+    drawn = {points.get_label(): points.get_offsets() for points in axis.collections}
+    assert (drawn["male, accommodated"][:, 0] < 1.81).all()
+    assert (drawn["male, left out"][:, 0] > 1.81).all()
+    assert sum(map(len, drawn.values())) == 25
 
 
 def standing(figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:

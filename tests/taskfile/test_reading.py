@@ -101,7 +101,7 @@ def test_the_good_file_is_good(write: Callable[[str], Path]) -> None:
         ('type = "point"', 'type = "pont"', ["no goal type", "did you mean point"]),
         ('shape = "box"', 'shape = "cube"', ["object 1, key shape", "no object shape is called 'cube'"]),
         ('name = "qp"', 'name = "xyz"', ["method", "qp"]),
-        ("[[goal]]", "[[gaol]]", ["no key or table is called 'gaol'", "goal"]),
+        ("[[goal]]", "[[gaol]]", ["no key or table of a task file is called 'gaol'", "goal"]),
         # a wrong structure
         ("[[goal]]", "[goal]", ["goal", "write [[goal]]"]),
         ("[figure]", "[[figure]]", ["figure 1", 'write called = "anna"']),

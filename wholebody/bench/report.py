@@ -66,7 +66,9 @@ def _environment(folder: Path) -> Environment:
 
 
 def formatted(value: float, spec: str, unit: str = "", none: str = "") -> str:
-    """A number by a format, with its unit; `none` for one that is not finite."""
+    """A number by a format, with its unit, without exponents of large ones; `none` for one that is not finite."""
+    if spec.endswith("g") and isfinite(value) and abs(value) >= 10.0 ** int(spec[1:-1] or 6):
+        spec = ".0f"
     return f"{value:{spec}}{unit}" if isfinite(value) else none
 
 

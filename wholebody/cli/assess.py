@@ -88,18 +88,17 @@ def _show(judged: Any, scores: Any) -> None:
     """Print tables."""
     import math
 
-    from rich.console import Console
     from rich.markup import escape
 
-    from wholebody.cli.tables import judgement, table
+    from wholebody.cli.tables import console, judgement, table
 
-    console = Console()
+    shown = console()
     made = table("judged", "")
     made.add_row("goals missed by", f"{1e3 * judged.goal_error:.3f} mm, {math.degrees(judged.goal_angle):.3f} deg")
-    console.print(judgement(made, judged))
+    shown.print(judgement(made, judged))
     if scores is not None:
         made = table("ergonomics", "left", "right", "worse")
         made.columns[3].justify = "left"
         for row in scores.rows():
             made.add_row(*map(escape, row))
-        console.print(made)
+        shown.print(made)

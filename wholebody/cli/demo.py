@@ -27,7 +27,7 @@ def run(arguments: argparse.Namespace) -> int:
     tasks = task_paths()
     if arguments.list:
         for name, path in tasks.items():
-            print(f"{name:24} {path}")
+            print(f"{name:25} {path}")
         return 0
     if arguments.name not in tasks:
         raise UnknownNameError("demo", arguments.name, tasks)

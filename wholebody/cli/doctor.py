@@ -26,28 +26,26 @@ def run(arguments: argparse.Namespace) -> int:
         state = clear_cache()
         print(f"removed {state.entries} meshes, {state.size / 2**20:.1f} MB, in {state.folder}")
         return 0
-    from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
 
+    from wholebody.cli.tables import console
     from wholebody.doctor import examine
     from wholebody.version import __version__
 
-    console = Console()
-    if not console.is_terminal:
-        console.width = 140  # a file or a log needs no wrapping
-    with console.status("trying everything once (about ten seconds)"):
+    shown = console()
+    with shown.status("trying everything once (about ten seconds)"):
         report = examine()
-    console.print(f"[bold]wholebody {__version__}[/], {report.python}", highlight=False, soft_wrap=True)
+    shown.print(f"[bold]wholebody {__version__}[/], {report.python}", highlight=False, soft_wrap=True)
     made = Table(box=None, padding=(0, 2, 0, 0), header_style="dim")
     for column in ("kind", "name", "", "detail", "to have it"):
         made.add_column(column, overflow="fold")
     for entry in report.entries:
         repair = entry.repair if entry.state != "works" else ""
         made.add_row(entry.kind, entry.name, _MARKS[entry.state], escape(entry.detail), escape(repair))
-    console.print(made)
+    shown.print(made)
     for fault, repair in report.faults:
-        console.print(f"[red]wrong:[/] {escape(fault)}\n  repair: {escape(repair)}", highlight=False, soft_wrap=True)
+        shown.print(f"[red]wrong:[/] {escape(fault)}\n  repair: {escape(repair)}", highlight=False, soft_wrap=True)
     if report.healthy:
-        console.print("[green]nothing is wrong[/]")
+        shown.print("[green]nothing is wrong[/]")
     return 0 if report.healthy else 1

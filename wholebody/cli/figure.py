@@ -30,15 +30,13 @@ examples:
 )
 def run(arguments: argparse.Namespace) -> int:
     """Describe or write."""
-    from rich.console import Console
-
     from wholebody.cli.tables import show_figure
     from wholebody.figures import load
 
     options = person_options(arguments)
     if arguments.out is not None:
         return _write(arguments.name, options, arguments.out)
-    show_figure(Console(), load(arguments.name, **options))
+    show_figure(load(arguments.name, **options))
     return 0
 
 

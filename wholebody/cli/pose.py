@@ -74,7 +74,7 @@ def _pose(path: Path, method: str | None, out: Path, as_json: bool, screenshots:
     else:
         from wholebody.cli import tables
 
-        tables.show_solution(Console(), task, solution)
+        tables.show_solution(task, solution)
     with Console(stderr=as_json).status("drawing"):
         written, note = picture.draw(task.problem, solution.q, task.view, out, task.title, screenshots)
     told = [f"wrote {file}" for file in (out / "result.json", *written)]

@@ -48,7 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
     from rich.console import Console
 
     from wholebody.cli.picture import make_folder
-    from wholebody.cli.tables import table
+    from wholebody.cli.tables import console, table
     from wholebody.studies.study import study
     from wholebody.studies.study_files import read_study
 
@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
     for one in records:
         left, overlap = f"{1e3 * one.goal_error:.2f} mm", f"{1e3 * one.penetration:.3f} mm"
         made.add_row(one.name, one.outcome, left, overlap, f"{1e3 * one.seconds:.0f} ms")
-    Console().print(made)
+    console().print(made)
     counts = ", ".join(f"{count} {outcome}" for outcome, count in records.counts().items())
     print(f"{len(records)} cases: {counts}")
     for one in records:

@@ -27,10 +27,20 @@ if TYPE_CHECKING:
 CONTACTS = 10
 """Most pairs that are listed."""
 
+UNWRAPPED = 140
+"""Letters of a line in a file or a log."""
+
 NEAR = 0.01
 """Metres beyond the clearance at which a pair is listed."""
 
 _COLORS = {"solved": "green", "unreachable": "yellow", "stalled": "yellow", "infeasible": "red"}
+
+
+def console(least: int = 0) -> Console:
+    """The output, whose lines have `least` letters or more, and where it is no terminal enough for all tables."""
+    made = Console()
+    made.width = max(made.width, least, 0 if made.is_terminal else UNWRAPPED)
+    return made
 
 
 def progress_bar(*, counted: bool = True, thread: bool = True) -> Progress:
@@ -46,8 +56,7 @@ def progress_bar(*, counted: bool = True, thread: bool = True) -> Progress:
 
     numbers = MofNCompleteColumn() if counted else TaskProgressColumn()
     columns = TextColumn("{task.description}"), BarColumn(), numbers, TimeRemainingColumn()
-    console = Console(stderr=True)
-    return Progress(*columns, console=console, transient=True, auto_refresh=thread, refresh_per_second=4)
+    return Progress(*columns, console=Console(stderr=True), transient=True, auto_refresh=thread, refresh_per_second=4)
 
 
 def table(*columns: str, title: str = "") -> Table:
@@ -65,30 +74,31 @@ def print_rows(rows: Sequence[Row]) -> None:
     made = table("", *(f"{row.case}, {row.tool}" for row in rows))
     for name in dict.fromkeys(name for row in rows for name in row.figures):
         made.add_row(name, *(shown(row.figures[name]) if name in row.figures else "" for row in rows))
-    Console().print(made)
+    console().print(made)
 
 
-def show_solution(console: Console, task: Task, solution: Solution) -> None:
+def show_solution(task: Task, solution: Solution) -> None:
     """Print everything about a solution."""
+    shown = console()
     problem, judged = task.problem, solution.assessment
     figure = problem.scene.figure
-    console.print(escape(task.title), style="bold", highlight=False)
-    console.print(
+    shown.print(escape(task.title), style="bold", highlight=False)
+    shown.print(
         f"{escape(figure.name)}: {figure.model.nv} degrees of freedom, {len(problem.scene.objects)} things, "
         f"{problem.scene.geometry.ngeoms} pieces, {len(problem.scene.geometry.collisionPairs)} pairs that can touch",
         highlight=False,
     )
-    console.print(
+    shown.print(
         f"[{_COLORS[solution.status]}]{solution.status}[/] by {solution.method} in {1e3 * solution.seconds:.0f} ms, "
         f"{solution.iterations} iterations: {escape(solution.message)}\n",
         highlight=False,
     )
-    console.print(_goals(task, solution))
-    console.print(_contacts(problem, solution))
-    console.print(_measures(problem, solution))
+    shown.print(_goals(task, solution))
+    shown.print(_contacts(problem, solution))
+    shown.print(_measures(problem, solution))
     held = judgement(table("judged independently", ""), judged)
     held.add_row("first-order optimality", f"{judged.optimality:.1e}")
-    console.print(held)
+    shown.print(held)
 
 
 def judgement(made: Table, judged: Assessment) -> Table:
@@ -133,11 +143,12 @@ def _measures(problem: Problem, solution: Solution) -> Table:
     return made
 
 
-def show_figure(console: Console, figure: Figure) -> None:
+def show_figure(figure: Figure) -> None:
     """Describe a figure: size, names of joints, frames, groups and postures."""
+    shown = console()
     model = figure.model
     mass = sum(inertia.mass for inertia in model.inertias)
-    console.print(
+    shown.print(
         f"[bold]{escape(figure.name)}[/]: {model.nv} degrees of freedom, {mass:.1f} kg, "
         f"{figure.geometry.ngeoms} pieces ({figure.detail}), "
         f"{len(figure.geometry.collisionPairs)} pairs that can touch, {figure.root} root\n",
@@ -153,7 +164,7 @@ def show_figure(console: Console, figure: Figure) -> None:
     }
     for kind, known in listed.items():
         names.add_row(kind, escape(", ".join(known)))
-    console.print(names)
+    shown.print(names)
     joints = table("joint", "lowest", "highest", title="")
     limits = figure.limits
     ranges = dict(zip(limits.idx_q.tolist(), zip(limits.lower, limits.upper, strict=True), strict=True))
@@ -168,8 +179,8 @@ def show_figure(console: Console, figure: Figure) -> None:
         joints.add_row(
             escape(name), *(f"{end:.3f} m" if slides else f"{math.degrees(end):.1f} deg" for end in (low, high))
         )
-    console.print(joints)
+    shown.print(joints)
     if figure.notes:
-        console.print("\nnotes", style="dim")
+        shown.print("\nnotes", style="dim")
     for note in figure.notes:
-        console.print(f"- {note}", markup=False, highlight=False)
+        shown.print(f"- {note}", markup=False, highlight=False)

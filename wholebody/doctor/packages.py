@@ -51,11 +51,10 @@ EXTRAS = {
     "optik-py": "optik",
     "pytracik": "tracik",
     "eaik": "eaik",
-    "embodik": "embodik",
 }
 """Optional packages: distribution -> the extra that installs it."""
 
-OLDEST, NEWEST = (3, 10), (3, 13)
+OLDEST, NEWEST = (3, 10), (3, 14)
 LIBRARIES = ("libpinocchio", "libcoal", "libhpp-fcl", "libeigenpy", "libboost_python", "liburdfdom", "libassimp")
 """Shared libraries of which other versions break those of the wheels."""
 
@@ -140,7 +139,7 @@ def python_fault(version: tuple[int, int] = sys.version_info[:2]) -> str | None:
     """Say what is wrong with the interpreter's version, if anything."""
     if OLDEST <= version <= NEWEST:
         return None
-    return f"Python {version[0]}.{version[1]} is not one of 3.10 to 3.13, for which all packages exist"
+    return f"Python {version[0]}.{version[1]} is not one of 3.10 to 3.14, for which the required packages exist"
 
 
 def shadowing_folders(environ: Mapping[str, str], modules: Iterable[str]) -> dict[str, list[str]]:

@@ -52,8 +52,8 @@ def within_budget(seconds: float) -> Iterator[None]:
 
 def budget_for_sweep() -> Callable[[], bool]:
     """Whether a sweep that begins now has had its share of this thread's budget."""
-    # A search ends within one budget or little more; sweeps have another two.
-    until = max(3.0, BUDGET.spent + 1.0)
+    # A search ends within one budget or little more; sweeps have another two, a late one half of one at least.
+    until = max(3.0, BUDGET.spent + 0.5)
     return lambda: BUDGET.spent > until
 
 
@@ -113,7 +113,7 @@ class Control:
         return (self._now() - self._began) / (self._longest if self._time_limit is None else self._time_limit)
 
     def _now(self) -> float:
-        return time.thread_time() - compile_seconds() if self._time_limit is None else time.monotonic()
+        return (time.thread_time() if self._time_limit is None else time.monotonic()) - compile_seconds()
 
     def message(self, judgement: Assessment) -> str:
         """Why the solve was ended, and the remaining errors; empty if it was not ended."""

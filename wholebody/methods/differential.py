@@ -15,11 +15,13 @@ import pinocchio as pin
 
 from wholebody.assessment.posture import goal_errors, largest_violation
 from wholebody.base.arrays import Array
+from wholebody.figures.state import State
 from wholebody.geometry.pieces import COAL_ACCURACY
 from wholebody.methods.control import Control
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
+from wholebody.tasks.checks import values_and_rows
 
 REST = 1e-2  # share of the tolerance: a smaller step counts as convergence
 MEASURES = 1e-2  # weight of the measures at the beginning, against goals of weight 1
@@ -49,6 +51,19 @@ class Stopwatch(threading.local):
 
 TOOL = Stopwatch()
 """Runs while a tool computes, so that its time is told apart from what states problems to it and judges its steps."""
+
+
+def held(problem: Problem, state: State, q: Array, tolerance: float) -> Array:
+    """The posture (nq,) near q, within limits, where stated equalities hold: a few of Newton's least motions."""
+    equal = [term for term in problem.stated if np.array_equal(term.lower, term.upper)]
+    for _ in range(4 if equal else 0):
+        found = [(term, *values_and_rows(term, term.value, state.update(q))) for term in equal]
+        missed = np.concatenate([value - term.lower for term, value, _ in found])
+        if not np.abs(missed).max() > tolerance:
+            break
+        way = np.linalg.lstsq(np.concatenate([rows for *_, rows in found]), -missed, rcond=1e-6)[0]
+        q = problem.scene.figure.clamp(np.asarray(pin.integrate(state.model, q, way)))
+    return q
 
 
 class StepError(Exception):

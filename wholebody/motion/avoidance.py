@@ -25,6 +25,7 @@ from wholebody.motion.checking import ClipCheck, check, same_joints
 from wholebody.motion.clip import Clip
 from wholebody.motion.clip_torques import torques
 from wholebody.motion.faults import DEPTH
+from wholebody.motion.foreseen import foreseen
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
 from wholebody.motion.judging import COLLISION, HELD, ROUNDING, AvoidanceReport, Avoided, judged
 from wholebody.motion.load_change import load_change
@@ -89,6 +90,9 @@ def avoid(
         keep_ends: keep the first and the last posture as they are where they are free.
         progress: called with an `AvoidProgress` now and then; the method ends with what it has if it returns True.
 
+    What must give way is warned of before anything is computed: feet held inside things, a recording that jumps where
+    it collides, and ends that are to be kept but overlap.
+
     Returns:
         The new clip and a report. A clip that could not be freed is an answer too: `report.solved` is False, and
         `report.message` says what is left.
@@ -124,8 +128,8 @@ def avoid(
         given = (*given, StanceFeet()) if has_feet(scene.figure) else given
     flag(keep_ends, "avoid: keep_ends")
     judge = _Judge(clip, scene, chosen, given, keep_ends)
-    if judge.held_inside:
-        warn(f"avoid: {clip.name}: {judge.held_inside}")
+    if judge.foreseen:
+        warn(f"avoid: {clip.name}: {judge.foreseen}")
     with scene.borrow() as workspace:
         run = Run(clip, judge.terms, workspace, chosen.clearance, Watch(progress), judge.feet)
         began = time.perf_counter()
@@ -168,37 +172,16 @@ class _Judge:
         terms = frame_terms(scene, clip.q, clip.dt, given, method.clearance)
         self.asked = _bounds(given, self._was, terms, keep_ends)
         self.terms = replace(terms, largest=self.asked.largest)
-        self.held_inside = _held_inside(self.terms, self._was)
+        self.foreseen = foreseen(self.terms, self._was, self.asked.keep_ends)
 
     def report(self, result: MethodResult, run: Run) -> AvoidanceReport:
         """What a method made of the clip."""
-        said = [result.message, "the caller ended it" if run.ended else "", run.work.left_out, self.held_inside]
+        said = [result.message, "the caller ended it" if run.ended else "", run.work.left_out, self.foreseen]
         result, change = with_values(result, message="; ".join(part for part in said if part)), None
         if self._loads is not None and self._strength is not None:
             places = None if result.times is None else result.times / self._clip.dt
             change = load_change(self._loads, self._clip.with_q(result.q), places, self._strength, self.feet)
         return judged(self._was, self.terms, self.asked, result, run.work, self._name, change)
-
-
-def _held_inside(terms: FrameTerms, was: ClipCheck) -> str:
-    """Which feet are held where they are inside of a thing, so that no method can free them; empty without one."""
-    figure, told = terms.scene.figure, list[str]()
-    joints = [{figure.model.frames[figure.frame_id(name)].parentJoint for name in names} for names in terms.stands]
-    for contact in was.contacts:
-        segment, thing = contact.first, contact.second
-        segment, thing = (segment, thing) if segment in figure.segments else (thing, segment)
-        if contact.kind != "thing" or segment not in figure.segments:
-            continue
-        joint = figure.model.frames[figure.frame_id(segment)].parentJoint
-        held = np.array([joint in here for here in joints]) & (contact.depth > HELD)
-        if held.any():
-            told.append(f"{segment} stands up to {1e3 * contact.depth[held].max():.0f} mm inside {thing}")
-    if not told:
-        return ""
-    return (
-        f"{', '.join(told)}, and is held there; let feet slide by hold_feet=False (or --no-feet), or retarget "
-        "the recording with this scene, which puts feet on what is below them"
-    )
 
 
 def freed(method: Avoider, run: Run) -> MethodResult:

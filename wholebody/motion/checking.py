@@ -153,7 +153,8 @@ class ClipCheck(Shown):
             depth[::2], depth[1::2] = each.depth, each.between
             axis.plot(times, 1e3 * depth, label=plain(each.names))
         axis.axhline(1e3 * self.tolerance, color="0.6", linestyle="--", label="tolerance")
-        axis.set(xlabel="time [s]", ylabel="depth [mm]", xlim=(0.0, max(self.clip.duration, self.clip.dt)))
+        ends = 0.0, max(self.clip.duration, self.clip.dt)
+        axis.set(xlabel="time [s]", ylabel="depth [mm]", title=plain(self.clip.name), xlim=ends)
         chart.legend(loc="outside right upper", fontsize="x-small")
         return chart
 

@@ -276,7 +276,7 @@ class Clip(Shown):
         """Draw values of joints over time, a matplotlib figure.
 
         Args:
-            joints: their names; None for the eight whose values range the farthest.
+            joints: their names; None for those that move, at most the eight whose values range the farthest.
 
         Raises:
             InputError: no joint is named.
@@ -294,6 +294,7 @@ class Clip(Shown):
                 name: float(np.ptp(self.q[:, one.idx_q : one.idx_q + one.nq], axis=0).max()) for name, one in of.items()
             }
             names = sorted(reach, key=lambda name: -reach[name])[:DRAWN]
+            names = [name for name in names if reach[name] > 1e-9] or names[:1]
         chart, axes = new_chart(1, 1, (8.0, 3.2))
         for name in names:
             one = of[name]
@@ -301,7 +302,8 @@ class Clip(Shown):
                 axes[0, 0].plot(
                     self.times, self.q[:, one.idx_q + k], label=plain(name if one.nq == 1 else f"{name}[{k}]")
                 )
-        axes[0, 0].set(xlabel="time [s]", ylabel="value [rad, m]", title=plain(self.name))
+        turns = all(one.nq < 3 and not one.shortname().startswith("JointModelP") for one in map(of.__getitem__, names))
+        axes[0, 0].set(xlabel="time [s]", ylabel="angle [rad]" if turns else "value [rad, m]", title=plain(self.name))
         chart.legend(loc="outside right upper", fontsize="x-small")
         return chart
 

@@ -118,15 +118,20 @@ class LoadChange:
             curves = [
                 [(loads.joint_of(k), loads.share[:, k]) for k in joints],
                 [(name, loads.force[:, k, 2]) for k, name in enumerate(loads.feet)],
-                [("zero moment point", 1e3 * loads.outside)],
+                [("", 1e3 * loads.outside)],
             ]
             for axis, each in zip(axes, curves, strict=True):
                 for number, (name, values) in enumerate(each):
                     axis.plot(t, values, style, color=f"C{number}", label=plain(name) if style == "-" else None)
-        for axis, said in zip(axes, ("torque [strength]", "force upwards [N]", "outside of feet [mm]"), strict=True):
-            axis.set(xlabel="time [s]", ylabel=said)
+        said = "torque / strength", "vertical force [N]", "outside of feet [mm]"
+        for axis, words in zip(axes, said, strict=True):
+            axis.set(xlabel="time [s]", ylabel=words)
+        for axis in axes[:2]:
             if axis.lines:
                 axis.legend(fontsize="x-small")
+        axes[0].set_title("dashed: before", fontsize="small", loc="left")
+        axes[2].set_title("zero moment point", fontsize="small", loc="left")
+        axes[2].set_ylim(0.0, max(1.0, 1.05 * axes[2].get_ylim()[1]))
         return chart
 
     def _torque_missed(self, joint: int) -> str:

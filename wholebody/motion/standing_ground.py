@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,7 +36,7 @@ class Foothold(NamedTuple):
     height: float  # of the ground there above the lowest level, metres
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Ground:
     """The ground of a recording. `dataclasses.replace` makes a changed one.
 
@@ -56,7 +56,7 @@ class Ground:
     """
 
     footholds: tuple[Foothold, ...]
-    rests: Mapping[str, Mask] = field(repr=False)
+    rests: Mapping[str, Mask]
     lowest: Mapping[str, float]
     levels: tuple[float, ...]
     tilt: float
@@ -101,8 +101,13 @@ class Ground:
     def __str__(self) -> str:
         """One sentence."""
         shares = ", ".join(f"{role} {mask.mean():.0%}" for role, mask in self.rests.items() if mask.any())
-        kind = "uneven" if self.uneven else f"levels at {', '.join(f'{level:.2f}' for level in self.levels)} m"
-        return f"ground: {kind}, tilt {self.tilt:.1f} degrees; rests: {shares or 'none'}"
+        return f"ground: {self._kind()}, tilt {self.tilt:.1f} degrees; rests: {shares or 'none'}"
+
+    def __repr__(self) -> str:
+        return f"Ground({self._kind()}, {len(self.footholds)} footholds)"
+
+    def _kind(self) -> str:
+        return "uneven" if self.uneven else f"levels at {', '.join(f'{level:.2f}' for level in self.levels)} m"
 
     def chart(self, path: str | os.PathLike[str]) -> str:
         """Draw footholds seen from above and their heights over time into a picture; returns its path."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array
+from wholebody.base.charts import Shown, new_chart
 from wholebody.base.errors import InputError
 from wholebody.ergonomics.vision import sight
 from wholebody.figures.adjustable import ADJUSTABLE
@@ -24,7 +25,7 @@ from wholebody.studies.study import TaskFunction, Variant, loaded_person, study
 from wholebody.studies.study_files import TaskFile
 from wholebody.tasks import inputs
 
-BUDGET = 100  # programs of restarts for one person: who is left out takes 1 s in place of 3 s
+BUDGET = 30  # programs of restarts for one person: who is left out takes half of the time of 100
 REACHED = 1e-3  # m, rad: by which a goal may be missed by somebody who reaches it
 
 
@@ -59,8 +60,8 @@ class Exclusion(NamedTuple):
         return f"{self.excluded} {'men' if self.sex == 'male' else 'women'} do not {self.verdict}: {words}"
 
 
-@dataclass(frozen=True)
-class Accommodation:
+@dataclass(frozen=True, repr=False)
+class Accommodation(Shown):
     """How much of a population a task accommodates.
 
     Attributes:
@@ -127,6 +128,33 @@ class Accommodation:
                 if out and rest:
                     found.append(self._told(sex, verdict, out, rest))
         return tuple(sorted(found, key=lambda one: -one.excluded))
+
+    def plot(self) -> Any:
+        """Draw who is left out, a matplotlib figure: stature, and the dimension that tells most of those left out.
+
+        Raises:
+            InputError: nobody was tried who has dimensions.
+        """
+        chart, axes = new_chart(1, 1, (6.0, 3.6))
+        axis, worst = axes[0, 0], next(iter(self.exclusions), None)
+        other = "mass" if worst is None or worst.dimension == "stature" else worst.dimension
+        known = [k for k, tried in enumerate(self.tried) if tried and self.dimensions[k]]
+        if not known:
+            raise InputError("plot: nobody was tried who has dimensions; give people, such as wb.people(100)")
+        for sex, marker in (("female", "o"), ("male", "^")):
+            for good, color, words in ((True, "C2", "accommodated"), (False, "C3", "left out")):
+                who = [self.dimensions[k] for k in known if self.sexes[k] == sex and self.accommodated[k] == good]
+                if who:
+                    x, y = [one["stature"] for one in who], [one[other] for one in who]
+                    axis.scatter(x, y, color=color, marker=marker, s=18, label=f"{sex}, {words}")
+        if worst is not None and worst.dimension in ("stature", other):
+            (axis.axvline if worst.dimension == "stature" else axis.axhline)(worst.value, color="0.6", linestyle="--")
+        unit = "kg" if other == "mass" else "m"
+        axis.set(
+            xlabel="stature [m]", ylabel=f"{other.replace('_', ' ')} [{unit}]", title=f"{self.share:.0%} accommodated"
+        )
+        chart.legend(loc="outside right upper", fontsize="small")
+        return chart
 
     def _of_tried(self, good: tuple[bool, ...]) -> float:
         """Share of those tried."""

@@ -18,7 +18,7 @@ from wholebody.base.errors import InputError
 from wholebody.base.files import write
 
 INCHES = 2.4  # width of one height
-MEANING = "red: metres short    green: reached, 1 with the least measure"
+MEANING = "above 0: reached, 1 with the least measure\nbelow 0: metres short; gray: inside a thing"
 INSIDE_GRAY = (0.35, 0.35, 0.38, 1.0)
 
 _PAGE = """<!doctype html>
@@ -45,7 +45,7 @@ def slices_chart(found: Any) -> Any:
     columns = -(-len(shown) // rows)
     deep, wide = (float(np.ptp(places)) + 0.1 for places in (found.x, found.y))
     high = INCHES * min(max(deep / wide, 0.4), 2.5) + 0.75  # inches of one height for its title and its axis
-    chart, axes = new_chart(rows, columns, (INCHES * columns + 1.6, max(high * rows + 0.5, 4.0)))
+    chart, axes = new_chart(rows, columns, (INCHES * columns + 1.6, max(high * rows + 0.5, 3.0)))
     values = heat(found)
     image: Any = None
     for axis in axes.flat[len(shown) :]:

@@ -151,7 +151,8 @@ class Records(Shown, Sequence[SolveRecord]):
         """Lines about answers of neighbours, changes of strategy, and the first refused and the first ended case."""
         lines = f"\n  {self.from_neighbours} solved from the answer of a neighbour" if self.from_neighbours else ""
         changed = [f"{one.name}, {one.change}" for one in self._records if one.change]
-        lines += f"\n  {len(changed)} changes of strategy, first: {changed[0]}" if changed else ""
+        many = "changes" if len(changed) > 1 else "change"
+        lines += f"\n  {len(changed)} {many} of strategy, first: {changed[0]}" if changed else ""
         for outcome in (REFUSED, ENDED):
             first = next((one for one in self._records if one.outcome == outcome), None)
             lines += "" if first is None else f"\n  first {outcome}: {first.name}, {first.message}"

@@ -69,12 +69,13 @@ def contents_of(path: Path, kind: str, keys: tuple[Key, ...], known: Mapping[str
         if is_file(path) or os.path.lexists(path):
             raise
         there = sorted(file.name for file in path.parent.glob("*.toml")) if os.path.isdir(path.parent) else []
-        raise UnknownNameError(kind, path.name, there, one_line(str(path.parent))) from None
+        place = "" if path.parent == Path() else one_line(str(path.parent))
+        raise UnknownNameError(kind, path.name, there, place) from None
     data, where, names = parsed_toml(text, path.name), Where(path, text), {key.name: key for key in keys}
     plain = {name: value for name, value in data.items() if name not in known}
     for name in plain:
         if name not in names:
-            raise UnknownNameError("key or table", name, [*names, *known], str(where))
+            raise UnknownNameError(f"key or table of a {kind}", name, [*names, *known], str(where))
     top = Entry(where, None, "", names, values_of(plain, keys, where))
     return Contents(top, {name: _entries(name, data[name], known[name], where) for name in known if name in data})
 

@@ -39,6 +39,10 @@ class Dragged:
         iterations: (n,) of the method in each frame.
         end: the solution at the end.
         paths: the way to each posture, as in `DragFrame`; empty where it is straight.
+
+    Examples:
+        >>> wholebody.tracking.drag_along(problem, [(0.5, -0.25, 0.95)], "qp").method
+        'qp'
     """
 
     __repr__ = brief
@@ -69,6 +73,11 @@ class DragJudgement:
         constraint_violation: (n + 2,) largest violation of a constraint, metres or radians.
         limit_violation: largest violation of a joint limit at any posture, radians.
         jerk: (n - 1,) root of the mean square of the third difference of the joint angles over time, rad/s^3.
+
+    Examples:
+        >>> dragged = wholebody.tracking.drag_along(problem, [(0.5, -0.25, 0.95)], "qp")
+        >>> bool(wholebody.tracking.judge_drag(problem, dragged).limit_violation < 1e-6)
+        True
     """
 
     __repr__ = brief
@@ -114,6 +123,11 @@ def drag_along(
         goal: index of the goal that moves.
         dt: seconds from frame to frame.
         progress: called after each frame with the number of frames done.
+
+    Examples:
+        >>> dragged = wholebody.tracking.drag_along(problem, [(0.5, -0.25, 0.95)], "qp")
+        >>> dragged.end.status
+        'solved'
     """
     given = array(places, "places", "places of shape (n, 3), metres")
     if given.ndim != 2 or given.shape[1] != 3 or not len(given):
@@ -162,7 +176,13 @@ def _lags(left: list[float], late: int) -> bool:
 
 
 def judge_drag(problem: Problem, dragged: Dragged, *, goal: int = 0) -> DragJudgement:
-    """Assess a drag of a problem's goal."""
+    """Assess a drag of a problem's goal.
+
+    Examples:
+        >>> dragged = wholebody.tracking.drag_along(problem, [(0.5, -0.25, 0.95)], "qp")
+        >>> bool(wholebody.tracking.judge_drag(problem, dragged).depth.max() < 1e-3)
+        True
+    """
     own = copied(problem)
     instance(dragged, Dragged, "judge_drag: dragged", "make one with drag_along(problem, places)")
     moving_goal(problem, goal)

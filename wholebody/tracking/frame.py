@@ -53,6 +53,11 @@ class Frame(NamedTuple):
         note: "" or a report of unusual events.
         collisions: what things that move (`Scene.move` with `over`) passed through, or are inside of; empty if nothing.
         path: shares of the frame, from 0 to 1, and the postures (nq,) there, if things moved; otherwise empty.
+
+    Examples:
+        >>> frame = wholebody.tracking.FrameLoop(scene, standing).frame(standing)
+        >>> frame.q.shape
+        (56,)
     """
 
     q: Array

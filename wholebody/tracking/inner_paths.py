@@ -66,6 +66,10 @@ def resampled(figure: Figure, motion: Any, name: str = "track") -> Track:
 
     Raises:
         InputError: it is no motion of this figure, or has no valid `dt`.
+
+    Examples:
+        >>> wholebody.tracking.resampled(human, clip).q.shape
+        (6, 56)
     """
     model, dt = check_figure(figure, "resampled").model, time_step(getattr(motion, "dt", None), "resampled: dt")
     plain = Track.of(figure, motion.q, dt, name)

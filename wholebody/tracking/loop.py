@@ -55,6 +55,11 @@ class FrameLoop(NotCopyable):
         overlap: name of the overlap strategy.
         give_way: who takes an overlap of the figure with a thing that has a `wb.Body`.
         count: number of frames so far.
+
+    Examples:
+        >>> loop = wholebody.tracking.FrameLoop(scene, standing)
+        >>> loop.frame(standing).note
+        ''
     """
 
     def __init__(
@@ -294,6 +299,11 @@ def follow(
     Raises:
         UnknownNameError, InputError: the track does not fit the figure, or no posture near its start is free; frame
             and place are named, before anything is computed.
+
+    Examples:
+        >>> track = wholebody.tracking.posed(human, angles={"right_elbow_flexion": [0.0, 0.1, 0.2]}, dt=1 / 60)
+        >>> wholebody.tracking.follow(scene, track).q.shape
+        (3, 56)
     """
     instance(scene, Scene, "follow: scene", "make one with wb.Scene(figure)")
     instance(track, Track, "follow: track", "make one with Track.of(figure, q, dt)")

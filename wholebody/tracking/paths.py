@@ -30,6 +30,10 @@ def circle(center: ArrayLike, radius: float, normal: ArrayLike = (1.0, 0.0, 0.0)
 
     Raises:
         InputError: the radius is not positive, or a value is not finite.
+
+    Examples:
+        >>> wholebody.tracking.circle((0.5, 0.0, 1.0), 0.1)[0].round(3)
+        array([0.5, 0. , 0.9])
     """
     middle, axis = point(center, "circle: center"), direction(normal, "circle: normal")
     radius = number(radius, "circle: radius", 1e-6, LARGEST, "m")  # m: smallest circle
@@ -46,6 +50,11 @@ def read_path(path: str | os.PathLike[str]) -> Array:
 
     Empty lines, comments after #, and a first line of names are ignored. Raises FileFormatError for a file without
     points, or a line that is none and is named.
+
+    Examples:
+        >>> _ = (folder / "corners.csv").write_text("0.4, 0, 1")
+        >>> wholebody.tracking.read_path(folder / "corners.csv")
+        array([[0.4, 0. , 1. ]])
     """
     path = checked_path(path, "path")
     text = read_text(path, "path")
@@ -69,6 +78,10 @@ def spread(corners: ArrayLike, frames: int | None = None, dt: float = FRAME) -> 
 
     Raises:
         InputError: the corners are no path, or frames is not positive.
+
+    Examples:
+        >>> wholebody.tracking.spread([(0.0, 0.0, 0.0), (0.0, 0.0, 0.1)], frames=2)[:, 2]
+        array([0.05, 0.1 ])
     """
     given = array(corners, "path", "at least two corners, shape (k, 3), metres")
     if given.ndim != 2 or given.shape[1] != 3 or len(given) < 2:

@@ -33,6 +33,11 @@ class Recording:
         notes: a note for each frame, mostly empty.
         paths: the way to each posture, as in `Frame`; empty where it is straight.
         moves: things that moved, with their placements at the ends of the frames.
+
+    Examples:
+        >>> track = wholebody.tracking.posed(human, angles={"right_elbow_flexion": [0.0, 0.1]}, dt=1 / 60)
+        >>> wholebody.tracking.follow(scene, track).overlap
+        'qp'
     """
 
     __repr__ = brief
@@ -91,6 +96,11 @@ class Judgement:
         returns: for every end of contact that was followed by 30 frames without contact: the frame, and the number of
             frames until the shown posture was at the tracked one to 1 mrad; -1 if that did not happen before the next
             contact.
+
+    Examples:
+        >>> track = wholebody.tracking.posed(human, angles={"right_elbow_flexion": [0.0] * 4}, dt=1 / 60)
+        >>> wholebody.tracking.judge(scene, wholebody.tracking.follow(scene, track)).passed
+        ()
     """
 
     __repr__ = brief
@@ -109,7 +119,14 @@ class Judgement:
 
 
 def judge(scene: Scene, recording: Recording) -> Judgement:
-    """Assess a recording of a scene."""
+    """Assess a recording of a scene.
+
+    Examples:
+        >>> track = wholebody.tracking.posed(human, angles={"right_elbow_flexion": [0.0] * 4}, dt=1 / 60)
+        >>> judged = wholebody.tracking.judge(scene, wholebody.tracking.follow(scene, track))
+        >>> bool(judged.depth.max() < 1e-3)
+        True
+    """
     instance(scene, Scene, "judge: scene", "make one with wb.Scene(figure)")
     instance(recording, Recording, "judge: recording", "make one with follow(scene, track)")
     shown, tracked = (assess_motion(scene, q, recording.dt, recording.moves) for q in (recording.q, recording.tracked))

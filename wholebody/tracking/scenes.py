@@ -48,6 +48,10 @@ class InteractionScene:
         eye, target: position of the camera, and the point in the middle of the picture, metres; None for a camera that
             sees the figure.
         see_through: things to draw transparent.
+
+    Examples:
+        >>> len(wholebody.tracking.build_scene("hand_on_table", frames=3).track)
+        3
     """
 
     name: str
@@ -80,6 +84,10 @@ class SceneFile:
         Raises:
             UnknownNameError: there is no such scene.
             InputError: fewer than one frame, or a seed or a time step out of range.
+
+        Examples:
+            >>> wholebody.tracking.build_scene("two_arms", frames=2).name
+            'two_arms'
         """
         known(name, self.scenes, "scene")
         if frames is not None:
@@ -201,5 +209,9 @@ def gallery(figure: Figure) -> Scene:
 
     Walls, a door with a lintel, a niche in the east room, tables, a bench, pedestals, and sculptures on them: a torus,
     a sphere, an egg, an obelisk and a column. All of them are fixed.
+
+    Examples:
+        >>> "bench" in wholebody.tracking.gallery(human).objects
+        True
     """
     return _FILE.furnish(Scene(one_figure(figure, "gallery: figure")), "gallery")

@@ -35,6 +35,11 @@ def write_track(track: Track, path: str | os.PathLike[str]) -> Path:
 
     Raises:
         InputError: the name does not end in .csv, or the file cannot be written.
+
+    Examples:
+        >>> track = wholebody.tracking.posed(human, angles={"left_elbow_flexion": [0.0, 0.5]}, dt=0.1)
+        >>> wholebody.tracking.write_track(track, "track.csv").name
+        'track.csv'
     """
     instance(track, Track, "write_track: track", "make one with Track.of(figure, q, dt)")
     path = checked_target(path, "write_track: path", "a track", (".csv",))
@@ -67,6 +72,12 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
         UnknownNameError: a column that is no joint of the figure.
         InputError: no time or no joint has a column, a root has some of its columns, or a quaternion is not of unit
             length; the frame is named.
+
+    Examples:
+        >>> track = wholebody.tracking.posed(human, angles={"left_elbow_flexion": [0.0, 0.5]}, dt=0.1)
+        >>> path = wholebody.tracking.write_track(track, "track.csv")
+        >>> len(wholebody.tracking.read_track(path, human))
+        2
     """
     path = checked_path(path, "path")
     one_figure(figure, "read_track: figure")

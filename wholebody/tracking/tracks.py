@@ -53,6 +53,10 @@ class Track:
 
     Raises:
         InputError: no frame, a time step that is not positive, or a value that is not finite; the frame is named.
+
+    Examples:
+        >>> wholebody.tracking.posed(human, angles={"left_elbow_flexion": [0.0, 0.5]}, dt=0.1).dt
+        0.1
     """
 
     __repr__ = brief
@@ -160,6 +164,11 @@ def posed(
         UnknownNameError: a joint that the figure does not have.
         InputError: tracks of different length, a placement that cannot be read (the frame is named), roots for a fixed
             figure.
+
+    Examples:
+        >>> track = wholebody.tracking.posed(human, angles={"left_elbow_flexion": [0.0, 0.5, 1.0]}, dt=0.1)
+        >>> track.q.shape
+        (3, 56)
     """
     check_figure(figure, "posed")
     base = _posture(figure, posture)

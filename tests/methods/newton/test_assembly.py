@@ -462,3 +462,19 @@ def test_errors_are_distances_and_angles() -> None:
     said = turned.solve()
     assert said.goal_error == pytest.approx(np.sqrt(3.0), abs=1e-5)
     assert turned.goal_error(0) == pytest.approx(said.goal_error, abs=1e-9)
+
+
+@pytest.mark.parametrize("links", [6, 12])
+def test_a_goal_far_out_of_reach_of_a_chain_stretches_it_and_does_not_pull_it_open(links: int) -> None:
+    along = np.array((1.0, 2.0, -1.0)) / np.sqrt(6.0)
+    made, last = Assembly(), "world"
+    for k in range(links):
+        made.body(f"link{k}", 0.3 * (k + 0.5) * along).spherical(last, f"link{k}", at=0.3 * k * along)
+        last = f"link{k}"
+    made.body("end", 0.3 * links * along).fixed(last, "end").point_goal("end", 0.15 * links * along)
+    assert made.solve().status == "solved"  # folded
+    for far in (6.0, 19.0):
+        answer = made.retarget(0, far * along).solve()
+        assert answer.status == "unreachable", answer.message
+        assert answer.goal_error == pytest.approx(far - 0.3 * links, abs=0.02)
+        assert answer.joint_error < 1e-5

@@ -66,22 +66,19 @@ def _asked(pairs: Sequence[tuple[HardCase, Adapter]], jobs: int) -> list[Cell]:
 
 def _print(result: Result) -> None:
     """The matrix in signs, as narrow as it can be, and every wrong answer in words."""
-    from rich.console import Console
-
     from wholebody.bench.suite.stability.verdict import SYMBOLS, WORDS
-    from wholebody.cli.tables import table
+    from wholebody.cli.tables import console, table
 
-    console = Console()
     letters = [chr(ord("a") + number) for number in range(len(result.methods))]
     signs = table("case", *letters)
     for case in result.cases:
         signs.add_row(case.name, *(result.verdicts[case.name, method].symbol for method in result.methods))
-    console.print(signs)
+    console().print(signs)
     counts = table("", "method", *WORDS.values(), "acceptable")
     for letter, method in zip(letters, result.methods, strict=True):
         found = (str(result.count(method, kind)) for kind in WORDS)
         counts.add_row(letter, method, *found, f"{result.acceptable(method)} of {len(result.cases)}")
-    console.print(counts)
+    console().print(counts)
     legend = ", ".join(f"{symbol} {WORDS[kind]}" for kind, symbol in SYMBOLS.items())
     print(f"{legend}; ● honest and as good as can be")
     for method, case, verdict in result.of_kind("wrong"):

@@ -99,26 +99,24 @@ def judge(arguments: argparse.Namespace) -> None:
     """Judge."""
     if arguments.answers.is_dir():
         return _leaderboard(arguments)
-    from rich.console import Console
     from rich.table import Table
 
     from wholebody.base.files import checked_target
     from wholebody.bench.suite.published.answers import read_answers
     from wholebody.bench.suite.published.judging import COLUMNS, as_json, cells, judge, left_out
     from wholebody.bench.suite.published.rebuilt import dumped, files_of
+    from wholebody.cli.tables import console
 
     out = arguments.out or arguments.answers.with_suffix(".verdict.json")
     checked_target(out, "--out", "a verdict", (".json",), [arguments.answers, *files_of(arguments.problems)])
     verdict = judge(read_answers(arguments.answers, arguments.problems), arguments.problems)
     write_text(out, dumped(as_json(verdict)))
-    console = Console()
-    console.width = max(console.width, 230)  # columns of the judge's table, also where the terminal has fewer
     table = Table(title=verdict.answers.method)
     for name in COLUMNS:
         table.add_column(name, justify="left" if name in COLUMNS[:2] else "right")
     for row in verdict.sets:
         table.add_row(*cells(row))
-    console.print(table)
+    console(230).print(table)  # letters of a line, also where the terminal has fewer
     print(*left_out(verdict), f"wrote {out}", sep="\n")
     return None
 

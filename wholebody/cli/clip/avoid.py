@@ -22,8 +22,6 @@ from wholebody.cli.clip.arguments import (
 from wholebody.cli.command import command, flag, option
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from wholebody.motion.avoider import Avoider
     from wholebody.motion.batch_table import AvoidedCase
     from wholebody.motion.judging import Avoided
@@ -79,8 +77,6 @@ def run(arguments: argparse.Namespace) -> int:
     methods, worn = arguments.method or [METHOD], arguments.equipment or [WORN]
     if len(arguments.files) * len(methods) * len(worn) > 1:
         return _batch(arguments, methods, worn)
-    from rich.console import Console
-
     from wholebody.base.errors import InputError
     from wholebody.base.files import check_writable, checked_target, write
     from wholebody.motion.avoidance import avoid
@@ -106,7 +102,7 @@ def run(arguments: argparse.Namespace) -> int:
             keep_ends=arguments.keep_ends,
             progress=lambda told: bool(tell(told.share, told.note)),  # it goes on: a bar says nothing
         )
-    _tell(Console(), avoided, avoided.clip.write(out))
+    _tell(avoided, avoided.clip.write(out))
     if arguments.html is not None:
         from wholebody.view.motion_curves import motion_curves
 
@@ -136,15 +132,16 @@ def _method(name: str, arguments: argparse.Namespace) -> Avoider:
     return replace(method, **settings) if settings else method  # type: ignore[type-var]
 
 
-def _tell(console: Console, avoided: Avoided, written: Path) -> None:
+def _tell(avoided: Avoided, written: Path) -> None:
     from rich.markup import escape
 
-    from wholebody.cli.tables import table
+    from wholebody.cli.tables import console, table
 
+    shown = console()
     report, clip = avoided.report, avoided.clip
     color = "green" if report.solved else "red"
     rate = report.seconds / max(clip.duration, clip.dt)
-    console.print(f"[{color}]{escape(report.message)}[/]", highlight=False)
+    shown.print(f"[{color}]{escape(report.message)}[/]", highlight=False)
     made = table("", "before", "after")
     made.add_row("frames in collision", str(report.before.colliding), str(report.after.colliding))
     made.add_row("deepest in a frame", f"{1e3 * report.before.deepest:.3g} mm", f"{1e3 * report.after.deepest:.3g} mm")
@@ -158,7 +155,7 @@ def _tell(console: Console, avoided: Avoided, written: Path) -> None:
         made.add_row("zero moment point outside of the feet", *far)
     if report.stretch > 1.0:
         made.add_row("duration", f"{report.before.clip.duration:.2f} s", f"{report.duration:.2f} s")
-    console.print(made)
+    shown.print(made)
     print(
         f"{report.method}: {report.seconds:.2f} s, {rate:.2f} s a second of motion; {report.programs} programs, "
         f"{report.posture_solves} postures; {report.frames_changed} of {len(clip)} frames changed\nwritten: {written}"
@@ -166,8 +163,6 @@ def _tell(console: Console, avoided: Avoided, written: Path) -> None:
 
 
 def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -> int:
-    from rich.console import Console
-
     from wholebody.base.errors import InputError
     from wholebody.motion.batch import BatchProgress, avoid_many
     from wholebody.motion.measures import MotionBounds
@@ -176,8 +171,7 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
         raise InputError("--html is for one motion with one equipment by one method; give one of each")
     if arguments.scene is not None:
         raise InputError("--scene is for one motion with one equipment by one method; give one of each")
-    # letters that a line of a batch's table needs
-    console, folder = Console(width=max(120, Console().width)), arguments.out or Path(FOLDER)
+    folder = arguments.out or Path(FOLDER)
     ways = [_method(name, arguments) for name in methods]
     count = len(arguments.files) * len(methods) * len(worn)
     try:
@@ -195,15 +189,15 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
     except KeyboardInterrupt:
         print(f"ended; {folder} keeps what is done, and the same command goes on")
         raise
-    _table(console, rows)
+    _table(rows)
     print(f"written: {folder}")
     return 0 if all(row.outcome == "free" for row in rows) else 1
 
 
-def _table(console: Console, rows: tuple[AvoidedCase, ...]) -> None:
+def _table(rows: tuple[AvoidedCase, ...]) -> None:
     from rich.markup import escape
 
-    from wholebody.cli.tables import table
+    from wholebody.cli.tables import console, table
 
     made = table(
         "motion", "wears", "method", "", "collide", "after", "dips", "deepest mm", "deviation mm", "s a second"
@@ -221,7 +215,7 @@ def _table(console: Console, rows: tuple[AvoidedCase, ...]) -> None:
             escape(row.clip), escape(row.equipment), escape(row.method), f"[{color}]{row.outcome}[/]",
             *(numbers if row.frames else ()),
         )  # fmt: skip
-    console.print(made)
+    console(120).print(made)  # letters that a line needs
     for row in rows:
         if row.outcome != "free":
             print(f"{row.clip}, {row.equipment}, {row.method}: {row.message}")

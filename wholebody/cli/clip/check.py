@@ -11,8 +11,6 @@ from wholebody.cli.clip.arguments import EQUIPMENT, JOBS, MOTIONS, SCENE, bar, j
 from wholebody.cli.command import command, flag, option
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from wholebody.motion.checking import ClipCheck
     from wholebody.motion.clip import Clip
     from wholebody.scene.scene import Scene
@@ -68,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(json.dumps(found.as_dict(), indent=1))
     else:
-        show(Console(width=max(WIDE, Console().width)), found)
+        show(found)
     if arguments.html is not None:
         from wholebody.view.timeline import timeline
 
@@ -90,14 +88,13 @@ def _many(arguments: argparse.Namespace, depth: float) -> int:
     """Each motion with each equipment: one line of a table each; 1 if one overlaps, or cannot be read."""
     import json
 
-    from rich.console import Console
     from rich.markup import escape
 
     from wholebody.base.batches import run_batch
     from wholebody.base.checks import number
     from wholebody.base.errors import InputError
     from wholebody.base.runner import Job
-    from wholebody.cli.tables import table
+    from wholebody.cli.tables import console, table
     from wholebody.motion.checking import LARGEST, SMALLEST
     from wholebody.motion.worn_equipment import NOTHING, put_on
 
@@ -132,7 +129,7 @@ def _many(arguments: argparse.Namespace, depth: float) -> int:
                 else (f"[red]{escape(one['refused'])}[/]",)
             )  # fmt: skip
             made.add_row(escape(names[file]), escape(worn), *told)
-        Console(width=max(WIDE, Console().width)).print(made)
+        console(WIDE).print(made)
     return 0 if all(one.get("free") and not one["limits"] for one in found.values()) else 1
 
 
@@ -150,26 +147,26 @@ def _check_one(arguments: argparse.Namespace, file: Path, worn: str, depth: floa
         return {"refused": str(error)}
 
 
-def show(console: Console, found: ClipCheck) -> None:
+def show(found: ClipCheck) -> None:
     """Print the tables."""
     from rich.markup import escape
 
-    from wholebody.cli.tables import table
+    from wholebody.cli.tables import console, table
 
-    clip = found.clip
+    shown, clip = console(WIDE), found.clip
     told = f"[bold]{escape(clip.name)}[/]: {len(clip)} frames, {clip.duration:.3f} s, {escape(clip.figure.name)}"
-    console.print(told, highlight=False)
+    shown.print(told, highlight=False)
     kinds = [contact.kind for contact in found.contacts]
     apart = ", ".join(f"{kinds.count(kind)} {name}" for kind, name in KINDS.items() if kind in kinds)
     verdict = "[green]free[/]" if found.free else f"[red]{len(kinds)} pairs overlap[/] ({apart})"
-    console.print(f"{verdict} at a depth of {1e3 * found.tolerance:g} mm\n", highlight=False)
+    shown.print(f"{verdict} at a depth of {1e3 * found.tolerance:g} mm\n", highlight=False)
     whole = table("judged", "")
     whole.add_row("frames in contact", f"{found.colliding} of {len(clip)}")
     whole.add_row("dips between free frames", f"{found.dips}")
     whole.add_row("deepest in a frame", f"{1e3 * found.deepest:.3f} mm")
     whole.add_row("deepest at any time", f"{1e3 * found.deepest_between:.3f} mm")
     whole.add_row("jerk, root mean square", f"{found.mean_jerk:.1f} rad/s^3")
-    console.print(whole)
+    shown.print(whole)
     dt = clip.dt
     if found.contacts:
         made = table("contacts", "with", "kind", "frames", "starts at s", "deepest mm", "at s", "longest s")
@@ -181,7 +178,7 @@ def show(console: Console, found: ClipCheck) -> None:
             made.add_row(escape(each.first), escape(each.second), *row)
         if len(found.contacts) > MOST:
             made.add_row(f"and {len(found.contacts) - MOST} more")
-        console.print(made)
+        shown.print(made)
     for title, beyond in (("joints beyond limits", found.limits), ("joints faster than limits", found.speeds)):
         if beyond:
             made = table(title, "frames", "worst at s", "value", "limit")
@@ -190,12 +187,12 @@ def show(console: Console, found: ClipCheck) -> None:
                 made.add_row(escape(worst.joint), *numbers)
             if len(beyond) > MOST:
                 made.add_row(f"and {len(beyond) - MOST} more")
-            console.print(made)
+            shown.print(made)
     if found.sliding:
         made = table("feet", "frames standing", "slides mm", "farthest at s")
         for point in found.sliding:
             made.add_row(point.frame, f"{point.stands.sum()}", f"{1e3 * point.distance:.2f}", f"{point.at * dt:.3f}")
-        console.print(made)
+        shown.print(made)
 
 
 KINDS = {"self": "of the figure with itself", "equipment": "with what it carries", "thing": "with things around it"}

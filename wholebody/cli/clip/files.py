@@ -28,10 +28,9 @@ greatest speed.""",
 def info(arguments: argparse.Namespace) -> int:
     """Describe the clip."""
     import numpy as np
-    from rich.console import Console
     from rich.markup import escape
 
-    from wholebody.cli.tables import table
+    from wholebody.cli.tables import console, table
 
     clip = clip_of(arguments)
     figure = clip.figure
@@ -50,7 +49,7 @@ def info(arguments: argparse.Namespace) -> int:
         low, high = (factor * end for end in (min(ranges[name]), max(ranges[name])))
         speed = factor * float(speeds[figure.dofs([name])].max())
         made.add_row(escape(name), f"{low:.4g} {unit}", f"{high:.4g} {unit}", f"{speed:.4g} {unit}/s")
-    Console().print(made)
+    console().print(made)
     return 0
 
 
@@ -169,16 +168,15 @@ def _aim(arguments: argparse.Namespace) -> None:
 def _print_errors(errors: Mapping[str, Array]) -> None:
     """Print how far the directions of bones are from the recording's; those beyond 15 degrees stand out."""
     import numpy as np
-    from rich.console import Console
 
-    from wholebody.cli.tables import table
+    from wholebody.cli.tables import console, table
 
     made = table("bones: degrees from the recording", "median", "of 95 in 100 frames", "greatest")
     for name, values in errors.items():
         half, most, greatest = np.degrees(np.percentile(values, (50, 95, 100)))
         style = "bold red" if half > 15.0 else None
         made.add_row(name, *(f"{value:.1f}" for value in (half, most, greatest)), style=style)
-    Console().print(made)
+    console().print(made)
 
 
 def _many(arguments: argparse.Namespace) -> int:

@@ -122,15 +122,15 @@ class Iteration:
     def iterate(self, iterations: int, *, goals: bool, measures: Measures, early_exit: bool = False) -> None:
         """Step until convergence, stagnation or the iteration limit; `early_exit`: also until a step gains little."""
         self.stationary, active, norms = False, self.active_system, self._norms(self.residual)
-        trust = _Trust(self.least_damping, max(STEPS.funnel * norms[1], self.tolerance))
+        trust = _Trust(self.least_damping, max(STEPS.funnel * min(norms[1], 1.0), self.tolerance))
         least, stagnant = sum(norms), 0
         enough = FRAMES.least_progress if early_exit else STEPS.least_progress
         patience = FRAMES.patience if early_exit else STEPS.patience
         begun, most = self.x, FRAMES.time_share if early_exit else 1.0
         for tried in range(iterations):
             over = active.control.over or active.control.spent > most
-            # a frame gets on if it can: its budget ends it after a step, or three that failed
-            late = over and (self.x is not begun or tried >= 3)
+            # a frame gets on if it can: its budget ends it after a step, or three that failed, or at twice as much
+            late = over and (self.x is not begun or tried >= 3 or (tried and active.control.spent > 2.0 * most))
             if self._holds(goals) or active.control.reason or late:
                 return
             active.control.tell(TraceEntry(self.goal, self.hard, 0.0, 0.0))

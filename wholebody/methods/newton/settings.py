@@ -24,7 +24,8 @@ class Steps(NamedTuple):
     amplified: float = 6.0
     # m or rad: goal error from which that is tested; nearer, the measures may move more than the goals
     far: float = 0.05
-    # m or rad of violation allowed for a metre of goal; beyond it a step only restores. Larger: longer steps
+    # m or rad of violation allowed for a metre of goal, and at most; beyond it a step only restores. Larger: longer
+    # steps; at metres, goals far out of reach pull chains open so far that they do not close again
     funnel: float = 0.5
     narrow: float = 0.7  # factor on the funnel after a step that only restores
     gain: float = 0.05  # least ratio of actual to predicted reduction of a step

@@ -122,7 +122,8 @@ class NewtonTracker(NotCopyable):
 
     def _trades(self, before: Array, after: Array) -> bool:
         """Whether goals of small weight improved at the expense of goals of large weight between two postures (nq,)."""
-        # True if the weighted error fell relatively by less than half as much as the unweighted error.
+        # True if the weighted error fell relatively by less than half as much as the unweighted error, or neither fell:
+        # goals that pull alike against each other do not move.
         goals = self.problem.goals
         weights = np.sqrt([goal.weight for goal in goals])
         errors = []
@@ -130,7 +131,7 @@ class NewtonTracker(NotCopyable):
             state = self.workspace.state.update(q)
             errors.append(np.array([np.linalg.norm(goal.error(state)) for goal in goals]))
         even, weighted = (np.linalg.norm(by * errors[1]) / np.linalg.norm(by * errors[0]) for by in (1.0, weights))
-        return bool(1.0 - weighted < 0.5 * (1.0 - even))
+        return bool(1.0 - weighted <= 0.5 * (1.0 - even) + 1e-6)
 
     def nearest(self, q: Array) -> Solution:
         """The method's answer from q (nq,), with measures relative to q."""

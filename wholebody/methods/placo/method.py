@@ -11,9 +11,9 @@ from wholebody.base.arrays import Array, Indices
 from wholebody.base.fields import Checked
 from wholebody.methods.base import UnsupportedTermError, refusal
 from wholebody.methods.conclusion import Ending
-from wholebody.methods.control import Control
+from wholebody.methods.control import BUDGET, Control
 from wholebody.methods.descents import Descends
-from wholebody.methods.differential import MEASURES, REGULAR, TOOL, Iteration, Settings, StepError
+from wholebody.methods.differential import MEASURES, REGULAR, TOOL, Iteration, Settings, StepError, held
 from wholebody.methods.inputs import Iterations, TimeLimit, Tolerance, check_problem
 from wholebody.methods.placo.robot import SWELL, Robot
 from wholebody.methods.placo.terms import add_terms, named_frames, unsupported
@@ -92,6 +92,8 @@ class Placo(Checked, Descends):
             settings = Settings(self.tolerance, self.iterations, STEP, 0.75)
             run = Iteration(problem, workspace, stepper, settings, control)
             run.go()
+        if BUDGET.spent > 1.0:  # a frame that was cut off: its programs hold to first order only
+            run.q = held(problem, workspace.state, run.q, self.tolerance)
         failure = f"placo gave up at program {run.steps} ({run.failure})" if run.failure else ""
         return Ending(run.q, run.converged, run.steps, tuple(run.trace), f"in {run.steps} programs", failure=failure)
 

@@ -96,13 +96,12 @@ def compiled_kernel() -> Any:
     active_set_kernel.primal_dual_active_set(program, index, active, 1, CORRECTIONS, room, x)
     active_set_kernel.grow(program, index, index, active, CORRECTIONS, room, x)
     active_set_kernel.minimise_with(program, active, CORRECTIONS.tolerance, room.work, x)
-    semismooth_kernel()
     return active_set_kernel
 
 
 @lru_cache(maxsize=1)
 def semismooth_kernel() -> Any:
-    """The module of semismooth Newton steps, compiled or read back."""
+    """The module of semismooth Newton steps, compiled or read back: few solves need it, a tracker cannot wait."""
     from wholebody.methods.qp import semismooth_kernel as kernel
 
     program, active = smallest()

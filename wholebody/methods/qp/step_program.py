@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, brief, with_values
 from wholebody.figures.state import State
+from wholebody.methods.qp.active_set import semismooth_kernel
 from wholebody.methods.qp.quadratic_program import QuadraticProgram, work_size
 from wholebody.methods.qp.rows import NUMBERS, Rows, StepParts, StepRoom, StepSize, Terms
 from wholebody.methods.qp.settings import CORRECTIONS, PROGRAM, STEP, WEIGHTS
@@ -246,6 +247,7 @@ def compiled_kernel() -> Any:
     from wholebody.methods.qp import tracking_kernel
 
     compiled_turning()
+    semismooth_kernel()
     none, index = np.zeros(0), np.zeros(0, dtype=np.intp)
     tracking_kernel.solve(
         (none, np.zeros((0, 1)), none, index, none, np.zeros((2, 2)), np.zeros((2, 1)), none, index),

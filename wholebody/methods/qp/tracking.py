@@ -14,7 +14,7 @@ from wholebody.base.errors import TermError
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
 from wholebody.methods.base import Method, begun, goal_error, nearest_to
-from wholebody.methods.control import BUDGET
+from wholebody.methods.control import BUDGET, budget_for_sweep
 from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.methods.qp.escaping import ProjectionRows, free_end, projection_rows
 from wholebody.methods.qp.escaping import compiled_kernel as compiled_escape
@@ -129,10 +129,11 @@ class QPTracker(NotCopyable):
             longest, way = way, float(np.abs(last.displacement).max(initial=0.0))
             # what is held is missed by the square of a step, and each runs ahead of that as the one before was curved
             curved = exact and max(longest, way) ** 2 > enough
-            if not curved and (error <= enough or error > TRACKING.worth * before):
+            met = error <= enough or error > TRACKING.worth * before
+            if (met and not curved) or BUDGET.spent > 1.0:
                 return FrameStep(last.q, spent)
             here, last = last.q, self.step(last.q, measures=False)
-            if not is_free(self.workspace, q, last.q, SHORT):
+            if not is_free(self.workspace, q, last.q, SHORT, budget_for_sweep()):
                 return FrameStep(here, spent + 1)
         return FrameStep(last.q, most)
 

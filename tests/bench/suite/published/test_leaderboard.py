@@ -27,11 +27,11 @@ def test_a_folder_of_answers_becomes_a_page(folder: Path, tmp_path: Path, arms: 
     (place / "b.json").write_text(json.dumps(poor))
     publish(judge_folder(place, folder), folder, tmp_path / "out")
     page = (tmp_path / "out" / "leaderboard.html").read_text()
-    assert "<strong>Robot arm, near:</strong> <code>good</code>, 500 ms." in page
+    assert "<strong>Robot arm, near:</strong> fastest <code>good</code>, 500 ms." in page
     assert "poor &lt;b&gt;" in page
     assert "<b>" not in page
     assert "Without an answer, and so not solved: 1, robot_arm/0001 first." in page
-    assert "median time 1e+02 reference kernels" in page
+    assert "median time 100 reference kernels" in page
     assert page.count("<svg") == 1
     assert not re.search(r'(?:src|href)="https?:', page)
     table = (tmp_path / "out" / "summary.tex").read_text()

@@ -102,7 +102,7 @@ def _rows() -> dict[str, _Row]:
     rows |= {name: _Row(partial(_outside, name), said["modules"], said["extra"]) for name, said in outside.items()}
     rows |= {f"{family}/{ONE}": _Row(partial(one_start, family)) for family in ("qp", "newton", "ccd")}
     rows = {name: with_values(row, build=partial(_described, name, row.build)) for name, row in rows.items()}
-    for family in ("qp", "newton", "ccd", "dls", "placo", "mink", "pink", "drake", "embodik"):
+    for family in ("qp", "newton", "ccd", "dls", "placo", "mink", "pink", "drake"):
         row = rows[f"{family}/{ONE}" if f"{family}/{ONE}" in rows else family]
         rows[f"{family}/{STARTS}"] = with_values(row, build=partial(_restarted, row.build))
     return rows

@@ -1,9 +1,8 @@
-"""A scene as a URDF file or an MJCF text: the same joints, limits, pieces, objects and frames."""
+"""A scene as an MJCF text: the same joints, limits, pieces, objects and frames; joints of a model in a URDF."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 from xml.etree import ElementTree
@@ -13,8 +12,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
-from wholebody.bench.suite.adapters.loop import size
-from wholebody.bench.suite.problem_sets.things import hull_obj, shape_of
+from wholebody.bench.suite.problem_sets.things import shape_of
 from wholebody.figures.figure import Figure
 from wholebody.figures.urdf.writing import FOLLOWS, UrdfAxis, add_joint, exact, urdf_axis
 from wholebody.scene.scene import Scene
@@ -44,38 +42,6 @@ def joint_name(index: int) -> str:
     return f"joint {index}"
 
 
-def piece_name(number: int) -> str:
-    """Name of the link that carries one of our pieces; none is part of another."""
-    return f"piece {number:05d}"
-
-
-def write_urdf(scene: Scene, frames: Mapping[str, tuple[int, pin.SE3]], folder: Path) -> Path:
-    """Write a scene as URDF, a link a piece or frame, with a file for each hull, and return its path."""
-    # Objects are fixed to the root, a half-space is the top of a box; `frames` has our joint and the placement in it.
-    model = scene.model
-    top = ElementTree.Element("robot", name="figure")
-    for index in range(model.njoints):
-        ElementTree.SubElement(top, "link", name=_link(index))
-    for index in range(1, model.njoints):
-        add_model_joint(top, model, index, _link(model.parents[index]), _link(index))
-    for number, piece in enumerate(scene.geometry.geometryObjects):
-        shape, shift = _shape(scene, piece, folder / f"{number}.obj")
-        _fixed(top, piece_name(number), piece.parentJoint, piece.placement * shift).append(shape)
-        # Pinocchio's extension of URDF: which cylinders are capsules, and which meshes are hulls.
-        checked = {"capsule": "capsule", "hull": "convex"}.get(shape_of(piece.geometry)[0])
-        if checked:
-            ElementTree.SubElement(ElementTree.SubElement(top[-2], "collision_checking"), checked, name="shape")
-    for name, (joint, place) in frames.items():
-        _fixed(top, name, joint, place)
-    path = folder / "scene.urdf"
-    path.write_bytes(ElementTree.tostring(top))
-    return path
-
-
-def _link(index: int) -> str:
-    return f"link {index}" if index else "root"
-
-
 def add_model_joint(top: ElementTree.Element, model: Any, index: int, parent: str, child: str) -> None:
     """Add a turning or sliding joint of a model between two links; InputError for a joint of another kind."""
     joint, known = model.joints[index], axis_of(model, index, "URDF is written for turning and sliding joints")
@@ -94,49 +60,6 @@ def axis_of(model: Any, index: int, written_for: str) -> UrdfAxis:
     if known is None or kind == FOLLOWS:
         raise InputError(f"joint {model.names[index]!r} is a {kind}; {written_for}")
     return known
-
-
-def _fixed(top: ElementTree.Element, name: str, joint: int, place: pin.SE3) -> ElementTree.Element:
-    """Add a link that is fixed to that of a joint; return it."""
-    link = ElementTree.SubElement(top, "link", name=name)
-    add_joint(top, f"{name} is fixed", "fixed", _link(joint), name, origin=place)
-    return link
-
-
-def _shape(scene: Scene, piece: Any, path: Path) -> tuple[ElementTree.Element, pin.SE3]:
-    """The shape of a piece, and how it is shifted against the piece."""
-    shift, (kind, lengths) = pin.SE3.Identity(), shape_of(piece.geometry)
-    made = ElementTree.Element("collision", name="shape")
-    inner = ElementTree.SubElement(made, "geometry")
-    if kind == "sphere":
-        ElementTree.SubElement(inner, "sphere", radius=repr(lengths[0]))
-    elif kind in ("capsule", "cylinder"):
-        ElementTree.SubElement(inner, "cylinder", radius=repr(lengths[0]), length=repr(lengths[1]))
-    elif kind == "box":
-        ElementTree.SubElement(inner, "box", size=exact(lengths))
-    elif kind == "half-space" and not piece.parentJoint:
-        # A box stands for a half-space: eight sizes of the figure wide, a quarter of that high.
-        edge = 8.0 * size(scene.figure)
-        ElementTree.SubElement(inner, "box", size=exact(np.array([edge, edge, 0.25 * edge])))
-        shift = _slab(scene, piece, 0.125 * edge)
-    elif kind == "hull":
-        path.write_text(hull_obj(piece.geometry), encoding="utf-8")
-        ElementTree.SubElement(inner, "mesh", filename=str(path))
-    else:
-        raise InputError(
-            f"{piece.name!r} is a {type(piece.geometry).__name__}; URDF is written for spheres, capsules, cylinders, "
-            "boxes, hulls and half-spaces of the world"
-        )
-    return made, shift
-
-
-def _slab(scene: Scene, piece: Any, depth: float) -> pin.SE3:
-    """Placement, in a half-space n . x <= d, of a box that reaches from so far inside to the surface, at the root."""
-    normal = np.array(piece.geometry.n)
-    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal).matrix()
-    places = scene.model.jointPlacements
-    root = piece.placement.actInv(places[1].translation) if len(places) > 1 else np.zeros(3)
-    return pin.SE3(turn, root - (normal @ root - piece.geometry.d + depth) * normal)
 
 
 def mjcf(scene: Scene, frames: Mapping[str, tuple[int, pin.SE3]] = MappingProxyType({})) -> str:

@@ -185,7 +185,9 @@ def advice(results: Results, rows: Sequence[Summary]) -> list[str]:
         said.append(f"**No method solves {100 * GOOD:.0f} % of any set.** Look at each set before choosing.")
     for choice in choices(results, rows):
         if choice.fastest:
-            said.append(f"**{words(choice.set).capitalize()}:** {named(choice.fastest)}, {choice.fastest_ms:.3g} ms.")
+            equal = " (not told apart)" if len(choice.fastest) > 1 else ""
+            title, least = words(choice.set).capitalize(), f"{choice.fastest_ms:.3g} ms"
+            said.append(f"**{title}:** fastest {named(choice.fastest)}{equal}, {least}.")
         else:
             apart = ", not told apart by more than chance" if len(choice.leading) > 1 else ""
             said.append(

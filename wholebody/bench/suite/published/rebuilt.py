@@ -70,7 +70,7 @@ def read_index(folder: Path) -> dict[str, Any]:
     if not is_folder(folder):
         raise InputError(f"{folder}: there is no such folder; make one with `wholebody bench export {folder}`")
     if not (folder / INDEX).is_file():
-        raise FileFormatError(f"{folder}: has no {INDEX}; make it with `wholebody bench export {folder}`")
+        raise FileFormatError(f"{folder}: has no {INDEX}; give a folder that `wholebody bench export` wrote")
     return read_json(folder / INDEX, "index")
 
 
