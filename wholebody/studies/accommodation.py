@@ -17,6 +17,7 @@ from wholebody.base.charts import Shown, new_chart
 from wholebody.base.errors import InputError
 from wholebody.ergonomics.vision import sight
 from wholebody.figures.adjustable import ADJUSTABLE
+from wholebody.figures.figure import Figure
 from wholebody.methods.base import Method
 from wholebody.methods.qp.method import QP
 from wholebody.studies.many import Running, SolveProgress, run_cases
@@ -285,15 +286,14 @@ def accommodation(
 def _settings(variants: Sequence[Variant], records: Records) -> dict[str, tuple[float, ...]]:
     """Settings of adjustable figures by joint, for each person."""
     found: dict[str, list[float]] = {}
-    for k, (variant, one) in enumerate(zip(variants, records, strict=True)):
+    figures: dict[int, Figure] = {}  # by coordinates: scenes of people differ in sizes, and take long to make
+    for k, one in enumerate(records):
         if one.q is None:
             continue
-        figure = variant().scene.figure
-        movable = [f"{name}/" for name, member in figure.members.items() if member.figure.name == ADJUSTABLE]
-        if not movable:
-            break  # nor is there one for others
-        for joint, value in figure.joint_values(one.q).items():
-            if joint.startswith(tuple(movable)):
+        figure = figures.get(len(one.q)) or figures.setdefault(len(one.q), variants[k]().scene.figure)
+        movable = tuple(f"{name}/" for name, member in figure.members.items() if member.figure.name == ADJUSTABLE)
+        for joint, value in figure.joint_values(one.q).items() if movable else ():
+            if joint.startswith(movable):
                 found.setdefault(joint, [math.nan] * len(records))[k] = value
     return {joint: tuple(values) for joint, values in found.items()}
 
