@@ -145,8 +145,13 @@ def runs_of(cases: Sequence[Case], length: int) -> list[list[Case]]:
 
 
 @ctrl_c_ends_all()
-def run_cases(runs: Sequence[Sequence[Case]], running: Running, store: RecordStore | None = None) -> Records:
-    """Solve cases; those of one run warm-start one from the other. The store has what was done before."""
+def run_cases(
+    runs: Sequence[Sequence[Case]], running: Running, store: RecordStore | None = None, *, lowers: bool = True
+) -> Records:
+    """Solve cases; those of one run warm-start one from the other. The store has what was done before.
+
+    `lowers`: whether neighbours whose postures jump are solved again for a lower measure, see `neighbours.lower`.
+    """
     order = [case for run in runs for case in run]
     before = {} if store is None else store.read()
     done = {k: replace(before[case.asked], name=case.record.name, factors=case.record.factors)
@@ -180,7 +185,7 @@ def run_cases(runs: Sequence[Sequence[Case]], running: Running, store: RecordSto
             over = _run(work, order, running, keep, alone, begun)
     if not over and waiting:
         family = Family(order, done, partial(_computed, order, running), keep)
-        _ = solve_from_neighbours(family) or (linked and (lower(family) or name_changes(family)))
+        _ = solve_from_neighbours(family) or (linked and lowers and (lower(family) or name_changes(family)))
     return Records([done.get(k, order[k].record) for k in range(len(order))])
 
 
