@@ -134,7 +134,7 @@ def test_it_waits_for_the_first_tab_however_late_and_ends_with_the_last(
         (pytest.fail if os.environ.get("WHOLEBODY_REQUIRE_BROWSER") else pytest.skip)("there is no Chromium")
     process, url, port, began = waiting
     assert url == f"http://127.0.0.1:{port}/"
-    time.sleep(max(0.0, began + 5.0 - time.monotonic()))  # longer than a tab may be away while it loads again
+    time.sleep(max(0.0, began + 3.0 - time.monotonic()))  # longer than a tab may be away while it loads again
     assert process.poll() is None
     with screenshot.Browser() as browser:
         browser.open(url)

@@ -13,6 +13,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.tracking.live import LiveDrag
+from wholebody.view import live_page
 from wholebody.view.browser import Browser
 from wholebody.view.live_page import LivePage
 
@@ -22,11 +23,15 @@ SIZE = (760, 320)  # small: without a GPU a frame of a large page takes a second
 
 
 @pytest.fixture
-def page(tmp_path: Path) -> Iterator[LivePage]:
+def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[LivePage]:
+    monkeypatch.setattr(live_page, "SETTLING", 20)  # frames; a handle arrives in fewer
     scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
     scene.add(wb.Box((0.4, 0.8, 0.04)), name="table", at=(0.6, 0.3, 0.75))
     drag = LiveDrag(wb.Problem(scene, constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")]))
     made = LivePage(drag, tmp_path / "posture.toml", 8377, lambda path: wb.taskfile.write_task(drag.stated(), path))
+    for piece in made._pieces:  # the mouse finds handles; to draw the meshes of a person takes a core without a GPU
+        piece.visible = False
+    made.server.scene.configure_environment_map(None)
     yield made
     made.stop()
 

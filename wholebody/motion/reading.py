@@ -13,7 +13,7 @@ from wholebody.base.errors import FileFormatError, InputError, one_line
 from wholebody.figures.figure import Figure
 from wholebody.figures.joined import one_figure
 from wholebody.motion.clip import Clip
-from wholebody.motion.files import FBX, amass, archive, bvh, columns, gltf_reading, read_frames
+from wholebody.motion.files import FBX, SKELETONS, bvh, columns, gltf_reading, read_frames
 from wholebody.motion.files.base import Frames
 from wholebody.motion.retargeting import retarget
 from wholebody.motion.roles import column_names
@@ -116,10 +116,5 @@ def _say(motion: SkeletonMotion, path: Path) -> None:
 
 def _skeleton(path: Path, unit: str | None, up: str | None) -> SkeletonMotion | None:
     """The skeleton of a file; None where the file holds none."""
-    if path.suffix.lower() == ".bvh":
-        return bvh.read_motion(path, unit, up)
-    if path.suffix.lower() in gltf_reading.ENDINGS:
-        return gltf_reading.skeleton_of(gltf_reading.Animated(path), unit, up)
-    if path.suffix.lower() == ".npz" and amass.is_amass(archive.read_arrays(path)):
-        return amass.read_motion(path)
-    return None
+    read = SKELETONS.get(path.suffix.lower())
+    return None if read is None else read(path, unit, up)

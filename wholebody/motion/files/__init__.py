@@ -11,8 +11,9 @@ from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, InputError, one_line
 from wholebody.figures.figure import Figure
 from wholebody.figures.joined import one_figure
-from wholebody.motion.files import archive, bvh, columns, gltf, joint_profile
+from wholebody.motion.files import amass, archive, bvh, columns, gltf, gltf_reading, joint_profile
 from wholebody.motion.files.base import Frames, Motion
+from wholebody.motion.skeleton import SkeletonMotion
 
 WRITERS: dict[str, Callable[[Motion, Path], Path]] = {
     ".npz": archive.write,
@@ -30,6 +31,12 @@ READERS: dict[str, Callable[[Path, Figure], Frames]] = {
 }
 """Ending of a name to the function that reads postures of a figure."""
 
+SKELETONS: dict[str, Callable[[Path, str | None, str | None], SkeletonMotion | None]] = {
+    ".bvh": bvh.read_motion,
+    **dict.fromkeys(gltf_reading.ENDINGS, gltf_reading.read_motion),
+    ".npz": amass.read_motion,
+}
+"""Ending of a name to the function that reads a skeleton, with its unit and axis; None of a file that holds none."""
 
 FBX = "FBX is not read; Blender turns it into what is: File > Import > FBX, then File > Export > glTF 2.0 (.glb)"
 

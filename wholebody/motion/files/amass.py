@@ -26,15 +26,12 @@ TEMPLATE = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """From the template's axes into those of a body that faces x: z forward to x, x left to y, y up to z."""
 
 
-def is_amass(arrays: dict[str, np.ndarray]) -> bool:
-    """Whether an archive's arrays are those of AMASS."""
-    return "trans" in arrays and ("poses" in arrays or {"root_orient", "pose_body"} <= arrays.keys())
-
-
-def read_motion(path: Path) -> SkeletonMotion:
-    """Read the body of an AMASS archive."""
-    name = one_line(path.name)
-    poses, places, frequency = _arrays(name, read_arrays(path))
+def read_motion(path: Path, _unit: str | None = None, _up: str | None = None) -> SkeletonMotion | None:
+    """Read the body of an AMASS archive, in metres with z up; None of another archive."""
+    name, arrays = one_line(path.name), read_arrays(path)
+    if "trans" not in arrays or not ("poses" in arrays or {"root_orient", "pose_body"} <= arrays.keys()):
+        return None
+    poses, places, frequency = _arrays(name, arrays)
     frames = len(poses)
     bones = packaged_table(Path(__file__).parents[1] / "data" / "smpl.csv")
     names = tuple(bone["joint"] for bone in bones)
@@ -58,9 +55,8 @@ def _arrays(name: str, arrays: dict[str, np.ndarray]) -> tuple[Array, Array, flo
     """Poses (n, 3 x joints) and places (n, 3) of an archive, and its frame rate, checked; see `read_motion`."""
     rates = ("mocap_framerate", "mocap_frame_rate", "fps")
     rate = next((arrays[key] for key in rates if key in arrays), None)
-    if not is_amass(arrays) or rate is None:
-        missing = [key for key in ("poses", "trans") if key not in arrays] or [rates[0]]
-        raise FileFormatError(f"{name}: is no archive of AMASS; it lacks {', '.join(missing)}")
+    if rate is None:
+        raise FileFormatError(f"{name}: is no archive of AMASS; it lacks {rates[0]}")
     if "poses" in arrays:
         poses = _numbers(arrays["poses"], f"{name}: poses")
         poses = poses.reshape(len(poses), -1) if poses.ndim == 3 and poses.shape[2] == 3 else poses

@@ -156,6 +156,11 @@ def _bound(document: GltfDocument, skin: int, rest: Array) -> Array:
     return found
 
 
+def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> SkeletonMotion:
+    """Read a moving skeleton; see `wholebody.motion.reading.read_skeleton`."""
+    return skeleton_of(Animated(path), unit, up)
+
+
 def own(animated: Animated, figure: Figure) -> Frames | None:
     """Postures of a file whose nodes are the figure's joints, as `gltf.write` writes it; None for any other."""
     document, model = animated.document, figure.model

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import re
 from pathlib import Path
 
 import pytest
 
 from tests.csv_rows import csv_rows
 from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.bench.suite.compare.lock import read_lock
 from wholebody.bench.suite.problem_sets.registry import beside
 from wholebody.cli.bench import run as group
 
@@ -29,6 +31,13 @@ def test_two_methods_on_one_problem(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "Robot arm" in (tmp_path / "report.html").read_text()
     with pytest.raises(InputError, match=r"holds a run with seeds = \[0, 1, 2\], and \[3, 4, 5\] is asked for"):
         bench(*words, "--seed", "3")
+    assert bench("--again", str(tmp_path / "lock.json"), "--out", str(tmp_path / "again")) == 0
+    assert re.search(r"\d+ figures compared; ", capsys.readouterr().out)
+    first, again = (read_lock(folder / "lock.json") for folder in (tmp_path, tmp_path / "again"))
+    assert again.amounts == first.amounts
+    assert {one for one in again.figures if one[2] == "solved"} == {
+        ("robot_arm", name, "solved") for name in ("qp/daqp", "dls")
+    }
 
 
 def test_what_cannot_be_is_refused_before_anything_is_computed(tmp_path: Path) -> None:

@@ -14,9 +14,8 @@ from wholebody.bench.suite.compare import lock, report
 from wholebody.bench.suite.compare import run as running
 from wholebody.bench.suite.compare.lock import Locked, differences, in_words, locked, read_lock, shares, write_lock
 from wholebody.bench.suite.compare.results import Chunk, Record, Results
-from wholebody.bench.suite.compare.run import run
 from wholebody.bench.suite.compare.solving import JUDGED
-from wholebody.bench.suite.compare.summary import Material, material, summaries
+from wholebody.bench.suite.compare.summary import Material, summaries
 from wholebody.cli import main
 
 AMOUNTS = {"cases": 2, "sweep": 0, "levels": 1, "seed": 5, "cap": 5.0, "minutes": 1.0}
@@ -69,18 +68,6 @@ def test_other_files_and_unknown_methods_are_refused(tmp_path: Path) -> None:
         replace(PUBLISHED, methods=("dlss",)).settings()
     with pytest.raises(InputError, match="no figure in common"):
         differences(PUBLISHED, replace(PUBLISHED, figures={("a", "b", "c"): Interval(1.0, 1.0, 1.0)}))
-
-
-def test_a_comparison_is_done_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    settings = PUBLISHED.settings()
-    chunks = run(settings, tmp_path / "first").chunks
-    write_lock(tmp_path / "lock.json", locked(material(settings, chunks, {}, {})))
-    out = tmp_path / "out"
-    assert main(["bench", "compare", "--again", str(tmp_path / "lock.json"), "--out", str(out)]) == 0
-    assert "1 figures compared; 0 differ" in capsys.readouterr().out
-    again = read_lock(out / "lock.json")
-    assert again.amounts == AMOUNTS
-    assert list(again.figures) == [("robot_arm", "dls", "solved")]
 
 
 def test_another_share_ends_with_one(

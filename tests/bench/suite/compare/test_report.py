@@ -118,8 +118,8 @@ def test_settings_are_checked(fakes: ModuleType) -> None:
         Settings((), (fakes.adapter("solves"),))
 
 
-@pytest.mark.parametrize("span", [(2.0, 30.0), (1.0, 900.0), (1.0, 20000.0), (0.01, 20000.0)])
-def test_labels_of_a_logarithmic_axis_do_not_overlap(span: tuple[float, float], tmp_path: Path) -> None:
+@pytest.mark.parametrize("span", [(2.0, 30.0), (1.0, 900.0), (0.01, 20000.0)])
+def test_labels_of_a_logarithmic_axis_do_not_overlap(span: tuple[float, float]) -> None:
     """In the narrowest panels of the charts: two in a row of eleven inches."""
     chart, axes = plot_style.figure(1, 2, (11.0, 4.0))
     axes[0][0].plot(span, (0.0, 1.0))
@@ -131,6 +131,5 @@ def test_labels_of_a_logarithmic_axis_do_not_overlap(span: tuple[float, float], 
         for label in axes[0][0].get_xticklabels()
         if label.get_text() and low <= label.get_position()[0] <= high
     ]
-    plot_style.save(chart, tmp_path / "chart")
     assert len(boxes) >= 3
     assert all(one.x1 + 2.0 < other.x0 for one, other in itertools.pairwise(boxes))
