@@ -13,7 +13,7 @@ def build() -> wb.Problem:
     """State the problem."""
     scene = wb.Scene(wb.load("human", sex="female", hands="fingers"))
     scene.add(wb.HalfSpace(), name="floor")
-    scene.add(wb.Cylinder(0.02, 2.2), name="pole", at=(0.40, -0.30, 1.1), color=STEEL)
+    scene.add(wb.Cylinder(0.017, 2.2), name="pole", at=(0.35, -0.35, 1.1), color=STEEL)
     scene.add(wb.Box((0.001, 0.05, 0.09)), name="ticket", at=(0.38, 0.12, 1.25), color=LIGHT)
     return wb.Problem(
         scene,

@@ -257,7 +257,8 @@ def _margin(scene: Any, q: Array) -> float:
     import pinocchio as pin
     from scipy.spatial import ConvexHull
 
-    from wholebody.tasks.balance import low_points, standing_points
+    from wholebody.tasks.balance import DOWN, standing_points
+    from wholebody.tasks.surfaces import outermost
 
     points = [standing_points(scene, q, ("left_foot", "right_foot"))]
     data, placed = scene.model.createData(), pin.GeometryData(scene.geometry)
@@ -268,7 +269,7 @@ def _margin(scene: Any, q: Array) -> float:
         pin.updateGeometryPlacements(scene.model, data, scene.geometry, placed, q)
         for owner, piece, place in zip(scene.piece_owner, scene.geometry.geometryObjects, placed.oMg, strict=True):
             if owner in ("pelvis", "left_thigh", "right_thigh"):
-                lows = low_points(piece.geometry, place)
+                lows = outermost(piece.geometry, place, DOWN)
                 on = (lows[:, 2] < middle[2] + half[2] + ON_SEAT) & (np.abs(lows - middle)[:, :2] < half[:2]).all(1)
                 points.append(lows[on])
     hull = ConvexHull(np.vstack(points)[:, :2])

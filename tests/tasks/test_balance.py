@@ -15,7 +15,8 @@ from scipy.spatial import ConvexHull, Delaunay
 from wholebody import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import Balance
-from wholebody.tasks.balance import convex_polygon, edges, low_points, shrunk
+from wholebody.tasks.balance import DOWN, convex_polygon, edges, shrunk
+from wholebody.tasks.surfaces import outermost
 
 
 def test_rows_are_positive_exactly_where_the_centre_of_mass_is_over_the_feet(humanoid: Any) -> None:
@@ -129,7 +130,7 @@ def test_low_points_touch_the_ground_first(geometry: Any) -> None:
         result = coal.DistanceResult()
         there = coal.Transform3s(placement.rotation, placement.translation)
         height = coal.distance(geometry, there, ground, coal.Transform3s(), coal.DistanceRequest(), result)
-        points = low_points(geometry, placement)
+        points = outermost(geometry, placement, DOWN)
         lowest = points[np.argmin(points[:, 2])]
         np.testing.assert_allclose(lowest[2], height, atol=1e-6)
         np.testing.assert_allclose(lowest[:2], result.getNearestPoint1()[:2], atol=1e-3)

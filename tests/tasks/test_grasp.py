@@ -89,12 +89,13 @@ def _outer(finger: str) -> tuple[str, ...]:
         (wb.Sphere(0.04), AT),
         (wb.Capsule(0.025, 0.3), AT),
         (wb.Capsule(0.0141, 0.515), (0.433, -0.157, 1.237, -0.6237, -0.5206, 0.5251, -0.2534)),
+        (wb.Capsule(0.0222, 0.52), (0.49, -0.467, 1.252)),
         (wb.Capsule(0.028, 0.488), (0.364, -0.388, 1.0977, 0.0208, 0.4411, 0.8921, -0.0954)),
     ],
-    ids=["ball 80 mm", "rod 50 mm", "thin rod behind the fingers", "thick rod, reached through it"],
+    ids=["ball 80 mm", "rod 50 mm", "thin rod behind the fingers", "rod aside", "thick rod, reached through it"],
 )
 def test_in_a_power_grip_the_thumb_opposes_the_fingers(figure: wb.Figure, shape: Any, at: Any) -> None:
-    """The last two were called unreachable, although postures that solve neighbouring rods lead to them."""
+    """The last three were called unreachable, although postures that solve neighbouring rods lead to them."""
     quaternion = np.array(at[3:] or (0.0, 0.0, 0.0, 1.0))
     scene = wb.Scene(figure).add(shape, name="thing", at=(*at[:3], *(quaternion / np.linalg.norm(quaternion))))
     problem = wb.Problem(scene, start=_start(figure), goals=[wb.Grasp("right", "thing", "power")], constraints=FEET)
@@ -183,6 +184,33 @@ def test_derivatives(figure: wb.Figure, shape: Any, kind: Any) -> None:
         behind = grasp.value(state.update(pin.integrate(model, there, -step)))
         kinks += int(np.abs((ahead - behind) / (2.0 * half) - given[:, dof]).max() > 3e-3)
     assert kinks <= 1
+
+
+def test_the_end_of_the_opposed_angles_is_a_plane(figure: wb.Figure) -> None:
+    """With k the weight of the angle a, rows of `opposed` of 0 and 0.1 are k a and k (a - 0.1): the plane is theirs.
+
+    Without it a step of the measures went beyond the end, the next one came back, and a descent took 150 of these.
+    """
+    place = figure.placement(_start(figure), "right_palm")
+    scene = wb.Scene(figure).add(wb.Capsule(0.015, 0.3), name="thing", at=place.act(np.array((0.05, 0.0, 0.06))))
+    state = scene.state(_start(figure))
+
+    def grasp(opposed: float) -> wb.Grasp:
+        return wb.Grasp("right", "thing", "fingertips", opposed=opposed, approach="side").resolve(scene, state.q)
+
+    opposing = 5  # the part after the gaps of five fingers, one row each
+    (whole, less), (row, other) = (
+        [getattr(grasp(opposed), what)(state)[opposing] for opposed in (0.0, 0.1)] for what in ("value", "jacobian")
+    )
+    most = 0.1 * whole / (whole - less) + 0.05
+    inside = grasp(float(most))
+    assert inside.value(state)[opposing] == 0.0
+    planes = inside.supporting_planes(state)
+    (place_of,) = np.flatnonzero(planes.key // (3 * 256) == opposing)
+    assert planes.value[place_of] == pytest.approx(whole - most / 0.1 * (whole - less), rel=1e-6)
+    np.testing.assert_allclose(planes.jacobian[place_of], row - most / 0.1 * (row - other), atol=1e-9)
+    tilt = np.arcsin(abs(place.rotation[2, 2]))  # of the palm, which may look down or up by 45 degrees
+    assert planes.value[planes.key // (3 * 256) > opposing][-1] == pytest.approx(tilt - np.pi / 4)
 
 
 @pytest.mark.parametrize(("approach", "low", "high"), [("underhand", 0.7, 1.0), ("side", -0.71, 0.71)])

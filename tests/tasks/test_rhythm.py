@@ -116,7 +116,8 @@ def test_knees_stay_straight_where_hips_do_not_flex(scene: wb.Scene, abduction: 
 
 def test_knees_stay_where_the_start_has_them(scene: wb.Scene) -> None:
     sitting = scene.figure.posture("sitting")
-    assert wb.Rhythm().resolve(scene, sitting).parts(sitting)[2][1] == pytest.approx(0.0, abs=1e-12)
+    knees = wb.Rhythm().resolve(scene, sitting).squares(scene.state(sitting))[0][2:4]
+    assert knees == pytest.approx([0.0, 0.0], abs=1e-12)
 
 
 @pytest.mark.parametrize("posture", ["standing", "squatting"])
@@ -201,6 +202,24 @@ def test_its_squares_are_its_value_and_their_rows_their_derivatives(scene: wb.Sc
         way = rng.normal(size=figure.model.nv)
         ends = [term.squares(state.update(pin.integrate(figure.model, q, side * step * way)))[0] for side in (1, -1)]
         np.testing.assert_allclose((ends[0] - ends[1]) / (2.0 * step), rows @ way, atol=1e-6)
+
+
+def test_who_sits_has_knees_where_the_pedals_are(scene: wb.Scene) -> None:
+    """127 drivers had knees of 115 and hips of 98 degrees (Wolf et al. 2022): knees stretch as hips open."""
+    car = wb.Scene({"anna": scene.figure, "bo": scene.figure}).add(wb.Box((0.5, 0.5, 0.1)), name="seat", at=(0, 0, 0.3))
+    start = car.figure.posture({"anna": "sitting", "bo": "standing"})
+    problem = wb.Problem(car, start, goals=[wb.Sit("seat", pelvis="anna/pelvis", trunk="anna/thorax")])
+    hips, knees, lumbar = ([f"{who}/{name}" for who in ("anna", "bo")] for name in
+                           ("right_hip_flexion", "right_knee_flexion", "spine2_flexion"))  # fmt: skip
+    rhythm = problem.measures[1]
+    reclined = car.figure.with_joints(
+        start, {hips[0]: math.radians(82.0), knees[0]: math.radians(65.0), lumbar[0]: 0.2}
+    )
+    crouched = car.figure.with_joints(start, {hips[1]: math.radians(82.0), lumbar[1]: 0.2})
+    state = State(car.model)
+    at_start = rhythm.value(state.update(start))
+    assert rhythm.value(state.update(reclined)) == pytest.approx(at_start, abs=1e-12)
+    assert rhythm.value(state.update(crouched)) > at_start + 1.0
 
 
 @lru_cache(maxsize=3)

@@ -19,7 +19,8 @@ from wholebody.figures.state import State
 from wholebody.motion.strength import Strength
 from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Constraint, Measure, Surroundings, filled
+from wholebody.tasks.base import Constraint, Surroundings, filled
+from wholebody.tasks.distance import SumOfSquares
 from wholebody.tasks.forces import GRAVITY, Force, Forces, Loads, point_rows, pressure, resolved
 
 LEVER = 0.06
@@ -156,7 +157,7 @@ def statics_of(scene: Surroundings, forces: Sequence[Force], strength: Strength,
 
 
 @dataclass(frozen=True, eq=False)
-class Exertion(Measure):
+class Exertion(SumOfSquares):
     """Sum of the squared torques of joints over their strength: elbows go in, and who lifts comes near [no unit].
 
     Torques are those of the weight, the forces and, of somebody who stands, the ground (`Statics`). Joints without
@@ -186,16 +187,6 @@ class Exertion(Measure):
     def resolve(self, scene: Surroundings, start: Array) -> Exertion:
         """Look up the joints and their strength."""
         return filled(self, statics=statics_of(scene, self.forces, self.strength, self.standing, "Exertion"))
-
-    def value(self, state: State) -> float:
-        """The sum."""
-        share = self.statics.efforts(state)[0]
-        return float(share @ share)
-
-    def gradient(self, state: State) -> Array:
-        """(nv,) its derivative."""
-        share, moves = self.statics.efforts(state)
-        return np.asarray(2.0 * share @ moves)
 
     def curvature(self, state: State) -> Array:
         """(nv,) the diagonal of Gauss and Newton."""

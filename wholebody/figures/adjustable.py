@@ -10,9 +10,8 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
-from wholebody.figures.description import Articulated, Chain, Description
+from wholebody.figures.description import Chain, Description, copied
 from wholebody.figures.figure import Figure
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.placement import FARTHEST, placement
@@ -94,11 +93,7 @@ def adjustable(
         chains={next(iter(parts)): Chain(tuple(joints), next(iter(parts)))},
         frames=tuple(parts),
         segments=tuple(parts),
-        postures={"middle": partial(_copied, q=middle)},
+        postures={"middle": partial(copied, q=middle)},
         effort=dict.fromkeys(joints, 0.0),
     )
     return Figure(ADJUSTABLE, model, geometry_model(pieces), "own", description)
-
-
-def _copied(figure: Articulated, q: Array) -> Array:
-    return np.array(q)

@@ -148,6 +148,11 @@ class Description(NamedTuple):
     outer: Callable[[], tuple[Solid, ...]] | None = None
 
 
+def copied(figure: Articulated, q: Array) -> Array:
+    """A posture (nq,) that a description has as it is."""
+    return np.array(q)
+
+
 def chosen_pairs(
     solids: Sequence[Solid], reason: Callable[[Solid, Solid], str | None]
 ) -> tuple[tuple[tuple[str, str], ...], tuple[ExcludedPair, ...]]:

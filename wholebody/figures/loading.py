@@ -84,5 +84,3 @@ def _check_options(builder: Callable[..., Figure], options: dict[str, Any], wher
         elif option == "samples":
             # Most random postures for finding pairs that always overlap: more take minutes.
             whole(value, f"{where}: {option}", 0, 100_000)
-        elif option == "seed":
-            whole(value, f"{where}: {option}", 0, 2**32 - 1)

@@ -38,7 +38,7 @@ class RestPosture(NamedTuple):
     parted: tuple[tuple[str, str], ...]  # pairs of pieces that overlap at `zero` and not at `q`, by name
 
 
-def rest_posture(model: pin.Model, geometry: pin.GeometryModel, seed: int) -> RestPosture:
+def rest_posture(model: pin.Model, geometry: pin.GeometryModel) -> RestPosture:
     """Find a posture near zero that is free of self-contact; pairs that cannot be separated are removed."""
     limits = limits_of(model)
     zero = pin.neutral(model)
@@ -51,7 +51,7 @@ def rest_posture(model: pin.Model, geometry: pin.GeometryModel, seed: int) -> Re
         return RestPosture(zero, zero.copy(), (), ())
     best = search.away_from(zero)
     # Random starts, half-way from zero, if zero itself does not lead to a free posture.
-    for other in random_postures(model, 8, seed + 1):
+    for other in random_postures(model, 8, seed=1):
         if not len(best.left):
             break
         best = min(best, search.away_from(pin.interpolate(model, zero, other, 0.5)), key=_badness)

@@ -16,7 +16,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError, InputError, WholebodyError
-from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, JointCone
+from wholebody.figures.description import ROOT_JOINT, Chain, Description, JointCone, copied
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, LinkShape, link_pieces
 from wholebody.figures.rest_posture import RestPosture, rest_posture
@@ -46,24 +46,24 @@ class Robot(NamedTuple):
     place: pin.SE3 | None = None  # of a free root in the first posture
 
 
-def robot_figure(robot: Robot, samples: int, seed: int) -> Figure:
-    """Return the figure of a robot; its pairs are chosen by a number of random postures of a seed."""
+def robot_figure(robot: Robot, samples: int) -> Figure:
+    """Return the figure of a robot; its pairs are chosen by a number of random postures."""
     model, geometry, links = robot.model, robot.geometry, robot.links
-    excluded = choose_pairs(model, geometry, samples, seed)
+    excluded = choose_pairs(model, geometry, samples)
     if robot.untested is not None:
         told = [robot.untested(pair.first, pair.second) for pair in geometry.collisionPairs]
         gone = drop_pairs(geometry, [k for k, why in enumerate(told) if why], "")
         named = [with_values(pair, reason=why) for pair, why in zip(gone, filter(None, told), strict=True)]
         excluded += tuple(sorted(named, key=lambda pair: pair.reason))
-    rest = rest_posture(model, geometry, seed)
+    rest = rest_posture(model, geometry)
     if robot.place is not None:
         rest.q[:7] = rest.zero[:7] = pin.SE3ToXYZQUAT(robot.place)
     carrying = {model.frames[piece.parentFrame].name for piece in geometry.geometryObjects}
-    postures = {"neutral": partial(_copied, q=rest.q)}
+    postures = {"neutral": partial(copied, q=rest.q)}
     if np.abs(rest.q - rest.zero).max(initial=0.0) > 1e-12:
-        postures["zero"] = partial(_copied, q=rest.zero)
+        postures["zero"] = partial(copied, q=rest.zero)
     called = {name: f"{name} of the file" if name in postures else name for name in robot.postures}
-    postures |= {called[name]: partial(_copied, q=q) for name, q in robot.postures.items()}
+    postures |= {called[name]: partial(copied, q=q) for name, q in robot.postures.items()}
     renamed = [f"posture {name!r} of the file is called {now!r}" for name, now in called.items() if now != name]
     description = Description(
         groups={**robot.groups, "all": tuple(name for name in list(model.names)[1:] if name != ROOT_JOINT)},
@@ -76,10 +76,6 @@ def robot_figure(robot: Robot, samples: int, seed: int) -> Figure:
         notes=(*robot.notes, *renamed, *_told(rest)),
     )
     return Figure(robot.name, model, geometry, "own", description, robot.visual)
-
-
-def _copied(figure: Articulated, q: Array) -> Array:
-    return np.array(q)
 
 
 def _told(rest: RestPosture) -> list[str]:

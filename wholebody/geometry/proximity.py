@@ -207,6 +207,13 @@ class Proximity:
             self._buffer = ContactBuffer(2 * len(index))
         return self._gathered(self._buffer, self._placed, index, within, most)
 
+    def least(self, data: Any, within: float) -> Array:
+        """Distances (pairs,) of pairs that may be nearer than `within` metres, and bounds from below of all others."""
+        index, _ = self.ask(data, within)
+        found = np.empty(len(self.table.pairs))
+        self._kernel.bound_from_below(self.results_of(index), index, self.known, found)
+        return found
+
     def ask(self, data: Any, within: float, most: Array | None = None) -> tuple[Indices, Array]:
         """Have coal compute the pairs of `query`: numbers (k,) and placements, until the next; see `results_of`."""
         began = time.perf_counter()
@@ -284,5 +291,7 @@ def compiled_kernel() -> Any:
     known = pairs, one, lines, placement.copy(), one.copy(), bound, lines, marks
     proximity_kernel.look(placement, known, 0.0, none, 0)
     room = none, np.zeros((3, 0, 3)), index, pairs
-    proximity_kernel.gather(np.zeros((0, RESULT_DOUBLES)), index, (pairs, one, bound), 0.0, none, room)
+    results = np.zeros((0, RESULT_DOUBLES))
+    proximity_kernel.gather(results, index, (pairs, one, bound), 0.0, none, room)
+    proximity_kernel.bound_from_below(results, index, (pairs, one, bound), none)
     return proximity_kernel

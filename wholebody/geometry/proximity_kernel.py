@@ -93,6 +93,23 @@ def gather(
     return count, broken
 
 
+@compiled()
+def bound_from_below(results: Array, index: Indices, known: tuple[Indices, Array, Array], least: Array) -> None:
+    """Write distances of the pairs (k,) that were asked, and bounds from below of all others, to `least` (pairs,).
+
+    For `results`, `index` and `known` see `gather`.
+    """
+    pairs, travelled, bound = known
+    for p in index:
+        distance = results[p, RESULT_FIRST]
+        way = travelled[pairs[p, 0]] + travelled[pairs[p, 1]]
+        bound[0, p] = distance - 10.0 * COAL_ACCURACY * (1.0 + abs(distance)) + way
+    for p in range(len(pairs)):
+        least[p] = bound[0, p] - travelled[pairs[p, 0]] - travelled[pairs[p, 1]]
+    for p in index:
+        least[p] = results[p, RESULT_FIRST]
+
+
 @compiled(inner=True)
 def renew(marked: Indices, before: int, index: Indices, count: int, changed: Indices) -> tuple[int, int]:
     """Make ``marked[:before]`` the pairs ``index[:count]``, both ascending; the numbers gone and new, in `changed`."""

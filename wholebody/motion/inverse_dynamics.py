@@ -18,7 +18,8 @@ from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.joined import one_figure
 from wholebody.motion.stance import pieces_on
-from wholebody.tasks.balance import convex_polygon, edges, low_points
+from wholebody.tasks.balance import DOWN, convex_polygon, edges
+from wholebody.tasks.surfaces import outermost
 
 ROOT = 6  # degrees of freedom of a free root
 LIGHT = 0.2
@@ -48,7 +49,7 @@ class Soles:
                 continue
             lows = np.vstack(
                 [
-                    low_points(piece.geometry, data.oMi[piece.parentJoint] * piece.placement)
+                    outermost(piece.geometry, data.oMi[piece.parentJoint] * piece.placement, DOWN)
                     for piece in self._pieces[foot]
                 ]
             )

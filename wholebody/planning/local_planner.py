@@ -18,13 +18,14 @@ from wholebody.assessment.posture import largest_violation
 from wholebody.base.arrays import Array, Mask
 from wholebody.geometry.continuous.motion_bounds import largest_approach
 from wholebody.methods.qp.method import QP
+from wholebody.planning.sampling import holds
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks import Posture
 from wholebody.tasks.base import filled
 from wholebody.tracking.qp_strategy import Attraction
 
-WITHIN = 0.08  # m: distance within which pairs are looked at; larger = fewer and dearer queries
+WITHIN = 0.02  # m: distance within which pairs are looked at; larger = fewer and dearer queries
 MARGIN = 2e-3  # m: distance that motions keep beyond the clearance, where their ends do; larger = fewer queries
 NOISE = 1e-5  # m: by which distances of one posture differ from query to query
 REACHED = 1e-3  # rad, m: difference from a posture that counts as reached by steps of the tracker
@@ -68,8 +69,8 @@ class Geodesics:
         self._required = problem.clearance + np.full(len(workspace.table.pairs), MARGIN)
         pieces = workspace.geometry.geometryObjects
         centres = np.array([np.linalg.norm(piece.placement.translation) for piece in pieces])
-        ways = [largest_approach(workspace.table, centres, unit) for unit in np.eye(self._model.nv)]
-        self._approach = np.array(ways).reshape(self._model.nv, -1).T.copy()  # of every pair by every freedom
+        # of every pair by every freedom
+        self._approach = np.asarray(largest_approach(workspace.table, centres, np.eye(self._model.nv)))
 
     def admit(self, q: Array) -> None:
         """See `LocalPlanner`."""
@@ -114,9 +115,8 @@ class Geodesics:
 
     def _room(self, q: Array) -> Array | None:
         """(pairs,) by how much distances exceed what is required at least, metres; None where one does not."""
-        near, room = self._workspace.near_views(q, WITHIN), WITHIN - self._required
-        room[near.number] = near.distance - self._required[near.number]
-        return None if (room[near.number] < 0.0).any() else room
+        room = self._workspace.proximity.least(self._workspace.state.update(q).data, WITHIN) - self._required
+        return room if room.min(initial=0.0) >= 0.0 else None
 
     def _joins(self, q: Array, motion: Array, room: Array | None, ahead: Array | None) -> bool:
         return (
@@ -142,11 +142,6 @@ class Geodesics:
                 return False
             asked += [(here, half, first, room, 0.5 * change), (middle, half, room, last, 0.5 * change)]
         return True
-
-
-def holds(problem: Problem) -> bool:
-    """Whether a constraint is an equality, such as a `Hold`, so that most postures near by are not allowed."""
-    return any(bool(np.any(term.lower == term.upper)) for term in problem.constraints)
 
 
 class TrackedMotions:

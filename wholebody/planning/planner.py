@@ -7,22 +7,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from wholebody.assessment.motion import frames_passed_through
 from wholebody.assessment.posture import assess
 from wholebody.base import checks
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.base.runner import processor_time
-from wholebody.figures.self_pairs import random_postures
+from wholebody.geometry.continuous.sweep import Sweep
 from wholebody.methods.qp.method import QP
+from wholebody.methods.simplification.reach import still_dofs
 from wholebody.motion.clip import Clip
-from wholebody.planning.local_planner import Geodesics, LocalPlanner, TrackedMotions, holds
+from wholebody.planning.local_planner import Geodesics, LocalPlanner, TrackedMotions
 from wholebody.planning.rrt_connect import RRTConnect
+from wholebody.planning.sampling import Sampler, holds
 from wholebody.planning.smoothing import SPACING, length, resampled, shortcut, smooth
 from wholebody.planning.timing import Pace, Timing
 from wholebody.problem import Problem
@@ -33,8 +35,7 @@ KEPT = 1e-4  # m, rad: by which limits, constraints and clearances may be missed
 PASSED = 5e-4  # m: overlap between two frames that counts
 OVER = 1.001  # of the limits of velocity and acceleration: the last slowing may end a little above them
 ENDS = 8  # postures that meet goals; more = ends that are reached more easily, for a solve each
-ENOUGH = 1500  # samples of all trees, after which no other search begins; more = shorter motions, later
-ROOM = 1.0  # m: by which samples move a free root along each axis
+ENOUGH = 1000  # samples of all trees, after which no other search begins; more = shorter motions, later
 ROUNDS = 50  # of the trees, until they get another end
 
 
@@ -115,7 +116,8 @@ def plan(
     goals = _goals(goal)
     problem = Problem(scene, start, goals=goals, constraints=constraints, clearance=clearance)
     _check_end(problem, problem.start, "start")
-    ends = _answers(problem, rng) if goals else iter([_End(_posture(problem, goal))])
+    sampler = Sampler(problem, rng)
+    ends = _answers(problem, sampler) if goals else iter([_End(_posture(problem, goal))])
     found = None
     with problem.borrow() as workspace:
         tracked = bool(problem.constraints or problem.bounds or scene.figure.followers)
@@ -125,7 +127,7 @@ def plan(
         def ended() -> bool:
             return processor_time() - ready > limit
 
-        search = _Search(problem, local, ends, rng, ended)
+        search = _Search(problem, local, ends, (sampler, rng), ended)
         path, message = search.shortest()
         while path is not None:
             found = _smoothed(problem, local, path, pace)
@@ -165,23 +167,12 @@ def _check_end(problem: Problem, q: Array, what: str) -> None:
             raise InputError(f"plan: the {what} is {by:.3g} m or rad beyond {name}; give a posture of wb.solve")
 
 
-def _frozen(problem: Problem) -> Mask:
-    """Which degrees of freedom (nv,) the bounds keep where they start."""
-    found: Mask = np.zeros(problem.scene.model.nv, dtype=bool)
-    if problem.bounds:
-        state = problem.scene.state(problem.start)
-        for bound in problem.bounds:
-            low, high = bound.bounds(state, None)
-            found |= (low == 0.0) & (high == 0.0)
-    return found
-
-
 def _moved(problem: Problem, q: Array) -> float:
     """By how much postures (n, nq) move what is frozen, radians and metres."""
-    frozen, model = _frozen(problem), problem.scene.model
-    if not frozen.any():
+    still, model = still_dofs(problem), problem.scene.model
+    if not still:
         return 0.0
-    return float(np.max([np.abs(pin.difference(model, problem.start, each)[frozen]).max() for each in q]))
+    return float(np.max([np.abs(pin.difference(model, problem.start, each)[still]).max() for each in q]))
 
 
 class _End(NamedTuple):
@@ -191,31 +182,15 @@ class _End(NamedTuple):
     why: str = ""
 
 
-def _answers(problem: Problem, rng: np.random.Generator) -> Iterator[_End]:
+def _answers(problem: Problem, sampler: Sampler) -> Iterator[_End]:
     """Ends that meet the goals: from the start, then from random postures."""
-    solution = QP().solve(problem)
-    yield _End(solution.q if solution.solved else None, solution.message)
-    for _ in range(ENDS - 1):
-        start = problem.with_start(_drawn(problem, problem.start, 1.0, rng))
-        solution = QP(restarts=0, budget=0).solve(start)
-        yield _End(solution.q if solution.solved else None, solution.message)
-
-
-def _drawn(problem: Problem, near: Array, spread: float, rng: np.random.Generator) -> Array:
-    """A posture (nq,) whose joints are a share of the way from another one to a random one."""
-    # A free root is within `ROOM` of the other's; where nothing is held it turns about the vertical.
-    held = holds(problem)
-    figure, (drawn,) = problem.scene.figure, random_postures(problem.scene.model, 1, int(rng.integers(2**31)))
-    away = spread * np.asarray(pin.difference(figure.model, near, drawn))
-    for root in figure.roots.values():
-        joint = figure.model.joints[root]
-        here = pin.XYZQUATToSE3(near[joint.idx_q : joint.idx_q + 7])
-        turn = np.eye(3) if held else pin.exp3(np.array((0.0, 0.0, rng.uniform(-np.pi, np.pi))))
-        moved = (spread if held else 1.0) * rng.uniform(-ROOM, ROOM, 3)
-        there = pin.SE3(turn @ here.rotation, here.translation + moved)
-        away[joint.idx_v : joint.idx_v + 6] = pin.log6(here.actInv(there)).vector
-    away[_frozen(problem)] = 0.0
-    return np.asarray(pin.integrate(figure.model, near, away))
+    for number in range(ENDS):
+        if number == 0:
+            solution = QP().solve(problem)
+        else:
+            solution = QP(restarts=0, budget=0).solve(problem.with_start(sampler.near(problem.start, 1.0)))
+        end = sampler.turns.nearest(solution.q, problem.start) if solution.solved else None
+        yield _End(end, solution.message)
 
 
 class _Search:
@@ -226,10 +201,11 @@ class _Search:
         problem: Problem,
         local: LocalPlanner,
         ends: Iterator[_End],
-        rng: np.random.Generator,
+        random: tuple[Sampler, np.random.Generator],
         ended: Callable[[], bool],
     ) -> None:
-        self._problem, self._local, self._ends, self._rng, self._ended = problem, local, ends, rng, ended
+        self._problem, self._local, self._ends, self._ended = problem, local, ends, ended
+        self._sampler, self._rng = random
         self._reached: list[Array] = []
         self._said = ""
         free_root = bool(problem.scene.figure.roots) and not holds(problem)
@@ -280,7 +256,7 @@ class _Search:
             near = self._reached[self._rng.integers(len(self._reached))]
             middle = np.asarray(pin.interpolate(model, start, near, self._rng.uniform()))
             spread = self._spreads[self._rng.integers(len(self._spreads))]
-            path = trees.grow(_drawn(self._problem, middle, spread, self._rng))
+            path = trees.grow(self._sampler.near(middle, spread))
             if path is not None:
                 return path, trees
         return None, trees
@@ -308,16 +284,19 @@ def _judged(problem: Problem, path: Array, pace: Pace) -> Plan:
     """The motion along a path (m, nq) as fast as it may be, and what it is worth, from its postures alone."""
     scene = problem.scene
     q, use = Timing(scene.figure, path, pace).within()
-    asked = _between(problem, q[-1])
-    judgements = [assess(asked, frame) for frame in q]
-    found = [(one.limit_violation, one.constraint_violation, one.clearance_violation) for one in judgements]
-    worst = max(float(np.max(found)), _moved(problem, q))
+    asked, worst = _between(problem, q[-1]), _moved(problem, q)
+    for frame in q:  # as far as the first that misses something
+        if worst <= KEPT:
+            one = assess(asked, frame)
+            worst = max(worst, one.limit_violation, one.constraint_violation, one.clearance_violation)
     faults = [
         f"a frame misses what must hold by {worst:.3g} m or rad" if not worst <= KEPT else "",
         f"velocities reach {use.velocity:.3g} of their limits" if not use.velocity <= OVER else "",
         f"accelerations reach {use.acceleration:.3g} of their limit" if not use.acceleration <= OVER else "",
     ]
-    if not any(faults) and (passed := frames_passed_through(scene, q, PASSED)):
-        faults.append(f"something is passed through before frame {passed[0]}")
+    if not any(faults):
+        ways, sweep = enumerate(pairwise(q), 1), Sweep(scene.model, scene.geometry)
+        passed = next((k for k, way in ways if sweep.first_contact(*way, tolerance=PASSED) is not None), 0)
+        faults.append(f"something is passed through before frame {passed}" if passed else "")
     said = "; ".join(fault for fault in faults if fault)
     return Plan(Clip(scene.figure, q, pace.dt, "plan"), not said, said, length(scene.model, list(q)), worst, *use)

@@ -17,6 +17,7 @@ class Tree:
         self._model, self._origin = model, origin
         self.postures: list[Array] = []
         self._parents: list[int] = []
+        self.grown = 0  # how many postures it has beyond its roots
         self._places = np.zeros((64, model.nv))
 
     def add(self, q: Array, parent: int = -1) -> int:
@@ -27,17 +28,13 @@ class Tree:
         self._places[number] = pin.difference(self._model, self._origin, q)
         self.postures.append(q)
         self._parents.append(parent)
+        self.grown += parent >= 0
         return number
 
     def nearest(self, q: Array) -> int:
         """The number of the posture that is nearest to q (nq,)."""
         apart = self._places[: len(self.postures)] - np.asarray(pin.difference(self._model, self._origin, q))
         return int(np.argmin(np.einsum("ij,ij->i", apart, apart)))
-
-    @property
-    def grown(self) -> int:
-        """How many postures it has beyond its roots."""
-        return sum(parent >= 0 for parent in self._parents)
 
     def path(self, number: int) -> list[Array]:
         """Postures from a root to one of the tree."""

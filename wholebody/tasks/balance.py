@@ -32,7 +32,7 @@ M258, its abstract): a share of 0.2; about 8 % lean farther than 0.15. The centr
 came 20 to 59 % less far from the middle of the stance than the edges are (Forth, Fiedler & Paloski 2011, Gait & Posture
 33: 715, its abstract); here it is 30 %."""
 
-_DOWN = np.array((0.0, 0.0, -1.0))
+DOWN = np.array((0.0, 0.0, -1.0))
 NEAREST = 1e-5  # Distance [m] below which two points count as one corner
 
 
@@ -47,7 +47,9 @@ def standing_points(scene: Surroundings, q: Array, feet: Sequence[str]) -> Array
             raise InputError(f"Balance: {foot!r} has no pieces to stand on; name segments with geometry as feet")
         for carrier in {joint for joint, *_ in pieces} - places.keys():
             places[carrier] = scene.figure.joint_placement(q, carrier)
-        lows = np.vstack([low_points(shape, places[joint] * placed, swept) for joint, placed, shape, swept in pieces])
+        lows = np.vstack(
+            [outermost(shape, places[joint] * placed, DOWN, swept) for joint, placed, shape, swept in pieces]
+        )
         points.append(lows[lows[:, 2] <= lows[:, 2].min() + STANDING_HEIGHT])
     return np.vstack(points)
 
@@ -59,11 +61,6 @@ def _pieces_of(scene: Surroundings, joint: int) -> list[tuple[int, pin.SE3, Any,
         (int(piece.parentJoint), pin.SE3(piece.placement), piece.geometry, swept_points(piece.geometry))
         for piece in pieces
     ]
-
-
-def low_points(geometry: Any, placement: pin.SE3, swept: SweptPoints | None = None) -> Array:
-    """Candidates (n, 3) for the lowest points of a piece: all corners, or the lowest points of its balls."""
-    return outermost(geometry, placement, _DOWN, swept)
 
 
 def convex_polygon(points: Array) -> Array:

@@ -65,12 +65,16 @@ def check_rows(where: str, term: Any, evaluate: Callable[[State], Array], state:
 def values_and_rows(term: Any, evaluate: Callable[[State], Array], state: State) -> tuple[Array, Array]:
     """Values (m,) of a goal or constraint at a state, and their derivatives (m, nv); TermError where counts differ."""
     values, jacobian = evaluate(state), term.jacobian(state)
+    check_row_count(term, values, jacobian, state.model.nv)
+    return values, state.dense_jacobian(jacobian)
+
+
+def check_row_count(term: Term, values: Array, jacobian: Wrench | Array, nv: int) -> None:
+    """A TermError where a term has not as many rows, of nv columns, as values (m,)."""
     count = len(jacobian.rows if isinstance(jacobian, Wrench) else jacobian)
     if count != len(values):
-        wanted = (len(values), state.model.nv)
-        told = f"it has {len(values)} values and a jacobian of {count} rows at a posture; give shape {wanted}"
-        raise TermError(term, answers.in_words(term), told)
-    return values, state.dense_jacobian(jacobian)
+        told = f"it has {len(values)} values and a jacobian of {count} rows at a posture; give shape "
+        raise TermError(term, answers.in_words(term), f"{told}{(len(values), nv)}")
 
 
 def undefined(terms: Iterable[Term], state: State, dt: float | None = None) -> UndefinedTermError | None:

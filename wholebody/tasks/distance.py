@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -15,6 +16,29 @@ from wholebody.tasks.base import Measure, Surroundings, filled
 
 LEAST_CURVATURE = 1e-6
 """Curvature [1/rad^2] of degrees of freedom without weight: positive, as methods require, and far below any in use."""
+
+
+class SumOfSquares(Measure):
+    """A measure that is the sum of the squares of its residuals r, with the derivatives R of `squares`."""
+
+    @abstractmethod
+    def squares(self, state: State) -> tuple[Array, Array]:
+        """Residuals (k,) and their derivatives (k, nv), always as many."""
+
+    def value(self, state: State) -> float:
+        """``r' r``."""
+        residuals = self.squares(state)[0]
+        return float(residuals @ residuals)
+
+    def gradient(self, state: State) -> Array:
+        """(nv,) ``2 R' r``."""
+        residuals, rows = self.squares(state)
+        return np.asarray(2.0 * residuals @ rows)
+
+    def curvature(self, state: State) -> Array:
+        """(nv,) row sums of ``2 |R|' |R|``, which bound the second derivative of Gauss and Newton."""
+        steep = np.abs(self.squares(state)[1])
+        return np.asarray(2.0 * steep.sum(axis=1) @ steep + LEAST_CURVATURE)
 
 
 class SquaredDistance(NamedTuple):
@@ -159,7 +183,7 @@ class BallJoint(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class RotationEffort(Measure):
+class RotationEffort(SumOfSquares):
     """Squared displacement of every joint from the start, a ball joint's by its rotation vector [rad^2].
 
     ``sum_i gamma_i d_i^2`` as in `Effort`, with the same weights; but of three hinges with one centre (shoulder, hip, a
@@ -191,30 +215,6 @@ class RotationEffort(Measure):
         for ball in balls:
             weights[list(ball.idx_v)] = 0.0
         return filled(self, balls=balls, others=SquaredDistance.build(start, weights))
-
-    def value(self, state: State) -> float:
-        """The measure."""
-        total = self.others.value(state)
-        for ball in self.balls:
-            residuals = ball.residuals(state.q)[0]
-            total += float(residuals @ residuals)
-        return total
-
-    def gradient(self, state: State) -> Array:
-        """(nv,) derivative [rad]."""
-        result: Array = self.others.gradient(state).copy()
-        for ball in self.balls:
-            residuals, rows = ball.residuals(state.q)
-            result[list(ball.idx_v)] += 2.0 * residuals @ rows
-        return result
-
-    def curvature(self, state: State) -> Array:
-        """(nv,) that of the other joints, and row sums of the squares' second derivative of Gauss and Newton."""
-        result: Array = self.others.curvature.copy()
-        for ball in self.balls:
-            steep = np.abs(ball.residuals(state.q)[1])
-            result[list(ball.idx_v)] = 2.0 * steep.T @ steep.sum(axis=1) + LEAST_CURVATURE
-        return result
 
     def squares(self, state: State) -> tuple[Array, Array]:
         """Residuals (k,) and their derivatives (k, nv): of each ball joint, then of the other joints that count."""

@@ -164,7 +164,8 @@ class Grasp(ContactTerm):
         thumb = fingers.pop("thumb", hand)
         if others := tuple(fingers.values()):
             first = thumb if thickness >= THIN else hand
-            parts.append(Opposing(first, others, thing, rounded(thing), float(self.opposed), CLOSED))
+            # lever [m]: shorter, and fingers around a thick bar do not turn; longer, and one stays away from a thin bar
+            parts.append(Opposing(first, others, thing, rounded(thing), float(self.opposed), CLOSED, lever=0.05))
         return parts
 
     def _fingers(self, scene: Surroundings, thing: Surface, state: State, where: str) -> list[Part]:

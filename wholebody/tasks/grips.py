@@ -24,7 +24,7 @@ from wholebody.geometry.hull import coal_convex
 from wholebody.geometry.pieces import swept_points
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import SupportingPlanes, filled
-from wholebody.tasks.contact_parts import Gap, Near, between, one_sided, through
+from wholebody.tasks.contact_parts import Gap, Near, between, no_planes, one_sided, through
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.surfaces import Face, Surface, between_pieces, nearest, outermost
 
@@ -178,16 +178,27 @@ class Looking(NamedTuple):
 
     def rows(self, state: State) -> tuple[Array, Array]:
         """The angle beyond, and a moment."""
+        return _beyond_zero(*self._signed(state))
+
+    def planes(self, state: State) -> SupportingPlanes:
+        """The end of the range of angles."""
+        return one_sided(*self._signed(state))
+
+    def _signed(self, state: State) -> tuple[Array, Array]:
+        """The angle beyond, negative within, and its derivative (1, nv)."""
         axis = state.frame(self.place.frame).rotation[:, 2]
         cosine = float(np.clip(axis @ self.direction, -1.0, 1.0))
         angle = abs(float(np.arcsin(cosine))) if self.level else float(np.arccos(cosine))
+        slope = (1.0 if cosine > 0.0 else -1.0) if self.level else -1.0
+        moment = pin.skew(axis) @ self.direction
         wrench = np.zeros((1, 6))
-        beyond = max(0.0, angle - self.most)
-        if beyond > 0.0:
-            slope = (1.0 if cosine > 0.0 else -1.0) if self.level else -1.0
-            moment = pin.skew(axis) @ self.direction
-            wrench[0, 3:] = slope * moment / max(float(np.linalg.norm(moment)), 1e-6)
-        return np.array([beyond]), between(state, wrench, self.place.joint, 0)
+        wrench[0, 3:] = slope * moment / max(float(np.linalg.norm(moment)), 1e-6)
+        return np.array([angle - self.most]), between(state, wrench, self.place.joint, 0)
+
+
+def _beyond_zero(value: Array, row: Array) -> tuple[Array, Array]:
+    """What of a value (1,) is beyond zero, and its derivative (1, nv) there."""
+    return (value, row) if value[0] > 0.0 else (np.zeros(1), np.zeros_like(row))
 
 
 class Opposing(NamedTuple):
@@ -212,12 +223,23 @@ class Opposing(NamedTuple):
 
     def rows(self, state: State) -> tuple[Array, Array]:
         """The angle beyond, and wrenches on every finger."""
+        found = self._signed(state, 0.0)
+        return (np.zeros(1), np.zeros((1, state.model.nv))) if found is None else found
+
+    def planes(self, state: State) -> SupportingPlanes:
+        """The end of the range of angles, where it is near."""
+        # rad: of a step. Less: measures that pull beyond the end are taken back again and again; more: time.
+        found = self._signed(state, -0.3)
+        return no_planes(state.model.nv) if found is None else one_sided(*found)
+
+    def _signed(self, state: State, least: float) -> tuple[Array, Array] | None:
+        """The angle beyond, negative within, and its derivative (1, nv); None where it is not more than `least`."""
         surfaces, thing = (self.first, *self.others), self.thing
         distances = [nearest(surface, thing, state).distance for surface in surfaces]
         farthest = int(np.argmax(distances))
         left = 1.0 - max(distances[farthest], 0.0) / self.far
         if left <= 0.0:
-            return np.zeros(1), np.zeros((1, state.model.nv))
+            return None
         # how much of the angle counts at the distance of the farthest contact, all at contact, and its derivative
         share, fall = left * left, -2.0 * left / self.far * (distances[farthest] > 0.0)
         nears = [nearest(surface, self.smooth, state) for surface in surfaces]
@@ -227,8 +249,8 @@ class Opposing(NamedTuple):
         mean = total / length
         cosine = float(np.clip(-normals[0] @ mean, -1.0, 1.0))
         beyond = float(np.arccos(cosine)) - self.most
-        if beyond <= 0.0:
-            return np.zeros(1), np.zeros((1, state.model.nv))
+        if beyond <= least:
+            return None
         ahead = mean + cosine * normals[0]  # of the mean across the first normal: the angle grows along it
         sine = float(np.linalg.norm(ahead))
         toward = ahead / sine if sine > SHORTEST else across(normals[0])[0]

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -15,17 +15,17 @@ from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Measure, Surroundings, filled
-from wholebody.tasks.distance import LEAST_CURVATURE
+from wholebody.tasks.base import Surroundings, filled
+from wholebody.tasks.distance import SumOfSquares
 
 LUMBAR_MOST, LUMBAR_RATE = math.radians(46.0), 2.5
 """Flexion of the lumbar spine while the pelvis tips forward: 46 degrees times tanh(2.5 sin(tilt)). Lumbar to hip motion
 of 1.9, 0.9 and 0.4 in the three thirds of bending by 90 degrees (Esola et al. 1996, Spine 21(1)) is met to 3 degrees.
 """
 
-CLAVICLE_WEIGHT, LUMBAR_WEIGHT = 100.0, 10.0
-"""1/rad^2, beside an effort of 20 for clavicle and spine: the clavicle follows its arm by five sixths, and the lumbar
-spine of a bent person is free to do what a goal needs."""
+CLAVICLE_WEIGHT, LUMBAR_WEIGHT = 100.0, 20.0
+"""1/rad^2, beside an effort of 20 for the clavicle, which follows its arm by five sixths. That of the lumbar spine is
+fitted to postures of people (`python -m tests.audits postures --fit`)."""
 
 
 KNEE_SHARE, KNEE_ONSET, KNEE_WEIGHT = 0.9, 0.4, 25.0
@@ -51,7 +51,7 @@ class Sharing(NamedTuple):
 STYLES = {
     "free": Sharing(KNEE_SHARE, KNEE_WEIGHT, LUMBAR_MOST, LUMBAR_WEIGHT),
     "stoop": Sharing(0.0, 4.0 * KNEE_WEIGHT, LUMBAR_MOST, LUMBAR_WEIGHT),
-    "squat": Sharing(1.5 * KNEE_SHARE, 4.0 * KNEE_WEIGHT, 0.5 * LUMBAR_MOST, 10.0 * LUMBAR_WEIGHT),
+    "squat": Sharing(1.5 * KNEE_SHARE, 4.0 * KNEE_WEIGHT, 0.5 * LUMBAR_MOST, 5.0 * LUMBAR_WEIGHT),
 }
 """Who stoops keeps the knees as they are; who squats bends them by 118 degrees at hips of 100 and keeps the back. The
 weights, ESTIMATES, make a style of what is only a tendency in who does as he likes."""
@@ -87,10 +87,10 @@ class Lumbar(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Rhythm(Measure):
+class Rhythm(SumOfSquares):
     """Squared distance of clavicles, lumbar spine and knees from their usual share of a motion [rad^2, weighted].
 
-    ``100 sum (c - 13 deg (1 - cos e))^2 + 25 sum (k - k_0)^2 + 10 (l - l_0)^2``:
+    ``100 sum (c - 13 deg (1 - cos e))^2 + 25 sum (k - k_0)^2 + 20 (l - l_0)^2``:
 
     - c is the elevation of a clavicle and e that of its arm in the clavicle (scapulohumeral rhythm);
     - k is the flexion of a knee beyond its share of the flexion f of its hip,
@@ -134,44 +134,23 @@ class Rhythm(Measure):
         lumbar = tuple(with_values(spine, rest=_bent(start, spine)[0]) for spine in lumbar)
         return filled(self, girdles=girdles, knees=knees, lumbar=lumbar)
 
-    def value(self, state: State) -> float:
-        """The measure."""
-        return float(sum(weight * excess**2 for weight, excess, _, _ in self.parts(state.q)))
-
-    def gradient(self, state: State) -> Array:
-        """(nv,) derivative [1/rad]."""
-        result = np.zeros(state.model.nv)
-        for weight, excess, places, slopes in self.parts(state.q):
-            result[places] += 2.0 * weight * excess * slopes
-        return result
-
-    def curvature(self, state: State) -> Array:
-        """(nv,) row sums of the absolute second derivative of the squares, which bound it [1/rad^2]."""
-        result = np.full(state.model.nv, LEAST_CURVATURE)
-        for weight, _, places, slopes in self.parts(state.q):
-            steep = np.abs(slopes)
-            result[places] += 2.0 * weight * steep * steep.sum()
-        return result
+    def of_arms(self, idx_v: Set[int]) -> Rhythm:
+        """Itself, resolved, without the knees and the lumbar spine of those joints; clavicles still follow arms."""
+        knees = tuple(knee for knee in self.knees if knee.idx_v[0] not in idx_v)
+        lumbar = tuple(spine for spine in self.lumbar if spine.idx_v[0] not in idx_v)
+        return filled(self, knees=knees, lumbar=lumbar)
 
     def squares(self, state: State) -> tuple[Array, Array]:
         """Residuals (k,) and their derivatives (k, nv): of each clavicle and knee, then of the lumbar spine."""
-        parts = self.parts(state.q)
+        parts: tuple[Any, ...] = (*self.girdles, *self.knees, *self.lumbar)
         residuals, rows = np.zeros(len(parts)), np.zeros((len(parts), state.model.nv))
-        for row, (weight, excess, places, slopes) in enumerate(parts):
-            residuals[row], rows[row, places] = math.sqrt(weight) * excess, math.sqrt(weight) * slopes
+        for row, part in enumerate(parts):
+            bends = isinstance(part, Lumbar)
+            excess, slopes = _bent(state.q, part) if bends else _beyond(state.q, part)
+            places = [*part.idx_v, part.root[1] + 4, part.root[1] + 5] if bends else list(part.idx_v)
+            root = math.sqrt(part.weight)
+            residuals[row], rows[row, places] = root * excess, root * np.array(slopes)
         return residuals, rows
-
-    def parts(self, q: Array) -> list[tuple[float, float, list[int], Array]]:
-        """Weight, excess, places in the tangent and slopes there of each square."""
-        found: list[tuple[float, float, list[int], Array]] = []
-        for part in (*self.girdles, *self.knees):
-            excess, slopes = _beyond(q, part)
-            found.append((part.weight, excess, list(part.idx_v), np.array(slopes)))
-        for spine in self.lumbar:
-            excess, turn = _bent(q, spine)
-            places = [*spine.idx_v, spine.root[1] + 4, spine.root[1] + 5]
-            found.append((spine.weight, excess, places, np.array([1.0, 1.0, 1.0, *turn])))
-        return found
 
 
 def girdles_of(figure: Figure) -> tuple[Elevation, ...]:
@@ -234,12 +213,12 @@ def _beyond(q: Array, part: Elevation) -> tuple[float, tuple[float, float, float
     )
 
 
-def _bent(q: Array, lumbar: Lumbar) -> tuple[float, tuple[float, float]]:
-    """Flexion of the lumbar spine beyond its share [rad], and its slopes by turns of the root about its y and z."""
+def _bent(q: Array, lumbar: Lumbar) -> tuple[float, tuple[float, ...]]:
+    """Flexion of the lumbar spine beyond its share [rad], its slopes by its joints and turns of the root about y, z."""
     x, y, z, w = (float(value) for value in q[lumbar.root[0] + 3 : lumbar.root[0] + 7])
     forward, left, up = 2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)
     # The root's x axis dips by sin(tilt) = -forward, the height of that axis.
     share = math.tanh(-LUMBAR_RATE * forward)
     steep = lumbar.most * LUMBAR_RATE * (1.0 - share * share)
     flexion = sum(float(q[place]) for place in lumbar.idx_q)
-    return flexion - lumbar.most * share - lumbar.rest, (-steep * up, steep * left)
+    return flexion - lumbar.most * share - lumbar.rest, (1.0, 1.0, 1.0, -steep * up, steep * left)

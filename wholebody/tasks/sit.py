@@ -14,10 +14,9 @@ from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
-from wholebody.tasks.balance import low_points
 from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Level, Near, Over, Part, owner_pairs
-from wholebody.tasks.surfaces import Surface, face, joined, surface
+from wholebody.tasks.surfaces import Surface, face, joined, outermost, surface
 
 UP = np.array((0.0, 0.0, 1.0))
 MARGIN = 0.08  # m: by which the middle of the pelvis is within the edges of the seat; half the seat if that is less
@@ -173,7 +172,7 @@ def _depth(scene: Surroundings, name: str, place: inputs.Place) -> float:
     """How far the pelvis reaches below its origin when it is upright, metres."""
     state = upright(scene)
     shape = joined(scene, name, [name])
-    lows = [low_points(piece, shape.placed(k, state))[:, 2].min() for k, piece in enumerate(shape.shapes)]
+    lows = [outermost(piece, shape.placed(k, state), -UP)[:, 2].min() for k, piece in enumerate(shape.shapes)]
     return float(state.frame(place.frame).translation[2] - min(lows))
 
 

@@ -10,12 +10,12 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import instance
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Goal, Measure, Surroundings, filled
-from wholebody.tasks.distance import LEAST_CURVATURE
+from wholebody.tasks.base import Goal, Surroundings, filled
+from wholebody.tasks.distance import SumOfSquares
 
 
 @dataclass(frozen=True, eq=False)
-class Soft(Measure):
+class Soft(SumOfSquares):
     """A goal as a preference: its squared error [m^2, rad^2], which is weighed against the other measures.
 
     Goals and constraints come first: where a preference cannot be met, or costs more than it is worth, the answer is
@@ -50,21 +50,6 @@ class Soft(Measure):
     def touching(self) -> tuple[tuple[str, str], ...]:
         """Those of the goal."""
         return self.goal.touching
-
-    def value(self, state: State) -> float:
-        """The squared error, times the goal's weight."""
-        error = np.atleast_1d(self.goal.error(state))
-        return float(self.goal.weight * (error @ error))
-
-    def gradient(self, state: State) -> Array:
-        """(nv,)."""
-        residual, rows = self.squares(state)
-        return np.asarray(2.0 * residual @ rows)
-
-    def curvature(self, state: State) -> Array:
-        """(nv,) row sums of absolute values of Gauss and Newton's second derivative, which bound it."""
-        _, rows = self.squares(state)
-        return np.asarray(2.0 * np.abs(rows.T @ rows).sum(axis=1) + LEAST_CURVATURE)
 
     def squares(self, state: State) -> tuple[Array, Array]:
         """The error (m,) and its derivative (m, nv), times the root of the goal's weight."""

@@ -15,9 +15,9 @@ from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.balance import STANDING_HEIGHT, STEADY, Feet, Margin, hull_corners, least_width
-from wholebody.tasks.base import Measure, Surroundings, filled
+from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.contact_parts import Facing, Gap, Over, Part, TermOfParts, between, owner_pairs, through
-from wholebody.tasks.distance import LEAST_CURVATURE
+from wholebody.tasks.distance import SumOfSquares
 from wholebody.tasks.sit import UP, upright
 from wholebody.tasks.surfaces import Surface, face, joined, outermost, segments_beyond, surface
 
@@ -114,7 +114,7 @@ class Stand(TermOfParts):
 
 
 @dataclass(frozen=True, eq=False)
-class Stance(Measure):
+class Stance(SumOfSquares):
     """Squared distance of two feet from side by side, as far apart and turned as in the figure's first posture.
 
     ``60 f^2 + 60 w^2 + 4 t^2``: f is by how much one foot is ahead of the other, w by how much their distance to the
@@ -150,21 +150,6 @@ class Stance(Measure):
         places = tuple(inputs.find_place(scene, foot, "Stance") for foot in self.feet)
         found = filled(self, places=places, rest=np.zeros(3))
         return filled(found, rest=found.squares(upright(scene))[0] / np.sqrt(STANCE_WEIGHTS))
-
-    def value(self, state: State) -> float:
-        """The measure."""
-        residuals = self.squares(state)[0]
-        return float(residuals @ residuals)
-
-    def gradient(self, state: State) -> Array:
-        """(nv,) derivative."""
-        residuals, rows = self.squares(state)
-        return np.asarray(2.0 * residuals @ rows)
-
-    def curvature(self, state: State) -> Array:
-        """(nv,) row sums of the absolute second derivative of the squares, which bound it."""
-        steep = np.abs(self.squares(state)[1])
-        return np.asarray(2.0 * steep.sum(axis=1) @ steep + LEAST_CURVATURE)
 
     def squares(self, state: State) -> tuple[Array, Array]:
         """Residuals (3,) and their derivatives (3, nv)."""

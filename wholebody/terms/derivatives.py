@@ -128,20 +128,13 @@ def _dofs(model: pin.Model, joint: int) -> range:
 
 def _value(term: Any, state: State) -> Array:
     """Values (m,) of a term."""
-    value = term.error(state) if isinstance(term, Goal) else term.value(state)
-    values = np.atleast_1d(np.asarray(value, dtype=float))
-    if values.ndim != 1 or not np.isfinite(values).all():
-        raise InputError(f"{type(term).__name__}: its value is {checks.shown(value)}; give finite numbers, shape (m,)")
-    return values
+    return np.atleast_1d(np.asarray(term.error(state) if isinstance(term, Goal) else term.value(state), dtype=float))
 
 
 def _derivative(term: Any, state: State) -> Array:
     """Derivative (m, nv) of a term as it has it itself."""
     given = term.gradient(state) if isinstance(term, Measure) else term.jacobian(state)
-    dense = state.wrench_jacobian(given) if isinstance(given, Wrench) else np.asarray(given, dtype=float)
-    if not np.isfinite(dense).all():
-        raise InputError(f"{type(term).__name__}: its derivative is not finite at a posture; give finite numbers")
-    return np.atleast_2d(dense)
+    return np.atleast_2d(state.wrench_jacobian(given) if isinstance(given, Wrench) else np.asarray(given, dtype=float))
 
 
 def _differences(term: Any, state: State, q: Array) -> tuple[Array, Array]:

@@ -22,8 +22,8 @@ from wholebody.scene.workspace import Workspace
 from wholebody.tasks.answers import is_own
 from wholebody.tasks.base import MOST_PLANES, Bound, Constraint, Goal, Measure, Term
 from wholebody.tasks.bounds import StepLimit
-from wholebody.tasks.checks import undefined
-from wholebody.terms.plan import OtherTerm, TermPlan, Terms, checked_count, checked_rows, make_plan
+from wholebody.tasks.checks import check_row_count, undefined
+from wholebody.terms.plan import OtherTerm, TermPlan, Terms, checked_count, make_plan
 
 
 class TermPlanes(NamedTuple):
@@ -298,7 +298,8 @@ class Lineariser:
             part, derivative = term.value_and_jacobian(state, evaluate)
             if np.ndim(part) != 1:
                 part = np.atleast_1d(part)
-            checked_rows(term, part, derivative, rows)
+            checked_count(term, len(part), rows)
+            check_row_count(term, part, derivative, state.model.nv)
             value[row : row + rows] = part
             if isinstance(derivative, Wrench):
                 wrenches = np.ascontiguousarray(derivative.rows, dtype=float)

@@ -17,7 +17,7 @@ from wholebody import tasks
 from wholebody.base.arrays import Array, with_values
 from wholebody.base.errors import TermError
 from wholebody.figures.description import Limits
-from wholebody.figures.state import State, Wrench, extended_columns, free_roots, root_freedoms
+from wholebody.figures.state import State, extended_columns, free_roots, root_freedoms
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.distance import LEAST_CURVATURE, SquaredDistance
 from wholebody.tasks.rhythm import LUMBAR_RATE
@@ -254,16 +254,6 @@ def _distances(
             q = int(places[v])
             parts[kinds.DISTANCE].append(((q, v), np.array([weight * distance.weights[v], distance.reference[q]])))
     return True
-
-
-def checked_rows(term: Goal | Constraint, value: Array, jacobian: Wrench | Array, expected: int) -> None:
-    """A TermError where a term of one's own has not as many rows as values, or not as many as at the start."""
-    rows = len(jacobian.rows) if isinstance(jacobian, Wrench) else len(jacobian)
-    if rows != len(value):
-        raise TermError(
-            term, type(term).__name__, f"it has {len(value)} values and {rows} rows at a posture; give as many"
-        )
-    checked_count(term, rows, expected)
 
 
 def checked_count(term: Goal | Constraint | Measure, rows: int, expected: int) -> None:

@@ -136,7 +136,7 @@ class _Uneven(_Growing):
 def test_a_goal_with_other_numbers_of_values_and_rows_is_refused(scene: wb.Scene) -> None:
     problem = wb.Problem(scene, goals=[_Uneven()])
     problem.goals[0].rows = 2
-    with pytest.raises(wb.InputError, match=r"goals\[0\] \(_Uneven\): it has 2 values and 1 rows"):
+    with pytest.raises(wb.InputError, match=r"goals\[0\] \(_Uneven\): it has 2 values and a jacobian of 1 rows"):
         wb.QP().tracker(problem, 0.02).step(problem.start)
 
 

@@ -27,17 +27,16 @@ def xml_figure(
     package_dirs: Iterable[str | PathLike[str]] = (),
     concavity: Concavity = None,
     samples: int = SAMPLES,
-    seed: int = 0,
 ) -> Figure:
     """The figure of an ``.xml`` file, an MJCF or a URDF; arguments as for `urdf_figure`, `root` also a robot's body."""
     place = Path(path)
     if not is_mjcf(place):
-        return urdf_figure(path, root, package_dirs, concavity, samples, seed)
-    return mjcf_figure(Compiled(place), root, concavity, samples, seed)
+        return urdf_figure(path, root, package_dirs, concavity, samples)
+    return mjcf_figure(Compiled(place), root, concavity, samples)
 
 
 def mjcf_figure(
-    compiled: Compiled, root: str | None = None, concavity: Concavity = None, samples: int = SAMPLES, seed: int = 0
+    compiled: Compiled, root: str | None = None, concavity: Concavity = None, samples: int = SAMPLES
 ) -> Figure:
     """Return the figure of a robot in a compiled file; arguments and errors as for `xml_figure`."""
     named = None if root in (None, "fixed", "free") else root
@@ -72,7 +71,7 @@ def mjcf_figure(
         untested=_untested(compiled, [kept[number] for number in numbers]),
         place=compiled.place(top) if compiled.is_free(top) and root != "fixed" else None,
     )  # fmt: skip
-    return robot_figure(found, samples, seed)
+    return robot_figure(found, samples)
 
 
 def _colors(compiled: Compiled, robot: RobotModel) -> dict[str, tuple[float, float, float, float]]:

@@ -26,7 +26,6 @@ def urdf_figure(
     package_dirs: Iterable[str | PathLike[str]] = (),
     concavity: Concavity = None,
     samples: int = SAMPLES,
-    seed: int = 0,
     srdf: str | PathLike[str] | None = None,
 ) -> Figure:
     """Return the figure of a URDF file; arguments and errors as for `wholebody.load`."""
@@ -48,7 +47,7 @@ def urdf_figure(
     robot = Robot(
         urdf.name, model, urdf.links, geometry, (*urdf.notes, *remarks, *notes), visual_of_links(model, urdf.visuals)
     )
-    return robot_figure(robot if srdf is None else _described(robot, Path(srdf)), samples, seed)
+    return robot_figure(robot if srdf is None else _described(robot, Path(srdf)), samples)
 
 
 def _described(robot: Robot, path: Path) -> Robot:

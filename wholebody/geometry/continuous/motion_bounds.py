@@ -106,42 +106,42 @@ class MotionBounds:
 def largest_approach(table: PairTable, centres: Array, most: Array) -> Array:
     """Most by which the distance of every pair can fall (pairs,), metres; infinite where nothing is known.
 
-    `centres` (n,): how far a piece's origin is from its joint's, infinite where placed anew; `most` (nv,): largest
-    displacements, radians and metres.
+    `centres` (n,): how far a piece's origin is from its joint's, infinite where placed anew; `most` (nv,) or (nv, m):
+    largest displacements of one motion or of m, radians and metres, for which the answer is (pairs, m).
     """
     model = table.model
     moved = np.array([_motion(model, joint, most) for joint in range(model.njoints)])
     lengths = np.array([_length(model, joint) for joint in range(model.njoints)])
     parents = np.array(list(model.parents), dtype=np.intp)
     joint = table.joint[table.pairs]
-    fixed, turned, lever = np.zeros((3, *joint.shape))
+    own, lever = (centres + table.reach)[table.pairs], np.zeros(joint.shape)
+    ways = np.zeros((len(joint), *most.shape[1:]))
     with np.errstate(invalid="ignore"):  # an infinite lever of what does not turn
         # a joint comes after the one that carries it: the later of two is never an ancestor of the other
         while len(row := np.flatnonzero(joint[:, 0] != joint[:, 1])):
             later = (row, (joint[row, 1] > joint[row, 0]).astype(np.intp))
             number = joint[later]
-            slide, turn = moved[number].T
-            fixed[later] += slide + np.where(turn > 0.0, turn * lever[later], 0.0)
-            turned[later] += turn
+            slide, turn = moved[number].swapaxes(0, 1)
+            far = (lever[later] + own[later]).reshape(-1, *[1] * (most.ndim - 1))
+            ways[row] += slide + np.where(turn > 0.0, turn * far, 0.0)
             lever[later] += lengths[number]
             joint[later] = parents[number]
-        own = (centres + table.reach)[table.pairs]
-        ways = fixed + np.where(turned > 0.0, turned * own, 0.0)
-    return np.asarray(ways.sum(axis=1))
+    return ways
 
 
-def _motion(model: pin.Model, joint: int, most: Array) -> tuple[float, float]:
-    """How far a joint can slide, and how far it can turn."""
+def _motion(model: pin.Model, joint: int, most: Array) -> Array:
+    """How far a joint can slide, and how far it can turn, (2,) or (2, m)."""
+    found = np.zeros((2, *most.shape[1:]))
     if joint == 0:
-        return 0.0, 0.0
+        return found
     kind: Any = model.joints[joint]
     size = most[kind.idx_v : kind.idx_v + kind.nvExtended]
-    if not np.isfinite(size).all():
-        return np.inf, 0.0
-    if any(word in kind.shortname() for word in TURNING_AXES):
-        return np.inf, 0.0
-    part = np.abs(_axes(model, kind)) @ size
-    return float(np.linalg.norm(part[:3])), float(np.linalg.norm(part[3:]))
+    turning = any(word in kind.shortname() for word in TURNING_AXES)
+    known = np.isfinite(size).all(axis=0) & (np.logical_not(turning) | (size == 0.0).all(axis=0))
+    part = np.abs(_axes(model, kind)) @ np.where(known, size, 0.0)
+    found[0], found[1] = (np.sqrt((half**2).sum(axis=0)) for half in (part[:3], part[3:]))
+    found[0] = np.where(known, found[0], np.inf)
+    return found
 
 
 def _length(model: pin.Model, joint: int) -> float:

@@ -43,7 +43,8 @@ def before_contact(
     """Descents that ignore contacts, to surfaces in front of their faces or, with `grips`, bars in front of palms."""
     # The measures count: without contacts, they determine what the terms leave free.
     terms = (*problem.goals, *problem.constraints)
-    faces = any(has_face(term) for term in terms)
+    state = shared.lineariser.state.update(problem.scene.figure.clamp(problem.start))
+    faces = any(_at_no_face(term, state) for term in terms)
     if faces == grips or (grips and not any(takes_bar(term) for term in terms)):
         return
     in_front = opened if grips else approached
@@ -74,6 +75,13 @@ def before_contact(
     if missed and not alike:
         nearest = min(missed, key=lambda each: each.violation.total)
         yield with_values(nearest, iterations=sum(each.iterations for each in missed))
+
+
+def _at_no_face(term: Any, state: State) -> bool:
+    """Whether a term is to bring surfaces to faces at which they are not: who stands stays on the floor."""
+    parts = getattr(term, "parts", ()) if has_face(term) else ()
+    gaps = [part.rows(state)[0] for part in parts if isinstance(part, (Gap, Near)) and part.face is not None]
+    return any(np.abs(gap).max() > IN_FRONT for gap in gaps)
 
 
 def at_its_place(problem: Problem, state: State) -> Problem | None:

@@ -1,0 +1,71 @@
+"""Random postures of a problem, near to one or all over the limits, towards which trees grow."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array
+from wholebody.figures.figure import Figure
+from wholebody.figures.self_pairs import random_postures
+from wholebody.methods.simplification.reach import still_dofs
+from wholebody.problem import Problem
+
+ROOM = 1.0  # m: by which samples move a free root along each axis
+BATCH = 256  # postures that are drawn at once, which takes a hundredth of drawing each
+
+
+def holds(problem: Problem) -> bool:
+    """Whether a constraint is an equality, such as a `Hold`, so that most postures near by are not allowed."""
+    return any(bool(np.any(term.lower == term.upper)) for term in problem.constraints)
+
+
+class Turns:
+    """Hinges whose limits are a whole turn apart or more: postures a turn apart there are the same but for limits."""
+
+    def __init__(self, figure: Figure) -> None:
+        """Find them; where joints follow others, none."""
+        hinges = (
+            [] if figure.followers else [j for j in figure.model.joints[1:] if j.shortname().startswith("JointModelR")]
+        )
+        places = np.array([joint.idx_q for joint in hinges if joint.nq == 1], dtype=np.intp)
+        low, high = figure.model.lowerPositionLimit[places], figure.model.upperPositionLimit[places]
+        wide = high - low >= 2.0 * np.pi
+        self._places, self._low, self._high = places[wide], low[wide], high[wide]
+
+    def nearest(self, q: Array, near: Array) -> Array:
+        """The posture q (nq,), turned as near to another one as limits let it."""
+        found, here = np.array(q), q[self._places]
+        turned = here - 2.0 * np.pi * np.round((here - near[self._places]) / (2.0 * np.pi))
+        found[self._places] = np.where((turned >= self._low) & (turned <= self._high), turned, here)
+        return found
+
+
+class Sampler:
+    """Draws postures of a problem; what is frozen stays."""
+
+    def __init__(self, problem: Problem, rng: np.random.Generator) -> None:
+        """Take the problem, and what draws."""
+        self._figure, self._rng, self._held = problem.scene.figure, rng, holds(problem)
+        self._frozen = still_dofs(problem)
+        self._roots = [self._figure.model.joints[root] for root in self._figure.roots.values()]
+        self._drawn: list[Array] = []
+        self.turns = Turns(self._figure)
+
+    def near(self, q: Array, spread: float) -> Array:
+        """A posture (nq,) whose joints are a share of the way from q (nq,) to a random posture.
+
+        A free root is within `ROOM` of that of q; where nothing is held it turns about the vertical.
+        """
+        if not self._drawn:
+            self._drawn = list(random_postures(self._figure.model, BATCH, int(self._rng.integers(2**31))))
+        model, rng = self._figure.model, self._rng
+        away = spread * np.asarray(pin.difference(model, q, self.turns.nearest(self._drawn.pop(), q)))
+        for joint in self._roots:
+            here = pin.XYZQUATToSE3(q[joint.idx_q : joint.idx_q + 7])
+            turn = np.eye(3) if self._held else pin.exp3(np.array((0.0, 0.0, rng.uniform(-np.pi, np.pi))))
+            moved = (spread if self._held else 1.0) * rng.uniform(-ROOM, ROOM, 3)
+            there = pin.SE3(turn @ here.rotation, here.translation + moved)
+            away[joint.idx_v : joint.idx_v + 6] = pin.log6(here.actInv(there)).vector
+        away[self._frozen] = 0.0
+        return np.asarray(pin.integrate(model, q, away))
