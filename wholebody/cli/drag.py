@@ -68,10 +68,10 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.live:
         return live(arguments)
     arguments.method = arguments.method or "newton"
+    from wholebody.base.files import make_folder
     from wholebody.bench.measure.frames import drag_rows, frame_panels, is_clean
     from wholebody.bench.rows import chart, report
     from wholebody.bench.tables import machine, write_rows, write_text
-    from wholebody.cli.picture import make_folder
     from wholebody.cli.tables import print_rows
     from wholebody.methods.solve import method_named
     from wholebody.taskfile import read_task
@@ -106,7 +106,7 @@ def run(arguments: argparse.Namespace) -> int:
 def live(arguments: argparse.Namespace) -> int:
     """Let the figure be dragged in a browser until Ctrl-C."""
     from wholebody.base.errors import InputError
-    from wholebody.cli.picture import make_folder
+    from wholebody.base.files import make_folder
     from wholebody.taskfile import read_task, write_task
     from wholebody.tracking.live import LiveDrag
     from wholebody.view.live_page import LivePage
