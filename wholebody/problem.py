@@ -26,7 +26,7 @@ from wholebody.scene.workspace import Workspace, borrowed
 from wholebody.tasks.answers import in_words, is_own
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.checks import KINDS, check_measure, check_rows, checked_terms
-from wholebody.tasks.defaults import balancing, default_constraints, default_measures, stances, standing
+from wholebody.tasks.defaults import balancing, default_constraints, default_measures, seated, stances, standing
 from wholebody.tasks.inputs import once
 from wholebody.terms.linearisation import Lineariser
 from wholebody.terms.plan import TermPlan, Terms, make_plan
@@ -149,8 +149,9 @@ class Problem(checks.FixedAttributes):
 
     def _usual_measures(self, stated: Sequence[Constraint]) -> tuple[Measure, ...]:
         scene, start, ranges = self.scene, self.start, self.range_of_motion
-        make = partial(default_measures, scene, start, feet := stances(scene, start, stated), ranges=ranges)
-        return scene.built.known(("measures", ranges, feet, start.tobytes()), make)
+        feet, sits = stances(scene, start, stated), seated(scene, (*stated, *self.goals))
+        make = partial(default_measures, scene, start, feet, sits, ranges=ranges)
+        return scene.built.known(("measures", ranges, feet, sits, start.tobytes()), make)
 
     def _usual_constraints(self, at: _State, stated: Sequence[Constraint]) -> tuple[tuple[Constraint, ...], str]:
         scene, start, ranges = self.scene, self.start, self.range_of_motion

@@ -204,6 +204,24 @@ def test_its_squares_are_its_value_and_their_rows_their_derivatives(scene: wb.Sc
         np.testing.assert_allclose((ends[0] - ends[1]) / (2.0 * step), rows @ way, atol=1e-6)
 
 
+def test_who_sits_has_knees_where_the_pedals_are(scene: wb.Scene) -> None:
+    """127 drivers had knees of 115 and hips of 98 degrees (Wolf et al. 2022): knees stretch as hips open."""
+    car = wb.Scene({"anna": scene.figure, "bo": scene.figure}).add(wb.Box((0.5, 0.5, 0.1)), name="seat", at=(0, 0, 0.3))
+    start = car.figure.posture({"anna": "sitting", "bo": "standing"})
+    problem = wb.Problem(car, start, goals=[wb.Sit("seat", pelvis="anna/pelvis", trunk="anna/thorax")])
+    hips, knees, lumbar = ([f"{who}/{name}" for who in ("anna", "bo")] for name in
+                           ("right_hip_flexion", "right_knee_flexion", "spine2_flexion"))  # fmt: skip
+    rhythm = problem.measures[1]
+    reclined = car.figure.with_joints(
+        start, {hips[0]: math.radians(82.0), knees[0]: math.radians(65.0), lumbar[0]: 0.2}
+    )
+    crouched = car.figure.with_joints(start, {hips[1]: math.radians(82.0), lumbar[1]: 0.2})
+    state = State(car.model)
+    at_start = rhythm.value(state.update(start))
+    assert rhythm.value(state.update(reclined)) == pytest.approx(at_start, abs=1e-12)
+    assert rhythm.value(state.update(crouched)) > at_start + 1.0
+
+
 @lru_cache(maxsize=3)
 def lifted(style: str) -> tuple[wb.Figure, np.ndarray]:
     """A man at a box on the floor."""

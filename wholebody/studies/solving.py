@@ -15,6 +15,7 @@ from wholebody.base.errors import WholebodyError, one_line
 from wholebody.base.runner import Job
 from wholebody.methods.base import Method
 from wholebody.methods.inputs import check_problem
+from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
 from wholebody.studies.records import JUDGED, REFUSED, SolveRecord, answer_of
 from wholebody.studies.sending import Sender, sent_to
@@ -73,8 +74,14 @@ def _solved(make: Make, method: Method, q: Array | None) -> dict[str, Any]:
 
 def _warm_answer(problem: Problem, method: Method, q: Array) -> dict[str, Any] | None:
     """What a record says of a problem solved from another's answer (nq,); None where not solved, or refused."""
+    plain = warmed(method)
     try:
-        solution = warmed(method).solve(begun_at(problem, q))
+        begun = begun_at(problem, q)
+        # Whether all is met near there is asked first: it takes a tenth of the search for what is closest, which is
+        # of no use here.
+        if isinstance(plain, QP) and not next(replace(plain, measures=False).minima(begun, [begun.start])).solved:
+            return None
+        solution = plain.solve(begun)
     except WholebodyError:
         return None
     return answer_of(solution) if solution.solved else None

@@ -30,15 +30,29 @@ _effort = Effort()
 
 
 def default_measures(
-    scene: Surroundings, start: Array, stances: Sequence[tuple[str, ...]], *, ranges: bool
+    scene: Surroundings, start: Array, stances: Sequence[tuple[str, ...]], seated: Sequence[str], *, ranges: bool
 ) -> tuple[Measure, ...]:
-    """Resolved `Effort`, a person's `Rhythm`, `Stance` of sliding feet; kneelers count them from a kneeling posture."""
+    """Resolved `Effort`, a person's `Rhythm`, `Stance` of sliding feet; kneelers count them from a kneeling posture.
+
+    `seated` are the persons who sit, by what their names begin with. The shares of knees and lumbar spine are those of
+    somebody who bends down on both feet: on a seat the knees follow the pedals, and who leans back bends no lordosis.
+    """
     if not (ranges and scene.figure.ranges and inputs.once(scene, "girdles", lambda: girdles_of(scene.figure))):
         return (_effort.resolve(scene, start),)
     shanks = {side for sides in stances for side in sides if side.endswith("_shank")}
     rest = _kneeling(scene, start, shanks) if shanks else start
     pairs = [feet for feet in stances if len(feet) == 2 and shanks.isdisjoint(feet)]
-    return tuple(measure.resolve(scene, rest) for measure in (_effort, Rhythm(), *map(Stance, pairs)))
+    rhythm = Rhythm().resolve(scene, rest)
+    if seated:
+        joints = [scene.model.joints[joint] for body in seated for joint in scene.figure.bodies[body]]
+        rhythm = rhythm.of_arms({int(joint.idx_v) for joint in joints})
+    return (_effort.resolve(scene, rest), rhythm, *(Stance(pair).resolve(scene, rest) for pair in pairs))
+
+
+def seated(scene: Surroundings, terms: Sequence[Constraint | Goal]) -> tuple[str, ...]:
+    """The persons who sit on something, by what their names begin with."""
+    return tuple(body for term in terms if isinstance(term, Sit)
+                 if (body := inputs.body_of(scene, [term.frame])) is not None)  # fmt: skip
 
 
 def stances(scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal]) -> tuple[tuple[str, ...], ...]:

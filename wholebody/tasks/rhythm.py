@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Literal, NamedTuple, TypeAlias
@@ -23,9 +23,9 @@ LUMBAR_MOST, LUMBAR_RATE = math.radians(46.0), 2.5
 of 1.9, 0.9 and 0.4 in the three thirds of bending by 90 degrees (Esola et al. 1996, Spine 21(1)) is met to 3 degrees.
 """
 
-CLAVICLE_WEIGHT, LUMBAR_WEIGHT = 100.0, 10.0
-"""1/rad^2, beside an effort of 20 for clavicle and spine: the clavicle follows its arm by five sixths, and the lumbar
-spine of a bent person is free to do what a goal needs."""
+CLAVICLE_WEIGHT, LUMBAR_WEIGHT = 100.0, 20.0
+"""1/rad^2, beside an effort of 20 for the clavicle, which follows its arm by five sixths. That of the lumbar spine is
+fitted to postures of people (`python -m tests.audits postures --fit`)."""
 
 
 KNEE_SHARE, KNEE_ONSET, KNEE_WEIGHT = 0.9, 0.4, 25.0
@@ -51,7 +51,7 @@ class Sharing(NamedTuple):
 STYLES = {
     "free": Sharing(KNEE_SHARE, KNEE_WEIGHT, LUMBAR_MOST, LUMBAR_WEIGHT),
     "stoop": Sharing(0.0, 4.0 * KNEE_WEIGHT, LUMBAR_MOST, LUMBAR_WEIGHT),
-    "squat": Sharing(1.5 * KNEE_SHARE, 4.0 * KNEE_WEIGHT, 0.5 * LUMBAR_MOST, 10.0 * LUMBAR_WEIGHT),
+    "squat": Sharing(1.5 * KNEE_SHARE, 4.0 * KNEE_WEIGHT, 0.5 * LUMBAR_MOST, 5.0 * LUMBAR_WEIGHT),
 }
 """Who stoops keeps the knees as they are; who squats bends them by 118 degrees at hips of 100 and keeps the back. The
 weights, ESTIMATES, make a style of what is only a tendency in who does as he likes."""
@@ -90,7 +90,7 @@ class Lumbar(NamedTuple):
 class Rhythm(SumOfSquares):
     """Squared distance of clavicles, lumbar spine and knees from their usual share of a motion [rad^2, weighted].
 
-    ``100 sum (c - 13 deg (1 - cos e))^2 + 25 sum (k - k_0)^2 + 10 (l - l_0)^2``:
+    ``100 sum (c - 13 deg (1 - cos e))^2 + 25 sum (k - k_0)^2 + 20 (l - l_0)^2``:
 
     - c is the elevation of a clavicle and e that of its arm in the clavicle (scapulohumeral rhythm);
     - k is the flexion of a knee beyond its share of the flexion f of its hip,
@@ -133,6 +133,12 @@ class Rhythm(SumOfSquares):
         lumbar = tuple(with_values(spine, most=own.lumbar, weight=own.lumbar_weight) for spine in spines)
         lumbar = tuple(with_values(spine, rest=_bent(start, spine)[0]) for spine in lumbar)
         return filled(self, girdles=girdles, knees=knees, lumbar=lumbar)
+
+    def of_arms(self, idx_v: Set[int]) -> Rhythm:
+        """Itself, resolved, without the knees and the lumbar spine of those joints; clavicles still follow arms."""
+        knees = tuple(knee for knee in self.knees if knee.idx_v[0] not in idx_v)
+        lumbar = tuple(spine for spine in self.lumbar if spine.idx_v[0] not in idx_v)
+        return filled(self, knees=knees, lumbar=lumbar)
 
     def squares(self, state: State) -> tuple[Array, Array]:
         """Residuals (k,) and their derivatives (k, nv): of each clavicle and knee, then of the lumbar spine."""

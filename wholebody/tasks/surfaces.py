@@ -213,6 +213,8 @@ def face(scene: Surroundings, name: str, direction: Array, state: State, where: 
 
 def outermost(shape: Any, placement: pin.SE3, direction: Array, swept: SweptPoints | None = None) -> Array:
     """Candidates (n, 3) for a piece's points farthest along a unit direction (3,); `swept` if they are known."""
+    if swept is None and isinstance(shape, coal.Convex):  # its faces, which take far longer, are not asked for
+        return np.asarray(np.array(shape.points()) @ placement.rotation.T + placement.translation)
     swept = swept_points(shape) if swept is None else swept
     if len(swept.points) == 0:  # an ellipsoid: the image of the ball's point whose normal is the direction
         radii = np.asarray(shape.radii)

@@ -28,6 +28,7 @@ class HeadShape(NamedTuple):
     skin: Field
     hair: Field
     eyes: Field
+    lids: Field
     irises: Field
     brows: Field
     lips: Field
@@ -51,7 +52,8 @@ def head_shape(size: Dimensions) -> HeadShape:
 
     female = size.body.sex == "female"
     parts = [_face(female), _hair(_skull(), female), _pair(lambda s: ball((0.0725, s * 0.0315, 0.118), 0.0126))]
-    parts.append(_pair(lambda s: ball((0.0797, s * 0.0310, 0.118), 0.0066)))
+    parts.append(_lids())
+    parts.append(_pair(lambda s: ball((0.0797, s * 0.0310, 0.118), 0.0070)))
     parts.append(_pair(lambda s: round_cone((0.0915, s * 0.018, 0.1365), (0.0835, s * 0.045, 0.1375), 0.0034, 0.0022)))
     parts.append(
         union(
@@ -61,8 +63,7 @@ def head_shape(size: Dimensions) -> HeadShape:
             ]
         )
     )
-    skin, hair, eyes, irises, brows, lips = (stretched(part) for part in parts)
-    return HeadShape(skin, hair, eyes, irises, brows, lips)
+    return HeadShape(*map(stretched, parts))
 
 
 def _skull() -> Field:
@@ -94,9 +95,14 @@ def _face(female: bool) -> Field:
         0.008,
     )
     ears = _pair(lambda s: ellipsoid((-0.006, s * 0.077, 0.104), (0.017, 0.007, 0.030), _ear_axes(s)))
-    lids = _pair(lambda s: ball((0.0725, s * 0.0315, 0.118), 0.0136))
-    slit = _pair(lambda s: ellipsoid((0.0905, s * 0.0315, 0.1175), (0.012, 0.0120, 0.0040)))
-    return union([without(union([union([face, nose], 0.014), lids], 0.004), slit, 0.002), ears], 0.006)
+    return union([union([face, nose], 0.014), ears], 0.006)
+
+
+def _lids() -> Field:
+    """Upper and lower lids, which are too thin for the head's own mesh: without them eyes stare."""
+    lids = _pair(lambda s: ball((0.0725, s * 0.0315, 0.118), 0.0137))
+    slit = _pair(lambda s: ellipsoid((0.0905, s * 0.0315, 0.1168), (0.014, 0.0130, 0.0040)))
+    return without(lids, slit, 0.002)
 
 
 def _ear_axes(side: float) -> Array:

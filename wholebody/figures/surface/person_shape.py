@@ -240,6 +240,7 @@ class PersonShape:
         eye = self.at("head", (self.size.eye_x, 0.0, self.size.eye_z))
         around = bounds([eye], 0.075 * scale)
         yield Garment("eyes", COLORS.eyes, placed(shape.eyes, frame), *around, 0.0035, rigid)
+        yield Garment("lids", COLORS.skin, placed(shape.lids, frame), *around, 0.0022, rigid)
         yield Garment("irises", COLORS.irises, placed(shape.irises, frame), *around, 0.0025, rigid)
         yield Garment("brows", COLORS.hair, placed(shape.brows, frame), *around, 0.0022, rigid)
         mouth = bounds([eye - np.array([0.0, 0.0, 0.075]) * scale], 0.05 * scale)

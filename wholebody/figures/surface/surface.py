@@ -36,8 +36,8 @@ def _kept(person: Person, hand: str) -> Surface:
         return hand_surface(person, hand) if hand else person_surface(person)
 
     spec = human_spec(person)
-    # The 9 is another one whenever a shape, a weight or the layout changes.
-    digest = hashlib.sha256(f"9 {hand} {person!r}".encode())
+    # The 10 is another one whenever a shape, a weight or the layout changes.
+    digest = hashlib.sha256(f"10 {hand} {person!r}".encode())
     for solid in spec.solids:
         shape = solid.geometry
         sizes = [getattr(shape, name, 0.0) for name in ("radius", "halfLength")]
