@@ -129,15 +129,12 @@ def live(arguments: argparse.Namespace) -> int:
 
 def followed(problem: Problem, places: Any, method: str, goal: int, label: str) -> tuple[Dragged, DragJudgement]:
     """Drag and assess, with a progress bar."""
-    from wholebody.cli.tables import progress_bar
+    from wholebody.cli.tables import bar
     from wholebody.tracking.dragging import drag_along, judge_drag
 
-    with progress_bar() as bar:
-        work = bar.add_task(label, total=len(places))
-        dragged = drag_along(
-            problem, places, method, goal=goal, progress=lambda done: bar.update(work, completed=done)
-        )  # fmt: skip
-        bar.update(work, description="judging every pair of every frame")
+    with bar(label, len(places)) as tell:
+        dragged = drag_along(problem, places, method, goal=goal, progress=lambda done: tell(done, label))
+        tell(len(places), "judging every pair of every frame")
         return dragged, judge_drag(problem, dragged, goal=goal)
 
 

@@ -55,21 +55,19 @@ def compare(arguments: argparse.Namespace) -> int:
     from wholebody.bench.suite.compare import run as comparison
     from wholebody.bench.suite.compare.advice import advice
     from wholebody.bench.suite.compare.report import PAGE, publish, to_docs
-    from wholebody.cli.tables import progress_bar
+    from wholebody.cli.tables import bar
 
     jobs = arguments.jobs or (threads(arguments.cluster) if arguments.cluster else 1)
     settings = _settings(arguments)
-    with progress_bar(counted=False) as bar:
-        task = bar.add_task("starting", total=60.0 * settings.minutes * jobs)
-
-        def tell(progress: comparison.Progress) -> None:
-            bar.update(task, completed=progress.done, total=progress.total, description=f"solved {progress.said}")
-
-        store = comparison.run(settings, arguments.out, jobs, arguments.cluster, tell)
+    with bar("starting") as tell:
+        store = comparison.run(
+            settings, arguments.out, jobs, arguments.cluster,
+            lambda now: tell(now.done / now.total, f"solved {now.said}"),
+        )  # fmt: skip
         where = f"the dask cluster {arguments.cluster}" if arguments.cluster else "this machine"
         given = publish(
             settings, store, arguments.out, _facts(f"{jobs} on {where}"), missing(),
-            lambda what: bar.update(task, description=f"making {what}"),
+            lambda what: tell(1.0, f"making {what}"),
         )  # fmt: skip
     if arguments.update_docs is not None:
         to_docs(given, arguments.out, arguments.update_docs, "held-out" if arguments.held_out else "compare")

@@ -13,7 +13,6 @@ from wholebody.cli.clip.arguments import (
     MOTIONS,
     PAGE,
     SCENE,
-    bar,
     figure_of,
     jobs_of,
     scene_of,
@@ -79,6 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
         return _batch(arguments, methods, worn)
     from wholebody.base.errors import InputError
     from wholebody.base.files import check_writable, checked_target, write
+    from wholebody.cli.tables import bar
     from wholebody.motion.avoidance import avoid
     from wholebody.motion.files import check_ending
     from wholebody.motion.reading import read_clip
@@ -164,6 +164,7 @@ def _tell(avoided: Avoided, written: Path) -> None:
 
 def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -> int:
     from wholebody.base.errors import InputError
+    from wholebody.cli.tables import bar
     from wholebody.motion.batch import BatchProgress, avoid_many
     from wholebody.motion.measures import MotionBounds
 

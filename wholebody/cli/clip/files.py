@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.clip.arguments import JOBS, MOTIONS, ONE_MOTION, PAGE, bar, clip_of, figure_of, jobs_of
+from wholebody.cli.clip.arguments import JOBS, MOTIONS, ONE_MOTION, PAGE, clip_of, figure_of, jobs_of
 from wholebody.cli.command import command, flag, option
 
 if TYPE_CHECKING:
@@ -119,6 +119,7 @@ def retarget_motions(arguments: argparse.Namespace) -> int:
     if len(arguments.files) > 1:
         return _many(arguments)
     from wholebody.base.files import check_writable, checked_target, write
+    from wholebody.cli.tables import bar
     from wholebody.motion.files import check_ending
     from wholebody.motion.reading import read_skeleton
     from wholebody.motion.retargeting import bone_errors, retarget
@@ -181,6 +182,7 @@ def _print_errors(errors: Mapping[str, Array]) -> None:
 
 def _many(arguments: argparse.Namespace) -> int:
     from wholebody.base.errors import InputError
+    from wholebody.cli.tables import bar
     from wholebody.motion.batch import read_many
 
     for given in ("names", "ground", "unit", "up", "rate", "bare", "html"):
