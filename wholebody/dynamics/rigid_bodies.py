@@ -316,22 +316,20 @@ class RigidBodies:
             state.restore(end)
 
     def _record(self, events: Array, program: StepProgram, record: FrameRecord) -> None:
-        points = program.points
-        for row in events:
-            number = int(row[0])
-            first, second = points.bodies[number]
-            wrench = np.concatenate([row[2:], np.cross(points.point[number], row[2:])])
-            record.impulse[second] += wrench
-            record.impulse[first] -= wrench
-            for body, sign in ((first, 1.0), (second, -1.0)):
-                if self.state.bodies.given[body]:
-                    lever = points.point[number] - self.state.bodies.position[body]
-                    record.work += sign * float(
-                        row[2:] @ (self.state.velocity[body] + np.cross(self.state.spin[body], lever))
-                    )
-            place = points.point[number], points.normal[number]
-            names = self.names[first], self.names[second]
-            record.events.append(Event(record.time, *names, *place, float(row[1]), row[2:]))
+        points, state, number = program.points, self.state, events[:, 0].astype(np.intp)  # squeezed bodies: thousands
+        bodies, place, impulse = points.bodies[number], points.point[number], events[:, 2:]
+        wrench = np.hstack([impulse, np.cross(place, impulse)])
+        for side, sign in ((0, 1.0), (1, -1.0)):
+            np.add.at(record.impulse, bodies[:, side], -sign * wrench)
+            given = state.bodies.given[bodies[:, side]]
+            body = bodies[given, side]
+            velocity = state.velocity[body] + np.cross(state.spin[body], place[given] - state.bodies.position[body])
+            record.work += sign * float((impulse[given] * velocity).sum())
+        named = [(self.names[first], self.names[second]) for first, second in bodies.tolist()]
+        record.events += [
+            Event(record.time, *names, *each)
+            for names, *each in zip(named, place, points.normal[number], events[:, 1].tolist(), impulse, strict=True)
+        ]
 
     def _find_near(self, time: float) -> float:
         """Find the pairs that can meet within a time; the least distance of any."""

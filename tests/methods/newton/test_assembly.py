@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.methods.newton.assembly import Assembly
@@ -478,3 +479,16 @@ def test_a_goal_far_out_of_reach_of_a_chain_stretches_it_and_does_not_pull_it_op
         assert answer.status == "unreachable", answer.message
         assert answer.goal_error == pytest.approx(far - 0.3 * links, abs=0.02)
         assert answer.joint_error < 1e-5
+
+
+def test_a_figure_behind_other_bodies_keeps_its_balance_and_its_ranges() -> None:
+    human = wb.load("human")
+    scene = wb.Scene(human).add(wb.HalfSpace(), name="floor")
+    start = human.grounded(human.posture("standing"), scene)
+    kept = [wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Balance(), wb.ReachCones(), wb.RangeOfMotion()]
+    made = Assembly().body("ball", (3.0, 0.0, 1.0)).body("post", (4.0, 0.0, 1.0))
+    made.figure("anna", human, start, constraints=kept).point_goal("anna/right_palm", (0.6, -0.3, 0.6))
+    assert made.solve().status == "solved"
+    q = made.posture("anna")
+    assert scene.state(q).frame(scene.frame_id("right_palm")).translation == pytest.approx((0.6, -0.3, 0.6), abs=1e-4)
+    assert wb.assess(wb.Problem(scene, start, constraints=kept), q).constraint_violation < 1e-4

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
-import wholebody as wb
 from wholebody.methods.newton import quaternions as quat
-from wholebody.methods.newton.batches import Angle, Batch, Coincide, Slide, Turn, Unit
-from wholebody.methods.newton.task_batches import Cone, MassCenter, RootMotion, Toward
+from wholebody.methods.newton.batches import Angle, Batch, Coincide, Slide, Turn, Unit, with_world
+from wholebody.methods.newton.figure_bodies import FigureBodies
+from wholebody.methods.newton.task_batches import RootMotion
 
 K, N, H = 5, 6, 1e-6
 
@@ -33,19 +34,6 @@ def _forms(rng: np.random.Generator) -> np.ndarray:
     return quat.relative_forms(quat.axes_with_z(directions[0]), quat.axes_with_z(directions[1]))
 
 
-def _rotations(rng: np.random.Generator) -> np.ndarray:
-    return np.array([pin.Quaternion(e).toRotationMatrix() for e in _bodies(rng)[:K, 3:]])
-
-
-def _units(rng: np.random.Generator) -> np.ndarray:
-    directions = rng.normal(size=(K, 3))
-    return directions / np.linalg.norm(directions, axis=1)[:, None]
-
-
-def _cones() -> list[Any]:
-    return [cone.cone for cone in wb.load("human").cones.values()] * K
-
-
 NAMES = [""] * K
 EYES = np.broadcast_to(np.eye(3), (K, 3, 3))
 MAKERS: dict[str, Callable[[np.random.Generator], Batch]] = {
@@ -59,18 +47,6 @@ MAKERS: dict[str, Callable[[np.random.Generator], Batch]] = {
     "revolute": lambda g: Turn(_pairs(g), NAMES, _forms(g)[:, :2]),
     "fixed": lambda g: Turn(_pairs(g), NAMES, _forms(g)[:, :3]),
     "slide": lambda g: Slide(_pairs(g), NAMES, g.normal(size=(K, 2, 3)), g.normal(size=(K, 3)), g.normal(size=(K, 2))),
-    "toward": lambda g: Toward(
-        _pairs(g)[:, :1], NAMES, _rotations(g), g.normal(size=(K, 3)), 3.0 * g.normal(size=(K, 3))
-    ),
-    "cone": lambda g: Cone(_pairs(g), NAMES, _cones()[:K], _rotations(g), _units(g)),
-    "mass center": lambda g: MassCenter(
-        np.array([[0, 2, 3]]),
-        NAMES,
-        np.array((0.5, 0.3, 0.2)),
-        g.normal(size=(3, 3)),
-        g.normal(size=(4, 3)),
-        g.normal(size=4),
-    ),
     "root": lambda g: _root(g),
     "angle": lambda g: Angle(_pairs(g), NAMES, _forms(g)[:, 2:], np.zeros(K), np.zeros(K), np.sign(g.normal(size=K))),
 }
@@ -82,16 +58,13 @@ def _root(g: np.random.Generator) -> RootMotion:
     return motion
 
 
-WITHOUT_CURVATURE = ("toward", "cone", "mass center", "root")
-
-
 @pytest.mark.parametrize("name", MAKERS)
 def test_derivatives_are_those_of_differences(name: str) -> None:
     rng = np.random.default_rng(3)
     batch, x = MAKERS[name](rng), _bodies(rng)
     force = rng.normal(size=(len(batch), batch.size))
     jacobian = batch.jacobian(x)
-    curvature = batch.curvature(x, force) if name not in WITHOUT_CURVATURE else None
+    curvature = batch.curvature(x, force) if name != "root" else None
     assert (jacobian[:, ~batch.pattern] == 0.0).all()
     for i, bodies in enumerate(batch.bodies):
         for column in range(jacobian.shape[2]):
@@ -137,3 +110,23 @@ def test_the_motion_of_a_root_is_pinocchios_to_first_order() -> None:
     assert motion.residual(q[None])[0] == pytest.approx(np.zeros(6), abs=1e-15)
     after = pin.integrate(model, q, step)
     np.testing.assert_allclose(motion.residual(after[None])[0], step, atol=1e-11)
+
+
+def test_degrees_of_freedom_of_every_kind_follow_their_bodies_as_pinocchio_differentiates_them() -> None:
+    model, rng = pin.Model(), np.random.default_rng(5)
+    kinds = (
+        pin.JointModelFreeFlyer(), pin.JointModelSpherical(), pin.JointModelPY(), pin.JointModelRUBZ(),
+        pin.JointModelRevoluteUnaligned(np.array((0.6, 0.0, 0.8))), pin.JointModelPrismaticUnaligned(0.0, 0.6, 0.8),
+    )  # fmt: skip
+    for number, kind in enumerate(kinds):
+        model.addJoint(number, kind, pin.SE3.Random(), f"joint {number}")
+    model.lowerPositionLimit, model.upperPositionLimit = np.full(model.nq, -4.0), np.full(model.nq, 4.0)
+    limits = SimpleNamespace(idx_q=np.arange(model.nq), lower=model.lowerPositionLimit, upper=model.upperPositionLimit)
+    figure: Any = SimpleNamespace(model=model, limits=limits, roots={"": 1})
+    bodies, q = FigureBodies(figure), pin.randomConfiguration(model)
+    x, step = bodies.variables(q), 1e-6 * rng.normal(size=model.nv)
+    moved = bodies.variables(pin.integrate(model, q, step)) - bodies.variables(pin.integrate(model, q, -step))
+    rows = bodies.tangent_rows(with_world(x))
+    np.testing.assert_allclose(rows @ moved, 2.0 * step, atol=1e-11)
+    assert (rows[~bodies.chart] == 0.0).all()
+    assert bodies.chart[-2].sum() == 8  # a joint that turns reads no positions

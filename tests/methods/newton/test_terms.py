@@ -43,15 +43,6 @@ def test_the_centre_of_mass_is_pinocchios(human: wb.Figure) -> None:
         assert _residual(problem, q) == pytest.approx(center - target, abs=1e-9)
 
 
-@pytest.mark.parametrize("term", [wb.Balance(margin=0.01), wb.ReachCones()])
-def test_constraints_say_what_their_terms_say(human: wb.Figure, term: Any) -> None:
-    problem = wb.Problem(wb.Scene(human), "standing", constraints=[term], range_of_motion=False)
-    resolved = problem.constraints[0]
-    for q in _postures(human):
-        wanted = resolved.value(problem.scene.state(q)) - resolved.lower
-        assert _residual(problem, q) == pytest.approx(wanted, abs=1e-9)
-
-
 def test_an_axis_towards_a_place_says_its_angle(human: wb.Figure) -> None:
     place = np.array((1.0, 0.5, 0.3))
     problem = wb.Problem(
@@ -61,7 +52,7 @@ def test_an_axis_towards_a_place_says_its_angle(human: wb.Figure) -> None:
         head = problem.scene.state(q).frame(human.frame_id("head"))
         way = place - head.translation
         angle = np.arccos(head.rotation[:, 0] @ way / np.linalg.norm(way))
-        assert np.linalg.norm(_residual(problem, q)) == pytest.approx(2.0 * np.sin(angle / 2.0), abs=1e-9)
+        assert np.linalg.norm(_residual(problem, q)) == pytest.approx(angle, abs=1e-9)
 
 
 def test_a_posture_goal_is_each_joints_distance(human: wb.Figure) -> None:

@@ -31,20 +31,14 @@ NOTHING_FIXED = Kept()
 
 
 class Polygon:
-    """A reach cone on plain floats: the test of a direction, and the nearest direction inside."""
+    """A reach cone: the test of a direction, on plain floats, and the nearest direction inside."""
 
     def __init__(self, cone: ReachCone) -> None:
         """Copy the planes of the cone."""
-        following = np.roll(cone.vertices, -1, axis=0)
-        slices = np.cross(cone.visible, cone.vertices)
-        self._middle: Vector = three(cone.visible)
+        self._cone, slices = cone, np.cross(cone.visible, cone.vertices)
         self._wedges = [
             (three(slice_), three(after), three(edge))
             for slice_, after, edge in zip(slices, np.roll(slices, -1, axis=0), cone.boundaries, strict=True)
-        ]
-        self._edges = [
-            (three(normal), three(start), three(end), three(np.cross(normal, start)), three(np.cross(end, normal)))
-            for normal, start, end in zip(cone.boundaries, cone.vertices, following, strict=True)
         ]
 
     def contains(self, direction: Vector) -> bool:
@@ -58,25 +52,10 @@ class Polygon:
 
     def nearest(self, direction: Vector) -> Vector:
         """The nearest direction inside to a unit direction outside, a little inside of the edge."""
-        x, y, z = direction
-        inward = 1e-6  # margin inside the cone, as a share of the distance to its middle; larger than rounding
-        best, found = -2.0, direction
-        for (a, b, c), start, end, (d, e, f), (g, h, i) in self._edges:
-            height = a * x + b * y + c * z
-            px, py, pz = x - height * a, y - height * b, z - height * c
-            length = (px * px + py * py + pz * pz) ** 0.5
-            within = d * px + e * py + f * pz >= 0.0 and g * px + h * py + i * pz >= 0.0
-            candidates: Sequence[Vector] = (start, end)
-            if within and length > inward:
-                candidates = ((px / length, py / length, pz / length),)
-            for candidate in candidates:
-                cosine = candidate[0] * x + candidate[1] * y + candidate[2] * z
-                if cosine > best:
-                    best, found = cosine, candidate
-        mx, my, mz = self._middle
-        px, py, pz = found[0] + inward * mx, found[1] + inward * my, found[2] + inward * mz
-        length = (px * px + py * py + pz * pz) ** 0.5
-        return px / length, py / length, pz / length
+        angle, inward = self._cone.signed_angle(direction)
+        # a share of the way to the middle; larger than rounding
+        found = np.cos(angle) * np.array(direction) - np.sin(angle) * inward + 1e-6 * self._cone.visible
+        return three(found / np.linalg.norm(found))
 
 
 class ConeGuard:

@@ -137,7 +137,7 @@ class AssemblyBodies:
         self._check_new(text(name, "the name of a figure"), "figure")
         one_figure(figure, f"figure {name!r}")
         painted = None if color is None else checked_color(color, f"figure {name!r}: color")
-        # The other bodies may carry it, so it is not taken for one that stands; its ranges have no equations of bodies.
+        # The other bodies may carry it, so it is not taken for one that stands.
         problem = Problem(Scene(figure), start, constraints=constraints, range_of_motion=False, balance=False)
         part = AssemblyFigure(name, problem, len(self._places))
         self._parts.append(name)

@@ -13,6 +13,7 @@ from wholebody.figures.state import State
 from wholebody.geometry.memory_views import placement_view
 from wholebody.geometry.placement import quaternions
 from wholebody.methods.base import UnsupportedTermError
+from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.batches import ONE_SIDED, Angle, EquationSet, Role, with_world
 from wholebody.methods.newton.quaternions import axes_with_z, relative_forms
 
@@ -67,7 +68,8 @@ class FigureBodies:
         self.q = self._start = pin.neutral(self.model) if start is None else start
         self._state: State | None = None
         self._state_of: Array | None = None
-        self._rows_of: tuple[Array | None, Any] = (None, None)
+        self._rows_of: tuple[Array, Array] = (np.zeros(0), np.zeros(0))
+        self._lay_chart()
 
     def index(self, joint: int) -> int:
         """Index of the body of one of Pinocchio's joints; -1, the world, for joint 0."""
@@ -78,11 +80,6 @@ class FigureBodies:
         """Of each free root its body, and its first places in the posture and in the tangent."""
         joints = [(joint, self.model.joints[joint]) for joint in self.figure.roots.values()]
         return tuple((joint - 1, int(kind.idx_q), int(kind.idx_v)) for joint, kind in joints)
-
-    @property
-    def uncharted(self) -> tuple[str, ...]:
-        """Names of the joints whose degrees of freedom `tangent_rows` omits."""
-        return tuple(self.names[joint - 1] for joint in self._others if joint not in self.figure.roots.values())
 
     @property
     def start_state(self) -> State:
@@ -108,37 +105,48 @@ class FigureBodies:
         self._state_of = None
         return self._present.update(q)
 
-    def tangent_rows(self, x: Array) -> Any:
-        """Derivative (nv, 7 count) of the tangent displacement by bodies x (count + 1, 7), a csr_matrix."""
+    def tangent_rows(self, x: Array) -> Array:
+        """Derivative (nv, 7 count) of the tangent displacement by bodies x (count + 1, 7)."""
         if self._rows_of[0] is not x:
             self._rows_of = x, self._tangent_rows(x)
         return self._rows_of[1]
 
-    def _tangent_rows(self, x: Array) -> Any:
-        from scipy.sparse import csr_matrix
-
-        rows, columns = np.repeat(self._tangent, 8), 7 * self.angles.bodies[:, :, None] + np.arange(3, 7)
-        slopes = self.angles.jacobian(x).reshape(-1, 2, 7)[:, :, 3:]
-        held = np.flatnonzero(columns >= 0)  # not by the world
-        parts = [(rows[held], columns.ravel()[held], slopes.ravel()[held])]
-        for body, _, v in self.roots:
-            a, b, c, w = x[body, 3:].tolist()
-            place = pin.Quaternion(x[body, 3:]).toRotationMatrix().T
-            # the rotation is 2 vec(conj(e) de), in the root's own axes
-            turn = 2.0 * np.array(((w, c, -b, -a), (-c, w, a, -b), (b, -a, w, -c)))
-            for row, column, block in ((v, 7 * body, place), (v + 3, 7 * body + 3, turn)):
-                at = np.indices(block.shape).reshape(2, -1)
-                parts.append((row + at[0], column + at[1], block.ravel()))
-        row, column, value = (np.concatenate(part) for part in zip(*parts, strict=True))
-        return csr_matrix((value, (row, column)), (self.model.nv, 7 * self.count))
+    def _tangent_rows(self, x: Array) -> Array:
+        """The velocity of each child relative to its parent, along the axes of the joint between them."""
+        (child, parent), (slides, turns) = self._ends, self._axes
+        first, second = x[child], x[parent]
+        along, about = (quat.rotate(first[:, 3:], axes) for axes in (slides, turns))  # in the world
+        lever = about + quat.cross(first[:, :3] - second[:, :3], along)
+        spins = quat.spin(first[:, 3:]), quat.spin(second[:, 3:])
+        ours = np.hstack([along, np.einsum("ki,kij->kj", about, spins[0])])
+        theirs = -np.hstack([along, np.einsum("ki,kij->kj", lever, spins[1])])
+        result = np.zeros((self.model.nv, 7 * self.count))
+        result[self._entries] = np.hstack([ours, theirs])[self._reads]
+        return result
 
     @property
     def chart(self) -> Mask:
         """(nv, 7 count) the variables of bodies that each degree of freedom is a function of."""
-        found = self.tangent_rows(with_world(self.variables(self._start))).tocoo()
-        result: Mask = np.zeros(found.shape, dtype=bool)
-        result[found.row, found.col] = True
+        result: Mask = np.zeros((self.model.nv, 7 * self.count), dtype=bool)
+        result[self._entries] = True
         return result
+
+    def _lay_chart(self) -> None:
+        """Find the bodies (2, nv) and the axes (2, nv, 3) of each degree of freedom, and what its row reads."""
+        model = self.model
+        self._ends: Indices = np.zeros((2, model.nv), dtype=np.intp)
+        self._axes = np.zeros((2, model.nv, 3))  # translation, rotation
+        for joint in range(1, model.njoints):
+            kind = model.joints[joint]
+            place, data = slice(kind.idx_v, kind.idx_v + kind.nv), kind.createData()
+            kind.calc(data, pin.neutral(model)[kind.idx_q : kind.idx_q + kind.nq])
+            self._ends[0, place], self._ends[1, place] = self.index(joint), self.index(int(model.parents[joint]))
+            subspace = np.array(data.S).reshape(6, -1)
+            self._axes[:, place] = subspace.reshape(2, 3, -1).transpose(0, 2, 1)
+        columns = (7 * (self._ends.T[:, :, None] - self.first) + np.arange(7)).reshape(model.nv, 14)
+        sliding = self._axes[0].any(axis=1)[:, None]
+        self._reads: Mask = (columns >= 0) & (sliding | (np.arange(14) % 7 >= 3))  # nothing of the world
+        self._entries = np.nonzero(self._reads)[0], columns[self._reads]
 
     def bound_step(self, q: Array, lower: Array, upper: Array) -> None:
         """Keep later postures within tangent displacements (nv,) of q (nq,), for the velocity bounds of a frame."""

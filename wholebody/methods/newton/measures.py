@@ -66,7 +66,7 @@ class Objective:
         for term in problem.measures:
             if isinstance(term, MINIMISED) or _depends_on(term, self._tangent, problem.start, state):
                 self.minimised.append(term)
-                rows = None if bodies.uncharted else square_rows(bodies, term, type(term).__name__)
+                rows = square_rows(bodies, term, type(term).__name__)
                 self._curved += [term] if rows is None else []
                 self.squares += [] if rows is None else [rows]
             else:

@@ -23,8 +23,8 @@ class Newton(Settings):
     Every body has seven variables, every joint is an equation, and each step is the least motion that satisfies all of
     them. The iteration minimises measures of the revolute joints, your own included, to the accuracy of its
     termination. A measure that depends on the root's position or on other joints is only reported, and the message
-    names it. Goals and constraints of your own are taken if all joints are revolute except a free root. If the goals
-    cannot be met, the method minimises their squares subject to the constraints.
+    names it. Goals and constraints of your own are taken. If the goals cannot be met, the method minimises their
+    squares subject to the constraints.
 
     The object has only settings and serves any number of problems and threads at the same time.
 

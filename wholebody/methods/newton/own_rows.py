@@ -1,8 +1,8 @@
 """Rows of terms that have no equations of bodies here: users' goals and constraints, and sums of squares.
 
 A term of a figure gives its derivative J with respect to the tangent displacement (nv,) of a posture. Every degree of
-freedom of revolute joints and of a free root is a function of one or two bodies, with derivative D (nv, 7 n), so the
-term's rows are J D. A constraint of an assembly gives its derivative with respect to the bodies themselves.
+freedom is a function of one or two bodies, with derivative D (nv, 7 n), so the term's rows are J D. A constraint of an
+assembly gives its derivative with respect to the bodies themselves.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ class TangentRows(Batch):
         depends: Mask | None = None,
     ) -> None:  # fmt: skip
         """Take a function, and its rows `chosen` (size,); `depends` (size, nv) on degrees of freedom, None for all."""
-        super().__init__(np.arange(bodies.count)[None], [label])
+        super().__init__(bodies.first + np.arange(bodies.count)[None], [label])
         self._figure, (self._value, self._slope) = bodies, function
         self.chosen, self.sign, self.bound = chosen, sign, bound
         self.size = len(chosen)
-        self.pattern = np.tile(_reads(bodies), (self.size, 1))
-        if depends is not None:
-            self.pattern &= depends @ bodies.chart
+        if depends is None:
+            depends = np.ones((self.size, bodies.model.nv), dtype=bool)
+        self.pattern = depends @ bodies.chart
 
     def count_from(self, q: Array | None) -> None:
         """Count the values from those at the posture q (nq,), or from zero."""
@@ -128,15 +128,6 @@ def constraint_rows(
         rows(equal, np.ones(len(equal)), lower[equal]),
         rows(np.concatenate([above, below]), sides, np.concatenate([lower[above], upper[below]])),
     )
-
-
-def _reads(bodies: FigureBodies) -> Mask:
-    """(7 n,) the variables on which the tangent depends: all rotations, and the position of a free root."""
-    result = np.zeros((bodies.count, 7), dtype=bool)
-    result[:, 3:] = True
-    for body, _, _ in bodies.roots:
-        result[body, :3] = True
-    return result.ravel()
 
 
 class AssemblyConstraint(ABC):

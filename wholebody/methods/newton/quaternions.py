@@ -63,6 +63,13 @@ def rotate_derivative(e: Array, c: Array) -> Array:
     return result
 
 
+def spin(e: Array) -> Array:
+    """(k, 3, 4) the angular velocity in the world, by the rate of unit quaternions (k, 4)."""
+    a, b, c, w = e.T
+    result: Array = 2.0 * np.array(((w, -c, b, -a), (c, w, -a, -b), (-b, a, w, -c))).transpose(2, 0, 1)
+    return result
+
+
 def rotate_form(c: Array, force: Array) -> Array:
     """The symmetric matrices Q (k, 4, 4) with force . R(e) c = e' Q e; twice that is the second derivative."""
     result = np.empty((len(c), 4, 4))

@@ -11,19 +11,16 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.figures.state import State
 from wholebody.methods.base import UnsupportedTermError
-from wholebody.methods.newton.batches import HARD, ONE_SIDED, Batch, EquationSet, Role, Unit
+from wholebody.methods.newton.batches import HARD, ONE_SIDED, EquationSet, Role, Unit
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.measures import Objective
 from wholebody.methods.newton.own_rows import constraint_rows, goal_rows
 from wholebody.methods.newton.quaternions import axes_along
 from wholebody.methods.newton.system import ActiveSystem
-from wholebody.methods.newton.task_batches import Cone, MassCenter, Toward
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks import (
     Axis,
-    Balance,
-    CenterOfMass,
     Frame,
     Freeze,
     Hold,
@@ -31,13 +28,11 @@ from wholebody.tasks import (
     Plane,
     Point,
     Posture,
-    RangeOfMotion,
-    ReachCones,
     Relative,
     StepLimit,
 )  # fmt: skip
 from wholebody.tasks.answers import is_own
-from wholebody.tasks.base import Constraint, Goal
+from wholebody.tasks.base import Goal
 from wholebody.tasks.checks import undefined
 from wholebody.tasks.residuals import PlacementResidual
 
@@ -60,16 +55,12 @@ def goal_equations(problem: Problem, bodies: FigureBodies, goals: Sequence[Goal]
             result.coincide(bodies.index(goal.place.joint), -1, label, point, goal.resolved_target, role)
         elif isinstance(goal, (Frame, Orientation, Relative)):
             _placement(result, bodies, goal.residual, label, role)
-        elif isinstance(goal, Axis):
-            _axis(result, bodies, goal, label)
-        elif isinstance(goal, CenterOfMass):
-            result.add(
-                _mass_center(bodies, label, goal.joints, np.eye(3)[: len(goal.axes)], goal.resolved_target), role
-            )
+        elif isinstance(goal, Axis) and goal.toward is None:
+            ours = axes_along(_local(bodies, goal.place.frame).rotation @ goal.basis[2])
+            result.turn(bodies.index(goal.place.joint), -1, label, ours, axes_along(goal.resolved_target), 2, role)
         elif isinstance(goal, Posture):
             bodies.add_posture_goals(result, label, goal.resolved_target, set(goal.dofs.tolist()), role)
         else:
-            _check_own(bodies, label)
             result.add(goal_rows(bodies, goal, label), role)
     return result
 
@@ -85,13 +76,7 @@ def constraint_equations(problem: Problem, bodies: FigureBodies) -> EquationSet:
             place, body = np.array(_local(bodies, term.place.frame).translation), bodies.index(term.place.joint)
             role = ONE_SIDED if term.side == "above" else HARD
             result.slide(-1, body, label, term.resolved_normal, place, term.height, role)
-        elif isinstance(term, Balance):
-            normals = np.column_stack([term.normals, np.zeros(len(term.normals))])
-            result.add(_mass_center(bodies, label, term.joints, normals, term.offsets + term.margin), ONE_SIDED)
-        elif isinstance(term, ReachCones):
-            result.add(_cones(bodies, term, label), ONE_SIDED)
         else:
-            _check_own(bodies, label, term)
             for rows, role in zip(constraint_rows(bodies, term, label), (HARD, ONE_SIDED), strict=True):
                 if rows is not None:
                     result.add(rows, role)
@@ -109,36 +94,6 @@ def bound_equations(problem: Problem, bodies: FigureBodies, state: State) -> Equ
                 "newton", [f"bounds[{number}], {type(bound).__name__} (it takes Freeze and StepLimit)"]
             )
     return result
-
-
-def _axis(equations: EquationSet, bodies: FigureBodies, goal: Axis, label: str) -> None:
-    """An axis along a direction, or towards a point."""
-    local, body, role = _local(bodies, goal.place.frame), bodies.index(goal.place.joint), Role(goal.weight)
-    if goal.toward is None:
-        ours, wanted = axes_along(local.rotation @ goal.basis[2]), axes_along(goal.resolved_target)
-        equations.turn(body, -1, label, ours, wanted, 2, role)
-        return
-    axes, point = goal.basis @ local.rotation.T, np.array(local.translation)
-    places = goal.resolved_target[None]
-    equations.add(Toward(np.array([[body]]), [label], axes[None], point[None], places), role)
-
-
-def _mass_center(bodies: FigureBodies, label: str, joints: range | None, directions: Array, height: Array) -> Batch:
-    inertias = list(bodies.model.inertias)[1:]
-    mass = np.array([inertia.mass for inertia in inertias])
-    if joints is not None:  # of one of several figures
-        mass[[k for k in range(len(mass)) if k + 1 not in joints]] = 0.0
-    heavy = np.flatnonzero(mass > 0.0)
-    centers = np.array([inertias[k].lever for k in heavy])
-    return MassCenter(bodies.first + heavy[None], [label], mass[heavy] / mass.sum(), centers, directions, height)
-
-
-def _cones(bodies: FigureBodies, term: ReachCones, label: str) -> Batch:
-    limbs = term.limbs
-    pairs = np.array([(bodies.index(limb.reference.joint), bodies.index(limb.limb.joint)) for limb in limbs])
-    turns = np.array([_local(bodies, limb.reference.frame).rotation for limb in limbs])
-    axes = np.array([_local(bodies, limb.limb.frame).rotation @ limb.axis for limb in limbs])
-    return Cone(pairs, [label] * len(limbs), [limb.cone for limb in limbs], turns, axes)
 
 
 def _placement(
@@ -171,17 +126,6 @@ def _frozen(equations: EquationSet, bodies: FigureBodies, bound: Freeze, state: 
 def _local(bodies: FigureBodies, frame: int) -> Any:
     """Placement of a frame in its body."""
     return bodies.model.frames[frame].placement
-
-
-def _check_own(bodies: FigureBodies, label: str, term: Constraint | None = None) -> None:
-    """Refuse a user's term if the figure's tangent is not a function of its bodies, or those of its range of motion."""
-    uncharted = bodies.uncharted
-    if isinstance(term, RangeOfMotion) and bodies.figure.members:
-        whose = {name.partition("/")[0] for name in term.row_names}
-        uncharted = tuple(name for name in uncharted if name.partition("/")[0] in whose)
-    if uncharted:
-        reason = f"its rows need joints that turn between limits and free roots, and {uncharted[0]!r} is neither"
-        raise UnsupportedTermError("newton", [f"{label} ({reason})"])
 
 
 class FigureSystem(ActiveSystem):
