@@ -73,7 +73,7 @@ def picture(
         see_through: things to draw transparent.
     """
     out.mkdir(parents=True, exist_ok=True)
-    with wb.Viewer(problem.scene, see_through=see_through, title=name) as viewer:
+    with wb.Viewer(problem.scene, see_through=see_through, title=name.replace("_", " ").capitalize()) as viewer:
         viewer.show(solution.q, problem=problem)
         viewer.look(eye=eye, target=target)
         print(f"  {viewer.save(out / f'{name}.html')}")
@@ -112,7 +112,7 @@ def film(
 ) -> None:
     """Write NAME.html, which plays the motion with the tracked posture as a ghost, and NAME.png of one frame."""
     out.mkdir(parents=True, exist_ok=True)
-    with wb.Viewer(scene, see_through=see_through, title=name) as viewer:
+    with wb.Viewer(scene, see_through=see_through, title=name.replace("_", " ").capitalize()) as viewer:
         viewer.look(eye=eye, target=target)
         viewer.play(recording, ghost=recording.tracked)
         print(f"  {viewer.save(out / f'{name}.html')}")
@@ -150,7 +150,7 @@ def play(
         dt: seconds from one to the next.
     """
     out.mkdir(parents=True, exist_ok=True)
-    with wb.Viewer(shown, title=name) as viewer:
+    with wb.Viewer(shown, title=name.replace("_", " ").capitalize()) as viewer:
         viewer.look(eye=eye, target=target)
         viewer.play(motion, **({} if dt is None else {"dt": dt}))
         print(f"  {viewer.save(out / f'{name}.html')}")

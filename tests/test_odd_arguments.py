@@ -27,7 +27,7 @@ from wholebody.figures.state import State
 from wholebody.geometry.compound import Compound
 from wholebody.motion import measures
 from wholebody.motion.sphere_filling import Spheres, fill_with_spheres
-from wholebody.planning.distinct import Solutions
+from wholebody.planning.distinct_solutions import Solutions
 from wholebody.view import Viewer
 from wholebody.view.timeline import timeline
 
@@ -726,6 +726,10 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         return wb.accommodation(people=some, jobs=1, progress=lambda told: True, **others)
 
     yield "accommodation", Call(accommodation, counted)
+    of_one = wb.studies.Records([wb.studies.SolveRecord("a", q=np.zeros(1))])
+    sizes = ({"stature": 1.8, "mass": 80.0},)
+    judged = wb.studies.Accommodation(of_one, ("male",), sizes, (True,), (True,), None)
+    yield "Accommodation.plot", Call(judged.plot, {})
     upright, work = person.figure.neutral, wb.ergonomics.Work(load=5.0)
     posed = {"figure": person.figure, "q": upright, "work": work}
     for judge in (wb.ergonomics.rula, wb.ergonomics.reba, wb.ergonomics.owas):
@@ -876,6 +880,7 @@ BY_OWNERS = ("Trajectory.avoid", "PerFrame.avoid", "Bisection.avoid", "QP.batche
 """Called by `avoid`, `solve_many` and a world alone, with what they set up."""
 
 DERIVATIVES = (
+    "of_arms",
     "on_polygon",
     "joint_placement",
     "companion",

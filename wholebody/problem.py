@@ -376,10 +376,8 @@ def _check_goals(goals: Sequence[Goal], state: State) -> None:
 
 def _start(scene: Scene, start: Array | str | Mapping[str, Array | str] | None) -> Array:
     figure = scene.figure
-    if start is None:
-        return np.array(figure.posture(figure.postures[0]), dtype=float)
-    if isinstance(start, (str, Mapping)):
-        return np.array(figure.posture(start), dtype=float)
+    if start is None or isinstance(start, (str, Mapping)):
+        return np.array(figure.posture(figure.postures[0] if start is None else start), dtype=float)
     q = checks.posture(start, scene.model.nq, "start")
     figure.warn_of_angles(q, "start")
     if q.dot(q) > FARTHEST**2 and np.abs(q).max() > FARTHEST:

@@ -1,9 +1,9 @@
 # ruff: noqa: T201
-"""A study of 20,000 cases on a dask cluster, with a live table. Run again after a kill, it goes on from its folder.
+"""A study of 20,000 cases on a dask cluster, with a live table. A run that was killed continues from its folder.
 
-python cluster_study.py                                        # two workers on this machine
-python cluster_study.py --cluster tcp://10.0.0.1:8786          # a scheduler that is there
-python cluster_study.py --slurm 40 --queue normal              # dask-jobqueue asks Slurm for 40 workers
+python cluster_study.py --robot arm.urdf                                   # two workers on this machine
+python cluster_study.py --robot arm.urdf --cluster tcp://10.0.0.1:8786     # a running scheduler
+python cluster_study.py --robot arm.urdf --slurm 40 --queue normal         # dask-jobqueue asks Slurm for 40 workers
 """
 
 from __future__ import annotations

@@ -146,7 +146,7 @@ def require_browser() -> None:
     [
         (["pose", "absent.toml"], ["no task file is called 'absent.toml'", "small.toml"]),
         (["pose", "small.toml", "--method", "xyz"], ["no method is called 'xyz'", "qp"]),
-        (["pose", "small.toml", "--out", "small.toml/x"], ["small.toml/x", "--out"]),
+        (["pose", "small.toml", "--out", "small.toml/x"], ["small.toml/x cannot be made", "another place"]),
         (["show", "humna"], ["no figure is called 'humna'", "human"]),
         (["show", "human", "--posture", "siting", "--save", "a.html"], ["no posture", "sitting"]),
         (["show", "human", "--save", "a.gif"], [".html", ".png"]),

@@ -18,7 +18,7 @@ import pytest
 import trimesh
 
 from wholebody.cli import main
-from wholebody.view import screenshot
+from wholebody.view import Viewer, screenshot
 from wholebody.view.browser import find_chromium
 
 
@@ -43,12 +43,6 @@ def showing(*arguments: str) -> tuple[subprocess.Popen[str], str]:
     return process, found[0]
 
 
-def ended(process: subprocess.Popen[str], how: int = signal.SIGINT) -> int:
-    process.send_signal(how)
-    process.communicate(timeout=20)
-    return int(process.returncode)
-
-
 def status(url: str, host: str | None = None) -> int:
     request = urllib.request.Request(url, headers={} if host is None else {"Host": host})
     try:
@@ -62,23 +56,26 @@ def status(url: str, host: str | None = None) -> int:
 def waiting() -> Iterator[tuple[subprocess.Popen[str], str, int, float]]:
     """Begin to show while the other tests of this file run; yield the process, its address, the port and when."""
     port = free_port()
-    process, url = showing("--port", str(port))
+    process, url = showing("--host", "0.0.0.0", "--port", str(port))
     yield process, url, port, time.monotonic()
     process.kill()
     process.communicate()
 
 
-def test_every_address_of_this_machine_can_be_served_and_no_foreign_name() -> None:
-    process, url = showing("--host", "0.0.0.0")
-    try:
-        assert status(url) == 200
-        assert status(url, "192.168.7.7:7000") == 200
-        assert status(url, socket.gethostname()) == 200
-        assert status(url, "evil.example") == 403
-        assert ended(process) == 130
-    finally:
-        process.kill()
-        process.wait()
+def test_every_address_of_this_machine_can_be_served_and_no_foreign_name(
+    waiting: tuple[subprocess.Popen[str], str, int, float],
+) -> None:
+    url = waiting[1]
+    assert status(url) == 200
+    assert status(url, "192.168.7.7:7000") == 200
+    assert status(url, socket.gethostname()) == 200
+    assert status(url, "evil.example") == 403
+
+
+def test_ctrl_c_ends_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Viewer, "open", lambda viewer: viewer)
+    monkeypatch.setattr(Viewer, "wait", lambda viewer, timeout: signal.raise_signal(signal.SIGINT))
+    assert main(["show", "hand"]) == 130
 
 
 @pytest.mark.parametrize(

@@ -52,6 +52,22 @@ def test_torques_are_those_of_inverse_dynamics(person: wb.Figure) -> None:
         assert abs(one) == pytest.approx(known[name], abs=0.02), name
 
 
+@pytest.mark.parametrize("standing", [True, False])
+def test_torques_of_one_of_several_are_those_of_the_person_alone(person: wb.Figure, bent: Any, standing: bool) -> None:
+    alone = StrengthLimit(CARRIED, standing=standing).resolve(wb.Scene(person), bent)
+    scene = wb.Scene({"hand": (wb.load("hand"), (2.0, 0.0, 1.0)), "anna": person})
+    q = scene.figure.posture({"anna": bent})
+    forces = [wb.Force(f"anna/{one.frame}", one.force) for one in CARRIED]
+    among = StrengthLimit(forces, standing=standing, person="anna")
+    assert wb.check_derivatives(among, scene, q).agrees
+    found = among.resolve(scene, q).value(scene.state(q))
+    np.testing.assert_allclose(found, alone.value(wb.Scene(person).state(bent)), atol=1e-9)
+    with pytest.raises(wb.InputError, match="several figures"):
+        StrengthLimit(forces).resolve(scene, q)
+    with pytest.raises(wb.UnknownNameError, match="anna"):
+        Exertion(CARRIED, person="ana").resolve(scene, q)
+
+
 def test_the_disc_bears_what_levers_say(person: wb.Figure) -> None:
     standing = person.posture("standing")
     # Nachemson (1981): 500 N at L3 of people of 70 kg who stand at ease.

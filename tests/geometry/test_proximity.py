@@ -97,6 +97,21 @@ def check(scene, found, expected, within, tolerance):
     assert set(numbers) <= set(expected)
 
 
+def test_bounds_from_below_are_distances_where_pairs_are_near():
+    rng = np.random.default_rng(3)
+    scene = among_things("capsules", rng)
+    state, proximity = scene.state(scene.figure.neutral), Proximity(scene.pair_table)
+    for within in (0.02, 0.3, 0.02):
+        q = random_posture(scene.figure, rng)
+        least, true = proximity.least(state.update(q).data, within), asked_one_by_one(scene, q)
+        distance = np.array([true[tuple(pair)][0] for pair in scene.pair_table.pairs.tolist()])
+        near = distance < within - 1e-5
+        assert (least <= distance + 1e-5).all()
+        assert (least[~near] >= within - 2e-5).all()
+        np.testing.assert_allclose(least[near], distance[near], atol=1e-5)
+        assert np.mean(least > within + 0.1) > 0.2  # far pairs have more than the query asked
+
+
 def test_contacts_come_nearest_first():
     scene = among_things("capsules", np.random.default_rng(2))
     found = scene.contacts(scene.figure.neutral, 0.5)

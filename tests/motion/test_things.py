@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import coal
@@ -12,8 +13,10 @@ import pytest
 import wholebody as wb
 from tests.motion.test_retargeting import person
 from wholebody.base.errors import InputError
+from wholebody.motion.held_points import HeldPoint, Holds, Touched
 from wholebody.motion.skeleton import SkeletonMotion
-from wholebody.motion.thing_contacts import Things
+from wholebody.motion.standing_ground import NOTHING, Foothold
+from wholebody.motion.thing_contacts import ThingContact, Things
 
 SIZE = (0.25, 0.30, 0.2)  # m: of the box, whose sides are 3 cm inwards of the wrists
 
@@ -117,6 +120,19 @@ def test_hands_stay_on_a_table_that_stands() -> None:
         wb.Clip(figure, loose.q, loose.dt, things={"box": np.tile(pin.SE3ToXYZQUAT(track[0]), (20, 1))}), "right"
     )
     assert off[:, 0].min() > 5e-3
+
+
+def test_a_hand_rests_on_the_ground_before_and_after_it_touches_a_thing() -> None:
+    scene = among(wb.load("human"), pin.SE3(np.eye(3), np.array([0.4, 0.0, 1.0])))
+    rests = [Foothold("left_hand", *frames, np.zeros(3), 0.0) for frames in ((0, 5), (18, 30), (40, 50))]
+    contact = ThingContact("left_hand", 20, 30, "box", np.array([0.0, 0.15, 0.0]), np.array([0.0, 1.0, 0.0]))
+    points = [HeldPoint("left_hand", "", 1, np.zeros(3)), HeldPoint("left_hand", "", 1, np.zeros(3), thing=True)]
+    ground = replace(NOTHING, footholds=tuple(rests))
+    held = Holds(points, ground, 1.0, 1 / 30, None, Touched(scene.figure, Things(scene, {}), [contact]))
+    held.begin({20: scene.figure.neutral})
+    paths = {frame: np.zeros((2, 3)) for frame in range(60)}
+    weights = [held.goals(frame, paths, np.zeros(3))[1][:, 0] for frame in (3, 25, 45)]
+    assert [(ground > 0.0, thing > 0.0) for ground, thing in weights] == [(True, False), (False, True), (True, False)]
 
 
 def test_check_moves_the_things_of_a_clip() -> None:

@@ -15,6 +15,7 @@ from wholebody.base.arrays import Array
 from wholebody.bench.suite.problem_sets.registry import problem_set
 from wholebody.planning import Pace, Plan
 from wholebody.planning.rrt_connect import Tree
+from wholebody.planning.sampling import Sampler
 
 
 def shelf(number: int) -> tuple[wb.Problem, Array]:
@@ -110,6 +111,14 @@ def test_goals_out_of_reach_and_wrong_ends_are_told() -> None:
         wb.plan(scene, problem.start, end)
 
 
+def test_a_half_space_that_is_carried_is_refused(planar_arm: Callable[..., wb.Figure]) -> None:
+    """It is endless, so that no part of a turn is short enough to be proven free."""
+    figure = planar_arm((0.5, 0.5))
+    scene = wb.Scene(figure).attach(wb.HalfSpace(), to=figure.segments[-1], name="plate", at=(0.0, 0.0, -9.0))
+    with pytest.raises(wb.InputError, match=r"plan: how much a motion brings .*plate.* has no bound; attach a box"):
+        wb.plan(scene, np.zeros(2), np.array([0.2, 0.2]))
+
+
 def test_the_nearest_posture_of_a_tree_is_that_of_all_differences() -> None:
     rng = np.random.default_rng(0)
     problem, _ = shelf(8)
@@ -121,6 +130,21 @@ def test_the_nearest_posture_of_a_tree_is_that_of_all_differences() -> None:
     at = rng.uniform(figure.limits.lower, figure.limits.upper)
     assert tree.nearest(at) == int(np.argmin(np.linalg.norm(drawn - at, axis=1)))
     np.testing.assert_array_equal(tree.path(5), drawn[:6])
+
+
+def test_samples_are_within_limits_and_no_whole_turn_away_where_these_let_them(
+    planar_arm: Callable[..., wb.Figure],
+) -> None:
+    """Of two joints that turn by two turns either way, both sides of a turn are the same posture."""
+    figure = planar_arm((0.5, 0.5), limit=4.0 * np.pi)
+    sampler = Sampler(wb.Problem(wb.Scene(figure), np.zeros(2)), np.random.default_rng(0))
+    at = np.array([3.0, -4.0 * np.pi + 0.1])
+    drawn = np.array([sampler.near(at, 1.0) for _ in range(400)])
+    assert (np.abs(drawn) <= 4.0 * np.pi).all()
+    assert np.abs(drawn[:, 0] - at[0]).max() <= np.pi
+    assert np.abs(drawn[:, 1] - at[1]).max() <= 2.0 * np.pi  # a limit is near on one side
+    assert np.ptp(drawn[:, 0]) > 6.0
+    np.testing.assert_allclose(sampler.turns.nearest(at + [2.0 * np.pi, 0.0], at), at, atol=1e-12)
 
 
 TURNTABLE = """<robot name="bar"><link name="base"/>

@@ -19,7 +19,7 @@ def upright(figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:
 
 
 def test_only_those_of_the_right_height_are_counted() -> None:
-    people = wb.people(2)
+    people = wb.people(1)
     found = wb.accommodation(upright, people, sees=(2.0, 0.0, 1.2))
     assert found.share == 0.0
     assert all(found.fits)

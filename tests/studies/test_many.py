@@ -67,14 +67,15 @@ def test_warm_starts_are_the_same_whatever_jobs_is_and_solve_each_goal(arm: wb.F
 
 
 def test_a_process_that_ends_costs_its_own_problem_alone(arm: wb.Figure) -> None:
-    problems = {"good": problem(arm, PLACES[0]), "fatal": problem(arm, PLACES[1], measures=[Fatal(os.getpid())])}
+    mine = [Fatal(os.getpid())]
+    problems = [problem(arm, PLACES[k % 5], measures=mine if k == 1 else None) for k in range(9)]  # two in a job
     for warm in (False, True):
-        good, fatal = wb.solve_many(problems, warm_start=warm)
-        assert good.solved
+        first, fatal, *others = wb.solve_many(problems, warm_start=warm)
+        assert all(each.solved for each in (first, *others))
         assert (fatal.outcome, fatal.q) == ("ended", None)
         assert "SIGKILL" in fatal.message
     told = repr(wb.studies.Records([fatal]))
-    assert "first ended: fatal, the process ended with SIGKILL" in told
+    assert "first ended: 1, the process ended with SIGKILL" in told
     assert "goal missed most: none" in told
 
 

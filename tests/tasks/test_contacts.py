@@ -377,6 +377,13 @@ def test_who_stands_keeps_the_margin_of_people() -> None:
     assert inside.min() >= stand.keeps - 1e-4
 
 
+@pytest.mark.parametrize("knees", ["both", ["left_shank"], ["left_shank", "left_foot"]], ids=str)
+def test_knees_that_are_no_feet_are_refused(knees: Any) -> None:
+    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+    with pytest.raises(wb.InputError, match=r"knees are of the feet, and (both|left_shank) is not"):
+        wb.Problem(scene, constraints=[wb.Stand("floor", knees=knees)])
+
+
 @pytest.mark.parametrize("start", ["kneeling", "standing", "sitting"])
 def test_a_person_kneels_in_balance(start: str) -> None:
     shanks = ("left_shank", "right_shank")

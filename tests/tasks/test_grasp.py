@@ -84,22 +84,22 @@ def _outer(finger: str) -> tuple[str, ...]:
 
 
 @pytest.mark.parametrize(
-    ("shape", "at"),
+    ("shape", "at", "measures"),
     [
-        (wb.Sphere(0.04), AT),
-        (wb.Capsule(0.025, 0.3), AT),
-        (wb.Capsule(0.0141, 0.515), (0.433, -0.157, 1.237, -0.6237, -0.5206, 0.5251, -0.2534)),
-        (wb.Capsule(0.0222, 0.52), (0.49, -0.467, 1.252)),
-        (wb.Capsule(0.028, 0.488), (0.364, -0.388, 1.0977, 0.0208, 0.4411, 0.8921, -0.0954)),
+        (wb.Sphere(0.04), AT, True),
+        (wb.Capsule(0.025, 0.3), AT, False),
+        (wb.Capsule(0.0141, 0.515), (0.433, -0.157, 1.237, -0.6237, -0.5206, 0.5251, -0.2534), False),
+        (wb.Capsule(0.0222, 0.52), (0.49, -0.467, 1.252), False),
+        (wb.Capsule(0.028, 0.488), (0.364, -0.388, 1.0977, 0.0208, 0.4411, 0.8921, -0.0954), True),
     ],
     ids=["ball 80 mm", "rod 50 mm", "thin rod behind the fingers", "rod aside", "thick rod, reached through it"],
 )
-def test_in_a_power_grip_the_thumb_opposes_the_fingers(figure: wb.Figure, shape: Any, at: Any) -> None:
+def test_in_a_power_grip_the_thumb_opposes_the_fingers(figure: wb.Figure, shape: Any, at: Any, measures: bool) -> None:
     """The last three were called unreachable, although postures that solve neighbouring rods lead to them."""
     quaternion = np.array(at[3:] or (0.0, 0.0, 0.0, 1.0))
     scene = wb.Scene(figure).add(shape, name="thing", at=(*at[:3], *(quaternion / np.linalg.norm(quaternion))))
     problem = wb.Problem(scene, start=_start(figure), goals=[wb.Grasp("right", "thing", "power")], constraints=FEET)
-    solution = wb.solve(problem)
+    solution = wb.solve(problem, wb.QP(measures=measures))
     assert solution.status == "solved", solution.message
     mean = np.sum([_normal(scene, solution.q, _outer(finger)) for finger in FOUR], axis=0)
     assert _apart(_normal(scene, solution.q, _outer("thumb")), mean) > 135.0 - 0.1

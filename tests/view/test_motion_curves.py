@@ -73,12 +73,13 @@ def test_curves_of_long_recordings_are_drawn(browser: Any, page: str, tmp_path: 
     (told,) = re.findall(r"const data = (.*);", page)[-1:]
     data = json.loads(told)
     data["frames"] *= 2000
+    del data["charts"][1:]
     for line in (line for chart in data["charts"] for line in chart["lines"]):
         line["values"] *= 2000
     file = tmp_path / "long.html"
     file.write_text(page.replace(told, json.dumps(data)), encoding="utf-8")
     browser.open(file.as_uri())
-    assert browser.evaluate("document.querySelectorAll('canvas').length") == 4
+    assert browser.evaluate("document.querySelectorAll('canvas').length") == 1
 
 
 def test_motions_of_other_lengths_are_refused() -> None:

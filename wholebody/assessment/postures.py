@@ -55,6 +55,11 @@ class Judged(NamedTuple):
         """Which (k,) meet their goals with everything held to a tolerance, metres and radians."""
         return np.maximum.reduce(self[:-1]) <= tolerance
 
+    def put(self, rows: Indices, other: Judged) -> None:
+        """Replace some rows (m,) by those of another judgement."""
+        for part, new in zip(self, other, strict=True):
+            part[rows] = new
+
 
 def judged(problem: Problem, numbers: Numbers, q: Array) -> Judged:
     """Judge postures q (k, nq) of one problem without constraints and bounds, each with its own numbers."""

@@ -87,13 +87,15 @@ def templates(folder: Path) -> Environment:
     """The templates of a folder, which jinja2 fills in; values are escaped in pages (`.html.jinja`)."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
 
-    return Environment(
+    made = Environment(
         loader=FileSystemLoader(folder),
         autoescape=select_autoescape(["html.jinja"]),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    made.policies["json.dumps_kwargs"] = {"separators": (",", ":")}  # of its filter `tojson`, in the order given
+    return made
 
 
 def parsed_toml(text: str, name: str) -> dict[str, Any]:

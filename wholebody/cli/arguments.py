@@ -95,15 +95,6 @@ def scene_options(scene: str, overlap: str, out: str) -> tuple[Option, ...]:
     )
 
 
-def check_overlaps(chosen: Iterable[str]) -> None:
-    """Check ways to remove overlap; raises UnknownNameError."""
-    from wholebody.tracking.loop import OVERLAPS
-
-    for overlap in chosen:
-        if overlap not in OVERLAPS:
-            raise UnknownNameError("way to remove overlap", overlap, OVERLAPS, "--overlap")
-
-
 def scene_names(arguments: argparse.Namespace, scenes: Mapping[str, str], command: str, *, files: bool) -> list[str]:
     """Names of the scenes to run, or of task files if `files`; none if the list was asked for, which is printed."""
     if arguments.list:

@@ -68,10 +68,10 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.live:
         return live(arguments)
     arguments.method = arguments.method or "newton"
+    from wholebody.base.files import make_folder
     from wholebody.bench.measure.frames import drag_rows, frame_panels, is_clean
     from wholebody.bench.rows import chart, report
     from wholebody.bench.tables import machine, write_rows, write_text
-    from wholebody.cli.picture import make_folder
     from wholebody.cli.tables import print_rows
     from wholebody.methods.solve import method_named
     from wholebody.taskfile import read_task
@@ -106,7 +106,7 @@ def run(arguments: argparse.Namespace) -> int:
 def live(arguments: argparse.Namespace) -> int:
     """Let the figure be dragged in a browser until Ctrl-C."""
     from wholebody.base.errors import InputError
-    from wholebody.cli.picture import make_folder
+    from wholebody.base.files import make_folder
     from wholebody.taskfile import read_task, write_task
     from wholebody.tracking.live import LiveDrag
     from wholebody.view.live_page import LivePage
@@ -129,15 +129,12 @@ def live(arguments: argparse.Namespace) -> int:
 
 def followed(problem: Problem, places: Any, method: str, goal: int, label: str) -> tuple[Dragged, DragJudgement]:
     """Drag and assess, with a progress bar."""
-    from wholebody.cli.tables import progress_bar
+    from wholebody.cli.tables import bar
     from wholebody.tracking.dragging import drag_along, judge_drag
 
-    with progress_bar() as bar:
-        work = bar.add_task(label, total=len(places))
-        dragged = drag_along(
-            problem, places, method, goal=goal, progress=lambda done: bar.update(work, completed=done)
-        )  # fmt: skip
-        bar.update(work, description="judging every pair of every frame")
+    with bar(label, len(places)) as tell:
+        dragged = drag_along(problem, places, method, goal=goal, progress=lambda done: tell(done, label))
+        tell(len(places), "judging every pair of every frame")
         return dragged, judge_drag(problem, dragged, goal=goal)
 
 

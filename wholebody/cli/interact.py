@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.arguments import check_overlaps, scene_names, scene_options
+from wholebody.cli.arguments import scene_names, scene_options
 from wholebody.cli.command import command
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ exit code: 1 if a frame overlaps by more than the tolerance, passes through some
 )
 def run(arguments: argparse.Namespace) -> int:
     """List the scenes, or run one or all."""
+    from wholebody.base.checks import known
     from wholebody.base.files import check_writable, make_folder
     from wholebody.bench.measure.frames import is_held, loop_report
     from wholebody.bench.tables import machine, write_text
@@ -42,8 +43,8 @@ def run(arguments: argparse.Namespace) -> int:
     names = scene_names(arguments, SCENES, "interact", files=False)
     if not names:
         return 0
-    chosen = list(OVERLAPS) if arguments.overlap == "all" else [arguments.overlap]
-    check_overlaps(chosen)
+    asked = list(OVERLAPS) if arguments.overlap == "all" else [arguments.overlap]
+    chosen = [known(one, OVERLAPS, "way to remove overlap", "--overlap") for one in asked]
     make_folder(arguments.out)
     check_writable(arguments.out / f"{names[0]}.csv")
     facts, rows = machine(), []
@@ -62,18 +63,17 @@ def _run_one(scene: InteractionScene, overlap: str, seed: int, out: Path, facts:
     from wholebody.bench.measure.frames import frame_panels, loop_rows
     from wholebody.bench.rows import chart
     from wholebody.bench.tables import write_rows
-    from wholebody.cli.tables import progress_bar
+    from wholebody.cli.tables import bar
     from wholebody.tracking import follow, judge
 
-    with progress_bar() as bar:
+    with bar(label := f"{scene.name}, {overlap}", len(scene.track)) as tell:
         gc.collect()
         gc.freeze()  # otherwise the garbage collector visits all objects once in a run, which delays a frame by 80 ms
-        task = bar.add_task(f"{scene.name}, {overlap}", total=len(scene.track))
         recording = follow(
             scene.scene, scene.track, overlap=overlap, seed=seed, rigid=scene.rigid,
-            progress=lambda done: bar.update(task, completed=done),
+            progress=lambda done: tell(done, label),
         )  # fmt: skip
-        bar.update(task, description="judging every pair of every frame")
+        tell(len(scene.track), "judging every pair of every frame")
         judged = judge(scene.scene, recording)
     row, frames = loop_rows(scene.name, recording, judged)
     name = f"{scene.name}-{overlap}"

@@ -1,12 +1,11 @@
-"""Viewers of problems, scene and picture of a posture, and the folder for them."""
+"""Viewers of problems, and scene and picture of a posture."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wholebody.base import files
-from wholebody.base.errors import InputError, MissingPackageError
+from wholebody.base.errors import MissingPackageError
 
 if TYPE_CHECKING:
     from wholebody.base.arrays import Array
@@ -14,14 +13,6 @@ if TYPE_CHECKING:
     from wholebody.taskfile.task import View
     from wholebody.view import Viewer
     from wholebody.view.screenshot import Screenshots
-
-
-def make_folder(folder: Path) -> None:
-    """Make a folder, before anything is computed; raises InputError."""
-    try:
-        files.make_folder(folder)
-    except InputError as error:
-        raise InputError(f"--out: {error}") from None
 
 
 def viewer_of(problem: Problem, view: View, title: str, **settings: Any) -> Viewer:

@@ -62,7 +62,7 @@ def _pose(path: Path, method: str | None, out: Path, as_json: bool, screenshots:
 
     chosen = None if method is None else method_named(method)
     task = read_task(path)
-    picture.make_folder(out)
+    files.make_folder(out)
     solution = solve(task.problem, chosen or task.method)
     text = result.as_json(result.describe(task, solution, out))
     files.write(out / "result.json", text)

@@ -13,7 +13,7 @@ from wholebody.cli.command import command, flag, option
     "reach",
     "map the places that a hand or another frame can reach",
     """\
-Find which places of a grid a frame of a task file's figure reaches, with everything that the task file asks except its
+Find which places of a grid a frame of a task file's figure reaches, under all conditions of the task file except its
 goals, and write into a folder:
 
   reach.png    heat maps of all heights, seen from above
@@ -27,7 +27,7 @@ goals, and write into a folder:
     option("--step", default="0.1", metavar="M", help="metres between places, or X,Y,Z (default: 0.1)"),
     option("--jobs", type=int, default=1, metavar="N", help="processes (default: 1)"),
     option("--cluster", metavar="ADDRESS", help="dask scheduler that runs the searches"),
-    flag("--goals", "meet the task's goals too at every place"),
+    flag("--goals", "meet the task's goals at every place too"),
     option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-TASK)"),
     epilog="""\
 examples:
@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Search and write; 1 if no place is reached."""
     from rich.console import Console
 
-    from wholebody.cli.picture import make_folder
+    from wholebody.base.files import make_folder
     from wholebody.studies.reach_map import reach_map
     from wholebody.taskfile import read_task
 

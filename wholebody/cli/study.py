@@ -16,7 +16,7 @@ from wholebody.cli.command import command, flag, option
 Solve the task of a study file for each person, with each target, in each layout, and write into a folder:
 
   cases.csv         one row a case
-  records.sqlite    the same with the postures; a run that was ended goes on from it""",
+  records.sqlite    the same with the postures; an interrupted run continues from it""",
     option("study", type=Path, metavar="FILE.toml", help="the study file"),
     option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-FILE)"),
     option("--jobs", type=int, default=1, metavar="N", help="cases at a time (default: 1)"),
@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Solve, report and write; 1 if a case is not solved."""
     from rich.console import Console
 
-    from wholebody.cli.picture import make_folder
+    from wholebody.base.files import make_folder
     from wholebody.cli.tables import console, table
     from wholebody.studies.study import study
     from wholebody.studies.study_files import read_study

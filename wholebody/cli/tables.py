@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.markup import escape
@@ -14,8 +16,6 @@ from wholebody.taskfile.result import goals_left
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from rich.progress import Progress
 
     from wholebody.assessment.posture import Assessment
     from wholebody.bench.rows import Row
@@ -43,8 +43,12 @@ def console(least: int = 0) -> Console:
     return made
 
 
-def progress_bar(*, counted: bool = True, thread: bool = True) -> Progress:
-    """A bar on the error output that goes when it is done; `thread`: redrawn by one, which a fork must not have."""
+@contextmanager
+def bar(what: str, count: float = 1.0, *, thread: bool = True) -> Iterator[Callable[[float, str], Any]]:
+    """Show on the error output how far something is: the function takes how much of `count` is done, and what it is.
+
+    The bar goes when it is done. A thread redraws it, which a fork must not have.
+    """
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -54,9 +58,12 @@ def progress_bar(*, counted: bool = True, thread: bool = True) -> Progress:
         TimeRemainingColumn,
     )
 
-    numbers = MofNCompleteColumn() if counted else TaskProgressColumn()
+    numbers = TaskProgressColumn() if count == 1.0 else MofNCompleteColumn()
     columns = TextColumn("{task.description}"), BarColumn(), numbers, TimeRemainingColumn()
-    return Progress(*columns, console=Console(stderr=True), transient=True, auto_refresh=thread, refresh_per_second=4)
+    settings: dict[str, Any] = {"transient": True, "auto_refresh": thread, "refresh_per_second": 4}
+    with Progress(*columns, console=Console(stderr=True), **settings) as shown:
+        task = shown.add_task(escape(what), total=count)
+        yield lambda done, said: shown.update(task, completed=done, description=escape(said), refresh=not thread)
 
 
 def table(*columns: str, title: str = "") -> Table:

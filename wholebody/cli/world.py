@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.base.checks import choice
+from wholebody.base.checks import choice, known
 from wholebody.base.errors import InputError
-from wholebody.cli.arguments import check_overlaps, scene_names, scene_options
+from wholebody.cli.arguments import scene_names, scene_options
 from wholebody.cli.command import command, flag, option
 
 if TYPE_CHECKING:
@@ -59,12 +59,13 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.tables import machine, write_text
     from wholebody.cli.tables import print_rows
     from wholebody.dynamics.world import WORLD_SCENES
+    from wholebody.tracking.loop import OVERLAPS
     from wholebody.tracking.overlaps import GIVE_WAY
 
     names = scene_names(arguments, WORLD_SCENES, "world", files=True)
     if not names:
         return 0
-    check_overlaps([arguments.overlap])
+    known(arguments.overlap, OVERLAPS, "way to remove overlap", "--overlap")
     choice(arguments.give_way, GIVE_WAY, "--give-way")
     if arguments.live:
         if len(names) > 1:
@@ -126,15 +127,14 @@ def _run_one(scene: InteractionScene, arguments: argparse.Namespace, facts: dict
     from wholebody.bench.measure.frames import frame_panels, world_rows
     from wholebody.bench.rows import chart
     from wholebody.bench.tables import write_rows
-    from wholebody.cli.tables import progress_bar
+    from wholebody.cli.tables import bar
     from wholebody.dynamics.world import World
     from wholebody.tracking.overlaps import overlaps
 
     name = scene.name
     frames: list[WorldFrame] = []
     pushed: list[tuple[Overlap, ...]] = []
-    with progress_bar() as bar:
-        task = bar.add_task(name, total=len(scene.track))
+    with bar(name, len(scene.track)) as tell:
         world = World(
             scene.scene, scene.track.q[0], dt=scene.track.dt, overlap=arguments.overlap, seed=arguments.seed,
             give_way=arguments.give_way,
@@ -142,7 +142,7 @@ def _run_one(scene: InteractionScene, arguments: argparse.Namespace, facts: dict
         for tracked in scene.track.q:
             frames.append(world.step(tracked))
             pushed.append(overlaps(scene.scene, frames[-1].wanted, arguments.give_way))
-            bar.update(task, completed=len(frames))
+            tell(len(frames), name)
     drawing = _animation(scene, frames, pushed, arguments.out, arguments.picture)
     inside = [sum(one.pairs for one in each) for each in pushed]
     summary, rows = world_rows(name, arguments.overlap, frames, drawing, inside)

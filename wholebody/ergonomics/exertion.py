@@ -49,6 +49,7 @@ class Statics(NamedTuple):
     """
 
     loads: Loads
+    body: range | None  # the person's joints in the model of several figures; None of one alone
     feet: tuple[inputs.Place, ...]  # the soles; none for who sits
     joints: Indices  # (k,) in the tangent, of the joints with published strength
     carriers: Indices  # (k,) their joints in the model
@@ -88,8 +89,9 @@ class Statics(NamedTuple):
             point_rows(state, point, one.joint) for point, one in zip((left, right), self.feet, strict=True)
         )
         height = 0.5 * float(left[2] + right[2])
-        at, d_at = pressure(state, self.loads, None, height)
-        weight = GRAVITY * sum(one.mass for one in list(state.model.inertias)[1:])
+        at, d_at = pressure(state, self.loads, self.body, height)
+        carried = self.body or range(1, state.model.njoints)
+        weight = GRAVITY * sum(state.model.inertias[k].mass for k in carried)
         whole = np.array((0.0, 0.0, weight)) - self.loads.vectors.sum(axis=0)
         d_height = 0.5 * (d_left + d_right)[2]
         d_at += np.outer(whole[:2] / whole[2], d_height)  # of where it presses at another height
@@ -136,23 +138,36 @@ class Statics(NamedTuple):
         return (whole - ROUND) / LEVER - float(force @ unit), moment @ d_moment / (whole * LEVER) - force @ d_unit
 
 
-def statics_of(scene: Surroundings, forces: Sequence[Force], strength: Strength, standing: bool, where: str) -> Statics:
-    """What holds a scene's person under forces; standing, on both soles."""
-    figure = check_person(scene.figure, f"{where}: the scene's figure")
-    lower, upper = strength.limits(figure)
-    legs = set() if standing else set(figure.dofs(["legs"]).tolist())
-    known = np.flatnonzero(np.isfinite(lower) & np.isfinite(upper))
-    joints = np.array([k for k in known.tolist() if k not in legs], dtype=np.intp)
+def statics_of(scene: Surroundings, term: Exertion | StrengthLimit) -> Statics:
+    """What holds a scene's person, or one of several, under forces; standing, on both soles."""
+    where, forces, person, standing = type(term).__name__, term.forces, term.person, term.standing
+    joined, prefix = scene.figure, ""
+    if person:
+        checks.known(person, tuple(joined.members), "figure", f"{where}: person")
+        prefix = f"{person}/"
+    figure = check_person(joined.members[person].figure if person else joined, f"{where}: the scene's figure")
     if "spine1_flexion" not in figure.joints:
         raise InputError(f"{where}: takes a person with a spine; load one with wb.load('human')")
+    body = joined.bodies[prefix] if person else None
     state, loads = State(scene.model), resolved(forces, scene, f"{where}: forces")
+    if others := [one.frame for one in forces if not str(one.frame).startswith(prefix)]:
+        raise InputError(
+            f"{where}: forces act on {checks.some(others)}, which is no part of {person!r}; leave them out"
+        )
+    legs = [figure.joint_id(name) for name in figure.groups["legs"]] if not standing else []
+    pairs = [(figure.model.joints[k].idx_v, scene.model.joints[joined.joint_id(prefix + name)].idx_v)
+             for name in figure.joints if (k := figure.joint_id(name)) not in legs]  # fmt: skip
+    own, there = np.array(pairs, dtype=np.intp).T
+    lower, upper = (limit[own] for limit in term.strength.limits(figure))
+    known = np.isfinite(lower) & np.isfinite(upper)
+    joints = there[known]
     if standing:
-        pressure(state, loads, None, 0.0)  # forces that lift are refused here
+        pressure(state, loads, body, 0.0)  # forces that lift are refused here
     return Statics(
-        loads,
-        tuple(inputs.find_place(scene, foot, where) for foot in FEET) if standing else (),
-        joints, state.column_joint[joints], upper[joints], lower[joints],
-        (figure.joint_id("spine1_flexion"), figure.joint_id("spine2_flexion")),
+        loads, body,
+        tuple(inputs.find_place(scene, prefix + foot, where) for foot in FEET) if standing else (),
+        joints, state.column_joint[joints], upper[known], lower[known],
+        (joined.joint_id(f"{prefix}spine1_flexion"), joined.joint_id(f"{prefix}spine2_flexion")),
     )  # fmt: skip
 
 
@@ -167,6 +182,7 @@ class Exertion(SumOfSquares):
         forces: on the person beside the weight.
         strength: of the person.
         standing: whether both feet carry the person; False for who sits, whose legs do not count.
+        person: whose torques, such as "anna", where the scene has several figures.
         weight: factor on the measure; 10 of it beside `Effort` is as strong as a habit.
 
     Raises:
@@ -181,12 +197,13 @@ class Exertion(SumOfSquares):
     _: KW_ONLY
     strength: StrengthOf = Strength()  # noqa: RUF009
     standing: bool = True
+    person: str = ""
     weight: inputs.Weight = 1.0
     statics: Statics = field(init=False, repr=False)
 
     def resolve(self, scene: Surroundings, start: Array) -> Exertion:
         """Look up the joints and their strength."""
-        return filled(self, statics=statics_of(scene, self.forces, self.strength, self.standing, "Exertion"))
+        return filled(self, statics=statics_of(scene, self))
 
     def curvature(self, state: State) -> Array:
         """(nv,) the diagonal of Gauss and Newton."""
@@ -208,7 +225,7 @@ class StrengthLimit(Constraint):
     Attributes:
         forces: on the person beside the weight.
         strength: of the person.
-        standing: as for `Exertion`.
+        standing, person: as for `Exertion`.
         share: of the strength that may be used.
         compression: greatest of the disc L5/S1 [N]; None for no bound.
 
@@ -224,13 +241,14 @@ class StrengthLimit(Constraint):
     _: KW_ONLY
     strength: StrengthOf = Strength()  # noqa: RUF009
     standing: bool = True
+    person: str = ""
     share: Annotated[float, Range(0.01, 10.0)] = 1.0
     compression: Annotated[float, Range(100.0, 1e5, "N")] | None = MOST
     statics: Statics = field(init=False, repr=False)
 
     def resolve(self, scene: Surroundings, start: Array) -> StrengthLimit:
         """Look up the joints and their strength."""
-        return filled(self, statics=statics_of(scene, self.forces, self.strength, self.standing, "StrengthLimit"))
+        return filled(self, statics=statics_of(scene, self))
 
     def value(self, state: State) -> Array:
         """(m,) what is left."""

@@ -105,3 +105,40 @@ def _bears(heights: Array, run: Window, low: float, dt: float, found: Mask, mark
         return True
     alone = ~(found[run.first : run.end].any(axis=1)) & (marks[run.first : run.end].sum(axis=1) <= 1)
     return bool(alone.sum() * dt > WAITED)
+
+
+class LiveRests:
+    """When points of a stream rest on a level floor, by speed and height as in a recording; no frame is seen twice."""
+
+    def __init__(self, lowest: Array, dt: float, back: int) -> None:
+        """Take the heights (p,) at which the points rest, metres; a rest begins `back` frames ago at most."""
+        self._lowest, self._dt, self._back, self._limits = lowest, dt, back, RestLimits()
+        self._least = max(1, round(self._limits.least / dt))
+        self._places, self._frame = list[Array](), 0
+        self._begun: list[tuple[int, Array, bool] | None] = [None] * len(lowest)  # frame, place, whether slow enough
+        self._rests: Mask = np.zeros(len(lowest), dtype=bool)
+
+    def push(self, places: Array) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+        """Take places (p, 3); rests that begin and that end, each as the number of a point and the frame."""
+        self._places = [*self._places[-2:], places]
+        if len(self._places) < 2:
+            return [], []
+        span, here = self._places[-1] - self._places[0], self._places[-2]
+        speed = np.linalg.norm(span, axis=1) / (self._dt * (len(self._places) - 1))
+        limits, begins, ends = self._limits, list[tuple[int, int]](), list[tuple[int, int]]()
+        low = (speed <= limits.speed) & (here[:, 2] <= self._lowest + limits.height)
+        for number, begun in enumerate(self._begun):
+            slow = bool(speed[number] <= 2.0 / 3.0 * limits.speed)
+            if begun is not None and low[number] and np.linalg.norm(here[number] - begun[1]) <= limits.slid:
+                begun = (begun[0], begun[1], begun[2] or slow)
+                if not self._rests[number] and begun[2] and self._frame - begun[0] + 1 >= self._least:
+                    self._rests[number] = True
+                    begins.append((number, max(begun[0], self._frame - self._back)))
+            else:
+                if self._rests[number]:
+                    self._rests[number] = False
+                    ends.append((number, self._frame))
+                begun = (self._frame, here[number], slow) if low[number] and begun is None else None
+            self._begun[number] = begun
+        self._frame += 1
+        return begins, ends

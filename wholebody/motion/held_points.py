@@ -8,10 +8,9 @@ with it.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-import coal
 import numpy as np
 import pinocchio as pin
 
@@ -21,11 +20,10 @@ from wholebody.geometry.pieces import swept_points
 from wholebody.motion.posture_fit import CLEARANCE
 from wholebody.motion.roles import Roles
 from wholebody.motion.skeleton import SkeletonMotion
-from wholebody.motion.standing_ground import Foothold, Ground
+from wholebody.motion.standing_ground import MOST_FRAMES, Foothold, Ground
 from wholebody.motion.structure import upright
 from wholebody.motion.thing_contacts import ThingContact, Things, thickness
 from wholebody.motion.windows import long_runs, runs
-from wholebody.scene.scene import Scene
 
 STRONG, NEARING, SWING = 800.0, 30.0, 0.3  # weights of what rests, nearly does, and of a sole between; 1 of a bone
 TOUCH = 100.0  # of what touches a thing
@@ -38,6 +36,7 @@ FOLLOW = 0.8  # share of the body's shift that a new place keeps; the rest goes 
 KEPT_OFF = 0.03  # m: largest distance at which a thing keeps a point from its place of contact
 LOST = 0.02  # m: points farther than this from their place on a thing cannot reach it
 OVER = 0.2  # s: in which a point goes over to where it rests
+AHEAD = 0.4  # s before a rest in which it is known: more leads longer swings to it, and postures come out later
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +148,11 @@ class Touched:
         return contact.place + (thickness(pieces, point.place, into) + CLEARANCE) * contact.normal
 
 
+def _meet(rest: Foothold, contact: ThingContact) -> bool:
+    """Whether a part touches a thing while it seems to rest on the ground: then the thing is what it rests on."""
+    return rest.role == contact.role and rest.first < contact.end and contact.first < rest.end
+
+
 class Holds:
     """Where each of `points` is to be in each frame, and with which weight."""
 
@@ -165,13 +169,15 @@ class Holds:
         # `scale` are metres of the figure for each metre of height of the recording's ground; `surface` is the height
         # of the highest surface below a place (3,), None for the recording's ground.
         self.points, self._scale, self._surface, self._touched = points, scale, surface, touched
-        self.over = max(1, round(OVER / dt))
+        self.over, self.ahead = max(1, round(OVER / dt)), max(1, round(AHEAD / dt))
         contacts = () if touched is None else touched.contacts
+        apart = [each for each in ground.footholds if not any(_meet(each, contact) for contact in contacts)]
         self._stands: list[list[Foothold | ThingContact]] = [
-            [each for each in (contacts if point.thing else ground.footholds) if each.role == point.role]
-            for point in points
+            [each for each in (contacts if point.thing else apart) if each.role == point.role] for point in points
         ]
-        self._down: Mask | None = None
+        feet = sorted({point.foot for point in points if point.foot})
+        self._soles = [[k for k, point in enumerate(points) if point.foot == foot] for foot in feet]
+        self._ways: dict[tuple[int, int], Array] = {}  # by point and frame the place of the free fit
         self._places: dict[tuple[int, int], Array] = {}
         self._touching: dict[tuple[int, int], Array] = {}  # in things' axes, before these keep parts off
         self._beside: set[int] = set()  # points that were let go of in the first frame
@@ -216,22 +222,33 @@ class Holds:
         self._places = places if told else self._places  # recompute where feet come down
         return "; ".join(told)
 
+    def rest(self, role: str, frame: int) -> None:
+        """Points of a role rest on the lowest level from a frame on, of a stream."""
+        for point, stands in zip(self.points, self._stands, strict=True):
+            if point.role == role:
+                stands.append(Foothold(role, frame, MOST_FRAMES, np.zeros(3), 0.0))
+
+    def leave(self, role: str, frame: int) -> None:
+        """They rest no more, from a frame on."""
+        for point, stands in zip(self.points, self._stands, strict=True):
+            if point.role == role:
+                stands[-1] = with_values(stands[-1], end=frame)
+
     def moved(self, frame: int) -> Mapping[str, pin.SE3]:
         """Where the things that move are in a frame."""
         return {} if self._touched is None else self._touched.things.moved(frame)
 
-    def begin(self, free: Array) -> None:
-        """Take the postures (n, nq) of the free fit, which say which side of a part touches a thing."""
+    def begin(self, free: Mapping[int, Array]) -> None:
+        """Take the postures (nq,) of the free fit by frame, which say which side of a part touches a thing."""
         self._free = free
 
-    def goals(self, frame: int, paths: Array, shift: Array, again: bool = False) -> tuple[Array, Array]:
-        """Goals (h, 3) and weights (h, 3) of a frame; `paths` (n, h, 3) without holds, `shift` (3,) of the body."""
-        if self._down is None:
-            self._down = self._facing_down(paths)
+    def goals(self, frame: int, paths: Mapping[int, Array], shift: Array, again: bool = False) -> tuple[Array, Array]:
+        """Goals and weights (h, 3) of a frame; `paths` (h, 3) by frame without holds, `shift` (3,) of the body."""
+        down = self._facing_down(paths[frame])
         goals, weights = np.array(paths[frame]), np.zeros((len(self.points), 3))
         for number, stands in enumerate(self._stands):
             after = bisect_right([stand.first for stand in stands], frame)
-            around = stands[max(0, after - 1) : after + 1] if after else stands[:1]
+            around = [each for each in stands[max(0, after - 1) : after + 1] if each.first <= frame + self.ahead]
             if not around:
                 continue
             nearest = [min(max(frame, stand.first), stand.end - 1) for stand in around]
@@ -251,37 +268,42 @@ class Holds:
                 )
             if self.points[number].edge:
                 weights[number, :2] = 0.0
-            if not (self._down[frame, number] or self.points[number].thing):
+            if not (down[number] or self.points[number].thing):
                 weights[number, 2] = 0.0  # contact says how high
         return goals, weights
 
     def _swing(
-        self, number: int, frame: int, nearest: list[int], places: list[Array], paths: Array
+        self, number: int, frame: int, nearest: list[int], places: list[Array], paths: Mapping[int, Array]
     ) -> tuple[Array, float]:
         """Where a point (3,) is to be between rests, and how near in time it is to one, from 0 to 1.
 
         Its way is led from one rest to the next; it comes to rest, and starts, slowly. `nearest` are their frames.
         """
-        beside = [place - paths[near][number] for place, near in zip(places, nearest, strict=True)]
+        for near in nearest:
+            if (number, near) not in self._ways:
+                self._ways[number, near] = np.array(paths[near][number])
+        led = [self._ways[number, near] for near in nearest]
+        beside = [place - start for place, start in zip(places, led, strict=True)]
         gone = 0.0
         if len(nearest) == 2:
-            part = (frame - nearest[0]) / (nearest[1] - nearest[0])
+            start = max(nearest[0], nearest[1] - self.ahead)
+            part = max(frame - start, 0) / (nearest[1] - start)
             gone = part * part * (3.0 - 2.0 * part)
         way = paths[frame][number]
         goal, most = way + (1.0 - gone) * beside[0] + gone * beside[-1], 0.0
-        for near in nearest:
+        for near, start_of in zip(nearest, led, strict=True):
             share = 0.5 + 0.5 * np.cos(np.pi * min(abs(frame - near) / self.over, 1.0))
-            goal, most = goal - share * (way - paths[near][number]), max(most, share)
+            goal, most = goal - share * (way - start_of), max(most, share)
         return goal, most
 
-    def _facing_down(self, paths: Array) -> Mask:
-        """(n, h) in which frames a point is of a sole that faces the ground."""
-        found = np.zeros(paths.shape[:2], dtype=bool)
-        for foot in {point.foot for point in self.points if point.foot}:
-            own = [k for k, point in enumerate(self.points) if point.foot == foot]
-            back, left, right, front = own[:4]
-            up = np.cross(paths[:, front] - paths[:, back], paths[:, left] - paths[:, right])
-            found[:, own] = (up[:, 2] > FACING * np.linalg.norm(up, axis=1))[:, None]
+    def _facing_down(self, places: Array) -> Mask:
+        """(h,) whether a point, at places (h, 3), is of a sole that faces the ground."""
+        found = np.zeros(len(places), dtype=bool)
+        for own in self._soles:
+            back, left, right, front = places[own[:4]]
+            (x, y, z), (u, v, w) = (front - back).tolist(), (left - right).tolist()
+            up = x * v - y * u  # of the normal, the cross product of both
+            found[own] = up > FACING * ((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + up**2) ** 0.5
         return found
 
     def landed(self, frame: int, places: Array) -> None:
@@ -309,7 +331,9 @@ class Holds:
         off = float(stand.normal @ (at.actInv(place) - own))  # beside the place that is touched nothing moves
         return np.asarray(own + min(max(off, 0.0), KEPT_OFF) * stand.normal)
 
-    def _place(self, number: int, stand: Foothold | ThingContact, paths: Array, shift: Array, frame: int) -> Array:
+    def _place(
+        self, number: int, stand: Foothold | ThingContact, paths: Mapping[int, Array], shift: Array, frame: int
+    ) -> Array:
         """(3,) where a point rests, decided when it is first asked for; on a thing, where that is in the frame."""
         known = self._places.get((number, stand.first))
         if isinstance(stand, ThingContact):
@@ -355,34 +379,3 @@ class Holds:
         told = self._scale * stand.height
         below = None if self._surface is None else self._surface(np.array([place[0], place[1], told + STEP]))
         return CLEARANCE + (told if below is None else below)
-
-
-def surface_of(scene: Scene, moving: Collection[str]) -> Callable[[Array], float | None]:
-    """The height of the first surface of a scene's things below a place (3,), metres; None for none within 2 m.
-
-    Things that are moving are left out.
-    """
-    owners, geometry = scene.piece_owner, scene.geometry
-    still = [
-        (piece.geometry, coal.Transform3s(piece.placement.rotation, piece.placement.translation))
-        for piece, owner in zip(geometry.geometryObjects, owners, strict=True)
-        if owner in scene.objects and scene.objects[owner].segment is None and owner not in moving
-    ]
-    ball, request, result = coal.Sphere(1e-4), coal.DistanceRequest(), coal.DistanceResult()
-
-    def height(place: Array) -> float | None:
-        at = np.array(place)
-        for _ in range(100):  # goes down by the least distance, so it passes nothing
-            center = coal.Transform3s(np.eye(3), at)
-            gap = min(
-                (float(coal.distance(ball, center, shape, where, request, result)) for shape, where in still),
-                default=np.inf,
-            )
-            if gap < 1e-5:
-                return float(at[2] - 1e-4)
-            at[2] -= gap
-            if not at[2] > place[2] - 2.0:
-                break
-        return None
-
-    return height

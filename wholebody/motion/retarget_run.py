@@ -1,23 +1,25 @@
 """Retargeting frame by frame: a free fit that follows the skeleton alone, then postures that hold what rests.
 
-The postures follow the free fit by a deviation d. A first pass goes forward in time, each frame from the deviation of
-the one before. Then sweeps go over all frames: each is solved anew between its neighbours, whose deviations say where
-the acceleration of d is least (block coordinate descent on the sum of all frames' costs and of |w d''|^2),
+Frames pass a row of stages. Each stage looks ahead by some frames of the stage before, so that the same postures come
+out of a recording and of a stream. The postures follow the free fit by a deviation d. A first pass goes forward in
+time, each frame from the deviation of the one before. Sweeps follow, each two frames behind the one before: a frame is
+solved anew between its neighbours, whose deviations say where the acceleration of d is least (block coordinate descent
+on the sum of all frames' costs and of |w d''|^2),
 
     d_k* = (4 (d_{k-1} + d_{k+1}) - (d_{k-2} + d_{k+2})) / 6
 
-so that the body begins to give way before a contact comes. No frame looks farther than half a second.
+so that the body begins to give way before a contact comes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from scipy.linalg import solveh_banded
 
-from wholebody.base.arrays import Array, with_values
+from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.figures.figure import Figure
 from wholebody.motion.held_points import HeldPoint, Holds
 from wholebody.motion.posture_fit import Fitter, Goals, Layout
@@ -28,169 +30,247 @@ from wholebody.scene.workspace import Workspace
 
 FIRST, FREE, PASS, SWEEP = 60, 2, 3, 1  # most steps of a first frame, a free one, one of the first pass, one of a sweep
 EVERY, WORTH = 10, 0.8  # frames after which a free posture is sought anew, and the share of the cost that it is for
+SLOWING = 8  # frames before it would be too fast in which a joint begins to move
+JUMP = 0.5  # rad, m: postures of neighbouring frames that are farther apart were found otherwise
 STARTS = 4  # how often the first frame is solved, each time from where soles came down beside each other
 SWEEPS = 6  # more: less jerk, and slower by a tenth each
 ANCHOR = 0.3  # weight of the place of the hips; 1 is that of a bone
 STAY = 0.03  # m/rad from the neutral posture, for what no goal determines
 CHANGE = 0.3  # weight of a change of the deviation in the first pass, in metres that limbs move
-BEND = 0.5  # s, weight of an acceleration of the deviation in sweeps, over the time step
+BEND = 2.0  # s, weight of an acceleration of the deviation in sweeps, over the time step
 GOES_ON, RETURN = 0.9, 0.3  # share of the last change that goes on; s in which a deviation that nothing needs goes back
-CALM, SPREAD = 0.03, 0.04  # s over which the free fit and the deviation of the first pass are smoothed
+CALM, SPREAD = 0.025, 0.06  # s over which the free fit and the deviation of the first pass are smoothed
 LEAST_LEVER = 0.1  # m
+KEPT = 30  # frames before the last one that stay known, for what looks back
 SPARE = 0.9  # share of the speed limits that the free fit takes, so that there is some for what deviates from it
 BONES = {"hand": 0.5, "toe": 0.7, "head": 0.7}  # weights of bones by their far ends, where it is not 1
 TURNS = {"pelvis": 0.3, "head": 0.15, "ankle": 0.15, "hand": 0.08}  # m/rad, weights of angles
 
 
-class Run:
-    """Postures of all frames of one skeleton.
+class Wanted(NamedTuple):
+    """Goals of one frame."""
 
-    Attributes:
-        lost: what does not reach the things that it is to touch, for a message; empty where all do.
-    """
+    places: Array  # (p, 3) of the points, metres
+    turns: Array  # (t, 3, 3) orientations
+    root: Array  # (3, 3) of the pelvis, from which a descent begins
+
+
+def wanted_of(targets: Targets, roles: Roles) -> list[Wanted]:
+    """Goals frame by frame, of what the figure has."""
+    points, turns = parts_of(targets, roles)
+    places = np.stack([targets.points[role] for role in points], axis=1)
+    rotations = np.stack([targets.turns[role] for role in turns], axis=1) if turns else np.zeros((len(places), 0, 3, 3))
+    return [Wanted(*each) for each in zip(places, rotations, targets.root, strict=True)]
+
+
+def parts_of(targets: Targets, roles: Roles) -> tuple[list[str], list[str]]:
+    """Roles of the points, and of the orientations, that skeleton and figure have."""
+    return [role for role in targets.points if role in roles.frames], [
+        role for role in targets.turns if role in roles.frames
+    ]
+
+
+class Run:
+    """Postures of the frames of one skeleton, as these come."""
 
     def __init__(
-        self, figure: Figure, wanted: Targets, roles: Roles, dt: float, holds: Holds | None, workspace: Workspace
+        self, figure: Figure, targets: Targets, roles: Roles, dt: float, holds: Holds | None, workspace: Workspace
     ) -> None:
-        """Set up; without holds the skeleton alone is followed, and nothing is free."""
-        self.lost = ""
+        """Set up for goals like `targets`; without holds the skeleton alone is followed, and nothing is free."""
         self.figure, self.model, self.dt, self.holds = figure, figure.model, dt, holds
-        points = [role for role in wanted.points if role in roles.frames]
-        turns = [role for role in wanted.turns if role in roles.frames]
+        points, turns = parts_of(targets, roles)
         self.fitter = Fitter(figure, _layout(points, turns, roles, figure, holds.points if holds else []), workspace)
-        self.places = np.stack([wanted.points[role] for role in points], axis=1)
         self.hips = [k for k, role in enumerate(points) if role.endswith("hip")] or [0]
-        self.count = len(self.places)
-        self.turns = (
-            np.stack([wanted.turns[role] for role in turns], axis=1) if turns else np.zeros((self.count, 0, 3, 3))
-        )
-        self.root, self.led = wanted.root, figure.root == "free" and has_trunk(roles.joints)
+        self.led = figure.root == "free" and has_trunk(roles.joints)
         self.upright = upright(figure)
         self.stay = STAY * figure.neutral_weights
         if figure.root == "free" and not self.led:
             self.stay[:6] = 1.0  # nothing says where the figure is, so it stays
         limit = np.array(self.model.velocityLimit, dtype=float)
         self.most = np.where(limit > 0.0, np.minimum(limit, 1e9) * dt, np.inf)
+        self.slow, self.slow_most = _limited(self.model, SPARE * self.most)
         self.levers = levers(figure)
         self.none = (np.zeros((len(self.fitter.layout.held), 3)),) * 2
+        self.calm, self.spread = (normal(time, dt) for time in (CALM, SPREAD))
+        # by frames: goals, free postures with their costs, those within speed limits, the free fit, where it has the
+        # points that may be held, deviations of the first pass, postures and deviations of the sweeps
+        self._wanted, self._chain = dict[int, Wanted](), dict[int, tuple[Array, float]]()
+        self._slow, self._free, self._paths = (dict[int, Array]() for _ in range(3))
+        self._first, self._found, self._deviation = (dict[int, Array]() for _ in range(3))
+        self._backward = dict[int, tuple[Array, float]]()
+        self._came, self.ended = 0, False
+        self._front, self._latest = np.zeros(0), (np.zeros(self.model.nv), np.zeros(self.model.nv))
+        self._stages: list[tuple[Callable[[int], None], int]] = [
+            (self._fit, 0), (self._slowed, EVERY + SLOWING), (self._calmed, len(self.calm) // 2)
+        ]  # fmt: skip
+        if holds is None:
+            self._stages.append((self._alone, 0))
+        else:
+            self._stages += [
+                (self._passed, holds.ahead + holds.over),
+                (self._spread, max(len(self.spread) // 2, holds.ahead)),
+                *[(self._swept, 2)] * SWEEPS,
+            ]
+            holds.begin(self._free)
+        self._done = [0] * len(self._stages)  # frames that each stage has passed
 
-    def run(self, tell: Callable[[float], object] | None) -> Array:
-        """Postures (n, nq)."""
-        done = _Progress(tell, self.count * (2 if self.holds is None else 3 + SWEEPS))
-        free = self._chosen([self._chain(range(self.count), done), self._chain(range(self.count)[::-1], done)])
-        free = self._calmed(free)
-        if self.holds is None:
-            return np.array([self._within(k, q) for k, q in enumerate(free)])
-        paths = np.array([self.fitter.held(q) for q in free])
-        self.holds.begin(free)
-        found = self._passed(free, paths, self.holds, done)
-        self.lost = self.holds.give_up()
-        if self.lost:
-            found = self._passed(free, paths, self.holds, done)
-        deviation = np.array([pin.difference(self.model, *pair) for pair in zip(free, found, strict=True)])
-        deviation = smoothed(deviation, self.dt, SPREAD)
-        found = np.array(
-            [self.figure.clamp(pin.integrate(self.model, *pair)) for pair in zip(free, deviation, strict=True)]
-        )
-        for _ in range(SWEEPS):
-            for k in range(self.count):
-                near = deviation[np.clip(np.arange(k - 2, k + 3), 0, self.count - 1)]
-                wanted = (4.0 * (near[1] + near[3]) - (near[0] + near[4])) / 6.0
-                found[k] = self._swept(k, np.asarray(pin.integrate(self.model, free[k], wanted)), found, paths)
-                deviation[k] = pin.difference(self.model, free[k], found[k])
-                done.one()
+    @property
+    def ahead(self) -> int:
+        """By how many frames it looks ahead: so much later a posture comes out."""
+        return sum(wait for _, wait in self._stages)
+
+    def push(self, wanted: Wanted) -> list[Array]:
+        """Take the goals of the next frame; the postures (nq,) that are known now, in their order."""
+        self._wanted[self._came] = wanted
+        self._came += 1
+        return self._advanced()
+
+    def led_by(self, frames: list[Wanted]) -> None:
+        """Know frames before they come: fitted backward in time too, these may have better postures."""
+        following: tuple[Array, float] | None = None
+        for k in range(len(frames) - 1, -1, -1):
+            self._wanted[k] = frames[k]
+            following = self._fitted(k, following and following[0], (len(frames) - 1 - k) % EVERY == 0)
+            self._backward[k] = following
+
+    def finish(self) -> list[Array]:
+        """The postures (nq,) of the last frames."""
+        self.ended = True
+        return self._advanced()
+
+    def _advanced(self) -> list[Array]:
+        """Let every stage do the frames whose later ones have come."""
+        given, come = self._done[-1], self._came
+        for number, (stage, wait) in enumerate(self._stages):
+            for frame in range(self._done[number], come if self.ended else come - wait):
+                stage(frame)
+                self._done[number] = frame + 1
+            come = self._done[number]
+        found = [self._found[frame] for frame in range(given, come)]
+        for values in (self._slow, self._free, self._paths, self._first, self._found, self._deviation):
+            for frame in range(given - KEPT, come - KEPT):
+                values.pop(frame, None)
+        for frame in range(given - KEPT, come - KEPT):
+            self._wanted.pop(frame, None)
+            self._chain.pop(frame, None)
         return found
 
     def _goals(self, frame: int, posture: Array, weights: Array, held: tuple[Array, Array] | None = None) -> Goals:
-        return Goals(self.places[frame], self.turns[frame], *(held or self.none), posture, weights)
+        wanted = self._wanted[frame]
+        return Goals(wanted.places, wanted.turns, *(held or self.none), posture, weights)
 
-    def _chain(self, order: range, done: _Progress) -> list[tuple[Array, float]]:
-        """Free postures and their costs, each from the one before in an order, or now and then from upright."""
-        found: list[tuple[Array, float]] = [(self.upright, np.inf)] * self.count
-        last: Array | None = None
-        for number, k in enumerate(order):
-            goals = self._goals(k, self.upright, self.stay)
-            best = (self.upright, np.inf) if last is None else self.fitter.descend(last, goals, FREE)
-            if number % EVERY == 0:
-                q = np.array(self.upright)
-                if self.led:
-                    q[:7] = pin.SE3ToXYZQUAT(pin.SE3(self.root[k], self.places[k, self.hips].mean(axis=0)))
-                alone = self.fitter.descend(q, goals, FIRST)
-                best = alone if alone[1] < WORTH * best[1] else best
-            found[k], last = best, best[0]
-            done.one()
-        return found
+    def _fitted(self, k: int, near: Array | None, anew: bool) -> tuple[Array, float]:
+        """The free posture of a frame and its cost, from a posture near to it, or anew if that is better."""
+        goals = self._goals(k, self.upright, self.stay)
+        best = (self.upright, np.inf) if near is None else self.fitter.descend(near, goals, FREE)
+        if not anew:
+            return best
+        q = np.array(self.upright)
+        if self.led:
+            hips = self._wanted[k].places[self.hips].mean(axis=0)
+            q[:7] = pin.SE3ToXYZQUAT(pin.SE3(self._wanted[k].root, hips))
+        alone = self.fitter.descend(q, goals, FIRST)
+        return alone if alone[1] < WORTH * best[1] else best
 
-    def _chosen(self, chains: list[list[tuple[Array, float]]]) -> Array:
-        """The postures (n, nq) of least cost and least difference between neighbours, by dynamic programming."""
-        kinds, came = range(len(chains)), np.zeros((self.count, len(chains)), dtype=int)
-        best = np.array([chain[0][1] for chain in chains])
-        for k in range(1, self.count):
-            # beside the costs of both frames, 0.05 m² for a difference of one radian between them
-            jump = np.array([[self._apart(one[k - 1][0], other[k][0]) for other in chains] for one in chains])
-            through = best[:, None] + 0.05 * jump
-            came[k] = through.argmin(axis=0)
-            best = through.min(axis=0) + [chain[k][1] for chain in chains]
-        kind, chosen = int(min(kinds, key=lambda each: best[each])), np.empty((self.count, self.model.nq))
-        for k in range(self.count - 1, -1, -1):
-            chosen[k] = chains[kind][k][0]
-            kind = int(came[k, kind])
-        return chosen
+    def _fit(self, k: int) -> None:
+        """The free posture of a frame, from that before; the frames before follow one that was found otherwise."""
+        near = self._chain[k - 1][0] if k else None
+        best = self._fitted(k, near, k % EVERY == 0)
+        other = self._backward.pop(k, None)
+        if other is not None and other[1] < WORTH * best[1]:
+            best = other
+        self._chain[k] = best
+        if near is not None and float(np.abs(pin.difference(self.model, near, best[0])).max()) > JUMP:
+            self._led_back(k)
 
-    def _apart(self, one: Array, other: Array) -> float:
-        way = pin.difference(self.model, one, other)
-        return float(way @ way)
+    def _led_back(self, k: int) -> None:
+        """Follow a better posture of a frame backward; the frames before take it over where it costs least."""
+        first, back = max(0, k - EVERY), {k: self._chain[k]}
+        for j in range(k - 1, first - 1, -1):
+            back[j] = self.fitter.descend(back[j + 1][0], self._goals(j, self.upright, self.stay), FREE)
+        least, start = (sum(each[1] for each in back.values()), 0) if first == 0 else (np.inf, k)
+        for j in range(first + 1, k + 1):
+            # beside the costs of both, 0.05 m² for a difference of one radian between neighbours
+            way = pin.difference(self.model, self._chain[j - 1][0], back[j][0])
+            costs = [self._chain[i][1] if i < j else back[i][1] for i in range(first, k + 1)]
+            total = sum(costs) + 0.05 * float(way @ way)
+            if total < least:
+                least, start = total, j
+        self._chain |= {j: back[j] for j in range(start, k + 1)}
 
-    def _within(self, frame: int, q: Array) -> Array:
+    def _slowed(self, k: int) -> None:
+        """The free posture within speed limits: the middle between what keeps to them forward and backward in time."""
+        q = np.array(self._chain[k][0])
+        for joint in self.model.joints[1:] if k else ():
+            if joint.nq not in (joint.nv, 2):  # a quaternion may have either sign
+                turned = slice(joint.idx_q + joint.nq - 4, joint.idx_q + joint.nq)
+                q[turned] *= 1.0 if q[turned] @ self._slow[k - 1][turned] >= 0.0 else -1.0
+        if len(self.slow):
+            values, most = self.slow, self.slow_most
+            here = q[values]
+            self._front = np.clip(here, self._front - most, self._front + most) if k else here
+            last = min(k + SLOWING, self._came - 1)
+            back = self._chain[last][0][values]
+            for j in range(last - 1, k - 1, -1):
+                back = np.clip(self._chain[j][0][values], back - most, back + most)
+            q[values] = 0.5 * (self._front + back)
+        self._slow[k] = q
+
+    def _calmed(self, k: int) -> None:
+        """The free fit, without the noise of limits and of what no goal determines."""
+        q = self.figure.clamp(pin.normalize(self.model, self._mean(self._slow, k, self.calm)))
+        self._free[k], self._paths[k] = q, self.fitter.held(q)
+
+    def _mean(self, values: dict[int, Array], k: int, weights: Array) -> Array:
+        """The value at a frame of the line that is nearest to those about it: inside, their mean.
+
+        With positive weights a mean is within the limits that the values are within, and changes no faster: nothing is
+        cut off afterwards, which would leave corners.
+        """
+        half, last = len(weights) // 2, self._came - 1
+        away = np.arange(max(-half, -k), (min(half, last - k) if self.ended else half) + 1)
+        near = weights[away + half]
+        sums = near.sum(), near @ away, near @ away**2  # beside an end the line leans
+        size = sums[0] * sums[2] - sums[1] ** 2
+        near = near * (sums[2] - sums[1] * away) / size if size > 0.0 else near / sums[0]
+        return np.asarray(near @ np.array([values[k + j] for j in away.tolist()]))
+
+    def _alone(self, k: int) -> None:
         """The posture within reach cones."""
-        goals = self._goals(frame, q, self.levers)
+        q = self._free[k]
+        goals = self._goals(k, q, self.levers)
         for _ in range(8):
             if not self.fitter.outside(q):
                 break
             q = self.fitter.step(q, goals, among=False)
-        return q
+        self._found[k] = q
 
-    def _calmed(self, q: Array) -> Array:
-        """The postures (n, nq) with the noise of limits, and of what no goal determines, smoothed out."""
-        found = np.array(q)
-        for joint in self.model.joints[1:]:
-            if joint.nq != joint.nv:  # a quaternion, or a point of a circle, may have either sign
-                turned = slice(joint.idx_q + (3 if joint.nq == 7 else 0), joint.idx_q + joint.nq)
-                signs = np.sign((found[1:, turned] * found[:-1, turned]).sum(axis=1))
-                if joint.nq != 2:
-                    found[1:, turned] *= np.cumprod(signs)[:, None]
-        found = smoothed(found, self.dt, CALM)
-        for joint in self.model.joints[1:]:
-            if joint.nq == joint.nv and np.isfinite(self.most[joint.idx_v : joint.idx_v + joint.nv]).all():
-                values = slice(joint.idx_q, joint.idx_q + joint.nq)
-                found[:, values] = slowed(found[:, values], SPARE * self.most[joint.idx_v : joint.idx_v + joint.nv])
-        return np.array([self.figure.clamp(pin.normalize(self.model, each)) for each in found])
+    def _passed(self, k: int) -> None:
+        """The posture of the first pass; it decides where points come down."""
+        assert self.holds is not None
+        model, free, holds = self.model, self._free[k], self.holds
+        deviation, change = self._latest
+        expected = (1.0 - min(self.dt / RETURN, 0.5)) * (deviation + GOES_ON * change)
+        reference = np.asarray(pin.integrate(model, free, expected))
+        shift = deviation[:3] if self.figure.root == "free" else np.zeros(3)
+        shift = pin.XYZQUATToSE3(free[:7]).rotation @ shift if self.figure.root == "free" else shift
+        before = np.asarray(pin.integrate(model, self._free[k - 1], self._first[k - 1])) if k else None
+        self.fitter.see(holds.moved(k))
+        q = self._reached(before, reference)
+        for _ in range(1 if k else STARTS):
+            held = holds.goals(k, self._paths, shift)
+            goals = self._goals(k, reference, CHANGE * self.levers, held)
+            q = self._settled(q, goals, before)
+            if holds.lost(k, self.fitter.held(q), held):
+                q = self._settled(self._reached(before, reference), goals, before)
+            holds.landed(k, self.fitter.held(q))
+        self._first[k] = np.asarray(pin.difference(model, free, q))
+        self._latest = self._first[k], self._first[k] - deviation if k else change
 
-    def _passed(self, free: Array, paths: Array, holds: Holds, done: _Progress) -> Array:
-        """Postures (n, nq) of the first pass; it decides where points come down."""
-        model, found = self.model, np.empty_like(free)
-        deviation, change = np.zeros(model.nv), np.zeros(model.nv)
-        for k in range(self.count):
-            expected = (1.0 - min(self.dt / RETURN, 0.5)) * (deviation + GOES_ON * change)
-            reference = np.asarray(pin.integrate(model, free[k], expected))
-            shift = deviation[:3] if self.figure.root == "free" else np.zeros(3)
-            shift = pin.XYZQUATToSE3(free[k, :7]).rotation @ shift if self.figure.root == "free" else shift
-            before = found[k - 1] if k else None
-            self.fitter.see(holds.moved(k))
-            found[k] = self._reached(before, reference)
-            for _ in range(1 if k else STARTS):
-                held = holds.goals(k, paths, shift)
-                goals = self._goals(k, reference, CHANGE * self.levers, held)
-                found[k] = self._settled(found[k], goals, before)
-                if holds.lost(k, self.fitter.held(found[k]), held):
-                    found[k] = self._settled(self._reached(before, reference), goals, before)
-                holds.landed(k, self.fitter.held(found[k]))
-            q = found[k]
-            latest = np.asarray(pin.difference(model, free[k], q))
-            change = latest - deviation if k else change
-            deviation = latest
-            done.one()
-        return found
+    def _spread(self, k: int) -> None:
+        """The posture from which the sweeps begin."""
+        self._deviation[k] = self._mean(self._first, k, self.spread)
+        self._found[k] = self.figure.clamp(pin.integrate(self.model, self._free[k], self._deviation[k]))
 
     def _settled(self, q: Array, goals: Goals, before: Array | None) -> Array:
         """The posture (nq,) after the steps of a frame of the first pass."""
@@ -204,19 +284,23 @@ class Run:
                 break
         return q
 
-    def _swept(self, frame: int, reference: Array, found: Array, paths: Array) -> Array:
-        """The posture (nq,) between its neighbours."""
+    def _swept(self, k: int) -> None:
+        """The posture between its neighbours."""
         assert self.holds is not None
-        self.fitter.see(self.holds.moved(frame))
-        held = self.holds.goals(frame, paths, np.zeros(3), again=True)
-        goals = self._goals(frame, reference, BEND / self.dt * self.levers, held)
-        before = found[frame - 1] if frame else None
+        last = self._came - 1
+        near = [self._deviation[min(max(j, 0), last)] for j in range(k - 2, k + 3)]
+        wanted = (4.0 * (near[1] + near[3]) - (near[0] + near[4])) / 6.0
+        reference = np.asarray(pin.integrate(self.model, self._free[k], wanted))
+        self.fitter.see(self.holds.moved(k))
+        held = self.holds.goals(k, self._paths, np.zeros(3), again=True)
+        goals = self._goals(k, reference, BEND / self.dt * self.levers, held)
+        before = self._found[k - 1] if k else None
         q = self._reached(before, reference)
         for number in range(8 * SWEEP):  # more than the usual where cones, or contacts, are curved
             if number >= SWEEP and not (self.fitter.outside(q) or self.fitter.overlaps(q)):
                 break
             q = self.fitter.step(q, goals, most=self._room(q, before))
-        return q
+        self._found[k], self._deviation[k] = q, np.asarray(pin.difference(self.model, self._free[k], q))
 
     def _room(self, q: Array, before: Array | None) -> Array | None:
         """Least and greatest displacement (2, nv) of q that joints reach from the posture before in time."""
@@ -233,18 +317,6 @@ class Run:
         if (np.abs(way) <= self.most).all():
             return q
         return self.figure.clamp(pin.integrate(self.model, before, np.clip(way, -self.most, self.most)))
-
-
-class _Progress:
-    """Tells the caller now and then which share of the frames of all passes is done."""
-
-    def __init__(self, tell: Callable[[float], object] | None, total: int) -> None:
-        self._tell, self._total, self._done = tell, total, 0
-
-    def one(self) -> None:
-        self._done += 1
-        if self._tell is not None and (self._done % 20 == 0 or self._done == self._total):
-            self._tell(self._done / self._total)
 
 
 def _layout(points: list[str], turns: list[str], roles: Roles, figure: Figure, held: list[HeldPoint]) -> Layout:
@@ -276,40 +348,18 @@ def _layout(points: list[str], turns: list[str], roles: Roles, figure: Figure, h
     )  # fmt: skip
 
 
-def smoothed(values: Array, dt: float, time: float) -> Array:
-    """Values (n, m) of least squared changes and accelerations over a time [s] (Whittaker 1923, graduation)."""
-    count, weight = len(values), (time / dt) ** 4
-    if count < 3:
-        return values
-    band = np.zeros((3, count))  # row d has the entries (i + d, i), as scipy's lower form
-    factors = (1.0, -2.0, 1.0)
-    for first, factor in enumerate(factors):
-        for second in range(first, 3):
-            band[second - first, first : count - 2 + first] += weight * factor * factors[second]
-    band[0] += 1.0
-    return np.asarray(solveh_banded(band, values, lower=True))
+def _limited(model: pin.Model, most: Array) -> tuple[Indices, Array]:
+    """Where a posture has the joints of one value that have a speed limit, and by how much they move in a frame."""
+    joints = [joint for joint in model.joints[1:] if joint.nq == joint.nv and joint.nq == 1]
+    kept = [(joint.idx_q, most[joint.idx_v]) for joint in joints if np.isfinite(most[joint.idx_v])]
+    return np.array([place for place, _ in kept], dtype=np.intp), np.array([speed for _, speed in kept])
 
 
-def slowed(values: Array, most: Array) -> Array:
-    """Values (n, m) nearest to given ones that change by at most `most` (m,) from row to row, but for rounding."""
-    # ADMM: Boyd and others, Foundations and Trends in Machine Learning 3(1), 2011.
-    changes = np.diff(values, axis=0)
-    if not (np.abs(changes) > most).any():
-        return values
-    weight, count = 10.0, len(values)
-    band = np.zeros((2, count))
-    band[0] = 1.0 + weight * np.array([1.0, *[2.0] * (count - 2), 1.0])
-    band[1, :-1] = -weight
-    kept, dual, found = np.clip(changes, -most, most), np.zeros_like(changes), values
-    for _ in range(100):
-        pull = weight * (kept - dual)
-        found = solveh_banded(
-            band, values + np.pad(pull, ((1, 0), (0, 0))) - np.pad(pull, ((0, 1), (0, 0))), lower=True
-        )
-        changes = np.diff(found, axis=0)
-        kept = np.clip(changes + dual, -most, most)
-        dual += changes - kept
-    return np.asarray(found)
+def normal(time: float, dt: float) -> Array:
+    """Weights of a normal distribution over frames, its standard deviation `time` [s]; their sum is 1."""
+    half = max(1, int(np.ceil(3.0 * time / dt)))
+    weights = np.exp(-0.5 * (np.arange(-half, half + 1) * dt / time) ** 2)
+    return np.asarray(weights / weights.sum())
 
 
 def levers(figure: Figure) -> Array:

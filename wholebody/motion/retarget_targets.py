@@ -37,14 +37,14 @@ class Targets(NamedTuple):
     points: dict[str, Array]  # role to (n, 3), metres in the figure's world
     turns: dict[str, Array]  # role to (n, 3, 3): orientations of the figure's frames
     root: Array  # (n, 3, 3) orientation of the pelvis, from which the descent begins
-    path: float  # metres of the figure for each metre of the skeleton's way over the ground
 
 
 class _Body:
     """Places of roles, of the figure in its neutral posture or of the skeleton in all frames; (..., 3)."""
 
-    def __init__(self, places: dict[str, Array]) -> None:
-        self.places = dict(places)
+    def __init__(self, places: dict[str, Array], like: _Body | None = None) -> None:
+        self.places, self._like = dict(places), like  # `like` has the lengths
+        self._lengths = dict[tuple[str, str], float]()
         for part in ("hip", "shoulder"):
             if {f"left_{part}", f"right_{part}"} <= places.keys():
                 self.places[f"{part}s"] = 0.5 * (places[f"left_{part}"] + places[f"right_{part}"])
@@ -59,7 +59,12 @@ class _Body:
 
     def length(self, first: str, second: str) -> float:
         """Length of a bone; of a trunk, which bends, that of its straightest frames."""
-        return float(np.percentile(np.linalg.norm(self.way(first, second), axis=-1), 95))
+        if self._like is not None:
+            return self._like.length(first, second)
+        if (first, second) not in self._lengths:
+            lengths = np.linalg.norm(self.way(first, second), axis=-1)
+            self._lengths[first, second] = float(np.percentile(lengths, 95))
+        return self._lengths[first, second]
 
 
 def standing_places(figure: Figure, roles: Roles) -> tuple[dict[str, Array], dict[str, Array], float]:
@@ -102,36 +107,52 @@ def rest_axes(motion: SkeletonMotion, roles: Roles) -> Array | None:
     return np.stack([np.cross(left, up), left, up], axis=1)
 
 
-def targets(motion: SkeletonMotion, figure: Figure, roles: Roles, ground: Ground, path: float | None) -> Targets:
-    """Goals of all frames; `path`: metres of the figure a metre of the way and heights, None as its legs."""
-    places, turned, lowest = standing_places(figure, roles)
-    own = _Body(places)
-    joint = {role: motion.names.index(name) for role, name in roles.joints.items()}
-    centres = {role: motion.positions[:, k] for role, k in joint.items()}
-    source = _Body(centres | soled(motion, roles, ground.rests, places))
-    turns = _turns(motion, joint, own, turned, rest_axes(motion, roles))
-    root, scale = turns.get("pelvis", _pelvis(source, motion)), 1.0
-    if figure.root == "fixed":  # only what moves relative to the pelvis can be followed
-        back = np.swapaxes(root, 1, 2)
-        source = _Body(
-            {role: (back @ (at - source.places["hips"])[:, :, None])[:, :, 0] for role, at in source.places.items()}
-        )
-        turns = {role: back @ turn for role, turn in turns.items() if role != "pelvis"}
-        hips = np.tile(own.places.get("hips", np.zeros(3)), (len(motion), 1))
-    else:
-        scale = _leg(own) / max(_leg(source), SMALL) if _leg(own) and _leg(source) else 1.0
-        path = scale if path is None else path
-        under = ground.below(len(motion))
-        hips = np.array([path, path, scale]) * source.places["hips"]
-        hips[:, 2] += (path - scale) * under
+class Proportions:
+    """What a recording says once and for all: lengths of bones, how feet are soled, heights, the scale of a figure.
+
+    Attributes:
+        path: metres of the figure for each metre of the skeleton's way over the ground.
+    """
+
+    def __init__(
+        self, motion: SkeletonMotion, figure: Figure, roles: Roles, ground: Ground, path: float | None = None
+    ) -> None:
+        """Measure a recording; `path`: metres of the figure a metre of the way and heights, None as its legs."""
+        places, self._turned, lowest = standing_places(figure, roles)
+        self._own, self._axes, self._fixed = _Body(places), rest_axes(motion, roles), figure.root == "fixed"
+        self._joint = {role: motion.names.index(name) for role, name in roles.joints.items()}
+        self._soles = soles(motion, roles, ground.rests, places)
+        own = self._own
+        self._source = source = _Body(self._centres(motion))
+        self._scale = _leg(own) / max(_leg(source), SMALL) if _leg(own) and _leg(source) else 1.0
+        self.path = 1.0 if self._fixed else self._scale if path is None else path
         lows = ground.lowest
         foot = next((part for part in ("left_ankle", "left_toe") if part in lows and own.has(part)), None)
         if foot is not None:
-            hips[:, 2] += own.places[foot][2] - lowest - scale * lows[foot]
+            self._rise = own.places[foot][2] - lowest - self._scale * lows[foot]
         else:
-            hips[:, 2] -= scale * float(np.percentile(motion.positions[:, :, 2].min(axis=1), 2))
-    points = _points(own, source, hips, figure.root == "fixed" or not has_trunk(joint))
-    return Targets(points, turns, root, path or 1.0)
+            self._rise = -self._scale * float(np.percentile(motion.positions[:, :, 2].min(axis=1), 2))
+
+    def _centres(self, motion: SkeletonMotion) -> dict[str, Array]:
+        centres = {role: motion.positions[:, k] for role, k in self._joint.items()}
+        return centres | soled(motion, self._joint, self._soles)
+
+    def targets(self, motion: SkeletonMotion, under: Array | float = 0.0) -> Targets:
+        """Goals of all frames of a motion of the same skeleton; `under` (n,) heights of the ground below it, metres."""
+        own, source = self._own, _Body(self._centres(motion), self._source)
+        turns = _turns(motion, self._joint, own, self._turned, self._axes)
+        root = turns.get("pelvis", _pelvis(source, motion))
+        if self._fixed:  # only what moves relative to the pelvis can be followed
+            back = np.swapaxes(root, 1, 2)
+            ways = {role: at - source.places["hips"] for role, at in source.places.items()}
+            turned = {role: (back @ way[:, :, None])[:, :, 0] for role, way in ways.items()}
+            source = _Body(turned, self._source)
+            turns = {role: back @ turn for role, turn in turns.items() if role != "pelvis"}
+            hips = np.tile(own.places.get("hips", np.zeros(3)), (len(motion), 1))
+        else:
+            hips = np.array([self.path, self.path, self._scale]) * source.places["hips"]
+            hips[:, 2] += (self.path - self._scale) * under + self._rise
+        return Targets(_points(own, source, hips, self._fixed or not has_trunk(self._joint)), turns, root)
 
 
 def _turns(
@@ -263,13 +284,14 @@ def _frame(along: Array, towards: Array) -> Array:
     return np.stack([x, y, np.cross(x, y)], axis=1)
 
 
-def soled(
+def soles(
     motion: SkeletonMotion, roles: Roles, stands: Mapping[str, Mask], places: Mapping[str, Array]
 ) -> dict[str, Array]:
-    """Places (n, 3) of a skeleton's toes as if its feet had the two joints as high above their soles as the figure's.
+    """Directions (3,) from ankles to toes in the ankles' axes, by role, as if feet were soled as the figure's are.
 
-    The way between the two may differ by 20 degrees and more. While both stand (n,) the sole is flat, which says in
-    the ankle's axes where the toes of the figure would be: `places` (3,) are those in its neutral posture, by role.
+    Skeletons have both joints at other heights above their soles; the way between them may differ by 20 degrees and
+    more. While both stand (n,) the sole is flat, which says in the ankle's axes where the toes of the figure would be:
+    `places` (3,) are those in its neutral posture, by role.
     """
     found = {}
     for side in ("left", "right"):
@@ -278,14 +300,23 @@ def soled(
             continue
         flat = stands[ankle] & stands[toe]
         start, end = (motion.names.index(roles.joints[role]) for role in (ankle, toe))
-        ways, turns = motion.positions[:, end] - motion.positions[:, start], motion.rotations[:, start]
-        lengths, own = np.linalg.norm(ways, axis=1), places[toe] - places[ankle]
-        heading = ways[flat] * (1.0, 1.0, 0.0)
+        ways = motion.positions[:, end] - motion.positions[:, start]
+        heading, own = ways[flat] * (1.0, 1.0, 0.0), places[toe] - places[ankle]
         along = np.linalg.norm(heading, axis=1)
-        if not flat.any() or along.min() < 0.5 * np.median(lengths):  # a hanging foot gives no information
+        if not flat.any() or along.min() < 0.5 * np.median(np.linalg.norm(ways, axis=1)):  # a hanging foot says nothing
             continue
         rise = float(own[2] / np.linalg.norm(own))
         wanted = heading / along[:, None] * np.sqrt(1.0 - rise**2) + (0.0, 0.0, rise)
-        local = np.einsum("nji,nj->ni", turns[flat], wanted).mean(axis=0)
-        found[toe] = motion.positions[:, start] + lengths[:, None] * (turns @ (local / np.linalg.norm(local)))
+        local = np.einsum("nji,nj->ni", motion.rotations[flat, start], wanted).mean(axis=0)
+        found[toe] = local / np.linalg.norm(local)
+    return found
+
+
+def soled(motion: SkeletonMotion, joint: Mapping[str, int], known: Mapping[str, Array]) -> dict[str, Array]:
+    """Places (n, 3) of toes whose directions from their ankles are `known`; `joint` has those of roles."""
+    found = {}
+    for toe, local in known.items():
+        ankle, end = joint[toe.replace("toe", "ankle")], joint[toe]
+        lengths = np.linalg.norm(motion.positions[:, end] - motion.positions[:, ankle], axis=1)
+        found[toe] = motion.positions[:, ankle] + lengths[:, None] * (motion.rotations[:, ankle] @ local)
     return found

@@ -15,15 +15,15 @@ from wholebody.figures.joined import one_figure
 from wholebody.geometry.placement import PlacementLike
 from wholebody.geometry.shapes import HalfSpace
 from wholebody.motion.clip import Clip
-from wholebody.motion.held_points import Holds, Touched, held_points, surface_of, touching_points
-from wholebody.motion.retarget_run import Run
-from wholebody.motion.retarget_targets import LIMBS, known_bones, soled, standing_places, targets
+from wholebody.motion.held_points import Holds, Touched, held_points, touching_points
+from wholebody.motion.retarget_run import Run, Wanted, wanted_of
+from wholebody.motion.retarget_targets import LIMBS, Proportions, known_bones, soled, soles, standing_places
 from wholebody.motion.roles import Roles, matched, skeleton_roles
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
 from wholebody.motion.stance import paths
 from wholebody.motion.standing_ground import NOTHING, Ground
 from wholebody.motion.standing_ground import ground as find_ground
-from wholebody.motion.thing_contacts import Things, still_things
+from wholebody.motion.thing_contacts import Things, still_things, surface_of
 from wholebody.motion.thing_tracks import thing_tracks
 from wholebody.scene.scene import Scene
 
@@ -89,10 +89,12 @@ def retarget(
             'name them by names= (or --names FILE.toml): a table "skeleton" with left_wrist = "hand.L"'
         )
     tracks = _tracks(motion, scene, things)
-    found = _ground(motion, figure, ground, names)
+    found = checked_ground(motion, figure, ground, names)
     # without things but floors, the paths of moving things are scaled like the figure's own path
     still = [] if scene is None else [name for name in still_things(scene) if name not in tracks]
-    wanted = targets(motion, figure, roles, found, path=None if scene is None or (tracks and not still) else 1.0)
+    path = None if scene is None or (tracks and not still) else 1.0
+    proportions = Proportions(motion, figure, roles, found, path)
+    wanted = proportions.targets(motion, found.below(len(motion)))
     if not wanted.points:
         raise InputError(
             f"the roles that {motion.name} and {figure.name} have in common ({', '.join(roles.joints)}) make no bone; "
@@ -109,24 +111,39 @@ def retarget(
         if scene is not None:
             recorded = Things(scene, tracks)
             there = ground is not None and figure.root == "free"
-            tracks = {name: recorded.scaled(name, wanted.path) for name in tracks}
+            tracks = {name: recorded.scaled(name, proportions.path) for name in tracks}
             joints = skeleton_roles(motion, names)
             contacts = recorded.contacts(motion, _touching(joints, roles)) if there else []
             touched = Touched(figure, Things(scene, tracks), contacts)
         points = held_points(figure, roles, held)
         if touched is not None and touched.contacts:
-            points = [point for point in points if point.role not in {one.role for one in touched.contacts}]
             points += touching_points(figure, roles, motion, touched.contacts, joints)
-        holds = Holds(points, held, wanted.path, motion.dt, surface, touched)
+        holds = Holds(points, held, proportions.path, motion.dt, surface, touched)
+    frames, lost = wanted_of(wanted, roles), ""
     with world.borrow() as workspace:
-        run = Run(figure, wanted, roles, motion.dt, holds, workspace)
-        q = run.run(progress)
-        clip = Clip(figure, q, motion.dt, motion.name, tracks)
-    if run.lost:
-        warn(f"retarget: {motion.name}: {run.lost}, which it lets go of there; things keep their places and sizes")
+        q = _postures(Run(figure, wanted, roles, motion.dt, holds, workspace), frames, progress)
+        if holds is not None and (lost := holds.give_up()):
+            q = _postures(Run(figure, wanted, roles, motion.dt, holds, workspace), frames, progress)
+    clip = Clip(figure, q, motion.dt, motion.name, tracks)
+    if lost:
+        warn(f"retarget: {motion.name}: {lost}, which it lets go of there; things keep their places and sizes")
     if told := said_of(errors_of(motion, clip, roles)):
         warn(f"retarget: {motion.name}: {told}; bone_errors has them frame by frame")
     return clip
+
+
+def _postures(run: Run, frames: list[Wanted], tell: Callable[[float], object] | None) -> Array:
+    """Postures (n, nq) of all frames."""
+    found = list[Array]()
+    run.led_by(frames)
+    for number, wanted in enumerate(frames):
+        found += run.push(wanted)
+        if tell is not None and number % 20 == 0:
+            tell((number + len(found)) / (2 * len(frames)))
+    found += run.finish()
+    if tell is not None:
+        tell(1.0)
+    return np.array(found)
 
 
 def _tracks(
@@ -161,7 +178,7 @@ def same_figure(scene: Scene, figure: Figure) -> None:
         raise InputError(f"retarget: the scene has the figure {scene.figure.name}, not {figure.name}; give its own")
 
 
-def _ground(
+def checked_ground(
     motion: SkeletonMotion,
     figure: Figure,
     given: object,
@@ -220,7 +237,8 @@ def errors_of(motion: SkeletonMotion, clip: Clip, roles: Roles) -> dict[str, Arr
     centres = {role: motion.positions[:, motion.names.index(joint)] for role, joint in roles.joints.items()}
     if clip.figure.root == "free":
         named = {"skeleton": roles.joints}
-        centres |= soled(motion, roles, find_ground(motion, named).rests, standing_places(clip.figure, roles)[0])
+        known = soles(motion, roles, find_ground(motion, named).rests, standing_places(clip.figure, roles)[0])
+        centres |= soled(motion, {role: motion.names.index(name) for role, name in roles.joints.items()}, known)
     found = {}
     for ends in (ends for side in ("left", "right") for limb in LIMBS for ends in known_bones(limb, side, places)):
         start, end = (centres[role] for role in ends)

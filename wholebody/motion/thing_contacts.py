@@ -7,7 +7,7 @@ size: relations to things are kept, not distances to the trunk.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import coal
@@ -154,3 +154,34 @@ def thickness(pieces: Sequence[pin.GeometryObject], start: Array, along: Array) 
                 last = max(last, far - gap)
             far += max(abs(gap), 1e-3)
     return last
+
+
+def surface_of(scene: Scene, moving: Collection[str]) -> Callable[[Array], float | None]:
+    """The height of the first surface of a scene's things below a place (3,), metres; None for none within 2 m.
+
+    Things that are moving are left out.
+    """
+    owners, geometry = scene.piece_owner, scene.geometry
+    still = [
+        (piece.geometry, coal.Transform3s(piece.placement.rotation, piece.placement.translation))
+        for piece, owner in zip(geometry.geometryObjects, owners, strict=True)
+        if owner in scene.objects and scene.objects[owner].segment is None and owner not in moving
+    ]
+    ball, request, result = coal.Sphere(1e-4), coal.DistanceRequest(), coal.DistanceResult()
+
+    def height(place: Array) -> float | None:
+        at = np.array(place)
+        for _ in range(100):  # goes down by the least distance, so it passes nothing
+            center = coal.Transform3s(np.eye(3), at)
+            gap = min(
+                (float(coal.distance(ball, center, shape, where, request, result)) for shape, where in still),
+                default=np.inf,
+            )
+            if gap < 1e-5:
+                return float(at[2] - 1e-4)
+            at[2] -= gap
+            if not at[2] > place[2] - 2.0:
+                break
+        return None
+
+    return height

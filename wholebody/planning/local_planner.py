@@ -16,6 +16,7 @@ import pinocchio as pin
 
 from wholebody.assessment.posture import largest_violation
 from wholebody.base.arrays import Array, Mask
+from wholebody.base.errors import InputError
 from wholebody.geometry.continuous.motion_bounds import largest_approach
 from wholebody.methods.qp.method import QP
 from wholebody.planning.sampling import holds
@@ -71,6 +72,13 @@ class Geodesics:
         centres = np.array([np.linalg.norm(piece.placement.translation) for piece in pieces])
         # of every pair by every freedom
         self._approach = np.asarray(largest_approach(workspace.table, centres, np.eye(self._model.nv)))
+        unbounded = np.flatnonzero(~np.isfinite(self._approach).all(axis=1))
+        if len(unbounded):
+            names = [workspace.owners[piece] for piece in workspace.table.pairs[unbounded[0]]]
+            raise InputError(
+                f"plan: how much a motion brings {names[0]} and {names[1]} together has no bound; attach a box in "
+                "place of a half-space, and give limits to what slides"
+            )
 
     def admit(self, q: Array) -> None:
         """See `LocalPlanner`."""

@@ -35,9 +35,10 @@ class Turns:
 
     def nearest(self, q: Array, near: Array) -> Array:
         """The posture q (nq,), turned as near to another one as limits let it."""
-        found, here = np.array(q), q[self._places]
-        turned = here - 2.0 * np.pi * np.round((here - near[self._places]) / (2.0 * np.pi))
-        found[self._places] = np.where((turned >= self._low) & (turned <= self._high), turned, here)
+        found, here, turn = np.array(q), q[self._places], 2.0 * np.pi
+        least, most = np.ceil((self._low - here) / turn), np.floor((self._high - here) / turn)
+        turns = np.maximum(least, np.minimum(most, np.round((near[self._places] - here) / turn)))
+        found[self._places] = here + turn * turns
         return found
 
 

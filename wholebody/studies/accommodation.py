@@ -6,22 +6,23 @@ import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array
 from wholebody.base.charts import Shown, new_chart
 from wholebody.base.errors import InputError
 from wholebody.ergonomics.vision import sight
 from wholebody.figures.adjustable import ADJUSTABLE
+from wholebody.figures.figure import Figure
 from wholebody.methods.base import Method
 from wholebody.methods.qp.method import QP
-from wholebody.studies.many import SolveProgress
+from wholebody.studies.many import Running, SolveProgress, run_cases
 from wholebody.studies.populations import people as sampled
 from wholebody.studies.records import CANCELLED, ENDED, REFUSED, Records
-from wholebody.studies.study import TaskFunction, Variant, loaded_person, study
+from wholebody.studies.study import TaskFunction, Variant, loaded_person, planned
 from wholebody.studies.study_files import TaskFile
 from wholebody.tasks import inputs
 
@@ -252,9 +253,10 @@ def accommodation(
     population = {name: given[name] for name in order}
     if method is None and callable(task):
         method = QP(budget=BUDGET)
-    records = study(
-        task, people=population, method=method, jobs=jobs, warm_start=True, folder=folder, progress=progress
-    )
+    run = partial(Running.checked, "accommodation", jobs=jobs, cluster=None, seconds=None, progress=progress)
+    # Who reaches and fits does not depend on how low the measure is: jumps between people are no reason to solve again.
+    varied = {"people": population, "targets": None, "layouts": None}
+    records = run_cases(*planned(task, varied, method, run, True, folder), lowers=False)
     if all(one.outcome == REFUSED for one in records):
         raise InputError(f"accommodation: everybody is refused; the first, {records[0].name}: {records[0].message}")
     reaches = tuple(one.q is not None and one.goal_error <= REACHED and one.goal_angle <= REACHED for one in records)
@@ -269,7 +271,8 @@ def accommodation(
     variants = [Variant(make, person, None, None) for person in population.values()]
     if point is not None:
         seen = tuple(  # a problem that failed is not made again
-            one.q is not None and _sees(variant, one.q, point) for variant, one in zip(variants, records, strict=True)
+            one.q is not None and sight(variant().scene, one.q, point).seen
+            for variant, one in zip(variants, records, strict=True)
         )
     persons = [who[name] for name in order]
     sizes = tuple(
@@ -283,18 +286,13 @@ def accommodation(
 def _settings(variants: Sequence[Variant], records: Records) -> dict[str, tuple[float, ...]]:
     """Settings of adjustable figures by joint, for each person."""
     found: dict[str, list[float]] = {}
-    for k, (variant, one) in enumerate(zip(variants, records, strict=True)):
+    figures: dict[int, Figure] = {}  # by coordinates: scenes of people differ in sizes, and take long to make
+    for k, one in enumerate(records):
         if one.q is None:
             continue
-        figure = variant().scene.figure
-        movable = [f"{name}/" for name, member in figure.members.items() if member.figure.name == ADJUSTABLE]
-        if not movable:
-            break  # nor is there one for others
-        for joint, value in figure.joint_values(one.q).items():
-            if joint.startswith(tuple(movable)):
+        figure = figures.get(len(one.q)) or figures.setdefault(len(one.q), variants[k]().scene.figure)
+        movable = tuple(f"{name}/" for name, member in figure.members.items() if member.figure.name == ADJUSTABLE)
+        for joint, value in figure.joint_values(one.q).items() if movable else ():
+            if joint.startswith(movable):
                 found.setdefault(joint, [math.nan] * len(records))[k] = value
     return {joint: tuple(values) for joint, values in found.items()}
-
-
-def _sees(variant: Variant, q: Array, point: Array) -> bool:
-    return sight(variant().scene, q, point).seen

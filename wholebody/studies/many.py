@@ -26,6 +26,7 @@ from wholebody.tasks.answers import is_own
 
 MOST_JOBS = 4096
 LONGEST = 1e7  # s: a greater deadline of a solve is a mistake
+TOGETHER = 16  # cases of a job. More: fewer scenes are sent, and processes end less together
 RUN = 16  # problems that warm-start one from the other: longer = fewer cold starts, fewer processes busy at the end
 
 T = TypeVar("T")
@@ -144,8 +145,13 @@ def runs_of(cases: Sequence[Case], length: int) -> list[list[Case]]:
 
 
 @ctrl_c_ends_all()
-def run_cases(runs: Sequence[Sequence[Case]], running: Running, store: RecordStore | None = None) -> Records:
-    """Solve cases; those of one run warm-start one from the other. The store has what was done before."""
+def run_cases(
+    runs: Sequence[Sequence[Case]], running: Running, store: RecordStore | None = None, *, lowers: bool = True
+) -> Records:
+    """Solve cases; those of one run warm-start one from the other. The store has what was done before.
+
+    `lowers`: whether neighbours whose postures jump are solved again for a lower measure, see `neighbours.lower`.
+    """
     order = [case for run in runs for case in run]
     before = {} if store is None else store.read()
     done = {k: replace(before[case.asked], name=case.record.name, factors=case.record.factors)
@@ -179,7 +185,7 @@ def run_cases(runs: Sequence[Sequence[Case]], running: Running, store: RecordSto
             over = _run(work, order, running, keep, alone, begun)
     if not over and waiting:
         family = Family(order, done, partial(_computed, order, running), keep)
-        _ = solve_from_neighbours(family) or (linked and (lower(family) or name_changes(family)))
+        _ = solve_from_neighbours(family) or (linked and lowers and (lower(family) or name_changes(family)))
     return Records([done.get(k, order[k].record) for k in range(len(order))])
 
 
@@ -252,10 +258,17 @@ def _done(
     if _is_quick(cases, running):
         yield from shared(work, running.jobs, here, there)
         return
-    outcomes = run_batch((there([part], True) for part in work), running.jobs, running.cluster)
-    with closing(outcomes):  # type: ignore[type-var]
-        for job, _, answer, error in outcomes:
-            yield job.name[0], None if answer is None else answer[0], error
+    # Several in a job, since each job has its scene with it; those of a job whose process ended are done one by one. A
+    # deadline is of one.
+    size = 1 if running.seconds else max(1, min(TOGETHER, len(work) // (4 * running.jobs)))
+    alone = list[list[T]]()
+    for chunks in ([[*work[k : k + size]] for k in range(0, len(work), size)], alone):
+        with closing(run_batch((there(each, True) for each in chunks), running.jobs, running.cluster)) as outcomes:  # type: ignore[type-var]
+            for job, _, answer, error in outcomes:
+                if error is not None and len(job.name) > 1:
+                    alone += [[part] for part in job.name]
+                else:
+                    yield from zip(job.name, answer or [None], [error] * len(job.name), strict=True)
 
 
 def _is_quick(cases: Iterable[Case], running: Running) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import html
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,26 +14,11 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.charts import new_chart, plain, png
 from wholebody.base.errors import InputError
-from wholebody.base.files import write
+from wholebody.base.files import templates, write
 
 INCHES = 2.4  # width of one height
 MEANING = "above 0: reached, 1 with the least measure\nbelow 0: metres short; gray: inside a thing"
 INSIDE_GRAY = (0.35, 0.35, 0.38, 1.0)
-
-_PAGE = """<!doctype html>
-<html lang="en"><meta charset="utf-8"><title>{title}</title>
-<style>body{{font:16px/1.5 sans-serif;margin:2rem auto;max-width:46rem;color:#222}}
-img{{width:100%;display:none}} img.on{{display:block}} input{{width:100%}} td{{padding-right:2rem}}</style>
-<h1>{title}</h1><table>{rows}</table>
-<label>height <output id="height"></output><input id="slider" type="range" min="0" max="{last}" value="{first}"></label>
-{images}
-<script>
-const heights={heights}, images=document.querySelectorAll("img"), slider=document.getElementById("slider");
-function show(){{const k=+slider.value;images.forEach((image,n)=>image.classList.toggle("on",n===k));
-document.getElementById("height").textContent=heights[k].toFixed(2)+" m";}}
-slider.addEventListener("input",show);show();
-</script></html>
-"""
 
 
 def slices_chart(found: Any) -> Any:
@@ -62,22 +46,15 @@ def slices_chart(found: Any) -> Any:
 def write_page(found: Any, path: Path) -> Path:
     """Write a page with one picture a height and a slider; returns the path."""
     values, images = heat(found), []
-    for k in range(len(found.z)):
+    for k, height in enumerate(found.z.tolist()):
         chart, axes = new_chart(1, 1, (6.4, 5.2))
         image = _slice(axes[0, 0], found, values, k)
         chart.colorbar(image, ax=axes[0, 0]).set_label(MEANING, fontsize="small")
-        data = base64.b64encode(png(chart)).decode()
-        images.append(f'<img alt="places at {found.z[k]:.2f} m" src="data:image/png;base64,{data}">')
+        images.append((height, base64.b64encode(png(chart)).decode()))
     facts = {**found.counts(), "solves": found.solves, "reach volume": f"{found.volume:.3g}"}
-    text = _PAGE.format(
-        title=html.escape(f"Reach of {found.frame}"),
-        rows="".join(f"<tr><td>{html.escape(word)}</td><td>{value}</td></tr>" for word, value in facts.items()),
-        last=len(found.z) - 1,
-        first=int(np.argmax(found.reached.sum(axis=(0, 1)))),
-        heights=[float(z) for z in found.z],
-        images="\n".join(images),
-    )
-    return write(path, text)
+    first = int(np.argmax(found.reached.sum(axis=(0, 1))))
+    page = templates(Path(__file__).parent).get_template("reach.html.jinja")
+    return write(path, page.render(title=f"Reach of {found.frame}", facts=facts, first=first, images=images))
 
 
 def heat(found: Any) -> Array:

@@ -69,24 +69,21 @@ class Brick:
             for place in pending:
                 self._try(asked, place, -1)
             return self.tries
-        while pending:
-            place, begin = self._next(pending)
-            del pending[place]
-            found = self._try(asked, place, begin)
-            if found.sure and not found.reached:
-                near = SURE * found.left
-                for other in [k for k in pending if np.linalg.norm(self.places[k] - self.places[place]) < near]:
-                    del pending[other]
-            if found.reached:
-                self._once_more()
+        while pending or self.again:
+            if pending:
+                place, begin = self._next(pending)
+                del pending[place]
+                found = self._try(asked, place, begin)
+                if found.sure and not found.reached:
+                    near = SURE * found.left
+                    for other in [k for k in pending if np.linalg.norm(self.places[k] - self.places[place]) < near]:
+                        del pending[other]
+                if found.reached:
+                    self._once_more()
             while self.again:
                 other, begin = self.again.pop(0)
                 if other not in self.reached and self._try(asked, other, begin).reached:
                     self._once_more()
-        while self.again:
-            other, begin = self.again.pop(0)
-            if other not in self.reached:
-                self._try(asked, other, begin)
         return self.tries
 
     def _next(self, pending: dict[int, None]) -> tuple[int, int]:

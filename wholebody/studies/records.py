@@ -143,7 +143,7 @@ class Records(Shown, Sequence[SolveRecord]):
         worst = max(placed, key=lambda one: one.goal_error, default=None)
         missed = f"{worst.name} by {1e3 * worst.goal_error:.3g} mm" if worst else "none"
         return (
-            f"{len(self)} solves: {counts}\n  {seconds:.3g} s of solving\n"
+            f"{len(self)} solve{'' if len(self) == 1 else 's'}: {counts}\n  {seconds:.3g} s of solving\n"
             f"  goal missed most: {missed}{self.remarks()}"
         )  # fmt: skip
 

@@ -139,16 +139,12 @@ def at_once(problems: Sequence[Problem], method: Any, jobs: int) -> Iterator[tup
     sender = Sender()
 
     def there(batches: list[Any], full: bool) -> Job:
-        return Job(batches, sent_to, (_run_all, sender.sent(batches, full)), 0.0)
+        return Job(batches, sent_to, (lambda given: [one.run() for one in given], sender.sent(batches, full)), 0.0)
 
     batches = method.batches(problems, LARGEST)
     for batch, answers, error in shared(batches, jobs, lambda batch: batch.run(), there):
         if error is None:
             yield from _records(batch, answers)
-
-
-def _run_all(batches: Sequence[Any]) -> list[Any]:
-    return [batch.run() for batch in batches]
 
 
 def _records(batch: Any, answers: Any) -> Iterator[tuple[int, dict[str, Any]]]:

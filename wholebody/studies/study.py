@@ -6,7 +6,7 @@ import inspect
 import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import product
 from math import prod
 from typing import Any
@@ -88,6 +88,16 @@ def study(
         >>> [record.outcome for record in records]
         ['solved', 'solved']
     """
+    run = partial(Running.checked, "study", jobs=jobs, cluster=cluster, seconds=seconds, progress=progress)
+    varied = {"people": people, "targets": targets, "layouts": layouts}
+    return run_cases(*planned(task, varied, method, run, warm_start, folder))
+
+
+def planned(
+    task: TaskFunction | str | os.PathLike[str], varied: Mapping[str, Any], method: str | Method | None,
+    run: Callable[..., Running], warm_start: bool, folder: str | os.PathLike[str] | None,
+) -> tuple[list[list[Case]], Running, RecordStore | None]:  # fmt: skip
+    """What `run_cases` takes of the arguments of `study`; `run` makes of a method how cases are run."""
     what = "study"
     make: TaskFile | TaskFunction
     mark: Any
@@ -100,10 +110,9 @@ def study(
         make, chosen, mark = task, "qp" if method is None else method, _source(task)
     else:
         raise InputError(f"study: task is {checks.shown(task)}; give the path of a task file, or a function")
-    running = Running.checked(what, chosen, jobs, cluster, seconds, progress)
+    running = run(chosen)
     warm_start = checks.flag(warm_start, f"{what}: warm_start")
-    given = {"people": people, "targets": targets, "layouts": layouts}
-    factors = [_named(values, f"{what}: {name}") for name, values in given.items()]
+    factors = [_named(values, f"{what}: {name}") for name, values in varied.items()]
     if not any(factors):
         raise InputError("study: nothing varies; give people, targets or layouts")
     if prod(len(values) or 1 for values in factors) > MOST_CASES:
@@ -124,7 +133,7 @@ def study(
             asked = fingerprint(marks[who], target, layout, running.method, warm_start) if store else ""
             record = SolveRecord(", ".join(named.values()), factors=named)
             cases.append(Case(record, variant, asked, (i, j, k)))
-    return run_cases(runs_of(cases, RUN if warm_start else 1), running, store)
+    return runs_of(cases, RUN if warm_start else 1), running, store
 
 
 def _check_takes_three(task: Any, what: str) -> None:

@@ -11,6 +11,7 @@ force-closure grasps"). Of several fingers the mean of their normals counts.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import coal
@@ -41,26 +42,23 @@ def bar_of(thing: Surface, state: State, where: str) -> Face:
     bounded = [(shape, thing.placed(k, state)) for k, shape in enumerate(thing.shapes) if np.isfinite(thing.reach[k])]
     if not bounded:
         raise InputError(f"{where}: {thing.name!r} is endless, so no hand closes around it; take it with the palm")
-    center, half = np.zeros(3), np.zeros(3)
-    for axis, along in enumerate(at.rotation.T):
-        ends = [outermost(shape, placed, sign * along) @ along for shape, placed in bounded for sign in (1.0, -1.0)]
-        low, high = float(np.concatenate(ends).min()), float(np.concatenate(ends).max())
-        center[axis], half[axis] = 0.5 * (low + high) - float(at.translation @ along), 0.5 * (high - low)
+    ends = np.array([(-_support(bounded, -along), _support(bounded, along)) for along in at.rotation.T])
+    center, half = 0.5 * (ends[:, 0] + ends[:, 1]) - at.rotation.T @ at.translation, 0.5 * (ends[:, 1] - ends[:, 0])
     order = np.argsort(half, kind="stable")
     return Face(thing, center, np.eye(3)[order], half[order])
+
+
+def _support(pieces: Iterable[tuple[Any, Any]], way: Array) -> float:
+    """How far shapes at their placements reach along a unit direction (3,) [m]."""
+    return max(float((outermost(shape, place, way) @ way).max()) for shape, place in pieces)
 
 
 def rim_of(thing: Surface, outwards: Array, state: State) -> Face | None:
     """The rim of a ring in a direction (3,) from its middle, as a bar: outwards, along the rim; None for no ring."""
     if len(thing.shapes) < 8:  # least number of pieces of a ring
         return None
-    middles = []
     shapes = [(shape, thing.placed(k, state)) for k, shape in enumerate(thing.shapes)]
-    for shape, place in shapes:
-        high = np.array([(outermost(shape, place, axis) @ axis).max() for axis in np.eye(3)])
-        low = np.array([(outermost(shape, place, -axis) @ axis).min() for axis in np.eye(3)])
-        middles.append(0.5 * (low + high))
-    points = np.array(middles)
+    points = 0.5 * np.array([[_support([one], way) - _support([one], -way) for way in np.eye(3)] for one in shapes])
     center = points.mean(axis=0)
     _, sizes, axes = np.linalg.svd(points - center, full_matrices=False)
     way = (points - center) @ axes.T
@@ -77,8 +75,7 @@ def rim_of(thing: Surface, outwards: Array, state: State) -> Face | None:
     e = level / np.linalg.norm(level)
     at = thing.placed(0, state)
     local = np.array([n, e, np.cross(n, e)]) @ at.rotation
-    ends = [np.concatenate([outermost(shape, place, way) @ n for shape, place in shapes]) for way in (n, -n)]
-    thick = 0.5 * float(ends[0].max() - ends[1].min())
+    thick = 0.5 * (_support(shapes, n) + _support(shapes, -n))
     # share of a ring's radius along which its rim counts as straight: it turns by 14 degrees
     return Face(thing, at.actInv(center + radius * e), local, np.array([thick, thick, 0.25 * radius]))
 

@@ -45,7 +45,6 @@ class Posture(Goal):
     resolved_target: Array = field(init=False, repr=False)  # (nq,) the posture
     dofs: Array = field(init=False, repr=False)  # (m,) indices of these joints in the tangent vector
     _angular: Mask = field(init=False, repr=False)
-    _constant: Array | None = field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -59,16 +58,7 @@ class Posture(Goal):
         """Look up the posture and the joints."""
         model = scene.model
         dofs = np.arange(model.nv) if self.joints is None else inputs.find_dofs(scene, self.joints, "Posture")
-        curved = [joint for joint in model.joints[1:] if joint.nq != joint.nv]
-        bent = {index for joint in curved for index in range(joint.idx_v, joint.idx_v + joint.nv)}
-        constant = None if bent.intersection(dofs.tolist()) else np.eye(model.nv)[dofs]
-        return filled(
-            self,
-            resolved_target=self._find(scene),
-            dofs=dofs,
-            _angular=inputs.angular_dofs(model)[dofs],
-            _constant=constant,
-        )
+        return filled(self, resolved_target=self._find(scene), dofs=dofs, _angular=inputs.angular_dofs(model)[dofs])
 
     @property
     def angular(self) -> Mask:
@@ -81,8 +71,6 @@ class Posture(Goal):
 
     def jacobian(self, state: State) -> Array:
         """(m, nv)."""
-        if self._constant is not None:
-            return self._constant
         return np.asarray(pin.dDifference(state.model, self.resolved_target, state.q, pin.ARG1)[self.dofs])
 
     def _find(self, scene: Surroundings) -> Array:

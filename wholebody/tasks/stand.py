@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices
-from wholebody.base.checks import shown
+from wholebody.base.checks import shown, some
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
@@ -63,6 +63,9 @@ class Stand(TermOfParts):
     def resolve(self, scene: Surroundings, start: Array) -> Stand:
         """Find the soles and the face that they stand on."""
         where = f"Stand({shown(self.on)})"
+        if stray := [self.knees] if isinstance(self.knees, str) else [k for k in self.knees if k not in self.feet]:
+            example = "feet=['left_foot', 'right_shank'], knees=['right_shank']"
+            raise InputError(f"{where}: knees are of the feet, and {some(stray)} is not; give {example}")
         state = State(scene.model).update(start)
         ground, thing = face(scene, self.on, UP, state, where), surface(scene, self.on, where)
         parts: list[Part] = []

@@ -186,18 +186,11 @@ def arrow(name: str, color: tuple[float, float, float], slender: float = 1.0) ->
     return _mesh(name, _triangles(vertices, faces, normals), _overlay((*color, 1.0)), order=6)
 
 
-def rod(name: str, color: tuple[float, float, float]) -> Three:
-    """A rod of radius 1 and length 1 along z from the origin."""
-    shape = {"type": "CylinderGeometry", "radiusTop": 1.0, "radiusBottom": 1.0, "height": 1.0, "radialSegments": 12}
-    middle = _ALONG_Z.copy()
-    middle[2, 3] = 0.5
-    return _mesh(name, shape, _overlay((*color, 1.0)), matrix=middle, order=5)
-
-
-def dashes(name: str, color: tuple[float, float, float]) -> Three:
-    """A rod of radius 1 and length 1 along z from the origin, in four dashes."""
-    one = np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]]) * (1.0, 0.14)  # a dash from the top down
-    outline = np.concatenate([one + (0.0, start) for start in (0.75, 0.5, 0.25, 0.0)])
+def rod(name: str, color: tuple[float, float, float], dashes: int = 1) -> Three:
+    """A rod of radius 1 and length 1 along z from the origin, whole or in dashes."""
+    share = 1.0 if dashes == 1 else 0.56 / dashes  # the length of a dash
+    one = np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]]) * (1.0, share)  # from the top down
+    outline = np.concatenate([one + (0.0, start / dashes) for start in reversed(range(dashes))])
     vertices, faces, normals = revolved(outline, np.broadcast_to([1.0, 0.0], outline.shape), 12)
     return _mesh(name, _triangles(vertices, faces, normals), _overlay((*color, 1.0)), order=5)
 
@@ -262,7 +255,7 @@ def _matrix(scale: tuple[float, float, float], placement: Array | None) -> list[
 
 
 def _mesh(
-    name: str, shape: Three, material: Three, *, matrix: Any = None, order: int = 0, shadow: bool = True
+    name: str, shape: Three, material: Three, *, matrix: list[float] | None = None, order: int = 0, shadow: bool = True
 ) -> Three:
     """A three.js mesh. The name is its uuid: animations tell objects apart by it, and files come out the same."""
     made: Three = {
@@ -270,7 +263,7 @@ def _mesh(
         "type": "Mesh",
         "geometry": f"{name}#geometry",
         "material": f"{name}#material",
-        "matrix": _matrix((1.0, 1.0, 1.0), matrix) if not isinstance(matrix, list) else matrix,
+        "matrix": matrix or _matrix((1.0, 1.0, 1.0), None),
         "renderOrder": order,
         "userData": {"shadow": shadow and order == 0},
     }

@@ -174,7 +174,7 @@ class LivePage:
         self._method.on_update(self._choose)
         names = (*self.drag.handles, *self.drag.things)
         self._choice = gui.add_dropdown("handle", names, initial_value=names[0])
-        self._choice.on_update(self._chosen)
+        self._choice.on_update(self._locked(self._show_rings))
         self._boxes: dict[str, Any] = {}
         for name in self.drag.handles:
             self._boxes[name] = gui.add_checkbox(f"hold {name}", name in self.drag.held)
@@ -182,7 +182,7 @@ class LivePage:
         again = "start again"
         if isinstance(self.drag, LiveWorld):
             self._give_way = gui.add_dropdown("gives way", self.drag.ways, initial_value=self.drag.give_way)
-            self._give_way.on_update(partial(self._shared, self.drag))
+            self._give_way.on_update(self._locked(partial(self._share, self.drag)))
         if isinstance(self.drag, LiveDrag):
             again = "undo"
             self._add_rings(self.drag)
@@ -200,7 +200,7 @@ class LivePage:
             command = gui.add_command(f"move the chosen handle {label}", hotkey=key, modifier=shift)
             command.on_trigger(partial(self._pressed, np.array(way)))
         if self._save is not None:
-            gui.add_button(f"save as {self._save_to.name}").on_click(self._write)
+            gui.add_button(f"save as {self._save_to.name}").on_click(self._locked(self._write))
 
     def _add_rings(self, drag: LiveDrag) -> None:
         """Rings that turn the chosen handle of a frame."""
@@ -218,9 +218,12 @@ class LivePage:
 
         self._rings.on_update(turned)
 
-    def _chosen(self, _: Any) -> None:
-        with self._lock:
-            self._show_rings()
+    def _locked(self, act: Callable[[], None]) -> Callable[[Any], None]:
+        def called(_: Any) -> None:
+            with self._lock:
+                act()
+
+        return called
 
     def _show_rings(self) -> None:
         """Put the rings around the chosen handle, unless the mouse has them."""
@@ -253,9 +256,8 @@ class LivePage:
             if self._constraints[name].value != drag.constraints[name]:
                 drag.constrain(name, self._constraints[name].value)
 
-    def _shared(self, world: LiveWorld, _: Any) -> None:
-        with self._lock:
-            world.give_way = self._give_way.value
+    def _share(self, world: LiveWorld) -> None:
+        world.give_way = self._give_way.value
 
     def _choose(self, _: Any) -> None:
         with self._lock:
@@ -274,16 +276,12 @@ class LivePage:
                     self._constraints[name].value = holds
             self._show(self.drag.report())
 
-    def _write(self, _: Any) -> None:
-        with self._lock:
-            self._status.content = self._saved()
-
-    def _saved(self) -> str:
+    def _write(self) -> None:
         assert self._save is not None
         try:
-            return f"wrote {self._save(self._save_to)}"
+            self._status.content = f"wrote {self._save(self._save_to)}"
         except WholebodyError as error:
-            return str(error)
+            self._status.content = str(error)
 
     def _run(self) -> None:
         while not self._stopped.is_set():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -50,9 +49,8 @@ def motion_curves(
     charts = [*_joints(clips), *_distances(clips, scene), *_slides(motion, clips, names), *_bones(motion, clips, names)]
     data = {"dt": first.dt, "frames": len(first), "charts": charts}
     named = ([] if motion is None else [RECORDING]) + list(clips)
-    text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
     page_of = templates(Path(__file__).parent).get_template("motion_curves.html.jinja")
-    return page_of.render(clip=first, named=named, data=text, page=page)
+    return page_of.render(clip=first, named=named, data=data, page=page)
 
 
 def _chart(title: str, unit: str, lines: Sequence[tuple[str, str, Array]]) -> dict[str, Any]:

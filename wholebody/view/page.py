@@ -6,9 +6,10 @@ import base64
 import gzip
 import html
 import importlib.util
+import re
 import sys
 from collections.abc import Iterable
-from functools import lru_cache
+from functools import cache, lru_cache
 from hashlib import sha256
 from itertools import groupby
 from pathlib import Path
@@ -17,78 +18,17 @@ from typing import Any
 from wholebody.base.errors import MissingPackageError
 from wholebody.view.server import Command, bundle
 
-_TEMPLATE = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<title>{title}</title>
-<link rel="icon" href="data:,">
-<style>
-body {{ margin: 0; background: #dfe3e7; }}
-#meshcat-pane {{ width: 100vw; height: 100vh; overflow: hidden; }}
-#bar {{ display: none; position: fixed; left: 50%; bottom: 18px; transform: translateX(-50%); gap: 12px;
-  align-items: center; width: min(640px, 90vw); box-sizing: border-box; padding: 8px 14px; border-radius: 10px;
-  background: rgba(255,255,255,.85); font: 13px "Helvetica Neue", Arial, sans-serif; color: #333a42; }}
-#bar button {{ width: 32px; height: 28px; border: 0; border-radius: 6px; background: #4f6f94; color: #fff; }}
-#bar input {{ flex: 1; }}
-#panel {{ display: none; position: fixed; left: 14px; top: 14px; max-width: 40vw; padding: 8px 12px;
-  border-radius: 10px; pointer-events: none; background: rgba(255,255,255,.8); color: #333a42;
-  font: 13px "Helvetica Neue", Arial, sans-serif; }}
-#panel b, #panel span {{ display: block; }}
-#panel i {{ display: inline-block; width: 10px; height: 10px; margin-right: 7px; border-radius: 3px; }}
-</style>
-</head>
-<body>
-<div id="meshcat-pane"{still}></div>
-<div id="panel"></div>
-<div id="bar">
-<button title="play or pause"></button><input type="range" min="0" max="1000" value="0"><span></span>
-</div>
-{parts}</body>
-</html>
-"""
-
-
 LARGE = 2_000  # bytes of a command that scenes of a notebook share
-
-_UNPACK = """
-(async function () {
-  async function unpacked(packed) {
-    packed = Uint8Array.from(atob(packed), c => c.charCodeAt(0));
-    return new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
-  }
-  const around = (() => { try { parent.document; return parent; } catch { return window; } })();
-  const known = around.wholebodyParts ??= {};
-  async function part(script) { // of this page, or of a scene before it in the notebook around it
-    const name = script.dataset.part, wait = document.createElement("p");
-    known[name] = script.textContent || known[name];
-    for (let tries = 0; !known[name]; tries++) {
-      wait.textContent = "A part is in the first scene of this notebook: scroll to it, or run the cells again.";
-      if (tries === 10) document.body.prepend(wait);
-      await new Promise(done => setTimeout(done, 200));
-    }
-    wait.remove();
-    return unpacked(known[name]);
-  }
-  const [player, ...scene] = document.querySelectorAll("script[data-part]");
-  window.picture = new Uint8Array(await new Blob(await Promise.all(scene.map(part))).arrayBuffer());
-  for (const text of new TextDecoder().decode(await part(player)).split("\\0")) {
-    const script = document.createElement("script");
-    script.textContent = text;
-    document.body.append(script);
-  }
-})();
-"""
 
 
 def live_page(title: str = "wholebody") -> str:
     """HTML of a page that connects to its server."""
-    return _page(title, _script(_meshcat_script()) + _script(_page_script()))
+    return _page(title, _script(_meshcat_script()) + _script(_file("page.js")))
 
 
 def static_page(commands: list[Command], title: str = "wholebody") -> str:
     """HTML of a page that contains its scene, compressed, and makes no network requests."""
-    return _page(title, player() + _data("scene", _bundled(commands)) + _script(_UNPACK))
+    return _page(title, player() + _data("scene", _bundled(commands)) + _script(_file("unpack.js")))
 
 
 _carriers: dict[str, tuple[str, str]] = {}
@@ -110,7 +50,7 @@ def notebook_frame(commands: list[Command], title: str = "wholebody") -> str:
         content = _bundled(some)
         name = sha256(content).hexdigest()[:16] if large else f"scene {len(parts)}"
         parts.append(_data(name, content if not large or _is_first(cell, name) else None))
-    page = html.escape(_page(title, "".join(parts) + _script(_UNPACK)), quote=True)
+    page = html.escape(_page(title, "".join(parts) + _script(_file("unpack.js"))), quote=True)
     return f'<iframe srcdoc="{page}" style="width: 100%; height: 480px; border: 0"></iframe>'
 
 
@@ -131,16 +71,17 @@ def _cell() -> tuple[str, str] | None:
 @lru_cache(maxsize=1)
 def player() -> str:
     """The part that all static pages have in common. A page with many scenes has it once, and puts it into each."""
-    return _data("player", f"{_meshcat_script()}\0{_page_script()}".encode())
+    return _data("player", f"{_meshcat_script()}\0{_file('page.js')}".encode())
 
 
 def picture_page() -> str:
     """HTML of an empty page for `Screenshots`: it gets its commands from outside, and draws only when asked to."""
-    return _page("wholebody", _script(_meshcat_script()) + _script(_page_script()), " data-still")
+    return _page("wholebody", _script(_meshcat_script()) + _script(_file("page.js")), " data-still")
 
 
 def _page(title: str, parts: str, still: str = "") -> str:
-    return _TEMPLATE.format(title=html.escape(title), still=still, parts=parts)
+    given = {"title": html.escape(title), "still": still, "parts": parts}
+    return re.sub("@(title|still|parts)@", lambda found: given[found[1]], _file("page.html"))
 
 
 def _script(text: str) -> str:
@@ -157,8 +98,10 @@ def _data(name: str, content: bytes | None = None) -> str:
     return f'<script data-part="{name}" type="application/octet-stream">{packed}</script>\n'
 
 
-def _page_script() -> str:
-    return Path(__file__).with_name("page.js").read_text(encoding="utf-8")
+@cache
+def _file(name: str) -> str:
+    """The text of a file of this folder."""
+    return Path(__file__).with_name(name).read_text(encoding="utf-8")
 
 
 @lru_cache(maxsize=1)

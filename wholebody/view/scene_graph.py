@@ -143,10 +143,8 @@ class SceneGraph:
             self.do(commands.label(path, marker.text, marker.color, marker.size))
         elif marker.kind == "arrow":
             self.put(path, drawing.arrow(path, marker.color, marker.size))
-        elif marker.kind == "rod":
-            self.put(path, drawing.rod(path, marker.color))
-        elif marker.kind == "dashes":
-            self.put(path, drawing.dashes(path, marker.color))
+        elif marker.kind in ("rod", "dashes"):
+            self.put(path, drawing.rod(path, marker.color, 1 if marker.kind == "rod" else 4))
         else:
             self.put(path, drawing.ball(path, marker.color, marker.size))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Any
@@ -40,9 +39,8 @@ def timeline(found: ClipCheck, scene: Scene | None = None) -> str:
     with Viewer(scene, title=clip.name) as viewer, Scratch() as folder:
         viewer.play(clip.q[::every], clip.dt * every)
         page = viewer.save(folder / "clip.html").read_text("utf-8")
-    data = _json(_data(found))
     page_of = templates(Path(__file__).parent).get_template("timeline.html.jinja")
-    return page_of.render(check=found, clip=clip, contacts=found.contacts, data=data, page=page)
+    return page_of.render(check=found, clip=clip, contacts=found.contacts, data=_data(found), page=page)
 
 
 def _data(found: ClipCheck) -> dict[str, Any]:
@@ -63,8 +61,3 @@ def _cells(contact: Contact) -> dict[str, Any]:
     at = np.flatnonzero(times)
     # digits of depths in the page, after the point of millimetres
     return {"at": at.tolist(), "depth": np.round(1e3 * times[at], 4).tolist()}
-
-
-def _json(value: Any) -> str:
-    """JSON that may stand in a script of a page."""
-    return json.dumps(value, separators=(",", ":")).replace("<", "\\u003c")

@@ -40,7 +40,11 @@ def test_no_pair_comes_nearer_than_the_bound_says(name: str, root: Path, tmp_pat
     scene.add(wb.Box((0.1, 0.2, 0.3)), name="box", at=(0.5, 0.4, 1.0))
     rng, model = np.random.default_rng(5), scene.model
     most = rng.uniform(0.01, 0.3, model.nv)
-    bound = scene.workspace().largest_approach(most)
+    workspace = scene.workspace()
+    bound = workspace.largest_approach(most)
+    each = workspace.largest_approach(np.diag(most))  # of a motion of each freedom alone
+    assert (each.sum(axis=1) >= bound - 1e-12).all()
+    assert (each <= bound[:, None] + 1e-12).all()
     tightest, distances = np.inf, asker(scene)
     for _ in range(40):
         q = figure.clamp(pin.integrate(model, figure.neutral, 0.5 * rng.normal(size=model.nv)))

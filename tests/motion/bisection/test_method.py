@@ -42,8 +42,8 @@ def person() -> Figure:
 
 @pytest.fixture(scope="module")
 def swing(person: Figure) -> Clip:
-    """Arms swing as in a walk, two periods of 40 frames."""
-    phase = 2.0 * np.pi * np.arange(61) / 40.0
+    """Arms swing as in a walk, a period of 40 frames."""
+    phase = 2.0 * np.pi * np.arange(41) / 40.0
     q = [
         person.with_joints(
             person.neutral,
@@ -115,9 +115,10 @@ def test_a_free_clip_stays_as_it_is(swing: Clip) -> None:
 
 
 def test_the_original_clip_and_the_answer_do_not_depend_on_earlier_runs(swing: Clip) -> None:
+    clip = swing[8:30]
     scene, kept = dressed(swing.figure, "side_sphere"), swing.q.copy()
-    first = freed_by(Bisection(), swing, scene)
-    second = freed_by(Bisection(), swing, scene)
+    first = freed_by(Bisection(), clip, scene)
+    second = freed_by(Bisection(), clip, scene)
     assert np.array_equal(swing.q, kept)
     assert np.array_equal(first.q, second.q)
 
@@ -127,7 +128,7 @@ def test_evaluation_points_keep_what_interpolation_smooths_away(swing: Clip) -> 
     scene = dressed(swing.figure, "pouches")
     assert (depths(scene, swing.q) > DEEP).all()
     away = {}
-    for name, points in (("none", ()), ("turns", (0, 10, 20, 30, 40, 50, 60)), ("chosen", None)):
+    for name, points in (("none", ()), ("turns", (0, 10, 20, 30, 40)), ("chosen", None)):
         result = freed_by(Bisection(evaluation=points), swing, scene)
         assert depths(scene, result.q).max() <= DEEP, name
         away[name] = float(np.abs(result.q - swing.q).max())
@@ -138,7 +139,7 @@ def test_evaluation_points_keep_what_interpolation_smooths_away(swing: Clip) -> 
 def test_a_ring_as_it_stands_is_left_free_between_frames_too(swing: Clip) -> None:
     """Frames inside of the hole and outside of it are free, and the way from one to the other is not."""
     scene = dressed(swing.figure, "torus")
-    result = freed_by(Bisection(), swing[:41], scene)
+    result = freed_by(Bisection(), swing, scene)
     assert depths(scene, result.q).max() <= DEEP
     assert between(scene, result.q) <= DEEP
 
@@ -409,7 +410,7 @@ def test_settings_out_of_range_are_refused(settings: dict[str, object], named: s
 def test_names_and_frames_that_do_not_fit_are_refused(swing: Clip) -> None:
     scene = wb.Scene(swing.figure)
     with pytest.raises(wb.InputError, match="evaluation"):
-        freed_by(Bisection(evaluation=(61,)), swing, scene)
+        freed_by(Bisection(evaluation=(41,)), swing, scene)
     with pytest.raises(wb.UnknownNameError, match="left_elbow"):
         freed_by(Bisection(planes=("left_elbov",)), swing, scene)
     with pytest.raises(wb.UnknownNameError, match="spine"):

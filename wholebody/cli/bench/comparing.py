@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     "every method on every problem set",
     """\
 Solve problems with known answers by every method at many budgets, and chart speed against accuracy. Writes a report
-(report.html) that says which method to choose when, charts as SVG and PNG, and every solve as CSV. A run that was
-ended goes on where it was when it is called again with the same settings and folder; a finished one writes its report
-anew. --held-out poses uniform witnesses, other people, other clutter and robots as they come, beside the sets of the
-same questions. --again compares times in units of a reference kernel, and ends with 1 where what is solved
-differs. --jobs works on cases beside each other through joblib; --cluster does so on a dask cluster.""",
+(report.html) that says which method to choose when, charts as SVG and PNG, and every solve as CSV. Call an
+interrupted run again with the same settings and folder to continue it; a finished one writes its report again.
+--held-out adds uniform witnesses, other people, other clutter and other robots beside the sets of the same questions.
+--again compares times in units of a reference kernel; the exit code is 1 if the solved problems differ. --jobs solves
+cases in parallel by joblib, --cluster on a dask cluster.""",
     quick("20 problems a set, within three minutes on two cores"),
     option(
         "--task", type=Path, metavar="TASK.toml", help="compare on the problem of a task file, in place of the sets"
@@ -33,12 +33,12 @@ differs. --jobs works on cases beside each other through joblib; --cluster does 
     listed(
         "--methods",
         "methods, such as qp, newton or qp/daqp; all for every method (default: one of each algorithm, from one "
-        "start and from several; with --quick as they come)",
+        "start and from several; with --quick with their usual starts)",
     ),
     count("--cases", None, "problems of each set (default: 200)"),
     option("--minutes", type=float, metavar="N", help="of solving in all (default: 25; with --quick 2)"),
     seed("of all problems"),
-    count("--jobs", None, "cases beside each other (default: 1, or all of the cluster)"),
+    count("--jobs", None, "cases in parallel (default: 1, or all workers of the cluster)"),
     option("--cluster", metavar="ADDRESS", help="of a dask scheduler, such as tcp://10.0.0.1:8786"),
     flag("--held-out", "pose problems of distributions that no constant was tuned on"),
     option("--again", type=Path, metavar="LOCK.json", help="repeat the comparison that left this file"),
@@ -55,21 +55,19 @@ def compare(arguments: argparse.Namespace) -> int:
     from wholebody.bench.suite.compare import run as comparison
     from wholebody.bench.suite.compare.advice import advice
     from wholebody.bench.suite.compare.report import PAGE, publish, to_docs
-    from wholebody.cli.tables import progress_bar
+    from wholebody.cli.tables import bar
 
     jobs = arguments.jobs or (threads(arguments.cluster) if arguments.cluster else 1)
     settings = _settings(arguments)
-    with progress_bar(counted=False) as bar:
-        task = bar.add_task("starting", total=60.0 * settings.minutes * jobs)
-
-        def tell(progress: comparison.Progress) -> None:
-            bar.update(task, completed=progress.done, total=progress.total, description=f"solved {progress.said}")
-
-        store = comparison.run(settings, arguments.out, jobs, arguments.cluster, tell)
+    with bar("starting") as tell:
+        store = comparison.run(
+            settings, arguments.out, jobs, arguments.cluster,
+            lambda now: tell(now.done / now.total, f"solved {now.said}"),
+        )  # fmt: skip
         where = f"the dask cluster {arguments.cluster}" if arguments.cluster else "this machine"
         given = publish(
             settings, store, arguments.out, _facts(f"{jobs} on {where}"), missing(),
-            lambda what: bar.update(task, description=f"making {what}"),
+            lambda what: tell(1.0, f"making {what}"),
         )  # fmt: skip
     if arguments.update_docs is not None:
         to_docs(given, arguments.out, arguments.update_docs, "held-out" if arguments.held_out else "compare")

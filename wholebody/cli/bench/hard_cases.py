@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from wholebody.bench.suite.adapters.base import Adapter
     from wholebody.bench.suite.stability.asking import Cell
     from wholebody.bench.suite.stability.catalogue import HardCase
-    from wholebody.bench.suite.stability.verdict import Result
 
 
 @measuring(
@@ -44,7 +43,6 @@ def stability(arguments: argparse.Namespace) -> None:
     chosen = catalogue.cases(arguments.cases or (catalogue.quick() if arguments.quick else None))
     facts, cells = machine(), _asked([(case, adapter) for case in chosen for adapter in asked], arguments.jobs)
     found = result(chosen, [adapter.name for adapter in asked], cells)
-    _print(found)
     text = report(found, facts)
     charts = {"stability": Chart(partial(matrix, found), "Cases by methods: a colour and a sign a cell")}
     tables = {"stability": found.rows}
@@ -53,36 +51,14 @@ def stability(arguments: argparse.Namespace) -> None:
 
 def _asked(pairs: Sequence[tuple[HardCase, Adapter]], jobs: int) -> list[Cell]:
     from wholebody.bench.suite.stability.asking import run
-    from wholebody.cli.tables import progress_bar
+    from wholebody.cli.tables import bar
 
     cells = []
-    with progress_bar(thread=False) as bar:
-        work = bar.add_task("asking", total=len(pairs))
+    with bar("asking", len(pairs), thread=False) as tell:
         for cell in run(pairs, jobs):
             cells.append(cell)
-            bar.update(work, advance=1, description=f"{cell.case.name}, {cell.method}", refresh=True)
+            tell(len(cells), f"{cell.case.name}, {cell.method}")
     return cells
-
-
-def _print(result: Result) -> None:
-    """The matrix in signs, as narrow as it can be, and every wrong answer in words."""
-    from wholebody.bench.suite.stability.verdict import SYMBOLS, WORDS
-    from wholebody.cli.tables import console, table
-
-    letters = [chr(ord("a") + number) for number in range(len(result.methods))]
-    signs = table("case", *letters)
-    for case in result.cases:
-        signs.add_row(case.name, *(result.verdicts[case.name, method].symbol for method in result.methods))
-    console().print(signs)
-    counts = table("", "method", *WORDS.values(), "acceptable")
-    for letter, method in zip(letters, result.methods, strict=True):
-        found = (str(result.count(method, kind)) for kind in WORDS)
-        counts.add_row(letter, method, *found, f"{result.acceptable(method)} of {len(result.cases)}")
-    console().print(counts)
-    legend = ", ".join(f"{symbol} {WORDS[kind]}" for kind, symbol in SYMBOLS.items())
-    print(f"{legend}; ● honest and as good as can be")
-    for method, case, verdict in result.of_kind("wrong"):
-        print(f"WRONG: {method}, {case.name}: {verdict.figure}")
 
 
 @command(

@@ -30,8 +30,8 @@ def _charts(name: str, panels: Sequence[Panel], caption: str) -> dict[str, Chart
 @measuring(
     "step",
     "one step of tracking by every tool",
-    "The same 200-step reach by every tool that is installed, interleaved, judged independently. With "
-    "--figure it is made by these figures in place of the standing human; tools that do not take one say why.",
+    "The same 200-step reach by every installed tool, interleaved, judged independently. With --figure these figures "
+    "replace the standing human; tools that do not take one say why.",
     listed("--figure", "URDF or MJCF files, or names of figures", "FILE"),
     count("--repeats", 5, "timed runs of every tool"),
     option("--steps", type=int, default=200, metavar="N", help="of each run (default: 200)"),
@@ -117,15 +117,15 @@ def clips(arguments: argparse.Namespace, most: int | None) -> dict[str, Path | N
     "motion",
     "clips freed of collisions by each method, with each piece of equipment",
     "Free clips of collisions by each method, with each piece of equipment, as `wholebody clip avoid` does, and sum up "
-    "deviation, jerk, sliding and time: clips that need no recordings, and the recordings of a folder. A run that was "
-    "ended goes on where its folder holds what was done.",
+    "deviation, jerk, sliding and time: clips that need no recordings, and the recordings of a folder. An interrupted "
+    "run continues from its folder.",
     *CLIPS,
     listed("--equipment", "what is worn (default: all)"),
     listed("--methods", "methods (default: all)"),
     count("--jobs", 1, "cases at a time"),
 )
 def motion(arguments: argparse.Namespace) -> None:
-    """Free, or go on; --quick takes two clips with two pieces of equipment."""
+    """Free, or continue; --quick takes two clips with two pieces of equipment."""
     from wholebody.bench.measure import motion
     from wholebody.bench.measure.motion import EQUIPMENT, recorded, synthetic
     from wholebody.figures import load

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from itertools import count as count_from
 from pathlib import Path
 
 from wholebody.base.errors import InputError
@@ -29,17 +30,15 @@ def export(arguments: argparse.Namespace) -> None:
     """Export."""
     from wholebody.bench.suite.problem_sets.registry import CASES, SETS, problem_set
     from wholebody.bench.suite.published.export import export
-    from wholebody.cli.tables import progress_bar
+    from wholebody.cli.tables import bar
 
     sets = [problem_set(name) for name in dict.fromkeys(arguments.sets or SETS)]
     per_set = arguments.per_set or CASES
     if arguments.seed < 0:
         raise InputError(f"--seed is {arguments.seed}; give 0 or more")
-    with progress_bar() as bar:
-        task = bar.add_task("writing", total=per_set * len(sets))
-        index = export(
-            sets, per_set, arguments.seed, arguments.folder, lambda name: bar.update(task, advance=1, description=name)
-        )
+    written = count_from(1)
+    with bar("writing", per_set * len(sets)) as tell:
+        index = export(sets, per_set, arguments.seed, arguments.folder, lambda name: tell(next(written), name))
     print(f"wrote {per_set * len(sets)} problems, listed in {index}")
 
 
@@ -60,7 +59,7 @@ def answer(arguments: argparse.Namespace) -> None:
     from wholebody.bench.suite.adapters.registry import adapters
     from wholebody.bench.suite.published.answering import Answering, chosen_problems
     from wholebody.bench.suite.published.rebuilt import dumped, files_of
-    from wholebody.cli.tables import progress_bar
+    from wholebody.cli.tables import bar
 
     found = adapters([arguments.method], starts=True)
     if len(found) > 1:
@@ -68,11 +67,10 @@ def answer(arguments: argparse.Namespace) -> None:
     out = arguments.out or Path(f"{found[0].name.replace('/', '-').replace(':', '-')}.answers.json")
     checked_target(out, "--out", "a file of answers", (".json",), files_of(arguments.folder))
     problems, answering = chosen_problems(arguments.folder, arguments.sets), Answering(arguments.folder, found[0])
-    with progress_bar() as bar:
-        work = bar.add_task("solving", total=len(problems))
-        for family, number in problems:
+    with bar("solving", len(problems)) as tell:
+        for done, (family, number) in enumerate(problems, 1):
             answering.answer(family, number)
-            bar.update(work, advance=1, description=f"{family} {number}")
+            tell(done, f"{family} {number}")
     write_text(out, dumped(answering.content()))
     print(f"wrote {out}; score it with: wholebody bench judge {out} --problems {arguments.folder}")
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -58,18 +56,6 @@ def jobs_of(arguments: argparse.Namespace) -> int:
     if arguments.jobs is None:
         return threads(arguments.cluster) if arguments.cluster else 1
     return whole(arguments.jobs, "--jobs", 1, 4096)
-
-
-@contextmanager
-def bar(what: str, count: float = 1.0) -> Iterator[Callable[[float, str], object]]:
-    """Show how far something is; the function takes what is done, and says what it is."""
-    from rich.markup import escape
-
-    from wholebody.cli.tables import progress_bar
-
-    with progress_bar(counted=count != 1.0) as shown:
-        task = shown.add_task(escape(what), total=count)
-        yield lambda done, said: shown.update(task, completed=done, total=count, description=escape(said))
 
 
 def figure_of(arguments: argparse.Namespace) -> Figure:

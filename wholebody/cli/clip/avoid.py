@@ -13,7 +13,6 @@ from wholebody.cli.clip.arguments import (
     MOTIONS,
     PAGE,
     SCENE,
-    bar,
     figure_of,
     jobs_of,
     scene_of,
@@ -33,12 +32,12 @@ METHOD, WORN, FOLDER = "trajectory", "nothing", "freed"
     "avoid",
     "free motions of collisions",
     """\
-Free motions of collisions of the body with itself and with what it wears. The answer is judged by all pairs in all
-frames and by sweeps between them, independently of the method; the exit code is 1 where something is left.
+Free motions of collisions of the body with itself, with its equipment and with things. All pairs in all frames and
+sweeps between them judge the answer, independently of the method; the exit code is 1 if a collision remains.
 
 Several motions, pieces of equipment or methods are a batch: each motion with each equipment by each method, written
-into a folder with a table (cases.csv, cases.json). What the folder holds already is not done again, so a batch that was
-ended goes on.""",
+into a folder with a table (cases.csv, cases.json). Cases that the folder holds are not done again, so an interrupted
+batch continues.""",
     *MOTIONS,
     option(
         "--method",
@@ -49,7 +48,7 @@ ended goes on.""",
     ),
     EQUIPMENT,
     SCENE,
-    flag("--no-feet", "let feet slide that stand; without it they are held"),
+    flag("--no-feet", "let standing feet slide; otherwise they are held"),
     flag("--keep-ends", "keep the first and the last posture where free"),
     flag("--dynamics", "keep torques within the strength of a median person, and the balance within the feet"),
     option(
@@ -79,6 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
         return _batch(arguments, methods, worn)
     from wholebody.base.errors import InputError
     from wholebody.base.files import check_writable, checked_target, write
+    from wholebody.cli.tables import bar
     from wholebody.motion.avoidance import avoid
     from wholebody.motion.files import check_ending
     from wholebody.motion.reading import read_clip
@@ -164,6 +164,7 @@ def _tell(avoided: Avoided, written: Path) -> None:
 
 def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -> int:
     from wholebody.base.errors import InputError
+    from wholebody.cli.tables import bar
     from wholebody.motion.batch import BatchProgress, avoid_many
     from wholebody.motion.measures import MotionBounds
 

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wholebody.cli.clip.arguments import EQUIPMENT, JOBS, MOTIONS, SCENE, bar, jobs_of, scene_of
+from wholebody.cli.clip.arguments import EQUIPMENT, JOBS, MOTIONS, SCENE, jobs_of, scene_of
 from wholebody.cli.command import command, flag, option
 
 if TYPE_CHECKING:
@@ -78,6 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def checked(clip: Clip, scene: Scene, depth: float) -> ClipCheck:
     """Check, with a progress bar."""
+    from wholebody.cli.tables import bar
     from wholebody.motion.checking import check
 
     with bar("checking every pair", len(clip)) as tell:
@@ -94,7 +95,7 @@ def _many(arguments: argparse.Namespace, depth: float) -> int:
     from wholebody.base.checks import number
     from wholebody.base.errors import InputError
     from wholebody.base.runner import Job
-    from wholebody.cli.tables import console, table
+    from wholebody.cli.tables import bar, console, table
     from wholebody.motion.checking import LARGEST, SMALLEST
     from wholebody.motion.worn_equipment import NOTHING, put_on
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.clip.arguments import JOBS, MOTIONS, ONE_MOTION, PAGE, bar, clip_of, figure_of, jobs_of
+from wholebody.cli.clip.arguments import JOBS, MOTIONS, ONE_MOTION, PAGE, clip_of, figure_of, jobs_of
 from wholebody.cli.command import command, flag, option
 
 if TYPE_CHECKING:
@@ -88,11 +88,11 @@ def convert(arguments: argparse.Namespace) -> int:
     "retarget",
     "skeletons' motions for a figure",
     """\
-Turn the motion of a skeleton (BVH, glTF, AMASS) into a clip of a figure of any proportions: directions of limbs as
-recorded, within joint limits, speed limits and reach cones, smooth, what rests held on the ground, in every frame
-free of itself and the floor. A table has the errors of bones; `wholebody clip check` says what is left, between frames
-too. A robot's .npz has the arrays that mjlab, BeyondMimic and GMR name. Several files are written into a folder; what
-it holds already is not made again.""",
+Turn the motion of a skeleton (BVH, glTF, AMASS) into a clip of a figure of any proportions. Limbs keep the recorded
+directions, within joint limits, speed limits and reach cones. Points that rest are held on the ground, and no frame
+overlaps itself or the floor. A table has the errors of bones; `wholebody clip check` tests the motion between frames. A
+robot's .npz has the arrays that mjlab, BeyondMimic and GMR name. Several files are written into a folder; those that
+it holds are not made again.""",
     *MOTIONS,
     option("--to", metavar="FIGURE", help="another name of --figure; a robot goes about freely"),
     option("--out", type=Path, metavar="OUT", help=".npz, .bvh, .csv, .txt or .glb; of several motions a folder"),
@@ -119,6 +119,7 @@ def retarget_motions(arguments: argparse.Namespace) -> int:
     if len(arguments.files) > 1:
         return _many(arguments)
     from wholebody.base.files import check_writable, checked_target, write
+    from wholebody.cli.tables import bar
     from wholebody.motion.files import check_ending
     from wholebody.motion.reading import read_skeleton
     from wholebody.motion.retargeting import bone_errors, retarget
@@ -181,6 +182,7 @@ def _print_errors(errors: Mapping[str, Array]) -> None:
 
 def _many(arguments: argparse.Namespace) -> int:
     from wholebody.base.errors import InputError
+    from wholebody.cli.tables import bar
     from wholebody.motion.batch import read_many
 
     for given in ("names", "ground", "unit", "up", "rate", "bare", "html"):

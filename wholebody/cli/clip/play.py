@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.clip.arguments import ONE_MOTION, bar, clip_of, skeleton_of
+from wholebody.cli.clip.arguments import ONE_MOTION, clip_of, skeleton_of
 from wholebody.cli.command import command, option
 
 if TYPE_CHECKING:
@@ -112,6 +112,8 @@ def _beside(path: Path, clip: Clip, scene: Scene) -> Viewer:
 
 def _written(viewer: Viewer, out: Path | None) -> int:
     """Show what a viewer plays, or write it as a page, glTF or movie."""
+    from wholebody.cli.tables import bar
+
     with viewer:
         if out is None:
             viewer.open()

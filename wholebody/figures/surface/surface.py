@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from wholebody.figures.anthropometry import Person
+from wholebody.figures.body_spec import urdf_text
 from wholebody.figures.figure import Figure
 from wholebody.figures.human.spec import human_spec
 from wholebody.figures.surface.garments import Bone, Patch, Surface
@@ -35,17 +36,8 @@ def _kept(person: Person, hand: str) -> Surface:
 
         return hand_surface(person, hand) if hand else person_surface(person)
 
-    spec = human_spec(person)
-    # The 10 is another one whenever a shape, a weight or the layout changes.
-    digest = hashlib.sha256(f"10 {hand} {person!r}".encode())
-    for solid in spec.solids:
-        shape = solid.geometry
-        sizes = [getattr(shape, name, 0.0) for name in ("radius", "halfLength")]
-        half = np.asarray(getattr(shape, "halfSide", np.zeros(3)))
-        digest.update(solid.name.encode() + np.array([*sizes, *half]).tobytes())
-        digest.update(np.asarray(solid.placement.homogeneous).tobytes())
-    for joint in spec.joints:
-        digest.update(joint.name.encode() + np.asarray(joint.origin.homogeneous).tobytes())
+    # The 11 is another one whenever a shape, a weight or the layout changes.
+    digest = hashlib.sha256(f"11 {hand} {person!r} {urdf_text(human_spec(person))}".encode())
     return cached_entry(digest.hexdigest(), make, _packed, _unpacked)
 
 

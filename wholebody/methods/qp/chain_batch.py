@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +18,7 @@ from wholebody.methods.control import Control
 from wholebody.methods.qp.chain import Asked, Descents, Rule, chains_of, distance_of, goal_entries, how_far
 from wholebody.methods.qp.chain_kernel import Goals
 from wholebody.methods.qp.plain_chain import FIRST, PlainChain
-from wholebody.methods.qp.settings import Budget
+from wholebody.methods.qp.settings import SEEDS, Budget
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.distance import Displacement, Effort
@@ -56,17 +58,24 @@ class Batch(NamedTuple):
             first = _First.of(self, chain, entries)
             q, iterations, ended = first.ends()
             judgement = judged(problem, self.numbers, q)
-            # Where the end of least effort is not free, or not stationary, the others are looked at, one by one.
-            left = np.flatnonzero(~(ended & (judgement.clearance_violation <= 0.0)))
+            blocked = ended & ~(judgement.clearance_violation <= 0.0)
+            # Where the end of least effort is not free, the next one is looked at while no descent can lead to less.
+            turn = blocked.copy()
+            for rank in range(1, first.order.shape[1]):
+                turn &= blocked & first.complete(rank)
+                if not len(some := np.flatnonzero(turn)):
+                    break
+                q[some] = first.postures(some, rank)
+                judgement.put(some, judged(problem, self.numbers.of_some(some), q[some]))
+                blocked[some] = ~(judgement.clearance_violation[some] <= 0.0)
+            left = np.flatnonzero(~ended | blocked)  # one by one
             ended[left] = False
+            for k in left.tolist():
+                met = first.descents(k, workspace).run(first.found(k))
+                if met is not None and met.complete:
+                    q[k], iterations[k], ended[k] = met.q, len(met.trace), True
             if len(left):
-                for k in left.tolist():
-                    met = first.descents(k, workspace).run(first.found(k))
-                    if met is not None and met.complete:
-                        q[k], iterations[k], ended[k] = met.q, len(met.trace), True
-                again = judged(problem, self.numbers.of_some(left), q[left])
-                for part, other in zip(judgement, again, strict=True):
-                    part[left] = other
+                judgement.put(left, judged(problem, self.numbers.of_some(left), q[left]))
         solved = ended & judgement.meets(assessed_tolerance(self.budget.tolerance))
         return Answers(solved, q, iterations, judgement, time.perf_counter() - began)
 
@@ -138,7 +147,8 @@ def _tables(problem: Problem, numbers: Numbers) -> Array:
     return tables
 
 
-class _First(NamedTuple):
+@dataclass(frozen=True)
+class _First:
     """Where the first descents of a batch end."""
 
     batch: Batch
@@ -171,15 +181,38 @@ class _First(NamedTuple):
         found, counts = chain.descents(batch.tables, goals, nearest, how_far(budget, rule.enough), ends, together)
         return cls(batch, chain, goals, rule, at, nearest, ends, found, np.maximum(counts, 0))
 
+    @cached_property
+    def effort(self) -> Array:
+        """(k, m) of the ends; infinite where the goals are not met."""
+        taken = np.arange(self.known.shape[1]) < self.counts[:, None]
+        return np.where(taken, self.known[:, :, 1], np.inf)
+
+    @cached_property
+    def order(self) -> Indices:
+        """(k, m) the ends from the least effort on."""
+        return np.argsort(self.effort, axis=1, kind="stable")
+
     def ends(self) -> tuple[Array, Indices, Mask]:
         """Postures (k, nq) at ends of least effort, descents (k,), and whether (k,) goals are met there for good."""
-        rows, taken = np.arange(len(self.at)), np.arange(self.known.shape[1]) < self.counts[:, None]
-        effort = np.where(taken, self.known[:, :, 1], np.inf)
-        least = effort.argmin(axis=1)
-        ended = (effort[rows, least] < np.inf) & (self.known[rows, least, 2] != 0.0)
+        rows, least = np.arange(len(self.at)), self.order[:, 0]
+        ended = (self.effort[rows, least] < np.inf) & (self.known[rows, least, 2] != 0.0)
         q = self.at.copy()
-        q[ended] = self.chain.posture(self.angles[rows, least][ended], self.at[ended])
-        return q, (taken & (self.known[:, :, 3] != 0.0)).sum(axis=1), ended
+        q[ended] = self.postures(np.flatnonzero(ended), 0)
+        counted = (np.arange(self.known.shape[1]) < self.counts[:, None]) & (self.known[:, :, 3] != 0.0)
+        return q, counted.sum(axis=1), ended
+
+    def postures(self, some: Indices, rank: int) -> Array:
+        """Postures (s, nq) of some problems at the ends with this rank."""
+        return np.asarray(self.chain.posture(self.angles[some, self.order[some, rank]], self.at[some]))
+
+    def complete(self, rank: int) -> Mask:
+        """Whether (k,) no descent can lead to less than the end with this rank, where those before it are not free."""
+        rows, here = np.arange(len(self.at)), self.order[:, rank]
+        effort = self.effort[rows, here]
+        isolated = self.nearest.shape[2] <= self.rule.rows
+        near = isolated | ~(self.effort[rows, self.order[:, 0]] < SEEDS.worth * effort)
+        complete: Mask = near & (effort < np.inf) & (self.known[rows, here, 2] != 0.0)
+        return complete
 
     def found(self, k: int) -> tuple[Array, Array]:
         """The ends (m, n) of one problem, and what was found there (m, 4)."""

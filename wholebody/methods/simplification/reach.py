@@ -141,35 +141,40 @@ def still_dofs(problem: Problem) -> list[int]:
 
 
 def reachable_pairs(problem: Problem, still: Iterable[int], numbers: Indices) -> Mask:
-    """Which pairs (k,), by number, are not proven to stay apart, with the degrees `still` and held frames fixed."""
+    """Which pairs (k,), by number, are not proven to stay apart, with the degrees `still` and held frames fixed.
+
+    Of two pieces that both move nothing is said.
+    """
     scene = problem.scene
     pieces, table, clearances = scene.geometry.geometryObjects, scene.pair_table, problem.clearances[numbers]
     joint, pairs = table.joint, table.pairs[numbers]
-    turn = np.array([piece.placement.rotation for piece in pieces]).reshape(-1, 3, 3)
     center = np.array([piece.placement.translation for piece in pieces]).reshape(-1, 3)
     reach = Reach(scene.model, problem.start, Balls(center, table.reach, np.arange(len(pieces))), joint, still)
-    seats, seat = np.unique(joint, return_inverse=True)
-    views = [(seat, [reach.seen_from(int(one)) for one in seats], 0.0)]
+    views, model, state = [(reach.seen_from(0), 0.0)], scene.model, State(scene.model).update(problem.start)
     # m: largest displacement of a piece by errors of holds; an accepted answer has less
-    views += [
-        (np.where(joint == 0, 0, -1), [balls], 1e-3) for balls in held_balls(scene.figure, reach, problem.constraints)
-    ]
-    open_ = np.ones(len(pairs), dtype=bool)
-    for row_of, seen, slack in views:
-        place, radius = np.zeros((len(seen) + 1, len(pieces), 3)), np.full((len(seen) + 1, len(pieces)), np.inf)
-        for row, balls in enumerate(seen):
-            place[row, balls.piece], radius[row, balls.piece] = balls.center, balls.radius
-        for fixed, moving in ((0, 1), (1, 0)):
-            other, own = pairs[:, moving], pairs[:, fixed]
-            at = row_of[own]
-            away = np.einsum("kji,kj->ki", turn[own], place[at, other] - center[own])  # in the axes of the piece
-            room = radius[at, other] + clearances + slack + COAL_ACCURACY
-            apart = np.sqrt((away * away).sum(axis=1)) - table.reach[own] > room
-            apart |= np.sqrt((np.maximum(np.abs(away) - table.half[own], 0.0) ** 2).sum(axis=1)) > room
-            for k in np.flatnonzero(np.isinf(table.reach)):
-                plane, mine = table.swept[k].faces[0], own == k
-                apart[mine] |= away[mine] @ plane[:3] - plane[3] > room[mine]
-            open_ &= ~(apart & (joint[own] != joint[other]))
+    views += [(balls, 1e-3) for balls in held_balls(scene.figure, reach, problem.constraints)]
+    rests, kept = np.zeros(model.njoints, dtype=bool), set(still)
+    for j in range(model.njoints):
+        dofs = range(model.idx_vs[j], model.idx_vs[j] + model.nvs[j]) if j else ()
+        rests[j] = (not j or rests[model.parents[j]]) and kept.issuperset(dofs)
+    at = [state.data.oMi[piece.parentJoint] * piece.placement for piece in pieces]  # of those that rest, in the world
+    open_, fixed = np.ones(len(pairs), dtype=bool), rests[joint[pairs]]
+    row = np.flatnonzero(fixed[:, 0] != fixed[:, 1])
+    side = fixed[row, 1].astype(np.intp)  # of the piece that is fixed
+    own, other = pairs[row, side], pairs[row, 1 - side]
+    turn = np.array([place.rotation for place in at]).reshape(-1, 3, 3)[own]
+    origin = np.array([place.translation for place in at]).reshape(-1, 3)[own]
+    for balls, slack in views:
+        place, radius = np.zeros((len(pieces), 3)), np.full(len(pieces), np.inf)
+        place[balls.piece], radius[balls.piece] = balls.center, balls.radius
+        away = np.einsum("kji,kj->ki", turn, place[other] - origin)  # in the axes of the piece
+        room = radius[other] + clearances[row] + slack + COAL_ACCURACY
+        apart = np.sqrt((away * away).sum(axis=1)) - table.reach[own] > room
+        apart |= np.sqrt((np.maximum(np.abs(away) - table.half[own], 0.0) ** 2).sum(axis=1)) > room
+        for k in np.flatnonzero(np.isinf(table.reach)):
+            plane, mine = table.swept[k].faces[0], own == k
+            apart[mine] |= away[mine] @ plane[:3] - plane[3] > room[mine]
+        open_[row] &= ~apart
     return open_
 
 

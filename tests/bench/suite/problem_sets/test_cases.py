@@ -16,7 +16,7 @@ from wholebody.base.errors import UnknownNameError
 from wholebody.bench.suite.problem_sets.case import Case
 from wholebody.bench.suite.problem_sets.registry import SETS, problem_set
 
-NUMBERS = (0, 199)  # of every kind, side and tip: sets take them in turn, of two and three, by number
+NUMBERS = (0, 1)  # of every kind, side and tip: sets take them in turn, of two and three, by number
 SPARE = 5e-4  # m
 TOLD = ("clutter", "self_contact", "balance", "robot_arm")  # every way of drawing things, postures and figures
 STILL = [name for name, group in SETS.items() if not group.moving]
@@ -57,7 +57,7 @@ def test_no_start_solves_it(name: str) -> None:
 
 @pytest.mark.parametrize("name", TOLD)
 def test_numbers_and_seeds_make_different_problems(name: str) -> None:
-    assert len({fingerprint(made(name, number, seed)) for number, seed in ((0, 0), (199, 0), (0, 1))}) == 3
+    assert len({fingerprint(made(name, number, seed)) for number, seed in ((0, 0), (1, 0), (0, 1))}) == 3
 
 
 def test_another_process_makes_the_same_problems() -> None:

@@ -39,7 +39,7 @@ def test_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "finite" in rows[-1]["sentence"]
     texts = " ".join(ElementTree.parse(tmp_path / "stability.svg").getroot().itertext())
     assert all(word in texts for word in ("Out of reach by 1 mm", "Edge on edge", "qp", "ccd", "●", "–"))
-    assert "3 of 3" in capsys.readouterr().out
+    assert "| `qp` | 0 | 2 | 1 | 0 | 3 |" in capsys.readouterr().out
     assert "- **Out of reach by 1 mm.**" in (tmp_path / "stability.md").read_text()
 
 

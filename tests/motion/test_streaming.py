@@ -1,0 +1,56 @@
+"""Skeletons that come frame by frame become the postures that a recording of them becomes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from tests.motion.test_ground import flat, slides, walker
+from wholebody.base.errors import InputError
+from wholebody.motion.skeleton import SkeletonMotion
+
+
+@pytest.fixture(scope="module")
+def human() -> wb.Figure:
+    return wb.load("human")
+
+
+def streamed(stream: wb.motion.Retargeter, motion: SkeletonMotion) -> np.ndarray:
+    """Postures of a stream; each comes out `ahead` frames after its skeleton, but for the last ones."""
+    found = []
+    for k in range(len(motion)):
+        q = stream.push(motion.part(k, k + 1))
+        assert len(q) == (1 if k >= stream.ahead else 0)
+        found.append(q)
+    return np.concatenate([*found, stream.finish()])
+
+
+def test_a_stream_gives_the_postures_of_the_recording(human: wb.Figure) -> None:
+    motion, stands = walker(flat, 3.5)
+    ground = wb.motion.ground(motion)
+    batch = wb.retarget(motion, human, ground=ground)
+    stream = wb.motion.Retargeter(motion, human, ground=ground)
+    assert stream.ahead < len(motion)
+    assert stream.latency == pytest.approx(stream.ahead * motion.dt)
+    assert np.abs(streamed(stream, motion) - batch.q).max() < 1e-9
+    found = wb.Clip(human, streamed(wb.motion.Retargeter(motion.part(0, 60), human), motion), motion.dt)  # type: ignore[arg-type]
+    assert slides(found, stands)[5:].mean() < 2e-3  # where feet rest is found as frames come
+    scene = wb.Scene(human).add(wb.HalfSpace(), name="floor")
+    assert max(-scene.contacts(q, 0.01).distance.min(initial=0.0) for q in found.q) < 5e-4
+
+
+def test_what_does_not_belong_to_a_stream_is_refused(human: wb.Figure) -> None:
+    motion, _ = walker(flat, 0.5)
+    stream = wb.motion.Retargeter(motion, human)
+    with pytest.raises(InputError, match="another time step"):
+        stream.push(replace(motion, dt=0.5))
+    with pytest.raises(InputError, match="other joints"):
+        stream.push(replace(motion, names=tuple(f"{name} of another" for name in motion.names)))
+    with pytest.raises(InputError, match="the scene has the figure"):
+        wb.motion.Retargeter(motion, human, wb.Scene(wb.load("hand")))
+    assert len(stream.finish()) == 0
+    with pytest.raises(InputError, match="was finished"):
+        stream.push(motion)
