@@ -364,12 +364,6 @@ class EquationSet:
             if np.isfinite(bound):
                 self._add("angle", ONE_SIDED, a, b, label, first.coeffs(), second.coeffs(), center, bound, sign)
 
-    def angle(
-        self, a: int, b: int, label: str, axes: tuple[Array, Array], center: float, value: float, role: Role
-    ) -> None:
-        """The angle about z of two axes (quaternions), chosen nearest to the center, has a value."""
-        self._add("angle", role, a, b, label, *axes, center, value, 1.0)
-
     def batches(self) -> list[Batch]:
         """The groups in batches."""
         listed = [_batch(kind, rows) for (kind, _), rows in self._rows.items()]

@@ -14,7 +14,7 @@ from wholebody.geometry.memory_views import placement_view
 from wholebody.geometry.placement import quaternions
 from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.newton import quaternions as quat
-from wholebody.methods.newton.batches import ONE_SIDED, Angle, EquationSet, Role, with_world
+from wholebody.methods.newton.batches import ONE_SIDED, Angle, EquationSet, with_world
 from wholebody.methods.newton.quaternions import axes_with_z, relative_forms
 
 
@@ -226,30 +226,6 @@ class FigureBodies:
             q = pin.integrate(self.model, start, share * way)
         result: Array = self.figure.clamp(q)
         return result
-
-    def add_posture_goals(self, equations: EquationSet, label: str, q: Array, dofs: set[int], role: Role) -> None:
-        """Add goals that move the joints of some degrees of freedom to their values in the posture q (nq,)."""
-        model = self.model
-        turning = {row[0]: k for k, row in enumerate(self._turning)}
-        for joint in range(1, model.njoints):
-            kind, a, b = model.joints[joint], self.index(int(model.parents[joint])), self.index(joint)
-            if kind.idx_v not in dofs:
-                continue
-            if joint in turning:
-                k = turning[joint]
-                center = float(self.angles.center[k])
-                equations.angle(a, b, label, self._turning[k][2:], center, float(q[kind.idx_q]), role)
-                continue
-            pin.forwardKinematics(model, self.data, q)
-            here = self.data.oMi[model.parents[joint]].actInv(self.data.oMi[joint])
-            if kind.shortname().startswith("JointModelP"):
-                along = model.jointPlacements[joint].rotation @ _axis(kind)
-                height = float(along @ here.translation)
-                equations.slide(a, b, label, along, np.zeros(3), height, role)
-                continue
-            equations.turn(a, b, label, pin.Quaternion(here.rotation), pin.Quaternion.Identity(), 3, role)
-            if kind.nq == 7:
-                equations.coincide(a, b, label, np.array(here.translation), np.zeros(3), role)
 
     def _add(self, joint: int) -> None:
         model, equations = self.model, self.equations

@@ -59,12 +59,12 @@ class TangentRows(Batch):
         return result
 
 
-def goal_rows(bodies: FigureBodies, goal: Goal, label: str) -> TangentRows:
-    """Rows of a goal: its error."""
+def goal_rows(bodies: FigureBodies, goal: Goal, label: str, depends: Mask | None = None) -> TangentRows:
+    """Rows of a goal: its error; `depends` as in `TangentRows`."""
     error = np.atleast_1d(goal.error(bodies.start_state))
     return TangentRows(
         bodies, label, _of_rows(goal, goal.error, len(error)),
-        np.arange(len(error)), np.ones(len(error)), np.zeros(len(error)),
+        np.arange(len(error)), np.ones(len(error)), np.zeros(len(error)), depends,
     )  # fmt: skip
 
 

@@ -58,10 +58,12 @@ def goal_equations(problem: Problem, bodies: FigureBodies, goals: Sequence[Goal]
         elif isinstance(goal, Axis) and goal.toward is None:
             ours = axes_along(_local(bodies, goal.place.frame).rotation @ goal.basis[2])
             result.turn(bodies.index(goal.place.joint), -1, label, ours, axes_along(goal.resolved_target), 2, role)
-        elif isinstance(goal, Posture):
-            bodies.add_posture_goals(result, label, goal.resolved_target, set(goal.dofs.tolist()), role)
         else:
-            result.add(goal_rows(bodies, goal, label), role)
+            depends = None
+            if isinstance(goal, Posture):  # each joint on itself
+                joint = np.repeat(np.arange(bodies.model.njoints), bodies.model.nvs)
+                depends = joint[goal.dofs][:, None] == joint
+            result.add(goal_rows(bodies, goal, label, depends), role)
     return result
 
 
