@@ -42,6 +42,17 @@ def test_a_stream_gives_the_postures_of_the_recording(human: wb.Figure) -> None:
     assert max(-scene.contacts(q, 0.01).distance.min(initial=0.0) for q in found.q) < 5e-4
 
 
+@pytest.mark.parametrize("known", [True, False])
+def test_a_stream_may_end_while_feet_rest(known: bool, human: wb.Figure) -> None:
+    """Its ground is that of a longer recording, or feet have just come down."""
+    motion, _ = walker(flat, 2.0)
+    ground = wb.motion.ground(motion) if known else None
+    for count in (4, 10, 13):
+        q = streamed(wb.motion.Retargeter(motion, human, ground=ground), motion.part(0, count))
+        assert q.shape == (count, human.model.nq)
+        assert np.isfinite(q).all()
+
+
 def test_what_does_not_belong_to_a_stream_is_refused(human: wb.Figure) -> None:
     motion, _ = walker(flat, 0.5)
     stream = wb.motion.Retargeter(motion, human)

@@ -147,6 +147,16 @@ def test_samples_are_within_limits_and_no_whole_turn_away_where_these_let_them(
     np.testing.assert_allclose(sampler.turns.nearest(at + [2.0 * np.pi, 0.0], at), at, atol=1e-12)
 
 
+@pytest.mark.parametrize("goal", [4.0, -5.0])
+def test_a_goal_for_joint_values_is_met_on_its_own_side_of_a_whole_turn(
+    goal: float, planar_arm: Callable[..., wb.Figure]
+) -> None:
+    scene, wanted = wb.Scene(planar_arm((0.5, 0.5), limit=2.0 * np.pi)), np.array([goal, 0.5])
+    found = wb.plan(scene, np.zeros(2), wb.Posture(wanted))
+    assert found.solved, found.message
+    np.testing.assert_allclose(found.clip.q[-1], wanted, atol=1e-4)
+
+
 TURNTABLE = """<robot name="bar"><link name="base"/>
 <link name="bar"><collision><origin xyz="0.5 0 0"/><geometry><box size="0.9 0.05 0.05"/></geometry></collision></link>
 <joint name="turn" type="continuous"><parent link="base"/><child link="bar"/><axis xyz="0 0 1"/>

@@ -377,10 +377,12 @@ def test_who_stands_keeps_the_margin_of_people() -> None:
     assert inside.min() >= stand.keeps - 1e-4
 
 
-@pytest.mark.parametrize("knees", ["both", ["left_shank"], ["left_shank", "left_foot"]], ids=str)
+@pytest.mark.parametrize("knees", ["left_foot", None, 3, ["left_shank"], ["left_shank", "left_foot"], [["a"]]], ids=str)
 def test_knees_that_are_no_feet_are_refused(knees: Any) -> None:
     scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
-    with pytest.raises(wb.InputError, match=r"knees are of the feet, and (both|left_shank) is not"):
+    with pytest.raises(
+        wb.InputError, match=r"knees (is .*, not a list|are of the feet, and (left_shank|\['a'\]) is not)"
+    ):
         wb.Problem(scene, constraints=[wb.Stand("floor", knees=knees)])
 
 

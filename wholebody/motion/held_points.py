@@ -234,6 +234,13 @@ class Holds:
             if point.role == role:
                 stands[-1] = with_values(stands[-1], end=frame)
 
+    def finish(self, count: int) -> None:
+        """No frame comes from `count` on: what rests there begins no more, and other rests end there."""
+        self._stands = [
+            [with_values(each, end=count) if each.end > count else each for each in stands if each.first < count]
+            for stands in self._stands
+        ]
+
     def moved(self, frame: int) -> Mapping[str, pin.SE3]:
         """Where the things that move are in a frame."""
         return {} if self._touched is None else self._touched.things.moved(frame)

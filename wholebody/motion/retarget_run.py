@@ -136,6 +136,8 @@ class Run:
     def finish(self) -> list[Array]:
         """The postures (nq,) of the last frames."""
         self.ended = True
+        if self.holds is not None:
+            self.holds.finish(self._came)
         return self._advanced()
 
     def _advanced(self) -> list[Array]:

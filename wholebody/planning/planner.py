@@ -19,6 +19,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.base.runner import processor_time
 from wholebody.geometry.continuous.sweep import Sweep
+from wholebody.methods.conclusion import meets
 from wholebody.methods.qp.method import QP
 from wholebody.methods.simplification.reach import still_dofs
 from wholebody.motion.clip import Clip
@@ -190,6 +191,9 @@ def _answers(problem: Problem, sampler: Sampler) -> Iterator[_End]:
         else:
             solution = QP(restarts=0, budget=0).solve(problem.with_start(sampler.near(problem.start, 1.0)))
         end = sampler.turns.nearest(solution.q, problem.start) if solution.solved else None
+        # a goal or a constraint on joint values may be met on one side of a whole turn alone
+        if end is not None and not np.array_equal(end, solution.q) and not meets(assess(problem, end), QP().tolerance):
+            end = solution.q
         yield _End(end, solution.message)
 
 

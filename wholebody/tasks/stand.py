@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.checks import shown, some
 from wholebody.base.errors import InputError
+from wholebody.base.fields import Names
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
@@ -57,13 +58,13 @@ class Stand(TermOfParts):
     feet: Feet = ("left_foot", "right_foot")
     balance: bool = True
     margin: Margin | None = None
-    knees: Sequence[str] = ()
+    knees: Annotated[Sequence[str], Names("['right_shank']", least=0)] = ()
     keeps: float = field(init=False, repr=False, default=0.0)
 
     def resolve(self, scene: Surroundings, start: Array) -> Stand:
         """Find the soles and the face that they stand on."""
         where = f"Stand({shown(self.on)})"
-        if stray := [self.knees] if isinstance(self.knees, str) else [k for k in self.knees if k not in self.feet]:
+        if stray := [str(knee) for knee in self.knees if knee not in self.feet]:
             example = "feet=['left_foot', 'right_shank'], knees=['right_shank']"
             raise InputError(f"{where}: knees are of the feet, and {some(stray)} is not; give {example}")
         state = State(scene.model).update(start)
