@@ -657,6 +657,10 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         "figure": {"left_wrist": "link4", "left_elbow": "link2"},
     }
     yield "retarget", Call(wb.retarget, {"motion": skeleton, "figure": arm, "names": bones, "progress": print})
+    fed = {"motion": skeleton, "figure": arm, "scene": wb.Scene(arm), "ground": None, "names": bones}
+    yield "Retargeter", Call(wb.motion.Retargeter, fed)
+    yield "Retargeter.push", Call(lambda motion: wb.motion.Retargeter(**fed).push(motion), {"motion": skeleton})
+    yield "Retargeter.finish", Call(wb.motion.Retargeter(**fed).finish, {})
     errors = {"motion": skeleton, "clip": wb.retarget(skeleton, arm, names=bones), "names": bones}
     yield "bone_errors", Call(wb.motion.bone_errors, errors)
     named = {"skeleton": {"left_ankle": "a"}, "figure": {"left_ankle": "link4"}}

@@ -116,7 +116,7 @@ def test_people_stand_on_their_feet(name: str, example: Example, solved: Any) ->
     q = solution.q
     before, after = places(problem, problem.start), places(problem, q)
     for side in ("left", "right"):
-        assert before(f"{side}_sole").isApprox(after(f"{side}_sole"), 1e-5)
+        assert np.abs(pin.log6(before(f"{side}_sole").actInv(after(f"{side}_sole"))).vector).max() < 1e-5
     model = problem.scene.model
     x, y, _ = pin.centerOfMass(model, model.createData(), q)
     assert after("left_heel").translation[0] < x < after("left_toe_tip").translation[0]
@@ -494,7 +494,7 @@ def test_every_domino_falls(example: Example, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["driver", "hold_a_pole"])
 def test_hands_hold_what_they_are_told(name: str, example: Example) -> None:
     problem = example(name).build()
-    solution = wb.solve(problem, wb.QP(measures=name != "driver"))  # to spare effort takes longest
+    solution = wb.solve(problem)
     assert solution.solved
     least, where = deepest(problem, solution.q)
     assert least > -1e-5, where

@@ -94,6 +94,10 @@ class Retargeter:
         self._holds = Holds(points, known, self._proportions.path, motion.dt, surface)
         self._run = Run(figure, like, self._roles, motion.dt, self._holds, world.workspace())
 
+    def __repr__(self) -> str:
+        """In a line."""
+        return f"Retargeter({self._like.name!r}, frames of {self._like.dt:g} s, {self.ahead} ahead)"
+
     @property
     def ahead(self) -> int:
         """Frames from a skeleton to its posture."""

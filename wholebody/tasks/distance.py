@@ -216,6 +216,14 @@ class RotationEffort(SumOfSquares):
             weights[list(ball.idx_v)] = 0.0
         return filled(self, balls=balls, others=SquaredDistance.build(start, weights))
 
+    def curvature(self, state: State) -> Array:
+        """(nv,) that of the other joints, and row sums of the squares' second derivative of Gauss and Newton."""
+        result: Array = self.others.curvature.copy()
+        for ball in self.balls:
+            steep = np.abs(ball.residuals(state.q)[1])
+            result[list(ball.idx_v)] = 2.0 * steep.T @ steep.sum(axis=1) + LEAST_CURVATURE
+        return result
+
     def squares(self, state: State) -> tuple[Array, Array]:
         """Residuals (k,) and their derivatives (k, nv): of each ball joint, then of the other joints that count."""
         residuals, rows = self.others.squares(state)

@@ -11,21 +11,22 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Surroundings, filled
-from wholebody.tasks.distance import SumOfSquares
+from wholebody.tasks.base import Measure, Surroundings, filled
+from wholebody.tasks.distance import LEAST_CURVATURE
 
 
 class Masses(NamedTuple):
     """The masses: joint indices, the centre of each mass in its joint, squared weights, rest heights."""
 
     joints: NDArray[np.intp]
-    centres: Array
+    centres: tuple[Array, ...]
     weights: Array
     heights: Array
+    support: Array
 
 
 @dataclass(frozen=True, eq=False)
-class PotentialEnergy(SumOfSquares):
+class PotentialEnergy(Measure):
     """Squared change of the potential energy of every segment from the neutral posture [J^2].
 
     ``sum_k (m_k g)^2 (h_k - h_k_neutral)^2`` with h the height of a segment's centre of mass: the delta potential
@@ -55,23 +56,46 @@ class PotentialEnergy(SumOfSquares):
             neutral[root.idx_q : root.idx_q + root.nq] = start[root.idx_q : root.idx_q + root.nq]
         state = State(model).update(neutral)
         joints = np.array([k for k in range(1, model.njoints) if model.inertias[k].mass > 0.0], dtype=np.intp)
-        centres = np.array([model.inertias[int(k)].lever for k in joints]).reshape(-1, 3)
+        centres = tuple(np.array(model.inertias[int(k)].lever) for k in joints)
         # standard acceleration of gravity [m/s^2] (CGPM 1901).
         weights = np.array([(model.inertias[int(k)].mass * 9.80665) ** 2 for k in joints])
         heights = _centres(state, joints, centres)[:, 2]
-        return filled(self, masses=Masses(joints, centres, weights, heights))
+        return filled(self, masses=Masses(joints, centres, weights, heights, state.support[joints]))
 
-    def squares(self, state: State) -> tuple[Array, Array]:
-        """How far each segment has risen times its weight (k,) [J], and the derivative (k, nv)."""
+    def value(self, state: State) -> float:
+        """The measure [J^2]."""
         bodies = self.masses
-        centres, roots = _centres(state, bodies.joints, bodies.centres), np.sqrt(bodies.weights)
-        lifts = np.zeros((len(centres), 6))  # wrenches of upward unit forces at the centres: [z, c x z]
-        lifts[:, 2], lifts[:, 3], lifts[:, 4] = 1.0, centres[:, 1], -centres[:, 0]
-        rows = state.rows(lifts, bodies.joints, np.zeros_like(bodies.joints))
-        return roots * (centres[:, 2] - bodies.heights), roots[:, None] * rows
+        rise = _centres(state, bodies.joints, bodies.centres)[:, 2] - bodies.heights
+        return float(bodies.weights @ (rise * rise))
+
+    def gradient(self, state: State) -> Array:
+        """(nv,) derivative [J^2/rad and J^2/m]."""
+        bodies = self.masses
+        centres = _centres(state, bodies.joints, bodies.centres)
+        wrenches = _lifts(centres) * (2.0 * bodies.weights * (centres[:, 2] - bodies.heights))[:, None]
+        # All descendants of a joint act on it: sum their wrenches first, then multiply by each of its columns.
+        columns = ((bodies.support.T @ wrenches) * state.jacobian.T).sum(axis=1)
+        return np.asarray(state.folded(columns[None])[0])
+
+    def curvature(self, state: State) -> Array:
+        """(nv,) diagonal of the Gauss-Newton matrix of the heights [J^2/rad^2 and J^2/m^2]."""
+        bodies = self.masses
+        lifts = _lifts(_centres(state, bodies.joints, bodies.centres))
+        rows = state.folded((lifts @ state.jacobian) * bodies.support)
+        return np.asarray(2.0 * (bodies.weights @ (rows * rows)) + LEAST_CURVATURE)
 
 
-def _centres(state: State, joints: NDArray[np.intp], centres: Array) -> Array:
+def _centres(state: State, joints: NDArray[np.intp], centres: tuple[Array, ...]) -> Array:
     """(k, 3) centres of mass in the world."""
-    placed = state.joints[joints]  # (k, 4, 3) columns of the rotation, then the translation
-    return np.asarray(np.einsum("ki,kij->kj", centres, placed[:, :3]) + placed[:, 3])
+    places = state.data.oMi
+    found = [places[joint].act(centre) for joint, centre in zip(joints.tolist(), centres, strict=True)]
+    return np.array(found).reshape(-1, 3)
+
+
+def _lifts(centres: Array) -> Array:
+    """(k, 6) wrenches of upward unit forces at the centres: [z, c x z]."""
+    rows = np.zeros((len(centres), 6))
+    rows[:, 2] = 1.0
+    rows[:, 3] = centres[:, 1]
+    rows[:, 4] = -centres[:, 0]
+    return rows

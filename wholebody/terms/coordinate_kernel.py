@@ -1,8 +1,9 @@
-"""Errors of postures in the joints' own coordinates, as compiled loops: see `plan`."""
+"""Errors of postures in the joints' own coordinates, and heights of masses, as compiled loops: see `plan`."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
 from wholebody.base.compiled import compiled
@@ -247,3 +248,36 @@ def _rotation(unit: Array, turn: Array) -> None:
     turn[0, 0], turn[0, 1], turn[0, 2] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)
     turn[1, 0], turn[1, 1], turn[1, 2] = 2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)
     turn[2, 0], turn[2, 1], turn[2, 2] = 2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)
+
+
+@compiled(inner=True)
+def heights(
+    tables: Array,
+    entries: Integers,
+    joints: Array,
+    columns: Array,
+    support: NDArray[np.int8],
+    column: Integers,
+    measure: Array,
+) -> None:
+    """See `tasks.PotentialEnergy`."""
+    if not len(tables):
+        return
+    nv = measure.shape[1] - 1
+    row = np.empty(nv)
+    centre = np.empty(3)
+    for e in range(len(tables)):
+        joint = entries[e, 0]
+        for i in range(3):
+            centre[i] = joints[joint, 3, i]
+            for k in range(3):
+                centre[i] += joints[joint, k, i] * tables[e, k]
+        weight, rise = tables[e, 3], centre[2] - tables[e, 4]
+        measure[0, nv] += weight * rise * rise
+        row[:] = 0.0
+        for k in range(len(columns)):
+            if support[joint, k]:
+                row[column[k, 0]] += columns[k, 2] + centre[1] * columns[k, 3] - centre[0] * columns[k, 4]
+        for v in range(nv):
+            measure[0, v] += 2.0 * weight * rise * row[v]
+            measure[1, v] += 2.0 * weight * row[v] * row[v]

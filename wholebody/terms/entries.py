@@ -19,8 +19,8 @@ from wholebody.tasks.residuals import PlacementResidual
 RESIDUAL, PLANE, AXIS, MASS_CENTER, COORDINATE, TURN, ROOT, CONE, COUPLED, ELLIPSE, TWIST = range(11)
 """The tables of goals and constraints, by what a row of them stands for."""
 
-DISTANCE, DISCOMFORT, BOX, LIMIT, BODY, CURVATURE, COLUMN = range(11, 18)
-ROOT_DISTANCE, ELEVATION, LUMBAR, BALL, EDGE = range(18, 23)
+DISTANCE, DISCOMFORT, HEIGHT, BOX, LIMIT, BODY, CURVATURE, COLUMN = range(11, 19)
+ROOT_DISTANCE, ELEVATION, LUMBAR, BALL, EDGE = range(19, 24)
 """The other tables of a plan: of measures, of bounds, of the model, and of the edges of reach cones."""
 
 WIDTHS = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
@@ -17,6 +18,7 @@ from wholebody.terms.coordinate_kernel import (
     coordinates,
     coupled_ranges,
     elliptic_ranges,
+    heights,
     rhythms,
     root_distances,
     roots,
@@ -25,8 +27,8 @@ from wholebody.terms.coordinate_kernel import (
 from wholebody.terms.entries import Integers
 from wholebody.terms.residual_kernel import axis_errors, cones, planes, residuals, twists
 
-Plan: TypeAlias = tuple[Array, Integers, Integers]
-"""Floats, integers and layout of a `TermPlan`."""
+Plan: TypeAlias = tuple[Array, Integers, Integers, NDArray[np.int8]]
+"""Floats, integers, layout and support of a `TermPlan`."""
 
 NearArrays: TypeAlias = tuple[Array, Array, Indices, Indices, Array, Array, Array, Indices, Indices, Array]
 """Room for contacts and their rows; see `linearise`."""
@@ -46,7 +48,7 @@ def _integers(flat: Integers, layout: Integers, table: int) -> Integers:
 
 @compiled(inner=True)
 def _table(plan: Plan, table: int) -> tuple[Array, Integers]:
-    floats, integers, layout = plan
+    floats, integers, layout, _ = plan
     return _floats(floats, layout, table), _integers(integers, layout, table)
 
 
@@ -98,7 +100,7 @@ def linearise(
     for r in range(gaps):
         gap_clearance[r] = least[gap_contact[r]]
     wrench, value, jacobian, box, measure, squares = room
-    floats, integers, layout = plan
+    floats, integers, layout, support = plan
     nv = jacobian.shape[1]
     terms = len(value)
     column, bodies = _integers(integers, layout, kinds.COLUMN), _integers(integers, layout, kinds.BODY)
@@ -157,13 +159,15 @@ def linearise(
     if layout[kinds.BALL, 1]:
         first = layout[kinds.ELEVATION, 1] + layout[kinds.LUMBAR, 1]
         balls(*_table(plan, kinds.BALL), q, measure, squares, first)
+    if layout[kinds.HEIGHT, 1]:
+        heights(*_table(plan, kinds.HEIGHT), joints, columns, support, column, measure)
     return known, gaps, False
 
 
 @compiled(error_model="numpy")
 def wrench_rows(wrench: Array, joint: int, against: int, columns: Array, plan: Plan, rows: Array) -> None:
     """Write the Jacobian rows (m, nv) of wrenches (m, 6) that work on the motion of a joint relative to another."""
-    _, integers, layout = plan
+    _, integers, layout, _ = plan
     column, bodies = _integers(integers, layout, kinds.COLUMN), _integers(integers, layout, kinds.BODY)
     rows[:] = 0.0
     for r in range(len(wrench)):

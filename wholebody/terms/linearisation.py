@@ -231,12 +231,12 @@ class Lineariser:
         asked = near.results_of(index), index, *near.known, within
         written = self._term_wrench, value, self._jacobian, box, measure, squares
         given = self._clearances, self.workspace.rows.arrays, self._rows
-        count, gaps, broken = self._kernel.linearise(there, plan[:3], asked, *given, -1, written)
+        count, gaps, broken = self._kernel.linearise(there, plan[:4], asked, *given, -1, written)
         self._placed[:] = placed
         contacts = self._near.contacts(count, self._placed)
         if broken:
             near.repair_normals(contacts)
-            _, gaps, _ = self._kernel.linearise(there, plan[:3], asked, *given, count, written)
+            _, gaps, _ = self._kernel.linearise(there, plan[:4], asked, *given, count, written)
         if plan.others:
             self._evaluate(plan.others, value, self._jacobian)
         if plan.other_bounds:
@@ -304,7 +304,7 @@ class Lineariser:
             if isinstance(derivative, Wrench):
                 wrenches = np.ascontiguousarray(derivative.rows, dtype=float)
                 joint, against, mine = derivative.joint, derivative.against, jacobian[row : row + rows]
-                self._kernel.wrench_rows(wrenches, joint, against, state.columns, self._plan[:3], mine)
+                self._kernel.wrench_rows(wrenches, joint, against, state.columns, self._plan[:4], mine)
             else:
                 jacobian[row : row + rows] = derivative
 
@@ -332,10 +332,10 @@ def compiled_kernel() -> Any:
     nv = state.model.nv
     wrenches, rows, box, measure = np.zeros((0, 6)), np.zeros((0, nv)), np.zeros((2, nv)), np.zeros((2, nv + 1))
     term_kernel.linearise(
-        (state.joints, state.columns, state.q, NO_PIECES), plan[:3], *NO_CONTACTS,
+        (state.joints, state.columns, state.q, NO_PIECES), plan[:4], *NO_CONTACTS,
         (wrenches, _NONE, rows, box, measure, rows),
     )  # fmt: skip
-    term_kernel.wrench_rows(wrenches, 0, 0, state.columns, plan[:3], rows)
+    term_kernel.wrench_rows(wrenches, 0, 0, state.columns, plan[:4], rows)
     return term_kernel
 
 
@@ -361,7 +361,7 @@ class ConstraintValues:
         """The values (c,) at a state; the next call overwrites them."""
         plan, value = self._plan, self._value
         self._kernel.linearise(
-            (state.joints, state.columns, state.q, NO_PIECES), plan[:3], *NO_CONTACTS,
+            (state.joints, state.columns, state.q, NO_PIECES), plan[:4], *NO_CONTACTS,
             (self._wrench, value, self._jacobian, self._box, self._measure, self._no_squares),
         )  # fmt: skip
         for term, evaluate, row, rows in plan.others:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from wholebody import tasks
 from wholebody.base.arrays import Array, with_values
@@ -48,6 +49,7 @@ class TermPlan(NamedTuple):
     floats: Array  # all tables of floats, one after the other
     integers: Integers  # all tables of integers
     layout: Integers  # (tables, 6) where each table of floats begins, its rows and columns, and the same of integers
+    support: NDArray[np.int8]  # (njoints, n) 1 where a column of the joint Jacobian moves a joint
     goal_rows: int  # rows of all goals
     value_rows: int  # rows of all constraints
     others: tuple[OtherTerm, ...]  # goals and constraints of other classes
@@ -150,7 +152,7 @@ def make_plan(limits: Limits, terms: Terms, dt: float | None, state: State) -> T
     ]
     floats, integers, layout = _packed(parts)
     return TermPlan(
-        floats, integers, layout, goal_rows, row - goal_rows, tuple(others),
+        floats, integers, layout, state.support.astype(np.int8), goal_rows, row - goal_rows, tuple(others),
         other_bounds, other_measures, goal_entries, constraint_entries,
     )  # fmt: skip
 
@@ -206,6 +208,13 @@ def _measures(
             columns = np.column_stack([joints.neutral, joints.weights, joints.limits.T, joints.phase.T])
             for q, v, floats in zip(joints.idx_q.tolist(), joints.idx_v.tolist(), columns, strict=True):
                 parts[kinds.DISCOMFORT].append(((q, v), np.array([term.weight, *floats])))
+        elif type(term) is tasks.PotentialEnergy:
+            curvature += term.weight * LEAST_CURVATURE
+            masses = term.masses
+            for joint, centre, weight, height in zip(
+                masses.joints.tolist(), masses.centres, masses.weights, masses.heights, strict=True
+            ):
+                parts[kinds.HEIGHT].append(((joint,), np.array([*centre, term.weight * weight, height])))
         elif type(term) is tasks.Rhythm:
             curvature += term.weight * LEAST_CURVATURE
             for part in (*term.girdles, *term.knees):

@@ -44,7 +44,7 @@ def test_goals_out_of_reach_are_not_tried_from_all_starts() -> None:
 
 def test_the_clock_does_not_change_the_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     """A machine on which half of the processor time that a solve may take passes at once finds what another finds."""
-    problem = problem_set("drivers").make(13, 0).problem
+    problem = problem_set("drivers").make(15, 0).problem
     quick = wb.solve(problem, wb.QP(measures=False))
     clock = iter([0.0])
     monkeypatch.setattr(control.time, "thread_time", lambda: next(clock, 0.9 * LONGEST))

@@ -46,7 +46,7 @@ class System:
         self.inequality = np.repeat([role.one_sided for role in roles], sizes).astype(bool)
         self.objective = np.repeat([role.objective for role in roles], sizes).astype(bool)
         self.stiffness = np.ones(len(self.objective))
-        rows_of = [1 if batch.role.one_sided else batch.size for batch in self.batches]
+        rows_of = [1 if batch.role.one_sided else max(batch.size, 1) for batch in self.batches]
         counts = [size // rows for size, rows in zip(sizes, rows_of, strict=True)]
         groups = np.repeat(np.array(rows_of, dtype=np.intp), counts)
         self.group_starts = (np.cumsum(groups) - groups).astype(np.intp)
