@@ -157,6 +157,16 @@ def test_a_goal_for_joint_values_is_met_on_its_own_side_of_a_whole_turn(
     np.testing.assert_allclose(found.clip.q[-1], wanted, atol=1e-4)
 
 
+def test_an_end_on_the_other_side_of_a_whole_turn_is_reached_past_a_wall(planar_arm: Callable[..., wb.Figure]) -> None:
+    """A post stands on the short way to the point; its posture less a whole turn is free to reach."""
+    scene = wb.Scene(planar_arm((1.0,), limit=6.2)).add(wb.Sphere(0.2), name="post", at=(-0.9, 0.0, 0.0))
+    tip = scene.figure.segments[-1]
+    there = wb.Point(tip, (np.cos(3.8), np.sin(3.8), 0.0), offset=(1.0, 0.0, 0.0))
+    found = wb.plan(scene, np.array([2.5]), there)
+    assert found.solved, found.message
+    assert found.clip.q[-1] == pytest.approx(3.8 - 2.0 * np.pi, abs=1e-4)
+
+
 TURNTABLE = """<robot name="bar"><link name="base"/>
 <link name="bar"><collision><origin xyz="0.5 0 0"/><geometry><box size="0.9 0.05 0.05"/></geometry></collision></link>
 <joint name="turn" type="continuous"><parent link="base"/><child link="bar"/><axis xyz="0 0 1"/>

@@ -190,7 +190,9 @@ def _answers(problem: Problem, sampler: Sampler) -> Iterator[_End]:
             solution = QP().solve(problem)
         else:
             solution = QP(restarts=0, budget=0).solve(problem.with_start(sampler.near(problem.start, 1.0)))
-        end = sampler.turns.nearest(solution.q, problem.start) if solution.solved else None
+        # Half of the ends are on any side of whole turns: things can block the nearest.
+        near = problem.start if number < ENDS // 2 else sampler.anywhere()
+        end = sampler.turns.nearest(solution.q, near) if solution.solved else None
         # a goal or a constraint on joint values may be met on one side of a whole turn alone
         if end is not None and not np.array_equal(end, solution.q) and not meets(assess(problem, end), QP().tolerance):
             end = solution.q

@@ -53,15 +53,19 @@ class Sampler:
         self._drawn: list[Array] = []
         self.turns = Turns(self._figure)
 
+    def anywhere(self) -> Array:
+        """A random posture (nq,) within limits, whatever is held."""
+        if not self._drawn:
+            self._drawn = list(random_postures(self._figure.model, BATCH, int(self._rng.integers(2**31))))
+        return self._drawn.pop()
+
     def near(self, q: Array, spread: float) -> Array:
         """A posture (nq,) whose joints are a share of the way from q (nq,) to a random posture.
 
         A free root is within `ROOM` of that of q; where nothing is held it turns about the vertical.
         """
-        if not self._drawn:
-            self._drawn = list(random_postures(self._figure.model, BATCH, int(self._rng.integers(2**31))))
         model, rng = self._figure.model, self._rng
-        away = spread * np.asarray(pin.difference(model, q, self.turns.nearest(self._drawn.pop(), q)))
+        away = spread * np.asarray(pin.difference(model, q, self.turns.nearest(self.anywhere(), q)))
         for joint in self._roots:
             here = pin.XYZQUATToSE3(q[joint.idx_q : joint.idx_q + 7])
             turn = np.eye(3) if self._held else pin.exp3(np.array((0.0, 0.0, rng.uniform(-np.pi, np.pi))))

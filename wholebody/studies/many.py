@@ -250,7 +250,7 @@ def _run(
 
 
 def _done(
-    work: Sequence[T], cases: Iterable[Case], running: Running,
+    work: Sequence[T], cases: Sequence[Case], running: Running,
     ways: tuple[Callable[[T], Any], Callable[[list[T], bool], Job]],
 ) -> Generator[tuple[T, Any, EndedError | None], None, None]:  # fmt: skip
     """Do work, in this process too where nobody else's code can end it; `ways`: here, and as jobs of `shared`."""
@@ -260,7 +260,8 @@ def _done(
         return
     # Several in a job, since each job has its scene with it; those of a job whose process ended are done one by one. A
     # deadline is of one.
-    size = 1 if running.seconds else max(1, min(TOGETHER, len(work) // (4 * running.jobs)))
+    most = TOGETHER * len(work) // max(1, len(cases))  # pieces of work are runs of cases
+    size = 1 if running.seconds else max(1, min(most, len(work) // (4 * running.jobs)))
     alone = list[list[T]]()
     for chunks in ([[*work[k : k + size]] for k in range(0, len(work), size)], alone):
         with closing(run_batch((there(each, True) for each in chunks), running.jobs, running.cluster)) as outcomes:  # type: ignore[type-var]
