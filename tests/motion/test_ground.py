@@ -221,7 +221,8 @@ def test_a_jump_that_collides_and_ends_that_overlap_are_told_before(human: wb.Fi
         warnings.simplefilter("error")
         wb.avoid(wb.Clip(human, [inside, inside], DT), method="frames", progress=lambda _: True)
         fast = [human.with_joints(standing, {"left_elbow_flexion": by}) for by in (0.1, 1.3, 1.3)]
-        wb.avoid(wb.Clip(human, fast, DT), method="frames", keep_ends=True)
+        freed = wb.avoid(wb.Clip(human, fast, DT), method="frames", keep_ends=True)
+    np.testing.assert_array_equal(freed.clip.q[[0, -1]], [fast[0], fast[-1]])
 
 
 def test_stance_of_a_clip_on_uneven_ground(human: wb.Figure) -> None:

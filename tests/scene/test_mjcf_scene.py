@@ -158,4 +158,5 @@ def test_pairs_of_robots_that_are_not_tested_are_told(tmp_path: Path) -> None:
     path = tmp_path / "cell.xml"
     path.write_text(TWO.replace("EXCLUDED", '<contact><exclude body1="l1" body2="right"/></contact>'))
     with pytest.warns(UserWarning, match="two robots that the file does not test are tested: l1 and right"):
-        wb.read_scene(path)
+        scene = wb.read_scene(path)
+    assert list(scene.figure.members) == ["left", "right", "drone"]
