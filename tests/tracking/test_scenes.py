@@ -12,13 +12,13 @@ import pytest
 import wholebody as wb
 from wholebody.assessment.motion import assess_motion
 from wholebody.tasks import ReachCones
-from wholebody.tracking import InteractionScene, Recording, Track, build_scene, follow, gallery, judge
+from wholebody.tracking import InteractionScene, Recording, build_scene, follow, gallery, judge
 
 BEFORE, AFTER = 7, 19
 
 
 @cache
-def first_contact(name: str) -> tuple[InteractionScene, Track]:
+def first_contact(name: str) -> tuple[InteractionScene, wb.Clip]:
     """A scene, and its track from just before it first goes into something; made once for both ways out."""
     made = build_scene(name)
     assert len(made.track) >= 600

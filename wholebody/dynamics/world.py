@@ -27,6 +27,7 @@ from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.geometry.continuous.passing_through import INSIDE
 from wholebody.geometry.proximity import Contacts
 from wholebody.methods.newton.assembly_bodies import AssemblyBodies
+from wholebody.motion.clip import MOST_FRAMES, Clip
 from wholebody.scene.matter.materials import Surface, surface
 from wholebody.scene.moving_obstacles import Collision
 from wholebody.scene.scene import Scene
@@ -35,7 +36,6 @@ from wholebody.tracking.frame import FRAME, Frame
 from wholebody.tracking.loop import FrameLoop, invalid_reason
 from wholebody.tracking.overlaps import GIVE_WAY, Overlap, overlaps
 from wholebody.tracking.scenes import InteractionScene, SceneFile
-from wholebody.tracking.tracks import MOST_FRAMES, Track
 
 Advance = tuple[Array, Frame, Mapping[str, Array], EngineFrame | None]
 """The posture that was wanted, the frame, impulses on things, and what the things did."""
@@ -329,5 +329,5 @@ def standing_scene(name: str, scene: Scene, q: Array, *, frames: int, dt: float 
     frames = whole(frames, "frames", 1, MOST_FRAMES)
     if not any(thing.body is not None for thing in scene.objects.values()):
         raise InputError(f"{name}: nothing moves by itself; give an object a density or a mass")
-    track = Track.of(scene.figure, np.tile(posture(q, scene.model.nq), (frames, 1)), dt, name)
+    track = Clip(scene.figure, np.tile(posture(q, scene.model.nq), (frames, 1)), dt, name)
     return InteractionScene(name, "things move around a figure that stands", scene, track)

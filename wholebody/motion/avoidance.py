@@ -21,8 +21,8 @@ from wholebody.base.checks import a, flag, function, instance, listed, shown, wa
 from wholebody.base.errors import InputError, UndefinedTermError, UnknownNameError
 from wholebody.methods.control import ctrl_c_ends_all
 from wholebody.motion.avoider import Avoider, MethodResult, Progress, Run, Watch, has_setting
-from wholebody.motion.checking import ClipCheck, check, same_joints
-from wholebody.motion.clip import Clip
+from wholebody.motion.checking import ClipCheck, check
+from wholebody.motion.clip import Clip, same_joints
 from wholebody.motion.clip_torques import torques
 from wholebody.motion.faults import DEPTH
 from wholebody.motion.foreseen import foreseen

@@ -20,13 +20,12 @@ from wholebody.figures.figure import Figure
 from wholebody.motion.avoidance import as_avoider, avoid
 from wholebody.motion.avoider import Avoider
 from wholebody.motion.batch_table import AvoidedCase, BatchTable, first_twice
-from wholebody.motion.clip import Clip
+from wholebody.motion.clip import Clip, check_figure
 from wholebody.motion.frame_terms import Given, frame_terms
 from wholebody.motion.judging import Avoided
 from wholebody.motion.measures import deviation, foot_sliding, jerk_ratio
 from wholebody.motion.reading import read_clip
 from wholebody.motion.worn_equipment import NOTHING, Worn, dressed, label
-from wholebody.tracking.tracks import check_figure
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack

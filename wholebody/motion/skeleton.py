@@ -10,7 +10,7 @@ from wholebody.base.arrays import Array, Indices, brief
 from wholebody.base.checks import array as checked_array
 from wholebody.base.checks import instance, listed, settle, text, time_step, whole
 from wholebody.base.errors import InputError
-from wholebody.tracking.tracks import LARGEST
+from wholebody.motion.clip import LARGEST
 
 UNITS = {
     "metres": 1.0,

@@ -15,5 +15,3 @@ from wholebody.tracking.scenes import (
     build_scene as build_scene,
     gallery as gallery,
 )
-from wholebody.tracking.track_files import read_track as read_track, write_track as write_track
-from wholebody.tracking.tracks import Track as Track, posed as posed

@@ -12,9 +12,9 @@ from wholebody.base.checks import array, is_number, number, shown, time_step, wh
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, InputError
 from wholebody.base.files import read_text
+from wholebody.motion.clip import MOST_FRAMES
 from wholebody.tasks.inputs import direction, point
 from wholebody.tracking.frame import FRAME
-from wholebody.tracking.tracks import MOST_FRAMES
 
 SPEED = 0.5  # m/s: of the goal, if the number of frames is not given
 LARGEST = 100.0  # m: a point farther from the origin is refused as a wrong unit

@@ -20,9 +20,9 @@ from wholebody.methods.qp.method import QP
 from wholebody.methods.solve import method_for_motions
 from wholebody.motion.avoider import MethodResult, Run
 from wholebody.motion.bisection.prediction import Prediction, Predictor, path_planes
+from wholebody.motion.clip import MOST_FRAMES
 from wholebody.motion.windows import runs
 from wholebody.tasks import Freeze, Plane
-from wholebody.tracking.tracks import MOST_FRAMES
 
 Kind = Literal["linear", "quadratic"]
 

@@ -17,9 +17,9 @@ from wholebody.base.errors import FileFormatError, UnknownNameError, one_line
 from wholebody.base.files import LARGEST, read_bytes, title_of
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
+from wholebody.motion.clip import MOST_FRAMES
 from wholebody.motion.files.base import Frames, Motion
 from wholebody.motion.files.robot_arrays import robot_arrays
-from wholebody.tracking.tracks import MOST_FRAMES
 
 VERSION = 1  # of the layout of the arrays
 

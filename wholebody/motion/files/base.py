@@ -11,7 +11,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.checks import TIME_STEP, TIME_STEP_ASKED
 from wholebody.base.errors import FileFormatError, one_line
-from wholebody.tracking.tracks import LARGEST, MOST_FRAMES
+from wholebody.motion.clip import LARGEST, MOST_FRAMES
 
 Motion: TypeAlias = Any
 """What is written, a `Clip`: `figure`, `q` (n, nq), `dt`, `name` and `things`; the module of clips imports this one."""

@@ -17,9 +17,9 @@ from wholebody.base.errors import FileFormatError, InputError, one_line
 from wholebody.base.files import read_text, title_of
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
+from wholebody.motion.clip import ROOT_SIZE
 from wholebody.motion.files.base import LARGEST_FILE, Frames, Motion, frame_count, seconds, table
 from wholebody.motion.files.nodes import angles_about
-from wholebody.tracking.tracks import ROOT_SIZE
 
 GLOBAL = 6  # values of the pelvis: place and rotation
 

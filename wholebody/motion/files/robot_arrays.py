@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from wholebody.motion.clip import ROOT_SIZE
 from wholebody.motion.files.base import Motion, steady
-from wholebody.tracking.tracks import ROOT_SIZE
 
 WXYZ = [3, 0, 1, 2]
 """Order of a quaternion x, y, z, w in files that begin with w."""
