@@ -42,7 +42,6 @@ class AllPairs:
     """
 
     def __init__(self, built: SceneGeometry) -> None:
-        """Allocate."""
         self._built, self.state = built, State(built.model)
         pairs = built.table.pairs
         self._distances = PairDistances(built.geometry, pairs)

@@ -161,7 +161,6 @@ class World(NotCopyable):
         }
 
     def __repr__(self) -> str:
-        """One line."""
         return f"World of {self.scene.figure.name!r} and {len(self._bodies)} bodies, {1e3 * self.dt:g} ms a frame"
 
     @property

@@ -157,7 +157,6 @@ class ClipCheck(Shown):
         return chart
 
     def __repr__(self) -> str:
-        """One line."""
         return f"ClipCheck({str(self).splitlines()[0]!r})"
 
     def as_dict(self) -> dict[str, Any]:

@@ -60,7 +60,6 @@ class Clip(Shown):
     things: Mapping[str, Array] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
-        """Check the values."""
         text(self.name, "the name of a clip")
         check_figure(self.figure, self.name)
         object.__setattr__(self, "dt", time_step(self.dt, f"{self.name}: dt"))
@@ -86,7 +85,6 @@ class Clip(Shown):
         object.__setattr__(self, "things", thing_tracks(things, len(q), self.name) if things else {})
 
     def __repr__(self) -> str:
-        """One line."""
         return f"Clip({self.name!r} of {self.figure.name!r}: {len(self)} frames, one each {self.dt:g} s)"
 
     def _normalise(self, q: Array) -> None:
@@ -111,7 +109,6 @@ class Clip(Shown):
         return self.figure.joints
 
     def __len__(self) -> int:
-        """Return the number of frames."""
         return len(self.q)
 
     @property

@@ -69,7 +69,6 @@ class FrameTerms:
     _state: State = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Make the room in which feet are looked at."""
         object.__setattr__(self, "_state", State(self.scene.model))
 
     def held(self, frame: int) -> tuple[HeldTerm, ...]:

@@ -90,7 +90,6 @@ class AvoidanceReport:
         )
 
     def __repr__(self) -> str:
-        """One line."""
         return f"AvoidanceReport({self.method!r}, solved={self.solved}, {self.message!r})"
 
 
@@ -112,7 +111,6 @@ class Avoided:
         return f"{self.clip.name}, {self.report}"
 
     def __repr__(self) -> str:
-        """One line."""
         return f"Avoided({self.clip.name!r}, {self.report!r})"
 
 

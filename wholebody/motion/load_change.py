@@ -159,7 +159,6 @@ class LoadChange:
         return f"it is {now:.3g} mm outside of the support of {feet} there, and was {before} before"
 
     def __str__(self) -> str:
-        """One sentence."""
         was, now = self.before, self.after
         return (
             f"most torque {was.largest_share:.0%} of a strength before, {now.largest_share:.0%} after; zero moment "

@@ -58,7 +58,6 @@ class Fitter:
     """Fits postures of a figure in its own workspace, so each thread needs its own."""
 
     def __init__(self, figure: Figure, layout: Layout, workspace: Workspace) -> None:
-        """Choose what goals are of."""
         self.figure, self.model, self.layout, self._workspace = figure, figure.model, layout, workspace
         self._state = workspace.state
         self._point_joints, self._point_parts = self._carried(layout.points)

@@ -58,7 +58,6 @@ class SkeletonMotion:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check the values."""
         text(self.name, "the name of a motion")
         object.__setattr__(self, "notes", tuple(listed(self.notes, f"{self.name}: notes", "[]")))
         names = tuple(listed(self.names, f"{self.name}: names", "['hips', 'spine']"))
@@ -85,7 +84,6 @@ class SkeletonMotion:
             raise InputError(f"{self.name}: rotations are no rotations; give orthonormal matrices")
 
     def __len__(self) -> int:
-        """Return the number of frames."""
         return len(self.positions)
 
     def rest(self) -> Array:

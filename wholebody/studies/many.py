@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from wholebody.base import checks
 from wholebody.base.arrays import brief
@@ -28,8 +28,6 @@ MOST_JOBS = 4096
 LONGEST = 1e7  # s: a greater deadline of a solve is a mistake
 TOGETHER = 16  # cases of a job. More: fewer scenes are sent, and processes end less together
 RUN = 16  # problems that warm-start one from the other: longer = fewer cold starts, fewer processes busy at the end
-
-T = TypeVar("T")
 
 
 class SolveProgress(NamedTuple):
@@ -206,17 +204,8 @@ def _answered(record: SolveRecord, answer: dict[str, Any]) -> SolveRecord:
 
 def _computed(order: Sequence[Case], running: Running, function: Callable[..., Any], work: Work) -> dict[Any, Any]:
     """Answers of a function of `solving` by key, see `Family`."""
-    given, sender = {key: (order[k].make, *rest) for key, (k, *rest) in work.items()}, Sender()
-
-    def here(key: Any) -> Any:
-        return function([given[key]], running.method)[0]
-
-    def there(keys: list[Any], full: bool) -> Job:
-        sent = sender.sent([given[key] for key in keys], full)
-        return Job(keys, sent_to, (function, sent, running.method), running.seconds or 0.0)
-
-    cases = [order[k] for k, *_ in work.values()]
-    with closing(_done([*work], cases, running, (here, there))) as outcomes:
+    given = {key: ([k], (order[k].make, *rest)) for key, (k, *rest) in work.items()}
+    with closing(_answers(function, given, order, running)) as outcomes:
         return {key: answer for key, answer, error in outcomes if error is None and answer is not None}
 
 
@@ -225,19 +214,10 @@ def _run(
     alone: list[Sequence[int]], begun: Mapping[int, Any],
 ) -> bool:  # fmt: skip
     """Do runs; whether the caller ended them. Those of several cases whose process ended are left in `alone`."""
-    sender = Sender()
-
-    def made(run: Sequence[int]) -> Run:
-        return begun.get(run[0]), [order[k].make for k in run]
-
-    def here(run: Sequence[int]) -> Any:
-        return solve_runs([made(run)], running.method)[0]
-
-    def there(runs: list[Sequence[int]], full: bool) -> Job:
-        given = sender.sent([made(run) for run in runs], full)
-        return Job(runs, sent_to, (solve_runs, given, running.method), (running.seconds or 0.0) * len(runs[0]))
-
-    with closing(_done(work, [order[k] for run in work for k in run], running, (here, there))) as outcomes:
+    given: dict[Any, tuple[Sequence[int], Run]] = {
+        tuple(run): (run, (begun.get(run[0]), [order[k].make for k in run])) for run in work
+    }
+    with closing(_answers(solve_runs, given, order, running)) as outcomes:
         for run, answers, error in outcomes:
             if error is not None and len(run) > 1:
                 alone.extend([k] for k in run)
@@ -249,21 +229,31 @@ def _run(
     return False
 
 
-def _done(
-    work: Sequence[T], cases: Sequence[Case], running: Running,
-    ways: tuple[Callable[[T], Any], Callable[[list[T], bool], Job]],
-) -> Generator[tuple[T, Any, EndedError | None], None, None]:  # fmt: skip
-    """Do work, in this process too where nobody else's code can end it; `ways`: here, and as jobs of `shared`."""
-    here, there = ways
+def _answers(
+    function: Callable[..., Any], work: Mapping[Any, tuple[Sequence[int], Any]], order: Sequence[Case], running: Running
+) -> Generator[tuple[Any, Any, EndedError | None], None, None]:
+    """What a function of `solving` answers, by key; `work` has of each key the cases and what the function takes."""
+    # In this process too where nobody else's code can end it.
+    sender, keys = Sender(), [*work]
+    cases = [order[k] for numbers, _ in work.values() for k in numbers]
+
+    def here(key: Any) -> Any:
+        return function([work[key][1]], running.method)[0]
+
+    def there(some: list[Any], full: bool) -> Job:
+        given = sender.sent([work[key][1] for key in some], full)
+        seconds = (running.seconds or 0.0) * len(work[some[0]][0])
+        return Job(some, sent_to, (function, given, running.method), seconds)
+
     if _is_quick(cases, running):
-        yield from shared(work, running.jobs, here, there)
+        yield from shared(keys, running.jobs, here, there)
         return
     # Several in a job, since each job has its scene with it; those of a job whose process ended are done one by one. A
     # deadline is of one.
-    most = TOGETHER * len(work) // max(1, len(cases))  # pieces of work are runs of cases
-    size = 1 if running.seconds else max(1, min(most, len(work) // (4 * running.jobs)))
-    alone = list[list[T]]()
-    for chunks in ([[*work[k : k + size]] for k in range(0, len(work), size)], alone):
+    most = TOGETHER * len(keys) // max(1, len(cases))  # keys are of runs of cases
+    size = 1 if running.seconds else max(1, min(most, len(keys) // (4 * running.jobs)))
+    alone = list[list[Any]]()
+    for chunks in ([keys[k : k + size] for k in range(0, len(keys), size)], alone):
         with closing(run_batch((there(each, True) for each in chunks), running.jobs, running.cluster)) as outcomes:  # type: ignore[type-var]
             for job, _, answer, error in outcomes:
                 if error is not None and len(job.name) > 1:

@@ -28,7 +28,6 @@ class Sender:
     """Pickles values; every scene is pickled once as long as nothing in it moves."""
 
     def __init__(self) -> None:
-        """Begin with none."""
         self._scenes: dict[tuple[int, int, int], tuple[str, bytes, Scene]] = {}
 
     def sent(self, value: Any, full: bool = True) -> Sent:

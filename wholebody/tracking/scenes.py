@@ -68,7 +68,6 @@ class SceneFile:
     """Scenes with scripted trackers, of a TOML file such as `tracking/scenes.toml`, by name."""
 
     def __init__(self, path: Path) -> None:
-        """Read the file."""
         self._data = parsed_toml(path.read_text("utf-8"), path.name)
         self.scenes: Mapping[str, str] = {name: plan["about"] for name, plan in self._data["scenes"].items()}
 

@@ -89,7 +89,6 @@ class Bisection(Checked):
     short: Annotated[int, COUNT] = 25
 
     def __post_init__(self) -> None:
-        """Check the settings."""
         super().__post_init__()
         method_for_motions(self.method)
 
@@ -142,7 +141,6 @@ class Recursion:
     """
 
     def __init__(self, predictor: Predictor, settings: Bisection) -> None:
-        """Begin at the original postures."""
         run = predictor.run
         self._run, self._predictor, self._settings = run, predictor, settings
         figure = run.scene.figure

@@ -27,7 +27,6 @@ class Chart:
     """
 
     def __init__(self, model: pin.Model, original: Array) -> None:
-        """Read which joints are curved."""
         self.model, self.original = model, original
         dofs = [range(joint.idx_v, joint.idx_v + joint.nv) for joint in list(model.joints)[1:] if joint.nq != joint.nv]
         self.curved: Indices = np.array([index for part in dofs for index in part], dtype=np.intp)
