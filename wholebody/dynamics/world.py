@@ -200,7 +200,8 @@ class World(NotCopyable):
         Raises:
             InputError: objects were added to or removed from the scene, or tracked consists of no numbers.
         """
-        self._check_fresh()
+        if self.scene.revision != self._revision:
+            raise InputError("objects of the scene were added or removed; make a new world")
         began, note = time.perf_counter(), ""
         if tracked is not None:
             goal = array(tracked, "tracked", f"{self.scene.model.nq} numbers")
@@ -294,10 +295,6 @@ class World(NotCopyable):
             if standing.issuperset(both) and not set(moving).isdisjoint(both):
                 deepest.setdefault(both, -float(near.distance[row]))
         return tuple(Collision(*both, depth, True) for both, depth in deepest.items())
-
-    def _check_fresh(self) -> None:
-        if self.scene.revision != self._revision:
-            raise InputError("objects of the scene were added or removed; make a new world")
 
 
 def _check_yielding(spring: Spring | Actuated | None, give_way: str) -> None:

@@ -25,9 +25,8 @@ from wholebody.motion.checking import ClipCheck, check
 from wholebody.motion.clip import Clip, same_joints
 from wholebody.motion.clip_torques import torques
 from wholebody.motion.faults import DEPTH
-from wholebody.motion.foreseen import foreseen
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
-from wholebody.motion.judging import COLLISION, HELD, ROUNDING, AvoidanceReport, Avoided, judged
+from wholebody.motion.judging import COLLISION, HELD, ROUNDING, AvoidanceReport, Avoided, foreseen, judged
 from wholebody.motion.load_change import load_change
 from wholebody.motion.measures import MotionBounds, resolved
 from wholebody.motion.stance import StanceFeet, has_feet, usual_feet

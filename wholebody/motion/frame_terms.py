@@ -213,7 +213,9 @@ def frame_terms(scene: Scene, q: Array, dt: float, constraints: Iterable[Given],
         elif isinstance(term, MotionBounds):
             largest = term.largest
         elif isinstance(term, (Constraint, Goal)):
-            _try(term, scene, q[0], f"avoid: constraints[{number}]")
+            resolved = term.resolve(scene, q[0])
+            ask = resolved.error if isinstance(resolved, Goal) else resolved.value
+            check_rows(f"avoid: constraints[{number}]", resolved, ask, State(scene.model).update(q[0]))
         elif isinstance(term, Bound):
             term.resolve(scene, q[0])
         else:
@@ -230,12 +232,6 @@ def frame_terms(scene: Scene, q: Array, dt: float, constraints: Iterable[Given],
     }
     grips = {number: shift for number, shift in found.items() if shift.any()}
     return FrameTerms(scene, q, dt, plain, stands, shifts(scene.figure, q, stands), grips, largest)
-
-
-def _try(term: HeldTerm, scene: Scene, q: Array, where: str) -> None:
-    state = State(scene.model).update(q)
-    resolved = term.resolve(scene, q)
-    check_rows(where, resolved, resolved.error if isinstance(resolved, Goal) else resolved.value, state)
 
 
 def _miss(term: HeldTerm, state: State) -> float:

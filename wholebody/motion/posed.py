@@ -48,7 +48,8 @@ def posed(
         (3, 56)
     """
     check_figure(figure, "posed")
-    base = _posture(figure, posture)
+    base = figure.neutral if posture is None else posture
+    base = figure.posture(base) if isinstance(base, str) else checked_posture(base, figure.model.nq)
     text(name, "name")
     if not (angles is None or isinstance(angles, Mapping)):
         raise InputError(f"{name}: angles is {shown(angles)}; give angles by joint, such as {{'neck_flexion': [0.5]}}")
@@ -71,12 +72,6 @@ def posed(
             except InputError as error:
                 raise InputError(f"{name}: frame {frame}: {error}") from None
     return Clip(figure, q, dt, name)
-
-
-def _posture(figure: Figure, posture: str | ArrayLike | None) -> Array:
-    if posture is None:
-        return figure.neutral
-    return figure.posture(posture) if isinstance(posture, str) else checked_posture(posture, figure.model.nq)
 
 
 def _angles(values: object, joint: str) -> Array:

@@ -88,7 +88,10 @@ class Run:
             self.stay[:6] = 1.0  # nothing says where the figure is, so it stays
         limit = np.array(self.model.velocityLimit, dtype=float)
         self.most = np.where(limit > 0.0, np.minimum(limit, 1e9) * dt, np.inf)
-        self.slow, self.slow_most = _limited(self.model, SPARE * self.most)
+        # where a posture has the joints of one value that have a speed limit, and by how much they move in a frame
+        joints = [one for one in self.model.joints[1:] if one.nq == one.nv == 1 and np.isfinite(self.most[one.idx_v])]
+        self.slow: Indices = np.array([one.idx_q for one in joints], dtype=np.intp)
+        self.slow_most = np.array([SPARE * self.most[one.idx_v] for one in joints])
         self.levers = levers(figure)
         self.none = (np.zeros((len(self.fitter.layout.held), 3)),) * 2
         self.calm, self.spread = (normal(time, dt) for time in (CALM, SPREAD))
@@ -350,13 +353,6 @@ def _layout(points: list[str], turns: list[str], roles: Roles, figure: Figure, h
         np.array(weights), np.array([TURNS[role.split("_")[-1]] for role in turns]),
         [(point.joint, point.place) for point in held],
     )  # fmt: skip
-
-
-def _limited(model: pin.Model, most: Array) -> tuple[Indices, Array]:
-    """Where a posture has the joints of one value that have a speed limit, and by how much they move in a frame."""
-    joints = [joint for joint in model.joints[1:] if joint.nq == joint.nv and joint.nq == 1]
-    kept = [(joint.idx_q, most[joint.idx_v]) for joint in joints if np.isfinite(most[joint.idx_v])]
-    return np.array([place for place, _ in kept], dtype=np.intp), np.array([speed for _, speed in kept])
 
 
 def normal(time: float, dt: float) -> Array:

@@ -20,8 +20,7 @@ from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
 from wholebody.studies.neighbours import Family, Work, lower, name_changes, solve_from_neighbours
 from wholebody.studies.records import ENDED, Records, RecordStore, SolveRecord
-from wholebody.studies.sending import Sender, sent_to
-from wholebody.studies.solving import Case, Run, at_once, solve_runs
+from wholebody.studies.solving import Case, Run, Sender, at_once, sent_to, solve_runs
 from wholebody.tasks.answers import is_own
 
 MOST_JOBS = 4096
@@ -167,10 +166,14 @@ def run_cases(
         return tell is not None and tell(SolveProgress(len(done), len(order), record)) is True
 
     over = tell is not None and tell(SolveProgress(len(done), len(order), None)) is True
-    if not over:
-        single = [run[0] for run in numbered if len(run) == 1 and run[0] not in done]
-        with closing(_at_once(single, order, running)) as answers:
-            over = any(keep(k, _answered(order[k].record, answer)) for k, answer in answers)
+    single = [run[0] for run in numbered if len(run) == 1 and run[0] not in done]
+    if not over and hasattr(running.method, "batches") and _is_quick([order[k] for k in single], running):
+        with closing(at_once([order[k].make() for k in single], running.method, running.jobs)) as answers:
+            for place, answer in answers:
+                record = order[single[place]].record  # `replace` would take three times as long
+                over = keep(single[place], SolveRecord(record.name, factors=record.factors, **answer))
+                if over:
+                    break
     waiting = [run for run in numbered if any(k not in done for k in run)]
     # The first of each run begin at each other's answers, one after the other, and the rest of a run at its first: so
     # all runs are of one family of postures, whatever `jobs` is.
@@ -185,21 +188,6 @@ def run_cases(
         family = Family(order, done, partial(_computed, order, running), keep)
         _ = solve_from_neighbours(family) or (linked and lowers and (lower(family) or name_changes(family)))
     return Records([done.get(k, order[k].record) for k in range(len(order))])
-
-
-def _at_once(
-    numbers: Sequence[int], order: Sequence[Case], running: Running
-) -> Generator[tuple[int, dict[str, Any]], None, None]:
-    """Cases with what their records say, of those that the method answers many of at a time."""
-    if not (hasattr(running.method, "batches") and _is_quick([order[k] for k in numbers], running)):
-        return
-    for place, answer in at_once([order[k].make() for k in numbers], running.method, running.jobs):
-        yield numbers[place], answer
-
-
-def _answered(record: SolveRecord, answer: dict[str, Any]) -> SolveRecord:
-    """The record of a case with what came of it: `replace`, in a third of the time."""
-    return SolveRecord(record.name, factors=record.factors, **answer)
 
 
 def _computed(order: Sequence[Case], running: Running, function: Callable[..., Any], work: Work) -> dict[Any, Any]:

@@ -102,7 +102,8 @@ class Bisection(Checked):
         # more iterations give a little less effort, and take long where planes and what is held contradict each other
         method = QP(restarts=0, iterations=50) if self.method == "qp" else method_for_motions(self.method)
         run = run.of(replace(run.terms, q=np.array([figure.clamp(q) for q in run.terms.q])))
-        ways = self._frozen(figure)
+        # what is frozen, and what else where a frame cannot be freed so
+        ways = ((tuple(figure.roots), ()) if figure.roots else ((),)) if self.frozen is None else (self.frozen,)
         for frozen in ways:
             given = (*run.terms.given, *([Freeze(*frozen)] if frozen else []))
             predictor = Predictor(run.of(replace(run.terms, given=given)), method, self.room)
@@ -112,12 +113,6 @@ class Bisection(Checked):
                 break
         hold_between(recursion, predictor)
         return MethodResult(recursion.q, repair=True, frozen=frozen)
-
-    def _frozen(self, figure: Figure) -> tuple[tuple[str, ...], ...]:
-        """What is frozen, and what else where a frame cannot be freed so."""
-        if self.frozen is not None:
-            return (self.frozen,)
-        return (tuple(figure.roots), ()) if figure.roots else ((),)
 
     def _points(self, figure: Figure, original: Array, frozen: tuple[str, ...]) -> tuple[int, ...]:
         """The evaluation points of a clip."""

@@ -87,7 +87,8 @@ def read(path: Path, figure: Figure) -> Frames:
     """Read a clip that `write` wrote of a figure of the same joints."""
     arrays = read_arrays(path)
     if "wholebody_clip" not in arrays:
-        raise FileFormatError(f"{path.name}: is no clip of wholebody; its arrays are {_listed(arrays)}")
+        listed = ", ".join(one_line(name, 30) for name in list(arrays)[:6]) or "none"
+        raise FileFormatError(f"{path.name}: is no clip of wholebody; its arrays are {listed}")
     missing = [name for name in ("q", "dt", "name", "joints") if name not in arrays]
     if missing:
         raise FileFormatError(f"{path.name}: the arrays lack {', '.join(missing)}; write the clip anew")
@@ -174,7 +175,3 @@ def _holds_objects(file: IO[bytes], what: str) -> bool:
             f"{what} has shape {shape}, {size / 1e6:.0f} MB; give at most {LARGEST / 1e6:g} MB, or cut it into parts"
         )
     return False
-
-
-def _listed(arrays: dict[str, NDArray[np.generic]]) -> str:
-    return ", ".join(one_line(name, 30) for name in list(arrays)[:6]) or "none"

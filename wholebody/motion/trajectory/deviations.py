@@ -67,7 +67,9 @@ class Chart:
         if not len(curved) or not x[curved].any():
             return rows
         turned = np.asarray(pin.dIntegrate(self.model, self.original[frame], x, pin.ARG1))
-        return self._times(rows, turned)
+        result = np.array(rows)  # but for its curved joints the matrix is the identity
+        result[:, curved] = rows[:, curved] @ turned[self._both]
+        return result
 
     def between(self, before: Array, after: Array, share: float) -> tuple[Array, Array, Array]:
         """The posture at a share of the way between two (nq,), and its derivatives (nv, nv) with respect to both."""
@@ -82,12 +84,6 @@ class Chart:
         first = from_before + from_way @ np.asarray(pin.dDifference(model, before, after, pin.ARG0))
         second = from_way @ np.asarray(pin.dDifference(model, before, after, pin.ARG1))
         return q, first, second
-
-    def _times(self, rows: Array, matrix: Array) -> Array:
-        """A product with a matrix (nv, nv) that is the identity but for its curved joints."""
-        curved, result = self.curved, np.array(rows)
-        result[:, curved] = rows[:, curved] @ matrix[self._both]
-        return result
 
 
 def second_differences(frames: int, seam_before: bool, seam_after: bool) -> Array:
