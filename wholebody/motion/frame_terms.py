@@ -152,7 +152,8 @@ class FrameTerms:
 
     def step_bounds(self, frame: int) -> tuple[Array, Array]:
         """Least and greatest motion (nv,) from a frame to the next one that speed limits allow; see `bounds`."""
-        fastest, bounds = speed_limits(self.scene, self.dt), self.bounds(frame)
+        limit, bounds = np.array(self.scene.model.velocityLimit, dtype=float).reshape(-1), self.bounds(frame)
+        fastest = np.where(limit > 0.0, np.minimum(limit, 1e9) * self.dt, np.inf)
         return np.maximum(bounds.slowest, -fastest), np.minimum(bounds.fastest, fastest)
 
     def at(self, times: Array) -> FrameTerms:
@@ -254,9 +255,3 @@ def between(model: pin.Model, q: Array, places: Array) -> Array:
     shares = np.clip(places - first, 0.0, 1.0)
     after = np.minimum(first + 1, len(q) - 1)
     return np.array([pin.interpolate(model, q[k], q[m], s) for k, m, s in zip(first, after, shares, strict=True)])
-
-
-def speed_limits(scene: Scene, dt: float) -> Array:
-    """(nv,) largest change of each degree of freedom in one frame; infinite for what has no limit."""
-    limit = np.array(scene.model.velocityLimit, dtype=float).reshape(-1)
-    return np.where(limit > 0.0, np.minimum(limit, 1e9) * dt, np.inf)

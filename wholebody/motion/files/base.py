@@ -75,10 +75,3 @@ def table(name: str, rows: Sequence[tuple[int, Sequence[str]]], columns: int) ->
                 f"{name}, line {line}: value {wrong + 1} is {one_line(words[wrong], 20)}; give finite numbers"
             )
     return found
-
-
-def steady(turns: Array) -> Array:
-    """Quaternions (n, ..., 4), each on the same half of the sphere as the one before."""
-    flips = np.where((turns[1:] * turns[:-1]).sum(axis=-1) < 0.0, -1.0, 1.0)
-    turns[1:] *= np.cumprod(flips, axis=0)[..., None]
-    return turns

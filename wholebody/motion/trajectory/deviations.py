@@ -86,14 +86,6 @@ class Chart:
         return q, first, second
 
 
-def second_differences(frames: int, seam_before: bool, seam_after: bool) -> Array:
-    """(k, n + 4) second differences over n frames and two on both sides, those across a seam included."""
-    full = np.zeros((frames + 2, frames + 4))
-    rows = np.arange(frames + 2)
-    full[rows, rows], full[rows, rows + 1], full[rows, rows + 2] = 1.0, -2.0, 1.0
-    return full[0 if seam_before else 2 : None if seam_after else frames]
-
-
 class Objective:
     """The objective of one window. It is quadratic in the deviations and does not change.
 
@@ -107,7 +99,10 @@ class Objective:
         self, frames: int, weights: Array, time: float, dt: float, seams: tuple[bool, bool], ends: Array | None = None
     ) -> None:  # fmt: skip
         """Lay out the bands, for weights (nv,) and tau `time` [s]; `ends` (4, nv): deviations beside the window."""
-        full, scale = second_differences(frames, *seams), (time / dt) ** 4
+        # second differences over the frames and two on both sides, those across a seam included
+        full, rows, scale = np.zeros((frames + 2, frames + 4)), np.arange(frames + 2), (time / dt) ** 4
+        full[rows, rows], full[rows, rows + 1], full[rows, rows + 2] = 1.0, -2.0, 1.0
+        full = full[0 if seams[0] else 2 : None if seams[1] else frames]
         inside, ends = full[:, 2:-2], np.zeros((4, len(weights))) if ends is None else ends
         beyond = full[:, [0, 1, -2, -1]] @ ends
         self.bands: Array = np.eye(frames) + scale * inside.T @ inside

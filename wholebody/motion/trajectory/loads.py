@@ -81,8 +81,12 @@ class ClipLoads:
     @cached_property
     def base(self) -> Array:
         """(n, nq) the filtered postures."""
-        clip = self.clip
-        return on_filtered(clip.figure, clip.q, clip.q if self.changed is None else self.changed, clip.dt)
+        model, original = self.figure.model, self.clip.q
+        # filtering the change would hide its accelerations
+        each = zip(
+            smoothed(self.clip, CUTOFF).q, original, original if self.changed is None else self.changed, strict=True
+        )
+        return np.array([pin.integrate(model, base, pin.difference(model, was, now)) for base, was, now in each])
 
     @classmethod
     def original(
@@ -93,7 +97,9 @@ class ClipLoads:
         base = smoothed(clip, CUTOFF).q
         lower, upper = torque_limits(clip.figure, strength)
         # Where a foot is held beside its place, the original stands in its own.
-        own, stands = soles_of(dynamics, base, feet, terms)
+        own = [dynamics.stand(q, [bool(marks[k]) for marks in feet.values()]) for k, q in enumerate(base)]
+        joints = dynamics.soles.joints
+        stands = [stand.shifted([terms.shift(k, joint) for joint in joints]) for k, stand in enumerate(own)]
         inside = tuple(np.zeros(len(each.normals)) for each in own)
         found = cls(clip, dynamics, own, LoadBounds(lower, upper, np.array([lower, upper]), inside))
         bounds = found._widened(stretch)
@@ -287,14 +293,6 @@ class WindowLoads:
         return [backward @ back[1], at + forward @ ahead[0] + backward @ back[0], forward @ ahead[1]]
 
 
-def on_filtered(figure: Figure, original: Array, changed: Array, dt: float) -> Array:
-    """(n, nq) postures whose loads are those of changed postures: the change on top of the filtered recording."""
-    # Filtering the change would hide its accelerations.
-    model, steady = figure.model, smoothed(Clip(figure, original, dt), CUTOFF).q
-    each = zip(steady, original, changed, strict=True)
-    return np.array([pin.integrate(model, base, pin.difference(model, was, now)) for base, was, now in each])
-
-
 def standing_frames(places: Array, feet: Array) -> Indices:
     """(m,) frames of a clip whose standing feet are those at places (m,) between frames; `feet` (n,) count them."""
     # A foot stands between frames if it stands in both: of two it is the one with fewer feet, or the nearer.
@@ -302,12 +300,3 @@ def standing_frames(places: Array, feet: Array) -> Indices:
     fewer = np.where(feet[below] < feet[above], below, above)
     found: Indices = np.where(feet[below] == feet[above], near, fewer)
     return found
-
-
-def soles_of(
-    dynamics: InverseDynamics, q: Array, stands: Mapping[str, Mask], terms: FrameTerms
-) -> tuple[list[Stand], list[Stand]]:
-    """Where each of postures (n, nq) stands, and where it stands while its feet are held; often the same objects."""
-    own = [dynamics.stand(posture, [bool(marks[k]) for marks in stands.values()]) for k, posture in enumerate(q)]
-    joints = dynamics.soles.joints
-    return own, [stand.shifted([terms.shift(k, joint) for joint in joints]) for k, stand in enumerate(own)]
