@@ -24,7 +24,7 @@ def first_contact(name: str) -> tuple[InteractionScene, wb.Clip]:
     assert len(made.track) >= 600
     coarse = np.arange(0, len(made.track), 6)
     first = int(coarse[np.argmax(assess_motion(made.scene, made.track.q[coarse], 1.0).depth > 5e-3)])
-    return made, made.track.part(first - BEFORE, first + AFTER)
+    return made, made.track[first - BEFORE : first + AFTER]
 
 
 @pytest.mark.parametrize(
