@@ -46,7 +46,6 @@ class Joints:
         solve_kernel.join(np.arange(len(self)), self.points.bodies, pieces.dynamic, self._island)
 
     def _points(self, number: int, joint: BallJoint) -> list[Array]:
-        """Points of a joint in the thing's axes."""
         at = np.array(joint.at)
         if not isinstance(joint, Hinge):
             return [at]

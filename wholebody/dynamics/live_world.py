@@ -213,7 +213,6 @@ class LiveWorld:
                 self._goals[name] = self._goals[name] + share * (self._places[name] - self._goals[name])
 
     def _track(self) -> Array:
-        """The tracked posture of this frame."""
         if not self._goals:
             return self._tracked
         if self._tracker is None:

@@ -199,7 +199,6 @@ def freed(method: Avoider, run: Run) -> MethodResult:
 
 
 def _bounds(given: tuple[Given, ...], was: ClipCheck, terms: FrameTerms, keep_ends: bool) -> MotionBounds:
-    """The bounds on jerk, speed and deviation, resolved for a clip."""
     stated = [term for term in given if isinstance(term, MotionBounds)]
     if len(stated) > 1:
         raise InputError("avoid: constraints has two wb.motion.MotionBounds; give one")

@@ -292,7 +292,6 @@ def _read(path: str, figure: Figure) -> tuple[Array, float] | str:
 
 
 def _sources(given: Sequence[Any], figure: Figure | None, what: str) -> dict[str, Clip | Path]:
-    """The clips and files by name."""
     found: list[tuple[str, Clip | Path]] = []
     sources = [one if isinstance(one, Clip) else checks.path(one, f"{what}: a clip") for one in given]
     stems = Counter(one.stem for one in sources if isinstance(one, Path))

@@ -135,7 +135,6 @@ class LoadChange:
         return chart
 
     def _torque_missed(self, joint: int) -> str:
-        """The sentence on a torque that is beyond its bound."""
         old, (lower, upper), now = self.before, self.bounds, self.after.torque[:, joint]
         high = now.max() / upper[joint] >= now.min() / lower[joint]
         sign, bound, strength = (1.0, upper, old.upper) if high else (-1.0, -lower, -old.lower)

@@ -75,7 +75,6 @@ def posed(
 
 
 def _angles(values: object, joint: str) -> Array:
-    """Angles (n,) of a joint, one or more."""
     wanted = "an angle for each frame, radians, or one for all"
     found = np.atleast_1d(array(values, f"angles of {joint!r}", wanted))
     if found.ndim != 1 or not len(found):

@@ -108,7 +108,6 @@ def read_clip(
 
 
 def _say(motion: SkeletonMotion, path: Path) -> None:
-    """Log what was recognised in a file."""
     for note in motion.notes:
         logging.getLogger(__name__).info("%s: %s", one_line(path.name), note)
 

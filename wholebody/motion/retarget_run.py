@@ -243,7 +243,6 @@ class Run:
         return np.asarray(near @ np.array([values[k + j] for j in away.tolist()]))
 
     def _alone(self, k: int) -> None:
-        """The posture within reach cones."""
         q = self._free[k]
         goals = self._goals(k, q, self.levers)
         for _ in range(8):
@@ -275,7 +274,6 @@ class Run:
         self._latest = self._first[k], self._first[k] - deviation if k else change
 
     def _spread(self, k: int) -> None:
-        """The posture from which the sweeps begin."""
         self._deviation[k] = self._mean(self._first, k, self.spread)
         self._found[k] = self.figure.clamp(pin.integrate(self.model, self._free[k], self._deviation[k]))
 
@@ -292,7 +290,6 @@ class Run:
         return q
 
     def _swept(self, k: int) -> None:
-        """The posture between its neighbours."""
         assert self.holds is not None
         last = self._came - 1
         near = [self._deviation[min(max(j, 0), last)] for j in range(k - 2, k + 3)]
@@ -327,7 +324,6 @@ class Run:
 
 
 def _layout(points: list[str], turns: list[str], roles: Roles, figure: Figure, held: list[HeldPoint]) -> Layout:
-    """What the goals of a figure are of."""
     place = {role: np.eye(len(points))[k] for k, role in enumerate(points)}
     for part in ("hip", "shoulder"):
         if {f"left_{part}", f"right_{part}"} <= place.keys():

@@ -149,8 +149,6 @@ def triangles_of(shape: Shape) -> tuple[Array, Faces]:
 
 
 class _Grid:
-    """Cells of a grid inside of a surface and around it."""
-
     def __init__(self, vertices: Array, faces: Faces, count: int) -> None:
         corners = vertices[faces]
         volume = abs(float(np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum()) / 6.0)

@@ -38,7 +38,6 @@ class Foothold(NamedTuple):
 
 
 def _by_role(given: object, what: str) -> Mapping[str, Any]:
-    """A mapping whose names are roles."""
     found = checks.instance(given, Mapping, what, "give role to value, as wb.motion.ground(motion) has")
     for role in found:
         checks.known(role, ROLES, "role", what)
@@ -257,7 +256,6 @@ def _tilt(places: Array, heights: Array, settled: Array) -> float:
 def _others(
     motion: SkeletonMotion, joint: int, role: str, holds: list[Foothold], above: Mapping[str, float]
 ) -> tuple[Mask, list[Foothold]]:
-    """When a hand or a knee rests on the ground, and where."""
     at, limits = motion.positions[:, joint], RestLimits()
     feet = [each for each in holds if each.role in above]
     middles, floors = np.array([each.place[:2] for each in feet]), np.array([each.height for each in feet])

@@ -258,8 +258,6 @@ def _is_quick(cases: Iterable[Case], running: Running) -> bool:
 
 @dataclass(frozen=True)
 class _Given:
-    """Gives a problem that was made before."""
-
     problem: Problem
 
     @property

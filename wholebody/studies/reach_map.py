@@ -39,8 +39,6 @@ LEAST_EDGE, MOST_EDGE = 2, 6  # places along an edge of a brick
 
 
 class _Grid(NamedTuple):
-    """The grid of places."""
-
     axes: tuple[Array, Array, Array]
     places: Array
     cells: Indices

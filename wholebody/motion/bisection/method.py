@@ -115,7 +115,6 @@ class Bisection(Checked):
         return MethodResult(recursion.q, repair=True, frozen=frozen)
 
     def _points(self, figure: Figure, original: Array, frozen: tuple[str, ...]) -> tuple[int, ...]:
-        """The evaluation points of a clip."""
         if self.evaluation is not None:
             return self.evaluation
         moving = np.ones(figure.model.nv, dtype=bool)
@@ -185,7 +184,6 @@ class Recursion:
                 self._fill(min(frame, end), frame, max(frame, end))
 
     def _between(self, low: int, high: int) -> None:
-        """Free the frames between two that stay."""
         waiting = [(low, high)]
         while waiting and not self._ended():
             low, high = waiting.pop()

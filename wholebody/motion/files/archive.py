@@ -123,7 +123,6 @@ def _things(path: Path, arrays: dict[str, NDArray[np.generic]], frames: int) -> 
 
 
 def _check_joints(path: Path, joints: list[str], figure: Figure) -> None:
-    """Check that the joints of a file are those of a figure, in the same order."""
     for joint in joints:
         if joint not in figure.joints:
             raise UnknownNameError("joint", joint, figure.joints, path.name)

@@ -226,7 +226,6 @@ def _time_step(path: Path, time: Array, places: list[int], decimals: int) -> flo
 
 
 def _lines(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
-    """Lines of a CSV file that are not empty, with their numbers."""
     reader = csv.reader(io.StringIO(text, newline=""))
     try:
         for line in reader:
