@@ -54,7 +54,8 @@ class _Grid(NamedTuple):
         """(places,) how many of the places beside each are marked."""
         padded = np.pad(marked.reshape([len(axis) for axis in self.axes]).astype(np.intp), 1)
         counts = [np.roll(padded, way, axis)[1:-1, 1:-1, 1:-1] for axis in range(3) for way in (1, -1)]
-        return np.sum(counts, axis=0).ravel()
+        found: Indices = np.sum(counts, axis=0).ravel()
+        return found
 
 
 def reach_map(

@@ -79,7 +79,7 @@ def follow_path(
     term = moving_goal(problem, goal)
     if not isinstance(term, Point):
         raise InputError(f"follow_path moves a Point, and goals[{goal}] is a {type(term).__name__}; use Drag")
-    own, q, found = copied(problem), problem.scene.figure.clamp(problem.start), []
+    own, q, found = copied(problem), problem.scene.figure.clamp(problem.start), list[Solution]()
     tracker = method_for_motions(method).tracker(own, FRAME)
     for place in places:
         retarget(own, goal, place)

@@ -23,14 +23,12 @@ class Chart:
         model: Pinocchio's model.
         original: (n, nq) the original postures.
         curved: indices in the tangent of the joints whose postures are no vectors, such as a free root.
-        straight: the other indices.
     """
 
     def __init__(self, model: pin.Model, original: Array) -> None:
         self.model, self.original = model, original
         dofs = [range(joint.idx_v, joint.idx_v + joint.nv) for joint in list(model.joints)[1:] if joint.nq != joint.nv]
         self.curved: Indices = np.array([index for part in dofs for index in part], dtype=np.intp)
-        self.straight: Indices = np.setdiff1d(np.arange(model.nv), self.curved).astype(np.intp)
         self._both = np.ix_(self.curved, self.curved)
 
     def __len__(self) -> int:
