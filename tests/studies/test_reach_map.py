@@ -97,6 +97,20 @@ def test_an_end_by_the_caller_leaves_places_untried(planar: wb.Problem) -> None:
     assert set(found.counts()) <= {"not tried", "beyond"}
 
 
+@pytest.mark.parametrize("stop", [1, 6, 12, 18])
+def test_a_caller_who_ends_the_search_is_not_asked_again(planar: wb.Problem, stop: int) -> None:
+    """Also at the last answer of a wave, as the 6th, 12th and 18th are."""
+    told: list[int] = []
+
+    def ends(settled: int, _: int) -> bool:
+        told.append(settled)
+        return len(told) == stop
+
+    area(planar, progress=ends)
+    assert len(told) == stop
+    assert told == sorted(told)
+
+
 def test_files(found: wb.studies.ReachMap, tmp_path: Path) -> None:
     loaded = np.load(found.save(tmp_path / "a.npz"))
     np.testing.assert_array_equal(loaded["verdict"], found.verdict)

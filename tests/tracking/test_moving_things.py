@@ -15,9 +15,11 @@ import pytest
 
 import wholebody as wb
 from wholebody import tracking
+from wholebody.base.batches import fingerprint
 from wholebody.bench.measure.throws import DT, SHAPES, Throw, throws
 from wholebody.methods.solve import as_method
 from wholebody.tracking.loop import FrameLoop
+from wholebody.tracking.overlaps import make_room
 
 KINDS = {"plate": "plate of 1 mm", "board": "board", "ball": "ball", "rod": "rod"}
 Path = Sequence[tuple[float, np.ndarray]]
@@ -182,6 +184,20 @@ def test_what_was_put_somewhere_did_not_move(planar_arm) -> None:
     assert not first.collisions[0].inside
     assert "ball" in str(first.collisions[0])
     assert tracker.step(first.q).collisions == ()  # it is out, and stays where it is
+
+
+def test_room_that_is_made_in_a_scene_leaves_others_as_they_are() -> None:
+    """Things of one size share their shapes, and what is not done again is known by the pickle of its scene."""
+    hand = wb.load("hand")
+
+    def scene() -> wb.Scene:
+        return wb.Scene(hand).add(wb.Cylinder(0.03, 0.2), name="can", at=hand.neutral[:3], body=wb.Body(density=500.0))
+
+    asked = fingerprint(scene())
+    moved = scene()
+    make_room(moved, hand.neutral)
+    assert not np.allclose(moved.objects["can"].placement.translation, hand.neutral[:3])
+    assert fingerprint(scene()) == asked
 
 
 def test_what_stays_inside_is_named_until_it_is_out(planar_arm) -> None:

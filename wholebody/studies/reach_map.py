@@ -140,14 +140,15 @@ class _Search:
         self._q: dict[int, Array] = {}
         self._tried: dict[int, set[int]] = {}  # places from which each was tried
         self._balls: dict[int, float] = {}
-        self._solves, self._from_neighbours = 0, 0
+        self._solves, self._from_neighbours, self._settled, self._over = 0, 0, 0, False
         self._bricks = _bricks(grid)
         self._sent = packed(asked)
         self._key = sha256(self._sent).hexdigest()
 
     def run(self) -> None:
         """All waves."""
-        while (wave := self._wave()) and self._search(wave):
+        while not self._over and (wave := self._wave()):
+            self._search(wave)
             self._settle()
 
     def answer(self) -> ReachMap:
@@ -181,9 +182,8 @@ class _Search:
                     apart = np.linalg.norm(places[free] - places[members].mean(axis=0), axis=1)
                     pairs.append((int(free[np.argmin(apart)]), -1))
         for place in np.flatnonzero(self._verdict == MISSED).tolist():
-            if (
-                len(self._tried[place]) == 4
-            ):  # more finds more behind things, and takes longer at the border of the reach
+            # starts of one place: more finds more behind things, and takes longer at the border of the reach
+            if len(self._tried[place]) == 4:
                 continue
             if beside[place] >= 3:
                 starts = [k for k in self._grid.neighbours(place) if reached[k]]
@@ -194,27 +194,31 @@ class _Search:
         start = self._asked.problem.start
         return [Search(place, begin, places[place], self._q.get(begin, start)) for place, begin in pairs]
 
-    def _search(self, wave: Sequence[Search]) -> bool:
-        """Search places beside each other, and take down in their order what was found; False where the caller ends."""
-        settled, total, found = len(self._verdict) - int((self._verdict == NOT_TRIED).sum()), len(self._verdict), []
+    def _search(self, wave: Sequence[Search]) -> None:
+        """Search places beside each other, and take down in their order what was found."""
+        open_, found = self._verdict == NOT_TRIED, list[Try]()
+        settled = len(open_) - int(open_.sum())
         size = max(1, min(16, len(wave) // (4 * self._jobs)))
         sent = ((self._key, self._sent, [*wave[k : k + size]]) for k in range(0, len(wave), size))
-        if self._told(settled, total):
-            return False
+        if self._ended(settled):
+            return
         answers = spread(search_places, sent, self._jobs, self._cluster)
         try:
             for tries in answers:
                 found += tries
-                if self._told(min(settled + len(found), total), total):
+                settled += int(open_[[one.place for one in tries]].sum())
+                if self._ended(settled):
                     break
         finally:
             answers.close()  # type: ignore[attr-defined]
         for one in sorted(found, key=lambda one: one.place):
             self._take(one)
-        return len(found) == len(wave)
 
-    def _told(self, settled: int, total: int) -> bool:
-        return self._progress is not None and self._progress(settled, total) is True
+    def _ended(self, settled: int) -> bool:
+        """Tell how many places are settled, and take down whether the caller ends the search."""
+        self._settled = max(self._settled, settled)  # a reached place may show that others were left out wrongly
+        self._over = self._progress is not None and self._progress(self._settled, len(self._verdict)) is True
+        return self._over
 
     def _take(self, one: Try) -> None:
         place = one.place

@@ -10,6 +10,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.geometry.continuous.passing_through import INSIDE
 from wholebody.geometry.penetration import global_depth
+from wholebody.geometry.pieces import box_corners
 from wholebody.scene.scene import Scene
 
 GIVE_WAY = ("figure", "both")
@@ -108,8 +109,6 @@ def make_room(scene: Scene, q: Array) -> None:
 
 def _thinnest(scene: Scene, name: str) -> float:
     """The least extent of a thing's pieces, metres: moved by less it does not get to the other side of another."""
-    pieces = [piece for piece, owner in enumerate(scene.piece_owner) if owner == name]
-    boxes = [scene.geometry.geometryObjects[piece].geometry for piece in pieces]
-    for box in boxes:
-        box.computeLocalAABB()
-    return min(float(np.min(box.aabb_local.max_ - box.aabb_local.min_)) for box in boxes)
+    geometry = scene.geometry.geometryObjects
+    corners = [box_corners(geometry[piece].geometry) for piece, owner in enumerate(scene.piece_owner) if owner == name]
+    return min(float(np.ptp(box, axis=0).min()) for box in corners)
