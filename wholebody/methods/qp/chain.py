@@ -17,7 +17,6 @@ import pinocchio as pin
 from wholebody import tasks
 from wholebody.base.arrays import Array, with_values
 from wholebody.base.pool import Pool
-from wholebody.figures.figure import Figure
 from wholebody.methods.control import Control
 from wholebody.methods.qp.chain_kernel import Goals
 from wholebody.methods.qp.closed_form import Branches
@@ -27,7 +26,7 @@ from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
 from wholebody.tasks.distance import SquaredDistance
-from wholebody.terms.entries import RESIDUAL, Entry, entries_of, placement_floats
+from wholebody.terms.entries import RESIDUAL, Entry, entries_of
 
 
 class Met(NamedTuple):
@@ -50,21 +49,6 @@ def chains_of(problem: Problem) -> Pool[Chains]:
     """What runs on a problem's scene borrow."""
     built, limits = problem.scene.built, problem.scene.figure.limits
     return built.pool(Chains, lambda: Chains(built.model, limits))
-
-
-def branches(figure: Figure, frame: str, placement: pin.SE3, at: Array) -> Array:
-    """Postures (k, nq) with a frame at a placement, by the closed form of its arm, the nearest to `at` (nq,) first."""
-    # All with six joints, samples with seven, some off by what limits take away. None where it has no closed form.
-    model = figure.model
-    known = model.frames[figure.frame_id(frame)]
-    chain = Chains(model, figure.limits).of(frozenset((known.parentJoint,)))
-    if chain is None or chain.arm is None:
-        return np.zeros((0, model.nq))
-    floats = [placement_floats(known.placement), np.zeros(12), placement.translation, placement.rotation.ravel()]
-    goals = Goals(np.concatenate(floats)[None], np.zeros((1, 6), dtype=np.int64))
-    near = chain.angles(at)
-    found = chain.branches(goals, np.array([near, np.zeros_like(near)]))
-    return np.array([chain.posture(values, at) for values in found.cheaper(np.inf)]).reshape(-1, model.nq)
 
 
 def goal_entries(problem: Problem) -> list[Entry] | None:
