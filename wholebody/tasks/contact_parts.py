@@ -289,10 +289,7 @@ class TermOfParts(Constraint):
 class ContactTerm(TermOfParts, Goal):
     """A term all of whose rows are zero where the contact is made."""
 
-    @property
-    def upper(self) -> Array:
-        """Zero, as `lower`."""
-        return np.zeros(())
+    upper = np.zeros(())
 
     def error(self, state: State) -> Array:
         """(m,) the value: a goal is met where it is zero."""

@@ -5,21 +5,19 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated
 
 from wholebody.assessment.posture import assess
 from wholebody.base.arrays import Array
 from wholebody.base.checks import posture, shown
 from wholebody.base.errors import InputError
-from wholebody.base.fields import Checked
-from wholebody.methods.base import BUDGET, Iterations, Restarts, Seed, TimeLimit, Tolerance, check_problem
+from wholebody.methods.base import check_problem
 from wholebody.methods.conclusion import Ending, concluded, meets
 from wholebody.methods.control import Control
 from wholebody.methods.descents import Descends
 from wholebody.methods.qp.chain import from_seeds
 from wholebody.methods.qp.chain_batch import Batch, batches
 from wholebody.methods.qp.multistart import Multistart
-from wholebody.methods.qp.settings import Budget
+from wholebody.methods.qp.settings import Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.registry import make_solver
 from wholebody.methods.qp.tracking import QPTracker
@@ -29,7 +27,7 @@ from wholebody.solution import Solution
 
 
 @dataclass(frozen=True)
-class QP(Checked, Descends):
+class QP(Settings, Descends):
     """Quadratic programs, solved by a QP solver of your choice.
 
     A solve is the best of a descent, of another that seeks feasibility first, and of seeded starts, which are tried
@@ -69,16 +67,6 @@ class QP(Checked, Descends):
     """
 
     longest = 10.0  # s: twice what a search within its numbers of programs takes for a person in a cabin
-    solver: str = "osqp"
-    hot_start: bool = True
-    tolerance: Tolerance = 1e-5
-    iterations: Iterations = 150
-    budget: Annotated[int, BUDGET] = 1000
-    restarts: Restarts = 40
-    restarts_for_measure: Restarts = 0
-    seed: Seed = 0
-    measures: bool = True
-    time_limit: TimeLimit = None
 
     def __post_init__(self) -> None:
         """Check the settings.
@@ -107,12 +95,11 @@ class QP(Checked, Descends):
 
     def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
         """See `Descends._descend`."""
-        budget = self._budget
-        met = from_seeds(problem, workspace, budget, control)
+        met = from_seeds(problem, workspace, self, control)
         judgement = assess(problem, met.q) if met is not None and met.complete else None
         if met is not None and judgement is not None and meets(judgement, self.tolerance):
             return Ending(met.q, True, len(met.trace), met.trace, "directly", judgement=judgement)
-        search = Multistart(problem, workspace, self._qp_solver(), budget, control)
+        search = Multistart(problem, workspace, self._qp_solver(), self, control)
         begin, before = (None, ()) if met is None else (met.q if judgement is None else None, met.trace)
         best = search.run(begin, None if met is None else met.blocked, () if met is None else met.near)
         return Ending(
@@ -126,14 +113,7 @@ class QP(Checked, Descends):
         Empty where a time limit, or the `solve` of a class derived from this one, has a say in each.
         """
         alone = self.time_limit is not None or type(self).solve is not QP.solve
-        return [] if alone else batches(problems, self._budget, largest)
-
-    @property
-    def _budget(self) -> Budget:
-        return Budget(
-            self.tolerance, self.iterations, self.budget, self.restarts, self.seed, self.measures,
-            self.restarts_for_measure,
-        )  # fmt: skip
+        return [] if alone else batches(problems, self, largest)
 
     def minima(self, problem: Problem, starts: Iterable[Array]) -> Iterator[Solution]:
         """For each start (nq,) the minimum of the measures that one descent from it leads to, without other starts.
@@ -146,12 +126,12 @@ class QP(Checked, Descends):
             begins = iter(starts)
         except TypeError:
             raise InputError(f"QP.minima: starts is {shown(starts)}; give postures, such as [problem.start]") from None
-        budget = Budget(self.tolerance, self.iterations, self.budget, 0, self.seed, self.measures)
+        alone = replace(self, restarts=0, restarts_for_measure=0)
         for given in begins:
             start = posture(given, problem.scene.model.nq, "QP.minima: a start")
             began = time.perf_counter()
             with problem.borrow() as workspace, Control(self.time_limit, None, self.longest) as control:
-                search = Multistart(problem, workspace, self._qp_solver(), budget, control)
+                search = Multistart(problem, workspace, self._qp_solver(), alone, control)
                 end = search.feasibility_first(start)
             ending = Ending(
                 end.q, end.converged, search.spent, tuple(search.trace), search.how,
