@@ -9,12 +9,11 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
-from wholebody.methods.qp.closed_form_kernel import BRANCHES, Arm, foreseen, sampled
+from wholebody.methods.qp.closed_form_kernel import BRANCHES, FULL, Arm, foreseen, sampled
 from wholebody.methods.qp.dense_kernel import copy, solve
 from wholebody.terms.entries import Integers
 from wholebody.terms.residual_kernel import residuals
 
-TURN = 2.0 * np.pi
 CLEARLY, NEAR = 1.25, 0.3
 """An end of less than this many radians or metres away is left where it will take this many times another's effort."""
 HARDLY = 1.6
@@ -295,10 +294,10 @@ def _unwind(chain: Chain, q: Array, nearest: Array) -> None:
     """Turn joints by whole turns to where they are nearest to a posture."""
     for i in range(len(q)):
         if chain.turns[i, 0] != 0.0 or chain.turns[i, 1] != 0.0 or chain.turns[i, 2] != 0.0:
-            while q[i] - nearest[i] > np.pi and q[i] - TURN >= chain.lower[i]:
-                q[i] -= TURN
-            while nearest[i] - q[i] > np.pi and q[i] + TURN <= chain.upper[i]:
-                q[i] += TURN
+            while q[i] - nearest[i] > np.pi and q[i] - FULL >= chain.lower[i]:
+                q[i] -= FULL
+            while nearest[i] - q[i] > np.pi and q[i] + FULL <= chain.upper[i]:
+                q[i] += FULL
 
 
 @compiled(inner=True)

@@ -301,7 +301,21 @@ def sampled(
         for v in range(len(values)):
             values[v] = low + (high - low) * v / (len(values) - 1)
     branches(arm, goal, values, found)
-    return _least(found, lower, upper, near, effort, order)
+    count, number = 0, len(found)
+    for b in range(BRANCHES):
+        for v in range(number):
+            effort[v, b] = within(found[v, b], lower, upper, near, BETWEEN if number > 1 else SLACK)
+        for v in range(number):
+            own = effort[v, b]
+            if own == np.inf or (v > 0 and effort[v - 1, b] <= own) or (v + 1 < number and effort[v + 1, b] < own):
+                continue
+            place = count
+            while place > 0 and effort[order[place - 1] // BRANCHES, order[place - 1] % BRANCHES] > own:
+                order[place] = order[place - 1]
+                place -= 1
+            order[place] = BRANCHES * v + b
+            count += 1
+    return count
 
 
 @compiled(inner=True, error_model="numpy")
@@ -314,26 +328,6 @@ def foreseen(effort: Array, v: int, b: int) -> float:
     if not 0.0 < bent < np.inf:
         return 0.0
     return float(own - 0.125 * (after - before) ** 2 / bent)
-
-
-@compiled(inner=True, error_model="numpy")
-def _least(found: Array, lower: Array, upper: Array, nearest: Array, effort: Array, order: Indices) -> int:
-    """See `sampled`."""
-    count, number = 0, len(found)
-    for b in range(BRANCHES):
-        for v in range(number):
-            effort[v, b] = within(found[v, b], lower, upper, nearest, BETWEEN if number > 1 else SLACK)
-        for v in range(number):
-            own = effort[v, b]
-            if own == np.inf or (v > 0 and effort[v - 1, b] <= own) or (v + 1 < number and effort[v + 1, b] < own):
-                continue
-            place = count
-            while place > 0 and effort[order[place - 1] // BRANCHES, order[place - 1] % BRANCHES] > own:
-                order[place] = order[place - 1]
-                place -= 1
-            order[place] = BRANCHES * v + b
-            count += 1
-    return count
 
 
 @compiled(inner=True, error_model="numpy")
