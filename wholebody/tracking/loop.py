@@ -22,7 +22,8 @@ from wholebody.base.errors import InputError
 from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.geometry.proximity import PENETRATION
-from wholebody.methods.base import SEED, judged
+from wholebody.methods.base import judged
+from wholebody.methods.inputs import SEED
 from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import Collision, FrameMotion

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
-from wholebody.methods.base import Method, check_problem
+from wholebody.methods.base import Method
+from wholebody.methods.inputs import check_problem
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.assembly_solution import AssemblySolution
 from wholebody.methods.solve import method_for_motions
