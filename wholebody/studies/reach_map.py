@@ -187,7 +187,7 @@ class _Search:
             tried = self._tried[place]
             if len(tried) == 4:  # more finds more behind things, and takes longer at the border of the reach
                 continue
-            if beside[place] >= 3:
+            if beside[place] >= 4:  # 3 reaches 2 of 226 places more for an eighth more solves
                 starts = [k for k in self._grid.neighbours(place) if reached[k]]
             else:  # a reached place is nearer than what the missed one was missed by
                 starts = [int(nearest[place])] if apart[place] < SURE * self._left[place] else []
