@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from wholebody.base import fields
-from wholebody.base.checks import color, flag, shown, text, unit_hint
+from wholebody.base.checks import color, flag, plain, shown, text, unit_hint
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.fields import Check, Range, Vector, check_of
 from wholebody.figures.anthropometry import DIMENSION
@@ -45,8 +45,8 @@ class Number(Kind):
     @property
     def words(self) -> str:
         """Range and unit."""
-        one = self.range
-        return f"{'whole number' if one.whole else 'number'} from {one.low:g} to {one.high:g} {one.unit}".strip()
+        ends = f"from {plain(self.range.low)} to {plain(self.range.high)} {self.range.unit}"
+        return f"{'whole number' if self.range.whole else 'number'} {ends}".strip()
 
     def read(self, value: Any, where: Where) -> float:
         """Return the number."""

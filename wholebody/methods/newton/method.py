@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 
 from wholebody.methods.base import UnsupportedTermError
@@ -72,13 +71,12 @@ class Newton(Settings):
             InputError: the problem has a term that this method has no equations for.
         """
         check_problem(problem, "Newton.solve: problem")
-        began = time.perf_counter()
-        with problem.borrow() as workspace, Control(self.time_limit, progress, STARTS.longest) as control:
+        with Control(self.time_limit, progress, STARTS.longest) as control, problem.borrow() as workspace:
             active_system = FigureSystem(problem, workspace, self.algebra)
             active_system.control = control
             search = Search(active_system, self)
             found = search.everywhere(problem.scene.figure.clamp(problem.start))
-            return search.solution(found, began)
+            return search.solution(found)
 
     def tracker(self, problem: Problem, dt: float | None = None) -> NewtonTracker:
         """A tracker of goals that move from call to call; it analyses its equations once.

@@ -104,8 +104,8 @@ class Search:
                 break
         return best
 
-    def solution(self, found: SearchResult, began: float) -> Solution:
-        """The solution of a result; the search began at `began` by `time.perf_counter`."""
+    def solution(self, found: SearchResult) -> Solution:
+        """The solution of a result."""
         reported = ", ".join(self.active_system.objective.reported)
         ending = Ending(
             found.q,
@@ -123,7 +123,6 @@ class Search:
             method=f"newton/{self.active_system.algebra.name}",
             tolerance=self.settings.tolerance,
             control=self.active_system.control,
-            began=began,
         )
 
     def _starts(self, q: Array) -> Iterator[tuple[Array, str]]:

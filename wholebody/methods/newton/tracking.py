@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -13,7 +12,7 @@ from wholebody.base.checks import posture, time_step
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT
 from wholebody.methods.base import begun, judged, nearest_to
-from wholebody.methods.control import BUDGET
+from wholebody.methods.control import BUDGET, Control
 from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.multistart import Search, Settings
@@ -144,11 +143,11 @@ class NewtonTracker(NotCopyable):
 
     def solve(self, q: Array) -> Solution:
         """Solve for the problem's present goals from the posture q (nq,), without other starts."""
-        began = time.perf_counter()
         q = posture(q, self.workspace.model.nq)
         with self._alone:
             search = Search(self._renewed(), self._settings)
-            return search.solution(search.from_here(q), began)
+            search.active_system.control = Control(np.inf)
+            return search.solution(search.from_here(q))
 
     @property
     def laid_out(self) -> tuple[int, float]:

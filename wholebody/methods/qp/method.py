@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
@@ -116,8 +115,8 @@ class QP(Checked):
             InputError: the scene changed after the problem was stated.
         """
         check_problem(problem, "QP.solve: problem")
-        began, budget = time.perf_counter(), self._budget
-        with problem.borrow() as workspace, Control(self.time_limit, progress, LONGEST) as control:
+        budget = self._budget
+        with Control(self.time_limit, progress, LONGEST) as control, problem.borrow() as workspace:
             met = from_seeds(problem, workspace, budget, control)
             judgement = assess(problem, met.q) if met is not None and met.complete else None
             if met is not None and judgement is not None and meets(judgement, self.tolerance):
@@ -130,7 +129,7 @@ class QP(Checked):
                     best.q, best.converged, len(before) + search.spent, (*before, *search.trace), search.how,
                     contradictions=search.contradictions, programs=search.solver.counted(),
                 )  # fmt: skip
-        return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
+        return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control)
 
     def batches(self, problems: Sequence[Problem], largest: int) -> list[Batch]:
         """Those of many problems that may be solved at once, in batches of at most so many: see `chain_batch`.
@@ -161,15 +160,14 @@ class QP(Checked):
         budget = Budget(self.tolerance, self.iterations, self.budget, 0, self.seed, self.measures)
         for given in begins:
             start = posture(given, problem.scene.model.nq, "QP.minima: a start")
-            began = time.perf_counter()
-            with problem.borrow() as workspace, Control(self.time_limit, None, LONGEST) as control:
+            with Control(self.time_limit, None, LONGEST) as control, problem.borrow() as workspace:
                 search = Multistart(problem, workspace, self._qp_solver(), budget, control)
                 end = search.feasibility_first(start)
             ending = Ending(
                 end.q, end.converged, search.spent, tuple(search.trace), search.how,
                 programs=search.solver.counted(),
             )  # fmt: skip
-            yield concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
+            yield concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control)
 
     def _qp_solver(self) -> QPSolver:
         """A QP solver of the name in the settings, for one run."""
