@@ -21,7 +21,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.base.errors import ALIKE, InputError, UnknownNameError
+from wholebody.base.errors import ALIKE, InputError, UnknownNameError, either
 
 _T = TypeVar("_T")
 
@@ -85,7 +85,7 @@ def some(names: Iterable[str]) -> str:
 def instance(value: object, kind: type[_T] | tuple[type[_T], ...], what: str, correction: str) -> _T:
     """A value of a type, or of one of several; `correction` ends the sentence: "load one with wb.load('human')"."""
     if not isinstance(value, kind):
-        wanted = " or ".join(a(one) for one in (kind if isinstance(kind, tuple) else (kind,)))
+        wanted = either(a(one) for one in (kind if isinstance(kind, tuple) else (kind,)))
         raise InputError(f"{what} is {a(type(value))}, not {wanted}; {correction}")
     return value
 
@@ -171,7 +171,7 @@ def text(value: object, what: str) -> str:
 def choice(value: object, options: Collection[str], what: str) -> str:
     """One of a few words."""
     if not isinstance(value, str) or value not in options:
-        raise InputError(f"{what} is {shown(value)}; give {' or '.join(map(repr, options))}")
+        raise InputError(f"{what} is {shown(value)}; give {either(map(repr, options))}")
     return value
 
 
