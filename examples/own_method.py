@@ -65,7 +65,7 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> None:
         solution = wb.solve(problem, method)
         print(f"{solution.method}: {solution.message}, {solution.iterations} iterations")
         if pictures and solution.method == "transpose":
-            picture("own_method", problem, solution, out, eye=(1.6, -2.4, 1.9), target=(0.2, 0.0, 1.1))
+            picture("own_method", problem, solution, out, eye=(2.0, -3.0, 2.0), target=(0.2, 0.0, 0.95))
 
 
 if __name__ == "__main__":
