@@ -122,12 +122,13 @@ class Descents:
                 return self._nearest() if self._is_out_of_reach() else None
             if (met is not None and met.blocked is None) or finite or self.control.over:
                 return met
-            # What blocks an end may leave postures of its branch free. All samples meet the goals.
+            # What blocks an end may leave postures of its branch free.
             most = np.inf if met is None else SEEDS.worth * self._effort(met.q)
-            cheaper = (branches or self._branches()).cheaper(most)
-            free = next((each for each in cheaper if self._is_free(self.chain.posture(each, self.asked.at))), None)
-            if free is not None:
-                return self._to_the_edge(free)
+            for each in (branches or self._branches()).cheaper(most):
+                # a sample a little beyond limits was clamped to them, and does not meet the goals
+                values = self.chain.beside(self.asked.goals, self.asked.nearest, float(each[self.chain.held]), each)
+                if values is not None and self._is_free(self.chain.posture(values, self.asked.at)):
+                    return self._to_the_edge(values)
             if met is not None:
                 return with_values(met, blocked=None)
             first = None

@@ -274,7 +274,7 @@ def sampled(
 ) -> int:  # fmt: skip
     """Which postures within limits take less effort than the samples beside them in their branch, the least first.
 
-    Samples are those of the joint that is held, all over its limits, but not farther than half a turn from a posture.
+    Samples are those of the joint that is held, all over its limits, or over a whole turn of them about a posture.
 
     Args:
         arm: the axes.
@@ -297,7 +297,8 @@ def sampled(
         near[1] = 1.0
     if arm.held >= 0:
         joint = arm.joints[arm.held]
-        low, high = max(lower[joint], near[0, joint] - np.pi), min(upper[joint], near[0, joint] + np.pi)
+        low = min(max(near[0, joint] - np.pi, lower[joint]), max(upper[joint] - FULL, lower[joint]))
+        high = min(low + FULL, upper[joint])
         for v in range(len(values)):
             values[v] = low + (high - low) * v / (len(values) - 1)
     branches(arm, goal, values, found)

@@ -87,8 +87,8 @@ class Multistart:
         if other is not None:
             self._accept(self._directly(other), "directly")
         self._find_closest()
-        poor = self._descend_again()
-        self._restart_for_measure(max(self.settings.restarts_for_measure, SEARCH.poor if poor else 0))
+        count = max(self.settings.restarts_for_measure, SEARCH.poor if self._descend_again() else 0)
+        self._restart_for_measure(count or int(self._is_dear()))
         if self.best.violation.worst <= self.settings.tolerance:
             self.contradictions = ()  # by less than the tolerance
         if self._out_of_reach:  # although a closer posture may be near
@@ -232,6 +232,15 @@ class Multistart:
             else:
                 self._accept(local, self.how)
         return assess(problem, self.best.q).optimality > SEARCH.optimal
+
+    def _is_dear(self) -> bool:
+        """Whether all is met, and a descent from there through everything leads to measures that are much less."""
+        tolerance, best = self.settings.tolerance, self.best
+        if not (self.settings.restarts and self.settings.measures and best.violation.worst <= tolerance):
+            return False
+        alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
+        through = self._ran(SQP(alone, tolerance, self._at_most(SEARCH.probe_programs), "through things"), best.q)
+        return through.violation.worst <= tolerance and best.measure > SEARCH.dear * through.measure
 
     def _restart_for_measure(self, count: int) -> None:
         """Where all is met, seek a lower minimum from the best of some feasible postures, of few programs each."""

@@ -105,7 +105,7 @@ class PlainChain:
 
     def branches(self, goals: Goals, nearest: Array) -> Branches:
         """The branches of the closed form for one frame's placement; `nearest` as in `closed_form_kernel.sampled`."""
-        # With six joints these are all postures; with seven samples of one joint, within half a turn of the nearest.
+        # With six joints these are all postures; with seven samples of one joint.
         count = 0
         for samples in self.samples:
             if not count:
@@ -120,8 +120,8 @@ class PlainChain:
     def along(self, goals: Goals, nearest: Array, values: Array) -> Array | None:
         """Values (n,) of the least effort between the samples beside others of a branch; None where there are none."""
         assert self.arm is not None
-        found, near, held = values.copy(), nearest[0, self.held], self.held
-        turn = min(self.chain.upper[held], near + np.pi) - max(self.chain.lower[held], near - np.pi)
+        found, held = values.copy(), self.held
+        turn = min(self.chain.upper[held] - self.chain.lower[held], 2.0 * np.pi)
         spacing, limits = turn / (SEEDS.samples - 1), (self.chain.lower, self.chain.upper)
         effort = closed_form_kernel().along(self.arm, goals.tables[0], limits, nearest, spacing, found)
         return found if effort < np.inf else None
@@ -170,9 +170,11 @@ class PlainChain:
         return found, counts
 
     def seeds(self, start: Array, seed: int, count: int) -> Iterator[Array]:
-        """Batches (count, n) of values all over the limits, but not farther from a start (n,) than half a turn."""
+        """Batches (count, n) of values all over the limits, or over a whole turn of them about a start (n,)."""
         # The first has the start, and values half as far, where ends of little effort are. Slides begin within a metre.
-        lower, upper = np.maximum(self.chain.lower - start, -self._far), np.minimum(self.chain.upper - start, self._far)
+        lower, upper = self.chain.lower - start, self.chain.upper - start
+        lower = np.clip(-self._far, lower, np.maximum(upper - 2.0 * self._far, lower))
+        upper = np.minimum(lower + 2.0 * self._far, upper)
         for batch in range(SEEDS.batches):
             directions = _directions(seed, batch, count, len(start))
             values = start + (0.5 if batch == 0 else 1.0) * np.where(directions < 0.0, -lower, upper) * directions

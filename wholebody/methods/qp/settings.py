@@ -203,6 +203,9 @@ class SearchNumbers(NamedTuple):
     moved: float = 0.99
     # how many starts for the measures are descended from where it is none after all. More: lower, slower.
     poor: int = 2
+    # times the measures of a descent through everything from which on a start for the measures is descended from. Less:
+    # lower, slower.
+    dear: float = 1.5
     # feasible postures that are looked for, for each that is descended from; more = lower measures, slower
     screened: int = 4
 

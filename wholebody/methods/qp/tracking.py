@@ -317,12 +317,12 @@ class QPTracker(SolvingTracker):
 
     def _of_goals(self) -> list[tuple[type, float, int]]:
         """What programs are set up from: kind, weight and number of rows of each goal."""
-        goals, rows = self._lineariser.goals, self._lineariser.rows()
+        goals, rows = self._lineariser.goals, self._lineariser.plan.rows
         return [(type(goal), goal.weight, count) for goal, count in zip(goals, rows, strict=False)]
 
     def _of_constraints(self) -> list[tuple[type, bytes, bytes, int]]:
         """And kind, bounds and number of rows of each constraint."""
-        terms, rows = self._lineariser.constraints, self._lineariser.rows()[len(self._lineariser.goals) :]
+        terms, rows = self._lineariser.constraints, self._lineariser.plan.rows[len(self._lineariser.goals) :]
         bounds = [(np.asarray(term.lower).tobytes(), np.asarray(term.upper).tobytes()) for term in terms]
         return [(type(term), *each, count) for term, each, count in zip(terms, bounds, rows, strict=True)]
 
