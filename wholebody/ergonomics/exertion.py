@@ -45,7 +45,7 @@ class Statics(NamedTuple):
     """Torques that hold a person under forces, and their derivatives.
 
     The ground's force is split over both soles by where it presses between them, seen from above, each part through a
-    point as far from its sole as the whole from the line of both. Somebody whose legs bear nothing, on a seat, has none:
+    point as far from its sole as the whole from the line of both. Who sits, whose legs bear nothing, has none:
     torques of the legs are then those of hanging legs, and are left out.
     """
 

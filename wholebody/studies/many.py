@@ -7,6 +7,7 @@ from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from typing import Any, NamedTuple, TypeVar
 
 from wholebody.base import checks
@@ -185,7 +186,8 @@ def run_cases(
             over = _run(work, order, running, keep, alone, begun)
     if not over and waiting:
         family = Family(order, done, partial(_computed, order, running), keep)
-        _ = solve_from_neighbours(family) or (linked and lowers and (lower(family) or name_changes(family)))
+        before_it = {k: j for run in (*linked, *heads) for j, k in pairwise(run)}
+        _ = solve_from_neighbours(family, before_it) or (linked and lowers and (lower(family) or name_changes(family)))
     return Records([done.get(k, order[k].record) for k in range(len(order))])
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import radians
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,10 +34,16 @@ class Family(NamedTuple):
     keep: Callable[[int, SolveRecord], bool]  # puts a record into its place; whether the caller ends the run
 
 
-def solve_from_neighbours(family: Family) -> bool:
-    """Try answers of solved cases as starts of neighbours until nothing new is solved; whether the caller ended it."""
+def solve_from_neighbours(family: Family, linked: Mapping[int, int] = MappingProxyType({})) -> bool:
+    """Try answers of solved cases as starts of neighbours until nothing new is solved; whether the caller ended it.
+
+    `linked` are cases that warm-started at the answer of another one, by number: that is not tried again.
+    """
     order, done, compute, keep = family
     tried: dict[int, dict[int, int]] = {k: {} for k, one in done.items() if one.q is not None and not one.solved}
+    for k, j in linked.items():
+        if k in tried and j in done and done[j].solved:
+            tried[k][j] = 1
     places = np.array([case.place for case in order], dtype=np.intp)
     while True:
         solved = np.array(sorted(j for j, one in done.items() if one.solved and one.q is not None), dtype=np.intp)

@@ -12,7 +12,7 @@ import numpy as np
 from wholebody.base.arrays import with_values
 from wholebody.figures.anthropometry import Person, make_person
 from wholebody.figures.body_spec import BodySpec, Solid, geometry_of, model_of
-from wholebody.figures.description import Chain, Description, ExcludedPair, JointCone, chosen_pairs
+from wholebody.figures.description import Chain, Description, JointCone, Pairs, PieceName, chosen_pairs
 from wholebody.figures.figure import Figure
 from wholebody.figures.hand import FINGERS, finger_degrees, finger_pair, is_finger
 from wholebody.figures.human.capsules import SPREAD
@@ -26,8 +26,6 @@ from wholebody.figures.reduction import drop_rigid_pairs
 from wholebody.figures.tables import named_angles, table
 
 TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "neck", "head")
-Pairs = tuple[tuple[tuple[str, str], ...], tuple[ExcludedPair, ...]]
-"""Pairs that are tested, and those that are not."""
 _LIMBS = (("clavicle", "upper_arm", "forearm", "hand"), ("thigh", "shank", "foot", "toes"))
 _NEXT = {frozenset(pair) for limb in _LIMBS for pair in pairwise(limb)} | {frozenset(("shank", "toes"))}
 
@@ -157,7 +155,11 @@ def avatar_figure(
 
 def body_pairs(solids: tuple[Solid, ...]) -> Pairs:
     """Return tested and excluded pairs of the capsules' and hulls' pieces."""
-    return chosen_pairs(solids, lambda a, b: _reason(a, b) or _reason(b, a))
+    return chosen_pairs(solids, _either_way)
+
+
+def _either_way(a: PieceName, b: PieceName) -> str | None:
+    return _reason(a, b) or _reason(b, a)
 
 
 def sphere_pairs(solids: tuple[Solid, ...]) -> Pairs:
@@ -166,7 +168,7 @@ def sphere_pairs(solids: tuple[Solid, ...]) -> Pairs:
     group = {names[row["name"]]: row["group"] for row in table("spheres39")}
     named = {frozenset((names[row["a"]], names[row["b"]])) for row in table("sphere_exclusions")}
 
-    def reason(a: Solid, b: Solid) -> str | None:
+    def reason(a: PieceName, b: PieceName) -> str | None:
         if group[a.name] == group[b.name]:
             return "same group of spheres"
         return "limbs meet the trunk" if frozenset((a.name, b.name)) in named else None
@@ -174,7 +176,7 @@ def sphere_pairs(solids: tuple[Solid, ...]) -> Pairs:
     return chosen_pairs(solids, reason)
 
 
-def _reason(a: Solid, b: Solid) -> str | None:
+def _reason(a: PieceName, b: PieceName) -> str | None:
     """Why the pair (a, b), in this order, is not tested; None if it is."""
     if a.segment == b.segment:
         return "same segment"
@@ -191,7 +193,7 @@ def _reason(a: Solid, b: Solid) -> str | None:
     return _resting(a, b, part_a, part_b)
 
 
-def _resting(a: Solid, b: Solid, part_a: str, part_b: str) -> str | None:
+def _resting(a: PieceName, b: PieceName, part_a: str, part_b: str) -> str | None:
     """Why soft parts of two segments overlap, or cannot meet; None if they can touch."""
     on_torso = a.segment in TRUNK and a.segment != "head"
     resting = {
