@@ -93,8 +93,9 @@ def solve_many(
     The answers are the same whatever `jobs` is. A problem that fails, or whose process ends, has a record that says so
     and ends no other. Without a deadline and with the package's own terms alone, problems are solved in this process,
     and beside it in others once these are ready, which are kept for the next call. A problem that is not solved from
-    its own start is tried from the answers of up to four solved ones beside it in the order given, of figures with as
-    many coordinates; `SolveRecord.neighbour` names the one that led to its answer.
+    its own start is tried from the answers of two solved ones beside it in the order given, of figures with as many
+    coordinates; of four where two factors of a study vary. `SolveRecord.neighbour` names the one that led to its
+    answer.
 
     Args:
         problems: the problems; a mapping gives them names, otherwise they are numbered from "0".

@@ -14,7 +14,8 @@ from wholebody.base.arrays import Array, Indices
 from wholebody.studies.records import SolveRecord
 from wholebody.studies.solving import Case, most_turned, solve_from
 
-NEIGHBOURS = 4  # answers of others that are tried for one problem: more find more, and cost where there is no answer
+NEIGHBOURS = 2  # answers of others that are tried for one problem, for each of at most two factors that vary: more find
+# more, and cost where there is no answer
 TRIES = 4  # more solves of a case whose posture jumps: its own start, both neighbours, and one that changed since
 JUMP = radians(10.0)  # a posture that turns a joint further from one case to the next is another strategy
 LOWER = 1e-3  # part of a measure: less is the tolerance of a solve, no better posture
@@ -45,13 +46,14 @@ def solve_from_neighbours(family: Family, linked: Mapping[int, int] = MappingPro
         if k in tried and j in done and done[j].solved:
             tried[k][j] = 1
     places = np.array([case.place for case in order], dtype=np.intp)
+    most = NEIGHBOURS * min(max(int((places != places[0]).any(axis=0).sum()), 1), 2)
     while True:
         solved = np.array(sorted(j for j, one in done.items() if one.solved and one.q is not None), dtype=np.intp)
         sizes = np.array([len(done[j].q) for j in solved.tolist()], dtype=np.intp)  # type: ignore[arg-type]
         work = {}
         for k in (k for k in tried if not done[k].solved):
             alike = solved[sizes == len(done[k].q)]  # type: ignore[arg-type]
-            if near := _nearest(alike, np.abs(places[alike] - places[k]).sum(axis=1), tried[k]):
+            if near := _nearest(alike, np.abs(places[alike] - places[k]).sum(axis=1), tried[k], most):
                 work[k] = near
         found = compute(solve_from, {k: (k, done[j].q) for k, (j, _) in work.items()})
         for k, (j, distance) in work.items():
@@ -62,15 +64,15 @@ def solve_from_neighbours(family: Family, linked: Mapping[int, int] = MappingPro
             return False
 
 
-def _nearest(solved: Indices, distances: Indices, tried: Mapping[int, int]) -> tuple[int, int] | None:
+def _nearest(solved: Indices, distances: Indices, tried: Mapping[int, int], most: int) -> tuple[int, int] | None:
     """The nearest solved case that was not tried, and how far it is; None where enough were tried."""
-    # After `NEIGHBOURS` only those nearer than all before: an answer spreads from neighbour to neighbour.
+    # After `most` only those nearer than all before: an answer spreads from neighbour to neighbour.
     left = ~np.isin(solved, [*tried])
     if not left.any():
         return None
     distance = int(distances[left].min())
     j = int(solved[left & (distances == distance)][0])
-    return (j, distance) if len(tried) < NEIGHBOURS or distance < min(tried.values()) else None
+    return (j, distance) if len(tried) < most or distance < min(tried.values()) else None
 
 
 def lower(family: Family) -> bool:
