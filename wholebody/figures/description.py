@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import lru_cache
 from itertools import combinations
 from types import MappingProxyType
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -155,26 +154,20 @@ def copied(figure: Articulated, q: Array) -> Array:
 
 
 class PieceName(NamedTuple):
-    """A piece by its names."""
+    """What of a piece decides which others it is tested against."""
 
     name: str
-    segment: str  # that carries it
+    segment: str
 
 
-Reason: TypeAlias = Callable[[PieceName, PieceName], str | None]
-Pairs: TypeAlias = tuple[tuple[tuple[str, str], ...], tuple[ExcludedPair, ...]]
-"""Pairs of pieces that are tested, by name, and those that are not."""
+Named = TypeVar("Named", Solid, PieceName)
 
 
-def chosen_pairs(solids: Sequence[Solid], reason: Reason) -> Pairs:
-    """The pairs of pieces that are tested, and those that are not, for which there is a reason."""
-    return _chosen(tuple(PieceName(one.name, one.segment) for one in solids), reason)
-
-
-@lru_cache(maxsize=16)
-def _chosen(pieces: tuple[PieceName, ...], reason: Reason) -> Pairs:
-    """Names decide alone, so people of all sizes have the same pairs."""
-    told = [(a.name, b.name, reason(a, b)) for a, b in combinations(pieces, 2)]
+def chosen_pairs(
+    solids: Sequence[Named], reason: Callable[[Named, Named], str | None]
+) -> tuple[tuple[tuple[str, str], ...], tuple[ExcludedPair, ...]]:
+    """The pairs of pieces that are tested, by name, and those that are not, for which there is a reason."""
+    told = [(a.name, b.name, reason(a, b)) for a, b in combinations(solids, 2)]
     tested = tuple((a, b) for a, b, why in told if not why)
     return tested, tuple(ExcludedPair(a, b, why) for a, b, why in told if why)
 

@@ -18,7 +18,7 @@ from wholebody.base.errors import InputError
 from wholebody.figures import hulls
 from wholebody.figures.anthropometry import Person, describe, make_person
 from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, geometry_of, model_of, place
-from wholebody.figures.description import Articulated, Chain, Description, PieceName, chosen_pairs
+from wholebody.figures.description import Articulated, Chain, Description, chosen_pairs
 from wholebody.figures.dimensions import FINGER_BASES, Dimensions, keyed_hand
 from wholebody.figures.figure import Figure
 from wholebody.figures.postures import lowest
@@ -181,7 +181,7 @@ def massive_links(size: Dimensions, radii: Mapping[str, tuple[float, float, floa
         yield Link(segment, mass, (0.0, 0.0, -c), inertia)
 
 
-def _reason(a: PieceName, b: PieceName) -> str | None:
+def _reason(a: Solid, b: Solid) -> str | None:
     return finger_pair(a.segment.partition("_")[2], b.segment.partition("_")[2])
 
 

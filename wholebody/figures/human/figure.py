@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import partial
+from functools import cache, lru_cache, partial
 from itertools import pairwise
 
 import numpy as np
@@ -12,7 +12,7 @@ import numpy as np
 from wholebody.base.arrays import with_values
 from wholebody.figures.anthropometry import Person, make_person
 from wholebody.figures.body_spec import BodySpec, Solid, geometry_of, model_of
-from wholebody.figures.description import Chain, Description, JointCone, Pairs, PieceName, chosen_pairs
+from wholebody.figures.description import Chain, Description, ExcludedPair, JointCone, PieceName, chosen_pairs
 from wholebody.figures.figure import Figure
 from wholebody.figures.hand import FINGERS, finger_degrees, finger_pair, is_finger
 from wholebody.figures.human.capsules import SPREAD
@@ -26,6 +26,8 @@ from wholebody.figures.reduction import drop_rigid_pairs
 from wholebody.figures.tables import named_angles, table
 
 TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "neck", "head")
+Pairs = tuple[tuple[tuple[str, str], ...], tuple[ExcludedPair, ...]]
+"""Pairs that are tested, and those that are not."""
 _LIMBS = (("clavicle", "upper_arm", "forearm", "hand"), ("thigh", "shank", "foot", "toes"))
 _NEXT = {frozenset(pair) for limb in _LIMBS for pair in pairwise(limb)} | {frozenset(("shank", "toes"))}
 
@@ -109,7 +111,8 @@ def human_chains(joints: set[str]) -> dict[str, Chain]:
     return {name: Chain(groups[name], tip) for name, tip in tips.items() if name in groups}
 
 
-def human_cones() -> dict[str, JointCone]:
+@cache
+def human_cones() -> Mapping[str, JointCone]:
     """Return the reach cones of shoulders (humerus in the thorax) and hips (femur in the pelvis)."""
     down = np.array([0.0, 0.0, -1.0])
     cones = {}
@@ -155,11 +158,12 @@ def avatar_figure(
 
 def body_pairs(solids: tuple[Solid, ...]) -> Pairs:
     """Return tested and excluded pairs of the capsules' and hulls' pieces."""
-    return chosen_pairs(solids, _either_way)
+    return _pairs_of(tuple(PieceName(solid.name, solid.segment) for solid in solids))
 
 
-def _either_way(a: PieceName, b: PieceName) -> str | None:
-    return _reason(a, b) or _reason(b, a)
+@lru_cache(maxsize=8)  # people differ in their sizes alone
+def _pairs_of(parts: tuple[PieceName, ...]) -> Pairs:
+    return chosen_pairs(parts, lambda a, b: _reason(a, b) or _reason(b, a))
 
 
 def sphere_pairs(solids: tuple[Solid, ...]) -> Pairs:
@@ -168,7 +172,7 @@ def sphere_pairs(solids: tuple[Solid, ...]) -> Pairs:
     group = {names[row["name"]]: row["group"] for row in table("spheres39")}
     named = {frozenset((names[row["a"]], names[row["b"]])) for row in table("sphere_exclusions")}
 
-    def reason(a: PieceName, b: PieceName) -> str | None:
+    def reason(a: Solid, b: Solid) -> str | None:
         if group[a.name] == group[b.name]:
             return "same group of spheres"
         return "limbs meet the trunk" if frozenset((a.name, b.name)) in named else None
