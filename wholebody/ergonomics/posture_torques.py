@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array, brief
+from wholebody.base.arrays import Array, brief, with_values
 from wholebody.ergonomics.angles import SIDES, check_person
 from wholebody.ergonomics.exertion import Exertion, statics_of
 from wholebody.ergonomics.work import LOAD
@@ -92,7 +92,7 @@ def static_torques(
     names = [name for name in person.joints if not (seated and name.split("_")[1] in LEGS)]
     joints = {name: joint for name in names if (joint := person.model.joints[person.joint_id(name)]).nv == 1}
     columns = np.array([joint.idx_v for joint in joints.values()], dtype=np.intp)
-    torque, _ = statics._replace(feet=bearing).torques(state, columns, state.column_joint[columns])
+    torque, _ = with_values(statics, feet=bearing).torques(state, columns, state.column_joint[columns])
     lower, upper = (limit[columns] for limit in strength.limits(person))
     share = np.abs(torque) / np.where(torque >= 0.0, upper, -lower)
     known = np.isfinite(lower) | np.isfinite(upper)
