@@ -133,6 +133,6 @@ def _goal_place(goal: Point | Frame | Orientation) -> GoalPlace:
         offset, place = three(goal.resolved_offset), three(goal.resolved_target)
         return GoalPlace(goal.place.frame, offset, place, None, goal.weight)
     asked = goal.residual
-    place = three(asked.target) if asked.position else None
+    there = three(asked.target) if asked.position else None
     rotation = asked.placement.rotation if asked.orientation else None
-    return GoalPlace(asked.place.frame, (0.0, 0.0, 0.0), place, rotation, goal.weight)
+    return GoalPlace(asked.place.frame, (0.0, 0.0, 0.0), there, rotation, goal.weight)
