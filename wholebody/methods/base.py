@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol, cast
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -183,10 +183,12 @@ class SolvingTracker(NotCopyable):
         """The same as `frame`; what things that moved meanwhile met is named."""
         q = begun(self.problem, q)
         self.workspace.refresh()
-        motion, step = self.workspace.next_frame(q), self.frame(q)
-        if motion is None:
-            return step
-        return with_values(cast(SolvedStep, step), collisions=judged(self.workspace, motion, q, step.q))
+        motion = self.workspace.next_frame(q)
+        step: Any = self.frame(q)
+        if motion is not None:
+            step = with_values(step, collisions=judged(self.workspace, motion, q, step.q))
+        made: Step = step
+        return made
 
     def frame(self, q: Array, tolerance: float | None = None) -> Step:
         """A whole solve from the posture q (nq,)."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
-from functools import cache, wraps
+from functools import lru_cache, wraps
 from math import isfinite
 from numbers import Integral
 from typing import Any
@@ -35,15 +35,16 @@ def in_words(term: object) -> str:
     return f"{type(term).__name__}({frame})" if isinstance(frame, str) else type(term).__name__
 
 
-def is_own(term: Any) -> bool:
+def is_own(term: object) -> bool:
     """Whether a term is of a class of one's own, or stands for one."""
     inner = getattr(term, "term", getattr(term, "goal", None))
-    return not _is_ours(type(term)) or (inner is not None and is_own(inner))
+    kind: Any = type(term)
+    return not _is_ours(kind) or (inner is not None and is_own(inner))
 
 
-@cache
-def _is_ours(kind: type) -> bool:
-    return kind.__module__.partition(".")[0] == _OURS
+@lru_cache(maxsize=256)
+def _is_ours(kind: Any) -> bool:
+    return bool(kind.__module__.partition(".")[0] == _OURS)
 
 
 def check_answers(kind: type, table: Mapping[str, Check]) -> None:

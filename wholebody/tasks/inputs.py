@@ -101,9 +101,9 @@ def point(value: object, where: str) -> Array:
 
 def check_reachable(place: Array, where: str) -> None:
     """Refuse a position that cannot be in metres."""
-    if place.dot(place) <= FAR**2:
+    distance = math.hypot(*place.tolist())  # the square of a large one is no number
+    if distance <= FAR:
         return
-    distance = math.hypot(*place)
     if distance > FARTHEST:
         raise InputError(
             f"{where} is {distance:.4g} m away; lengths are in metres: divide millimetres by 1000, centimetres by 100"

@@ -281,8 +281,7 @@ def sampled(
         goal: (36,) as in `branches`.
         limits: (n,) lower and upper ones of the joints.
         nearest: (2, n) the posture, and weights of the effort ``sum w (q - nearest)^2``; where these are zero, ones.
-        found: (v, 8, n) written: angles, NaN for none; turned by whole turns to where they are within limits and
-            nearest to the posture. Samples that are a little beyond limits are clamped to them.
+        found: (v, 8, n) written: angles, NaN for none; within limits, by whole turns and clamped, near the posture.
         effort: (v, 8) written; inf for a posture that does not exist or is nowhere within limits.
         order: (v * 8,) written: places in the flattened first two axes of `found`.
 
