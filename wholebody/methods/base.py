@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, cast
 
 import numpy as np
 
@@ -186,7 +186,7 @@ class SolvingTracker(NotCopyable):
         motion, step = self.workspace.next_frame(q), self.frame(q)
         if motion is None:
             return step
-        return with_values(step, collisions=judged(self.workspace, motion, q, step.q))
+        return with_values(cast(SolvedStep, step), collisions=judged(self.workspace, motion, q, step.q))
 
     def frame(self, q: Array, tolerance: float | None = None) -> Step:
         """A whole solve from the posture q (nq,)."""

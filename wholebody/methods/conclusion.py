@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -52,10 +51,8 @@ def meets(judgement: Assessment, tolerance: float) -> bool:
     return judgement.holds(enough) and judgement.met(enough)
 
 
-def concluded(
-    problem: Problem, ending: Ending, *, method: str, tolerance: float, control: Control, began: float
-) -> Solution:
-    """The solution of a problem, whose search began at `began` by `time.perf_counter`."""
+def concluded(problem: Problem, ending: Ending, *, method: str, tolerance: float, control: Control) -> Solution:
+    """The solution of a problem, whose search began with its control."""
     judgement = assess(problem, ending.q) if ending.judgement is None else ending.judgement
     enough = assessed_tolerance(tolerance)
     if control.undefined is not None:
@@ -76,7 +73,7 @@ def concluded(
     return Solution(
         q=ending.q,
         status=status,
-        seconds=time.perf_counter() - began,
+        seconds=control.seconds,
         iterations=ending.iterations,
         assessment=judgement,
         trace=ending.trace,

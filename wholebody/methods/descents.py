@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from abc import ABC, abstractmethod
 from dataclasses import replace
 from typing import Any, Generic, TypeVar
@@ -50,10 +49,9 @@ class Descends(ABC):
             InputError: the scene changed after the problem was made.
         """
         check_problem(problem, f"{type(self).__name__}.solve: problem")
-        began = time.perf_counter()
-        with problem.borrow() as workspace, Control(self.time_limit, progress, self.longest) as control:
+        with Control(self.time_limit, progress, self.longest) as control, problem.borrow() as workspace:
             ending = self._descend(problem, workspace, control)
-        return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
+        return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control)
 
     def tracker(self, problem: Problem, dt: float) -> SolvingTracker:
         """A tracker that searches anew at every step, from the present posture."""

@@ -35,7 +35,7 @@ def in_words(term: object) -> str:
     return f"{type(term).__name__}({frame})" if isinstance(frame, str) else type(term).__name__
 
 
-def is_own(term: object) -> bool:
+def is_own(term: Any) -> bool:
     """Whether a term is of a class of one's own, or stands for one."""
     inner = getattr(term, "term", getattr(term, "goal", None))
     return not _is_ours(type(term)) or (inner is not None and is_own(inner))

@@ -130,8 +130,7 @@ def reaching(figure: Figure, frame: str) -> tuple[int, ...]:
 
 def _goal_place(goal: Point | Frame | Orientation) -> GoalPlace:
     if isinstance(goal, Point):
-        offset, place = three(goal.resolved_offset), three(goal.resolved_target)
-        return GoalPlace(goal.place.frame, offset, place, None, goal.weight)
+        return GoalPlace(goal.place.frame, three(goal.resolved_offset), three(goal.resolved_target), None, goal.weight)
     asked = goal.residual
     place = three(asked.target) if asked.position else None
     rotation = asked.placement.rotation if asked.orientation else None

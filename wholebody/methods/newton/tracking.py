@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +12,7 @@ from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT
 from wholebody.methods.base import Method, SolvingTracker
 from wholebody.methods.conclusion import concluded
-from wholebody.methods.control import BUDGET
+from wholebody.methods.control import BUDGET, Control
 from wholebody.methods.inputs import TOLERANCE
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.multistart import Search, Settings
@@ -118,15 +117,13 @@ class NewtonTracker(SolvingTracker):
 
     def solve(self, q: Array) -> Solution:
         """Solve for the problem's present goals from the posture q (nq,), without other starts."""
-        began = time.perf_counter()
         q = posture(q, self.workspace.model.nq)
         with self._alone:
             search = Search(self._renewed(), self._settings)
-            ending, control = search.ending(search.from_here(q)), self._active_system.control
+            search.active_system.control = control = Control(np.inf)
+            ending = search.ending(search.from_here(q))
         tolerance = self._settings.tolerance
-        return concluded(
-            self.problem, ending, method=self._method.name, tolerance=tolerance, control=control, began=began
-        )
+        return concluded(self.problem, ending, method=self._method.name, tolerance=tolerance, control=control)
 
     def _lay_out(self) -> None:
         problem = self.problem

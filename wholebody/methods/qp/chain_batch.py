@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -49,8 +48,7 @@ class Batch(NamedTuple):
 
     def run(self) -> Answers:
         """Solve what descents of the chain lead to an answer of."""
-        began = time.perf_counter()
-        problem = self.problem
+        control, problem = Control(np.inf), self.problem
         entries = goal_entries(problem) or []
         with chains_of(problem).borrow() as chains, problem.borrow() as workspace:
             chain = chains.carrying(entries)
@@ -77,7 +75,7 @@ class Batch(NamedTuple):
             if len(left):
                 judgement.put(left, judged(problem, self.numbers.of_some(left), q[left]))
         solved = ended & judgement.meets(assessed_tolerance(self.settings.tolerance))
-        return Answers(solved, q, iterations, judgement, time.perf_counter() - began)
+        return Answers(solved, q, iterations, judgement, control.seconds)
 
 
 def batches(problems: Sequence[Problem], settings: Settings, largest: int) -> list[Batch]:

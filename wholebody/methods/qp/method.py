@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -130,15 +129,14 @@ class QP(Settings, Descends):
         alone = replace(self, restarts=0, restarts_for_measure=0)
         for given in begins:
             start = posture(given, problem.scene.model.nq, "QP.minima: a start")
-            began = time.perf_counter()
-            with problem.borrow() as workspace, Control(self.time_limit, None, self.longest) as control:
+            with Control(self.time_limit, None, self.longest) as control, problem.borrow() as workspace:
                 search = Multistart(problem, workspace, self._qp_solver(), alone, control)
                 end = search.feasibility_first(start)
             ending = Ending(
                 end.q, end.converged, search.spent, tuple(search.trace), search.how,
                 programs=search.solver.counted(),
             )  # fmt: skip
-            yield concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
+            yield concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control)
 
     def _qp_solver(self) -> QPSolver:
         """A QP solver of the name in the settings, for one run."""
