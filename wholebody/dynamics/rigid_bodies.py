@@ -17,7 +17,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, cross
 from wholebody.base.checks import TIME_STEP
 from wholebody.base.errors import InputError
 from wholebody.dynamics import motion_kernel
@@ -198,7 +198,9 @@ class RigidBodies:
             state.give(number, before, after, dt)
         self._sleepers.wake_where_put(self._finder, ended)
         count = int(np.ceil(dt / STEP - 1e-9))
-        record = FrameRecord(self._stops(), np.zeros((len(self.names), 6)), work=self._pushed)
+        # early ends of steps: eight for a dozen bodies, as each costs a step of all of them
+        stops = 96 // max(12, int(state.bodies.moving.sum()))
+        record = FrameRecord(stops, np.zeros((len(self.names), 6)), work=self._pushed)
         self._pushed = 0.0
         self._find_near(dt / count)
         for number in range(count):
@@ -214,10 +216,6 @@ class RigidBodies:
         return record.finished(self.names, self.energy(), self._sleepers.count)
 
     # ---- a step
-
-    def _stops(self) -> int:
-        """Early ends of steps that a frame may have: eight for a dozen bodies, as each costs a step of all of them."""
-        return 96 // max(12, int(self.state.bodies.moving.sum()))
 
     def _step(self, time: float, record: FrameRecord) -> None:
         """Advance by at most a time: to its end, to the next impact, or to where a shorter step leads."""
@@ -267,7 +265,7 @@ class RigidBodies:
         record.work += float(work.sum())
         self._joints.project_velocities(state, state.bodies.twist, state.bodies.moving)
         program.settle(before.kept, work)
-        wrench = np.hstack([impulse, np.cross(program.points.point, impulse)])
+        wrench = np.hstack([impulse, cross(program.points.point, impulse)])
         np.add.at(record.impulse, program.points.bodies[:, 1], wrench)
         np.add.at(record.impulse, program.points.bodies[:, 0], -wrench)
         record.contacts = int((impulse != 0.0).any(axis=1).sum())
@@ -318,12 +316,12 @@ class RigidBodies:
     def _record(self, events: Array, program: StepProgram, record: FrameRecord) -> None:
         points, state, number = program.points, self.state, events[:, 0].astype(np.intp)  # squeezed bodies: thousands
         bodies, place, impulse = points.bodies[number], points.point[number], events[:, 2:]
-        wrench = np.hstack([impulse, np.cross(place, impulse)])
+        wrench = np.hstack([impulse, cross(place, impulse)])
         for side, sign in ((0, 1.0), (1, -1.0)):
             np.add.at(record.impulse, bodies[:, side], -sign * wrench)
             given = state.bodies.given[bodies[:, side]]
             body = bodies[given, side]
-            velocity = state.velocity[body] + np.cross(state.spin[body], place[given] - state.bodies.position[body])
+            velocity = state.velocity[body] + cross(state.spin[body], place[given] - state.bodies.position[body])
             record.work += sign * float((impulse[given] * velocity).sum())
         named = [(self.names[first], self.names[second]) for first, second in bodies.tolist()]
         record.events += [

@@ -20,8 +20,9 @@ from wholebody.figures.link_pieces import triangles_of
 from wholebody.figures.link_visuals import Color, Drawn, drawn_of
 from wholebody.figures.surface import Surface, surface_of
 from wholebody.geometry.gltf_builder import VERTICES, GltfBuilder
-from wholebody.motion.files.base import Motion, steady
+from wholebody.motion.files.base import Motion
 from wholebody.motion.skeleton import UP
+from wholebody.motion.thing_tracks import steady
 
 JOINT = "joint "
 """Before the name of a joint, in the name of its node."""
