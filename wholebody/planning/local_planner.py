@@ -66,12 +66,12 @@ class Geodesics:
 
     searches: ClassVar[int] = 8
     tries: ClassVar[int] = 30
-    partial = True
 
     def __init__(self, problem: Problem, workspace: Workspace, resolution: float = 0.2) -> None:
         """Take a problem without constraints, and the length of a part of a motion, radians."""
         self._workspace, self._model, self._resolution = workspace, workspace.model, resolution
         self._clearance = problem.clearance
+        self.partial = not problem.scene.figure.roots  # motions of free bodies became no shorter, but later
         self._required = problem.clearance + np.full(len(workspace.table.pairs), MARGIN)
         pieces = workspace.geometry.geometryObjects
         centres = np.array([np.linalg.norm(piece.placement.translation) for piece in pieces])
