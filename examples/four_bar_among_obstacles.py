@@ -97,16 +97,16 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> tuple[wb.Assemb
 
 
 def draw(made: wb.Assembly, before: Array, states: list[Array], against: list[Array], out: Path) -> None:
-    """Write four_bar_among_obstacles.html, which plays the second turn, and .png: start, after a turn, at the post."""
-    chosen = [before, states[-1], against[-1]]
+    """Write four_bar_among_obstacles.html, which plays the second turn, and .png: start, half a turn, at the post."""
+    chosen = [before, states[len(states) // 2], against[-1]]
     play(
         "four_bar_among_obstacles",
         made,
         against,
         chosen,
         out,
-        eye=(0.2, -0.9, 0.3),
-        target=(0.22, 0.0, 0.14),
+        eye=(0.12, -1.15, 0.33),
+        target=(0.14, 0.0, 0.13),
         size=(480, 420),
         dt=1 / 30,
     )

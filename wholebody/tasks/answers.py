@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
-from functools import wraps
+from functools import cache, wraps
 from math import isfinite
 from numbers import Integral
 from typing import Any
@@ -41,6 +41,7 @@ def is_own(term: object) -> bool:
     return not _is_ours(type(term)) or (inner is not None and is_own(inner))
 
 
+@cache
 def _is_ours(kind: type) -> bool:
     return kind.__module__.partition(".")[0] == _OURS
 
