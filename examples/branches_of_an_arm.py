@@ -28,7 +28,7 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> wb.planning.Sol
         print(f"  effort {answer.assessment.measure:.2f}, off by {1e3 * answer.assessment.goal_error:.1e} mm")
     if pictures:
         out.mkdir(parents=True, exist_ok=True)
-        with wb.Viewer(problem.scene, title="branches_of_an_arm") as viewer:
+        with wb.Viewer(problem.scene, title="Branches of an arm") as viewer:
             viewer.look(eye=(1.3, -1.4, 1.1), target=(0.2, 0.05, 0.3))
             viewer.ghosts([answer.q for answer in found[1:]], color=(0.25, 0.45, 0.75, 0.5))
             viewer.show(found[0].q, problem=problem)

@@ -83,7 +83,7 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> tuple[wb.Scene,
         chosen = postures[:: len(postures) // 3]
         play(
             "carry_together", scene, np.array(postures), chosen, out,
-            eye=(2.6, -2.4, 1.7), target=(0.5 * APART, 0.0, 0.9), size=(400, 480), dt=1 / 15,
+            eye=(3.2, -3.1, 1.95), target=(0.5 * APART, 0.0, 0.95), size=(400, 480), dt=1 / 15,
         )  # fmt: skip
     return scene, postures, solution
 

@@ -44,8 +44,8 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> int:
         viewed = ViewedWorld(world.scene, frames[-1].placements)
         motion = [viewed.configuration(frame.q, frame.placements) for frame in frames]
         out.mkdir(parents=True, exist_ok=True)
-        with wb.Viewer(viewed, contact_distance=0.0, title="dominoes") as viewer:
-            viewer.look(eye=(-0.12, -0.36, 0.26), target=(0.19, 0.0, 0.02))
+        with wb.Viewer(viewed, contact_distance=0.0, title="Dominoes") as viewer:
+            viewer.look(eye=(-0.16, -0.50, 0.33), target=(0.15, 0.0, 0.02))
             viewer.play(motion, 1.0 / 60.0)
             print(f"  {viewer.save(out / 'dominoes.html')}")
             try:

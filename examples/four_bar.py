@@ -103,7 +103,7 @@ def draw(
     """Write four_bar.html, which plays the turn, and four_bar.png: the coupler's curve and the rocker's angle."""
     out.mkdir(parents=True, exist_ok=True)
     shown = drawn()
-    with wb.Viewer(shown, contact_distance=-1.0, title="four_bar") as viewer:  # no contacts: bars overlap at joints
+    with wb.Viewer(shown, contact_distance=-1.0, title="Four bar") as viewer:  # no contacts: bars overlap at joints
         viewer.look(eye=(0.2, -1.2, 0.35), target=(0.18, 0.0, 0.12))
         postures = [np.concatenate([pin.SE3ToXYZQUAT(place[name]) for name in shown.bodies]) for place in places]
         viewer.play(postures, dt=1 / 30)

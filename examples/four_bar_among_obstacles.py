@@ -105,8 +105,8 @@ def draw(made: wb.Assembly, before: Array, states: list[Array], against: list[Ar
         against,
         chosen,
         out,
-        eye=(0.2, -0.9, 0.3),
-        target=(0.22, 0.0, 0.14),
+        eye=(0.12, -1.15, 0.33),
+        target=(0.14, 0.0, 0.13),
         size=(480, 420),
         dt=1 / 30,
     )

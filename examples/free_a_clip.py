@@ -46,8 +46,8 @@ def main(
     print(f"  {report.message}")
     if pictures:
         out.mkdir(parents=True, exist_ok=True)
-        print(f"  {chart(walk, freed.clip, worn, out / 'free_a_clip_curves.png')}")
         film(scene, walk, freed.clip, out)
+        print(f"  {chart(walk, freed.clip, worn, out / 'free_a_clip_curves.png')}")
     return freed
 
 
@@ -92,7 +92,7 @@ def film(scene: wb.Scene, before: wb.Clip, after: wb.Clip, out: Path) -> None:
     """Write a page that plays the freed clip with the original as a ghost, and a film strip of both."""
     frames = most_changed(before.q, after.q)
     root = after.q[frames, :3]
-    with wb.Viewer(scene, title="free_a_clip") as viewer:
+    with wb.Viewer(scene, title="Free a clip") as viewer:
         away = _facing(after.q[frames[0]]) @ np.array([1.6, 3.0, 0.8])
         middle = (float(root[0, 0]), float(root[0, 1]), 0.9)
         viewer.look(eye=tuple(np.add(middle, away).tolist()), target=middle)

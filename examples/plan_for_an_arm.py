@@ -38,7 +38,7 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> wb.planning.Pla
     if pictures:
         q = found.clip.q
         chosen = [q[round(k * (len(q) - 1) / 3)] for k in range(4)]
-        play("plan_for_an_arm", scene, found.clip, chosen, out, eye=(-1.0, -1.6, 1.4), target=(0.3, 0.0, 0.3))
+        play("plan_for_an_arm", scene, found.clip, chosen, out, eye=(-1.25, -2.05, 1.7), target=(0.38, -0.05, 0.3))
     return found
 
 

@@ -18,6 +18,7 @@ def build() -> wb.Problem:
     scene.add(wb.HalfSpace(), name="floor")
     scene.add(wb.Box((0.70, 1.40, 0.03)), name="desk", at=(0.62, 0.0, 0.74), color=OAK)
     scene.add(wb.Box((0.03, 0.50, 0.32)), name="monitor", at=(0.72, 0.0, 0.98), color=DARK)
+    scene.add(wb.Box((0.40, 0.42, 0.04)), name="seat", at=(0.02, 0.0, 0.374), color=DARK)  # she sits 0.394 m high
     return wb.Problem(
         scene,
         "sitting",

@@ -135,7 +135,7 @@ def draw(made: wb.Assembly, chosen: list[Array], states: list[Array], out: Path)
         states[::2],
         chosen,
         out,
-        eye=(0.9, -3.0, 1.1),
+        eye=(1.0, -3.5, 1.2),
         target=(0.4, 0.0, 0.8),
         size=(440, 560),
         dt=1 / 30,

@@ -41,7 +41,7 @@ class Solution(Shown):
     Attributes:
         q: (nq,) the posture, within limits, never NaN.
         status: "solved", "unreachable", "infeasible" or "stalled"; see the guide.
-        seconds: wall time of the call.
+        seconds: wall time of the call without compiling, which a `time_limit` does not count either.
         iterations: iterations of the method.
         assessment: the independent judgement of q.
         trace: one entry for each iteration that judged a step, in order. An iteration that ends a descent judges none,

@@ -1,13 +1,13 @@
-"""Criteria of one dimension each, solved for people: `python -m tests.audits.accommodation ansur2.csv`.
+"""Criteria of one dimension or two, solved for people: `python -m tests.audits.accommodation ansur2.csv`.
 
-Each scene has one thing in the way of one dimension of people who stand or sit as they are measured. Whoever is solved
+Each scene has a thing in the way of a dimension of people who stand or sit as they are measured. Whoever is solved
 is compared with the own body's dimension, and the share of a population on the right side with that of the table.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -46,53 +46,56 @@ class Criterion:
         """Whether somebody with such a dimension, metres, is to pass; arrays too."""
         return (dimension <= self.value) if self.most else (dimension >= self.value)
 
+    @property
+    def dimensions(self) -> tuple[str, ...]:
+        """Its name alone."""
+        return (self.dimension,)
+
+    def passes_all(self, of: Mapping[str, Any]) -> Any:
+        """Whether people with these dimensions, metres, are to pass."""
+        return self.passes(of[self.dimension])
+
     def __call__(self, figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:
         """The task."""
-        made: wb.Problem = getattr(self, f"_{self.dimension}")(figure)
+        own = getattr(self, f"_{self.dimension}", None)
+        made: wb.Problem = _on_seat(figure, (self,)) if own is None else own(figure)
         return made
 
-    def _seated(self, figure: wb.Figure, deep: float = 0.40, high: float = HIGH) -> wb.Scene:
-        scene = wb.Scene(figure).add(wb.Box((deep, 0.6, 0.04)), name="seat", at=(0.5 * deep, 0.0, high - 0.02))
-        return scene.add(wb.Box((0.03, 0.6, 0.6)), name="back", at=(-0.015, 0.0, high + 0.4))
+    def beside(self, scene: wb.Scene) -> list[Any]:
+        """Put what is in the way of somebody on the seat into a scene; constraints beside sitting."""
+        found: list[Any] = getattr(self, f"_by_{self.dimension}")(scene)
+        return found
 
-    def _thigh_clearance(self, figure: wb.Figure) -> wb.Problem:
-        scene = self._seated(figure)
+    def _by_thigh_clearance(self, scene: wb.Scene) -> list[Any]:
         scene.add(wb.Box((0.6, 1.2, 0.03)), name="desk", at=(0.60, 0.0, HIGH + self.value + 0.015))
-        return wb.Problem(scene, "sitting", constraints=[SIT])
+        return []
 
-    def _hip_breadth_sitting(self, figure: wb.Figure) -> wb.Problem:
-        scene = self._seated(figure)
+    def _by_hip_breadth_sitting(self, scene: wb.Scene) -> list[Any]:
         for name, side in (("left rest", 1.0), ("right rest", -1.0)):
             scene.add(wb.Box((0.3, 0.04, 0.18)), name=name, at=(0.2, side * (0.5 * self.value + 0.02), HIGH + 0.091))
-        return wb.Problem(scene, "sitting", constraints=[SIT])
+        return []
+
+    def _by_buttock_knee_length(self, scene: wb.Scene) -> list[Any]:
+        scene.add(wb.Box((0.04, 1.2, 0.24)), name="panel", at=(self.value + 0.02, 0.0, HIGH + 0.08))
+        return [wb.Freeze("left_knee_flexion", "right_knee_flexion")]
+
+    def _by_sitting_height(self, scene: wb.Scene) -> list[Any]:
+        scene.add(wb.Box((0.8, 1.0, 0.05)), name="roof", at=(0.2, 0.0, HIGH + self.value + 0.025))
+        return []
+
+    def _by_eye_height_sitting(self, scene: wb.Scene) -> list[Any]:
+        scene.add(wb.Box((0.05, 2.0, 0.4)), name="board", at=(1.5, 0.0, HIGH + self.value - 0.2))
+        return []
+
+    def _by_overhead_reach_sitting(self, scene: wb.Scene) -> list[Any]:
+        return [wb.Plane("left_middle_tip", (0, 0, 1), point=(0.0, 0.0, HIGH + self.value), side="above")]
+
+    def _by_thumb_tip_reach(self, scene: wb.Scene) -> list[Any]:
+        return [GIRDLE, wb.Plane("left_thumb_tip", (1, 0, 0), point=(self.value, 0.0, 0.0), side="above")]
 
     def _popliteal_height(self, figure: wb.Figure) -> wb.Problem:
-        scene = self._seated(figure, 0.36, self.value).add(wb.HalfSpace(), name="floor")
+        scene = _seated(figure, 0.36, self.value).add(wb.HalfSpace(), name="floor")
         return wb.Problem(scene, "sitting", constraints=[SIT, wb.Stand(on="floor", balance=False)])
-
-    def _buttock_knee_length(self, figure: wb.Figure) -> wb.Problem:
-        scene = self._seated(figure)
-        scene.add(wb.Box((0.04, 1.2, 0.24)), name="panel", at=(self.value + 0.02, 0.0, HIGH + 0.08))
-        knees = wb.Freeze("left_knee_flexion", "right_knee_flexion")
-        return wb.Problem(scene, "sitting", constraints=[SIT, knees])
-
-    def _sitting_height(self, figure: wb.Figure) -> wb.Problem:
-        scene = self._seated(figure)
-        scene.add(wb.Box((0.8, 1.0, 0.05)), name="roof", at=(0.2, 0.0, HIGH + self.value + 0.025))
-        return wb.Problem(scene, "sitting", constraints=[SIT])
-
-    def _eye_height_sitting(self, figure: wb.Figure) -> wb.Problem:
-        scene = self._seated(figure)
-        scene.add(wb.Box((0.05, 2.0, 0.4)), name="board", at=(1.5, 0.0, HIGH + self.value - 0.2))
-        return wb.Problem(scene, "sitting", constraints=[SIT])
-
-    def _overhead_reach_sitting(self, figure: wb.Figure) -> wb.Problem:
-        reached = wb.Plane("left_middle_tip", (0, 0, 1), point=(0.0, 0.0, HIGH + self.value), side="above")
-        return wb.Problem(self._seated(figure), "sitting", constraints=[SIT, reached])
-
-    def _thumb_tip_reach(self, figure: wb.Figure) -> wb.Problem:
-        reached = wb.Plane("left_thumb_tip", (1, 0, 0), point=(self.value, 0.0, 0.0), side="above")
-        return wb.Problem(self._seated(figure), "sitting", constraints=[SIT, GIRDLE, reached])
 
     def _stature(self, figure: wb.Figure) -> wb.Problem:
         scene = wb.Scene(figure).add(wb.Box((0.5, 0.9, 0.1)), name="lintel", at=(0.0, 0.0, self.value + 0.05))
@@ -108,6 +111,50 @@ class Criterion:
             scene.add(wb.Box((0.5, 0.16, 0.05)), name=name, at=(0.0, y, self.value + 0.025))
         return wb.Problem(scene, constraints=[wb.Freeze("root", *figure.joints)])
 
+    def _foot_length(self, figure: wb.Figure) -> wb.Problem:
+        heel = float(figure.placement(figure.posture("standing"), "left_heel").translation[0])
+        scene = wb.Scene(figure)
+        for name, x in (("heel board", heel - 0.0205), ("toe board", heel + self.value + 0.02)):
+            scene.add(wb.Box((0.04, 1.0, 0.2)), name=name, at=(x, 0.0, 0.1))
+        return wb.Problem(scene, constraints=[wb.Freeze("root", *figure.joints)])
+
+
+def _seated(figure: wb.Figure, deep: float = 0.40, high: float = HIGH) -> wb.Scene:
+    scene = wb.Scene(figure).add(wb.Box((deep, 0.6, 0.04)), name="seat", at=(0.5 * deep, 0.0, high - 0.02))
+    return scene.add(wb.Box((0.03, 0.6, 0.6)), name="back", at=(-0.015, 0.0, high + 0.4))
+
+
+def _on_seat(figure: wb.Figure, criteria: Sequence[Criterion]) -> wb.Problem:
+    scene = _seated(figure)
+    terms = [term for one in criteria for term in one.beside(scene)]
+    return wb.Problem(scene, "sitting", constraints=[SIT, *terms])
+
+
+@dataclass(frozen=True)
+class Both:
+    """Two criteria of somebody on the seat at once."""
+
+    first: Criterion
+    second: Criterion
+
+    @property
+    def dimensions(self) -> tuple[str, ...]:
+        """Their names."""
+        return self.first.dimension, self.second.dimension
+
+    @property
+    def sees(self) -> tuple[float, float, float] | None:
+        """What has to be seen."""
+        return self.first.sees or self.second.sees
+
+    def passes_all(self, of: Mapping[str, Any]) -> Any:
+        """Whether people with these dimensions, metres, are to pass both."""
+        return self.first.passes_all(of) & self.second.passes_all(of)
+
+    def __call__(self, figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:
+        """The task."""
+        return _on_seat(figure, (self.first, self.second))
+
 
 CRITERIA = (
     Criterion("thigh_clearance", 0.185),
@@ -121,41 +168,55 @@ CRITERIA = (
     Criterion("stature", 1.7205),
     Criterion("knee_height_sitting", 0.5405),
     Criterion("acromial_height", 1.4005),
+    Criterion("foot_length", 0.2605),
 )
 """Those that judge `wb.accommodation`; the table is in whole millimetres."""
 
+_OF = {one.dimension: one for one in CRITERIA}
+PAIRS = tuple(
+    Both(_OF[first], _OF[second])
+    for first, second in (
+        ("thigh_clearance", "hip_breadth_sitting"),
+        ("thigh_clearance", "buttock_knee_length"),
+        ("sitting_height", "thigh_clearance"),
+        ("sitting_height", "eye_height_sitting"),
+        ("overhead_reach_sitting", "hip_breadth_sitting"),
+        ("thumb_tip_reach", "buttock_knee_length"),
+    )
+)
+"""Those of two dimensions."""
 
-def right(criterion: Criterion, given: Mapping[str, Any]) -> tuple[int, int]:
-    """How many of some people are judged as their bodies' dimension says, and how many there are."""
+
+def right(criterion: Criterion | Both, given: Mapping[str, Any]) -> tuple[int, int]:
+    """How many of some people are judged as their bodies' dimensions say, and how many there are."""
     found = wb.accommodation(criterion, given, sees=criterion.sees)
     names = [one.factors["person"] for one in found.records if one.factors]
-    bodies = [_body(given[name], criterion.dimension) for name in names]
-    return sum(good == criterion.passes(body) for good, body in zip(found.accommodated, bodies, strict=True)), len(
-        names
-    )
+    bodies = [_body(given[name]) for name in names]
+    good = sum(good == bool(criterion.passes_all(of)) for good, of in zip(found.accommodated, bodies, strict=True))
+    return good, len(names)
 
 
-def _body(given: Mapping[str, Any], dimension: str) -> float:
-    """A dimension of somebody's body, metres."""
-    return float(given["stature"]) if dimension == "stature" else measure(wb.load("human", **given))[dimension]
+def _body(given: Mapping[str, Any]) -> dict[str, float]:
+    """The dimensions of somebody's body, metres."""
+    return measure(wb.load("human", **given)) | {"stature": float(given["stature"])}
 
 
 def main(path: Path, count: int = 200, solved: int = 12) -> None:
-    """Print how people are judged, and the shares."""
+    """Print how people are judged, and the shares with the standard error of that of the people kept back."""
     for sex in ("male", "female"):
         kept, rest = (rows_of(path, kept_back=one)[sex] for one in (True, False))
+        both = {name: np.append(column, rest[name]) for name, column in kept.items()}
         given = wb.people(count, sex)
-        bodies = [measure(wb.load("human", **one)) | {"stature": one["stature"]} for one in given.values()]
-        for criterion in CRITERIA:
-            name = criterion.dimension
-            share = float(np.mean([criterion.passes(body[name]) for body in bodies]))
-            back, all_of = (
-                float(np.mean(criterion.passes(one))) for one in (kept[name], np.append(kept[name], rest[name]))
-            )
-            few = dict(list(given.items())[:solved])
-            good, number = right(criterion, few)
-            told = f"{share:.3f}, table {all_of:.3f}, kept back {back:.3f}; {good} of {number} judged as measured"
-            sys.stdout.write(f"{sex} {name}: {told}\n")
+        built = [_body(one) for one in given.values()]
+        bodies = {name: np.array([one[name] for one in built]) for name in built[0]}
+        for criterion in (*CRITERIA, *PAIRS):
+            share, all_of, back = (float(np.mean(criterion.passes_all(of))) for of in (bodies, both, kept))
+            error = float(np.sqrt(back * (1.0 - back) / len(kept["age"])))
+            told = f"{share:.3f}, table {all_of:.3f}, kept back {back:.3f} (standard error {error:.3f})"
+            if solved:
+                good, number = right(criterion, dict(list(given.items())[:solved]))
+                told += f"; {good} of {number} judged as measured"
+            sys.stdout.write(f"{sex} {' and '.join(criterion.dimensions)}: {told}\n")
             sys.stdout.flush()
 
 

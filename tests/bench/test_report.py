@@ -10,7 +10,8 @@ import jinja2
 import pytest
 
 from wholebody.bench import report
-from wholebody.bench.report import TEMPLATES, formatted, render, strong, upfirst, words
+from wholebody.bench.report import TEMPLATES, render, strong, upfirst, words
+from wholebody.bench.tables import formatted
 
 
 @pytest.mark.parametrize("path", sorted(TEMPLATES.iterdir()), ids=lambda path: path.name)
@@ -44,4 +45,6 @@ def test_numbers_that_are_not_finite_are_left_out() -> None:
     assert formatted(1.234, ".1f", " %") == "1.2 %"
     assert formatted(nan, ".1f", " %") == ""
     assert formatted(inf, ".1f", none="never") == "never"
+    large = [formatted(value, ".2g") for value in (99.4, 99.7, 113.0, 1e-7)]
+    assert large == ["99", "100", "113", "1e-07"]  # 99.7 rounds up to three digits
     assert (strong(0), strong(2), upfirst("a b"), words("a_b")) == ("0", "**2**", "A b", "a b")

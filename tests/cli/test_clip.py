@@ -186,7 +186,7 @@ def test_play_shows_what_the_body_wears_on_a_floor_below_it(
         (["convert", "bend.npz", "none/out.bvh"], "there is no such folder"),
         (["convert", "bend.npz", "out.bvh", "--dt", "0"], "dt is 0"),
         (["retarget", "bend.npz", "--out", "out.npz"], "bend.npz: is no skeleton"),
-        (["play", "bend.npz", "--out", "out.doc"], "cannot be written as .doc; give the name the ending .gif or"),
+        (["play", "bend.npz", "--out", "out.doc"], "cannot be written as .doc; end the name with"),
         (["avoid", "bend.npz", "--scene", "none.toml", "--sex", "female"], "leave out --figure"),
         (["avoid", "bend.npz", "bend.npz", "--scene", "none.toml"], "--scene is for one motion"),
         (["retarget", "bend.bvh"], "name it with --out"),

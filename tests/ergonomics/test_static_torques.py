@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import radians
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wholebody as wb
@@ -30,6 +31,23 @@ def test_a_hanging_arm_needs_nothing_and_a_raised_one_its_weight(person: wb.Figu
     q = person.with_joints(person.posture("standing"), {"right_shoulder_flexion": radians(90.0)})
     found = wb.ergonomics.static_torques(person, q)
     assert abs(found.torque["right_shoulder_flexion"]) > 5.0 > abs(found.torque["left_shoulder_flexion"])
+
+
+def test_on_one_foot_its_ankle_holds_the_whole_body(person: wb.Figure) -> None:
+    q = person.with_joints(person.posture("standing"), {"left_knee_flexion": radians(90.0)})
+    found = wb.ergonomics.static_torques(person, q).torque
+    ankle = person.placement(q, "right_ankle").translation[0]
+    data = person.model.createData()
+    center = pin.centerOfMass(person.model, data, q)[0]
+    first = person.joint_id("right_ankle_dorsiflexion")
+    foot = sum(  # its moment about the ankle
+        GRAVITY * person.model.inertias[k].mass * ((data.oMi[k] * person.model.inertias[k].lever)[0] - ankle)
+        for k in range(first, person.model.njoints)
+        if first in person.model.supports[k]
+    )
+    weight = GRAVITY * pin.computeTotalMass(person.model)
+    assert abs(found["right_ankle_dorsiflexion"]) == pytest.approx(abs(weight * (center - ankle) - foot), rel=1e-6)
+    assert abs(found["left_ankle_dorsiflexion"]) < 5.0  # it hangs
 
 
 def test_a_seat_takes_the_legs_out(person: wb.Figure) -> None:

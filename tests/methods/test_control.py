@@ -9,6 +9,7 @@ import time
 
 import numpy as np
 import pytest
+from numba.core import event
 
 import wholebody as wb
 from tests.needs import each
@@ -136,6 +137,22 @@ def test_progress_is_a_function(reach):
 def test_a_solve_that_is_let_alone_is_the_same(reach):
     one, other = wb.QP(time_limit=1000.0).solve(reach), wb.QP().solve(reach)
     assert np.array_equal(one.q, other.q)
+
+
+def test_compiling_is_no_time_of_a_solve(reach):
+    """Neither of its seconds nor of its limit: every iteration compiles for longer than the limit."""
+    compiled = []
+
+    def progress(entry):
+        began = time.monotonic()
+        with event.trigger_event("numba:compile", data={"dispatcher": progress}):
+            time.sleep(0.02)
+            compiled.append(time.monotonic() - began)
+
+    began = time.monotonic()
+    answer = wb.QP(time_limit=1000.0).solve(reach, progress)
+    assert compiled
+    assert answer.seconds <= time.monotonic() - began - sum(compiled)
 
 
 def test_processor_time_is_not_asked_for_before_so_much_time_went_by(monkeypatch):

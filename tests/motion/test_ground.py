@@ -203,7 +203,8 @@ def test_feet_that_are_held_inside_the_floor_are_told_before(human: wb.Figure) -
     clip = wb.Clip(human, np.tile(sunk, (5, 1)), DT)
     scene = wb.Scene(human).add(wb.HalfSpace(), name="floor")
     with pytest.warns(UserWarning, match=r"left_foot stands up to 30 mm inside floor.*hold_feet=False"):
-        assert not wb.avoid(clip, scene, method="frames").report.solved
+        held = wb.avoid(clip, scene, method="frames").report
+    assert (held.solved, "stands up to 30 mm" in held.message) == (False, True)
     assert wb.avoid(clip, scene, method="frames", hold_feet=False).report.after.free
 
 
@@ -215,8 +216,11 @@ def test_a_jump_that_collides_and_ends_that_overlap_are_told_before(human: wb.Fi
     said = r"jumps from frame 1 to 2 \(left_elbow_flexion by 0.74 rad.*clip\[:2\].*first posture.*give clip\[4:\]"
     with pytest.warns(UserWarning, match=said):
         wb.avoid(clip, method="frames", keep_ends=True, progress=lambda _: True)
-    with pytest.warns(UserWarning, match=r"last posture overlaps by .* give clip\[:0 \+ 1\]"):
+    with pytest.warns(UserWarning, match=r"last posture overlaps by .* give clip\[:1\]"):
         wb.avoid(wb.Clip(human, [standing, inside], DT), method="frames", keep_ends=True, progress=lambda _: True)
+    with pytest.warns(UserWarning, match="jumps from frame 1 to 2"):
+        freed = wb.avoid(wb.Clip(human, [inside, inside, bent, bent], DT), method="frames").report
+    assert (freed.solved, "jumps" in freed.message) == (True, False)
     with warnings.catch_warnings():  # a recording that is only fast, or jumps where it is free
         warnings.simplefilter("error")
         wb.avoid(wb.Clip(human, [inside, inside], DT), method="frames", progress=lambda _: True)

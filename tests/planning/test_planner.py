@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -16,6 +17,7 @@ from wholebody.bench.suite.problem_sets.registry import problem_set
 from wholebody.planning import Pace, Plan
 from wholebody.planning.rrt_connect import Tree
 from wholebody.planning.sampling import Sampler
+from wholebody.planning.smoothing import length, shortcut
 
 
 def shelf(number: int) -> tuple[wb.Problem, Array]:
@@ -76,6 +78,32 @@ def test_a_person_reaches_through_a_hole_on_its_feet(least_distance: Distance) -
         places = np.array([figure.placement(q, foot).translation for q in found.clip.q])
         assert np.abs(places - places[0]).max() < 1e-4
     assert least_along(scene, found.clip.q, least_distance) >= -5e-4
+
+
+class NothingButParts:
+    """A local planner by which no two postures are joined, and every path between them is free."""
+
+    searches, tries, partial = 1, 300, True
+
+    def joined(self, q: Array, target: Array, most: float) -> list[Array]:
+        return []
+
+    def through(self, path: Array) -> list[Array]:
+        return list(path[1:])
+
+
+def test_a_joint_that_turns_back_on_the_way_moves_evenly_though_no_two_postures_are_joined(
+    planar_arm: Callable[..., wb.Figure],
+) -> None:
+    """The shortest path is the straight one of two joints, of which one goes there and back five times."""
+    model, share = planar_arm((0.5, 0.5)).model, np.linspace(0.0, 1.0, 41)
+    path = list(np.stack([share, 0.5 * np.sin(5.0 * np.pi * share)], axis=1))
+    local: Any = NothingButParts()
+    found = shortcut(model, path, local, np.random.default_rng(0), lambda: False)
+    straight = float(np.linalg.norm(path[-1] - path[0]))
+    assert length(model, path) > 3.0 * straight
+    assert length(model, found) < 1.1 * straight
+    np.testing.assert_array_equal([found[0], found[-1]], [path[0], path[-1]])
 
 
 def test_the_same_seed_plans_the_same_motion() -> None:

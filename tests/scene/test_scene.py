@@ -129,9 +129,9 @@ def test_removing_takes_the_pairs_with_it(scene):
 def test_mistakes_are_answered_before_anything_changes(scene):
     scene.add(wb.Sphere(0.1), name="table", at=(1.0, 0.0, 1.0))
     revision = scene.revision
-    with pytest.raises(wb.InputError, match="already has a 'table'"):
+    with pytest.raises(wb.InputError, match="already has 'table'"):
         scene.add(wb.Sphere(0.1), name="table")
-    with pytest.raises(wb.InputError, match="already has a 'thorax'"):
+    with pytest.raises(wb.InputError, match="already has 'thorax'"):
         scene.add(wb.Sphere(0.1), name="thorax")
     with pytest.raises(wb.InputError, match="the name of an object is ''; give a line of text"):
         scene.add(wb.Sphere(0.1), name="")

@@ -346,9 +346,9 @@ def test_a_name_is_that_of_one_figure_or_thing_alone(ben: wb.Figure) -> None:
         scene.add_figure(ben, name="root")
     with pytest.raises(InputError, match="the scene has a thing 'post' already; give the figure another name"):
         scene.add_figure(ben, name="post")
-    with pytest.raises(InputError, match="the scene already has a 'ben'; give the new object another name"):
+    with pytest.raises(InputError, match="the scene already has 'ben'; give the new object another name"):
         scene.add(wb.Sphere(0.1), name="ben")
-    with pytest.raises(InputError, match="the scene already has a 'ben'; give the new object another name"):
+    with pytest.raises(InputError, match="the scene already has 'ben'; give the new object another name"):
         scene.attach(wb.Sphere(0.1), to="ben/head", name="ben")
     assert (set(scene.figure.members), set(scene.objects)) == ({"ben"}, {"post"})
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.task_text import box, figure, hold, point, table
-from wholebody.base.errors import WholebodyError
+from wholebody.base.errors import FileFormatError, WholebodyError
 from wholebody.taskfile import read_task
 
 GOOD = (
@@ -153,6 +153,19 @@ def test_a_file_that_is_not_there_is_told_with_its_neighbours(tmp_path: Path) ->
         read_task(tmp_path / "shef.toml")
     with pytest.raises(WholebodyError):
         read_task(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("robot.urdf", "is a robot.*path = 'robot.urdf'.*`wholebody show robot.urdf`"),
+        ("result.json", "is no task file;.*show"),
+    ],
+)
+def test_a_file_of_another_kind_is_told_with_what_takes_it(tmp_path: Path, name: str, said: str) -> None:
+    (tmp_path / name).write_text('<robot name="r"><link name="a"/></robot>')
+    with pytest.raises(FileFormatError, match=said):
+        read_task(tmp_path / name)
 
 
 def test_a_path_that_is_too_long_is_one_sentence(tmp_path: Path) -> None:

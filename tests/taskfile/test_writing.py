@@ -103,6 +103,17 @@ def test_forces_and_strength_go_round(tmp_path: Path) -> None:
     assert again.measures[0].weight * again.measures[0].value(state) == 2.0 * problem.measures[0].value(state)
 
 
+def test_whose_strength_it_is_goes_round(tmp_path: Path) -> None:
+    scene = wb.Scene({"anna": wb.load("human", sex="female"), "ben": (wb.load("human"), (0.0, 1.0, 0.0))})
+    limit = wb.ergonomics.StrengthLimit([wb.Force("ben/left_palm", (0.0, 0.0, -90.0))], person="ben")
+    problem = wb.Problem(scene, constraints=[limit], measures=[wb.ergonomics.Exertion(person="anna")])
+    path = wb.taskfile.write_task(problem, tmp_path / "two.toml")
+    same(problem, wb.read_task(path).problem)
+    path.write_text(path.read_text().replace('person = "ben"', 'person = "bne"'))
+    with pytest.raises(wb.UnknownNameError, match="did you mean ben"):
+        wb.read_task(path)
+
+
 def test_the_field_of_a_look_goes_round_and_a_balance_without_forces(tmp_path: Path) -> None:
     look = wb.ergonomics.Look((1.0, 0.2, 0.3), view=wb.ergonomics.FieldOfView(horizontal=0.1, down=0.2))
     problem = wb.Problem(wb.Scene(wb.load("human")), constraints=[look, wb.ergonomics.LoadedBalance([])])

@@ -65,7 +65,7 @@ def test_files_give_back_what_was_written(hand: wb.Figure, tmp_path: Path) -> No
         (lambda lines: [*lines[:2], *lines[1:]], "line 3: the time step changes"),
         (
             lambda lines: [lines[0], *(f"{k}e-9,{line.partition(',')[2]}" for k, line in enumerate(lines[1:]))],
-            "line 3: the time step is 1e-09 s; give one between 1e-06 and 1e.06 s",
+            "line 3: the time step is 1e-09 s; give one between 1e-6 and 1e6 s",
         ),
         (lambda lines: [lines[0], *lines[:0:-1]], "line 3: the time step is -"),
         (

@@ -8,6 +8,7 @@ from __future__ import annotations
 import inspect
 import math
 import os
+import re
 import warnings
 from collections.abc import Collection, Iterable
 from difflib import get_close_matches
@@ -20,7 +21,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.base.errors import ALIKE, InputError, UnknownNameError
+from wholebody.base.errors import ALIKE, InputError, UnknownNameError, either
 
 _T = TypeVar("_T")
 
@@ -33,7 +34,7 @@ SLIPS = {"m": {"millimetres": 1e-3, "centimetres": 1e-2}, "rad": {"degrees": mat
 
 TIME_STEP = (1e-6, 1e6)
 """Least and greatest time step, seconds: beyond them velocities have no significant digits."""
-TIME_STEP_ASKED = f"give one between {TIME_STEP[0]:g} and {TIME_STEP[1]:g} s"
+TIME_STEP_ASKED = "give one between 1e-6 and 1e6 s"
 """The end of a message about a time step that is out of that range."""
 
 MOST_TURNED = 4.0 * math.pi
@@ -84,7 +85,7 @@ def some(names: Iterable[str]) -> str:
 def instance(value: object, kind: type[_T] | tuple[type[_T], ...], what: str, correction: str) -> _T:
     """A value of a type, or of one of several; `correction` ends the sentence: "load one with wb.load('human')"."""
     if not isinstance(value, kind):
-        wanted = " or ".join(a(one) for one in (kind if isinstance(kind, tuple) else (kind,)))
+        wanted = either(a(one) for one in (kind if isinstance(kind, tuple) else (kind,)))
         raise InputError(f"{what} is {a(type(value))}, not {wanted}; {correction}")
     return value
 
@@ -95,11 +96,17 @@ def number(value: object, what: str, low: float, high: float, unit: str = "", wa
     if found is None or not low <= found <= high:
         if not wanted:
             finite = "finite " if math.isinf(high) or (isinstance(value, float) and not math.isfinite(value)) else ""
-            ends = f" between {low:g} and {high:g}" if math.isfinite(high) else f" of {low:g} or more"
+            ends = f" between {plain(low)} and {plain(high)}" if math.isfinite(high) else f" of {plain(low)} or more"
             wanted = f"a {finite}number{ends if math.isfinite(low) else ''}{f' {unit}' if unit else ''}"
         slip = "" if found is None else unit_hint(found, low, high, unit)
         raise InputError(f"{what} is {shown(value)}; give {wanted}{slip}")
     return found
+
+
+def plain(bound: float) -> str:
+    """An end of a range as it is written by hand: "0.001", "1e6", "4294967295"."""
+    short = f"{bound:.0f}" if bound % 1.0 == 0.0 and float(f"{bound:g}") != bound else f"{bound:g}"
+    return re.sub(r"e([+-])0*", lambda sign: f"e{sign[1]}".replace("+", ""), short)
 
 
 def warn(told: str) -> None:
@@ -164,7 +171,7 @@ def text(value: object, what: str) -> str:
 def choice(value: object, options: Collection[str], what: str) -> str:
     """One of a few words."""
     if not isinstance(value, str) or value not in options:
-        raise InputError(f"{what} is {shown(value)}; give {' or '.join(map(repr, options))}")
+        raise InputError(f"{what} is {shown(value)}; give {either(map(repr, options))}")
     return value
 
 

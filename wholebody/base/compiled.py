@@ -39,7 +39,6 @@ TOGETHER = (
     (
         "wholebody.methods.qp.escaping",
         "wholebody.methods.qp.turning",
-        "wholebody.methods.qp.solvers.split_form",
     ),
 )
 """Modules with compiled loops, in groups that call no loops of each other, those first that take longest to compile.
@@ -54,7 +53,8 @@ LOOPS = tuple(name for names in TOGETHER for name in names)
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_compiling = {"depth": 0, "since": 0.0, "seconds": 0.0, "collects": True, "alone": False}
+_compiling = {"depth": 0, "collects": True, "alone": False}
+_since, _seconds = {"thread_time": 0.0, "monotonic": 0.0}, {"thread_time": 0.0, "monotonic": 0.0}
 _beside: list[subprocess.Popen[bytes]] = []
 
 
@@ -130,9 +130,9 @@ def usable_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def compile_seconds() -> float:
-    """Processor time of all compilation so far, seconds; time limits of solves do not count it."""
-    return _compiling["seconds"]
+def compile_seconds(clock: str = "thread_time") -> float:
+    """Time of all compilation so far by a clock, "thread_time" or "monotonic"; times of solves are without it."""
+    return _seconds[clock]
 
 
 @lru_cache(maxsize=1)
@@ -144,6 +144,7 @@ def _loop_type() -> Any:
     numba would compile a function anew for every constant that a caller gives, 22 times one that finds a table by its
     number. Here a constant is a value as any: where that is faster, LLVM puts the function into its caller anyway.
     """
+    from numba.core import event
     from numba.core.caching import FunctionCache
     from numba.core.registry import CPUDispatcher
     from numba.core.runtime import rtsys
@@ -171,8 +172,9 @@ def _loop_type() -> Any:
         def compile(self, sig: Any) -> Any:
             if _beside and self.__module__ in BESIDE.values() and isinstance(self._cache, Kept):
                 # another process compiles it; reading its cache is faster than compiling it here too
-                while _beside[0].poll() is None and self._cache.load_overload(sig, self.targetctx) is None:
-                    time.sleep(0.05)
+                with event.trigger_event("numba:compile", data={"dispatcher": self}):
+                    while _beside[0].poll() is None and self._cache.load_overload(sig, self.targetctx) is None:
+                        time.sleep(0.05)
             return super().compile(sig)
 
         def get_call_template(self, args: Any, kws: Any) -> Any:
@@ -203,7 +205,7 @@ def _watch() -> None:
 
         def on_start(self, event: Any) -> None:
             if _compiling["depth"] == 0:
-                _compiling["since"] = time.thread_time()
+                _since.update((clock, getattr(time, clock)()) for clock in _since)
                 _compiling["collects"] = gc.isenabled()
                 gc.disable()  # numba makes millions of objects that stay: to look through them is an eighth of the time
             _compiling["depth"] += 1
@@ -215,7 +217,7 @@ def _watch() -> None:
         def on_end(self, event: Any) -> None:
             _compiling["depth"] -= 1
             if _compiling["depth"] == 0:
-                _compiling["seconds"] += time.thread_time() - _compiling["since"]
+                _seconds.update((clock, _seconds[clock] + getattr(time, clock)() - _since[clock]) for clock in _since)
                 if _compiling["collects"]:
                     gc.enable()
 

@@ -23,21 +23,39 @@ def one_line(text: str, most: int = SHOWN) -> str:
     return plain if len(plain) <= most else f"{plain[: most - 3]}..."
 
 
+def either(options: Iterable[str]) -> str:
+    """Several options in words: "a", "a or b", "a, b or c"."""
+    *others, last = options
+    return f"{', '.join(others)} or {last}" if others else last
+
+
+def suggestion(name: str, known: Collection[str]) -> str:
+    """The end of a sentence about an unknown name: the names that are like it, or some of all if none is."""
+    near = nearest_names(name, known)
+    if not near:
+        return "there are none."
+    if _likeness(name, near[0]) >= SIMILAR:
+        return f"did you mean {', '.join(map(one_line, near))}?"
+    more = f" and {len(known) - len(near)} more" if len(known) > len(near) else ""
+    return f"known: {', '.join(map(one_line, near))}{more}."
+
+
 def nearest_names(name: str, known: Collection[str]) -> list[str]:
     """The known names that are most similar to a name, the best first.
 
     Neither case nor the order of words matters, and "l" and "r" are sides: `hand_left`, `LeftHand` and `l_hand` are
     nearest to `left_hand`. Of at most six names all are offered if none is alike.
     """
-    given = _spellings(name[:SHOWN])
-    scores = {}
-    for one in known:
-        pairs = zip(given, _spellings(one[:SHOWN]), strict=True)
-        scores[one] = max(SequenceMatcher(None, theirs, mine).ratio() for mine, theirs in pairs)
+    scores = {one: _likeness(name, one) for one in known}
     order = sorted(scores, key=lambda one: (-scores[one], one))
     if len(order) <= OFFERED + 2 and (not order or scores[order[0]] < ALIKE):
         return order
     return [one for one in order[:OFFERED] if scores[one] >= SIMILAR] or order[: OFFERED + 2]
+
+
+def _likeness(given: str, known: str) -> float:
+    pairs = zip(_spellings(given[:SHOWN]), _spellings(known[:SHOWN]), strict=True)
+    return max(SequenceMatcher(None, theirs, mine).ratio() for mine, theirs in pairs)
 
 
 def _spellings(name: str) -> tuple[str, str]:
@@ -112,12 +130,10 @@ class UnknownNameError(WholebodyError, KeyError):
     def __init__(self, kind: str, name: str, known: Iterable[str], where: str = "") -> None:
         """Build the sentence of a kind of object and all known names; `where` is a place, such as "goal 2"."""
         known = sorted(set(known))
-        near = nearest_names(str(name), known)
-        hint = f"did you mean {', '.join(map(one_line, near))}?" if near else "there are none."
         place = f"{where}: " if where else ""
         self.kind, self.name, self.known = kind, name, tuple(known)
         called = repr(name) if len(name) <= SHOWN else f"{name[:SHOWN]!r}..."
-        super().__init__(f"{place}no {kind} is called {called}; {hint}")
+        super().__init__(f"{place}no {kind} is called {called}; {suggestion(str(name), known)}")
 
     def __str__(self) -> str:  # KeyError would show its repr
         return str(self.args[0])

@@ -46,7 +46,7 @@ class Range:
 
     def __str__(self) -> str:
         """Both ends and the unit, such as "0 and 1 m"."""
-        return f"{self.low:g} and {self.high:g} {self.unit}".strip()
+        return f"{checks.plain(self.low)} and {checks.plain(self.high)} {self.unit}".strip()
 
 
 @dataclass(frozen=True)

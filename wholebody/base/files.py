@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wholebody.base import checks
-from wholebody.base.errors import FileFormatError, InputError, one_line
+from wholebody.base.errors import FileFormatError, InputError, either, one_line
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -253,8 +253,7 @@ def checked_ending(path: object, what: str, content: str, endings: Collection[st
     if place.suffix.lower() not in endings:
         given = one_line(place.suffix) or "a file without ending"
         raise InputError(
-            f"{_named(place.name)}: {content} cannot be written as {given}; give the name the ending "
-            f"{' or '.join(sorted(endings))}"
+            f"{_named(place.name)}: {content} cannot be written as {given}; end the name with {either(sorted(endings))}"
         )
     return place
 

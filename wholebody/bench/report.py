@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wholebody.base.files import templates
 from wholebody.bench.statistics import Interval
-from wholebody.bench.tables import sentence
+from wholebody.bench.tables import formatted, sentence
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -63,13 +62,6 @@ def _environment(folder: Path) -> Environment:
         "words": words,
     }
     return made
-
-
-def formatted(value: float, spec: str, unit: str = "", none: str = "") -> str:
-    """A number by a format, with its unit, without exponents of large ones; `none` for one that is not finite."""
-    if spec.endswith("g") and isfinite(value) and abs(value) >= 10.0 ** int(spec[1:-1] or 6):
-        spec = ".0f"
-    return f"{value:{spec}}{unit}" if isfinite(value) else none
 
 
 def spanned(found: Interval, spec: str, scale: float = 1.0, unit: str = "", ends: str = "") -> str:

@@ -21,7 +21,7 @@ from wholebody.base.errors import FileFormatError
 from wholebody.base.files import parsed_toml, read_text
 from wholebody.bench import plot_style
 from wholebody.bench.statistics import Interval
-from wholebody.bench.tables import sentence
+from wholebody.bench.tables import formatted, sentence
 
 Figure = float | int | str | Interval
 _R = TypeVar("_R")
@@ -134,7 +134,7 @@ def shown(figure: Figure) -> str:
         ends = ", ".join(shown(end) or "∞" for end in (figure.low, figure.high))
         return f"{shown(figure.value)} [{ends}]" if isfinite(figure.value) else ""
     if isinstance(figure, float):
-        return "" if not isfinite(figure) else f"{figure:.0f}" if abs(figure) >= 1000.0 else f"{figure:.3g}"
+        return formatted(figure, ".3g")
     return str(figure)
 
 

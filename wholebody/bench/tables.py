@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import date
 from functools import cache
 from importlib import metadata
+from math import isfinite
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
@@ -49,6 +50,14 @@ def sentence(facts: Mapping[str, str]) -> str:
     kept = "wholebody", "date", "processor", "cores", "load", "OMP_NUM_THREADS"
     told = [f"{name} {value}" for name, value in facts.items() if name in kept]
     return f"Measured with {'; '.join(told)}."
+
+
+def formatted(value: float, spec: str, unit: str = "", none: str = "") -> str:
+    """A number by a format, with its unit, without exponents of large ones; `none` for one that is not finite."""
+    if not isfinite(value):
+        return none
+    text = f"{value:{spec}}"
+    return (f"{value:.0f}" if "e+" in text and spec.endswith("g") else text) + unit
 
 
 def _processor() -> str:

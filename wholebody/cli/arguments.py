@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
 from wholebody.base.checks import is_number
-from wholebody.base.errors import InputError, UnknownNameError, nearest_names
+from wholebody.base.errors import InputError, UnknownNameError, suggestion
 from wholebody.cli.command import Option, flag, option
 
 JOINED = "X,Y,Z"
@@ -32,19 +32,15 @@ class Parser(argparse.ArgumentParser):
             if is_number(word) and any(option.metavar == JOINED for option in self._actions):
                 self.error(f"{word} belongs to no option; join numbers by commas, such as 0.3,-0.4,1.0")
             if word.startswith("-") and not is_number(word):
-                self.error(f"no option is called {word!r}; {_did_you_mean(word, self._option_string_actions)}")
+                self.error(f"no option is called {word!r}; {suggestion(word, self._option_string_actions)}")
         return found, rest
 
     def error(self, message: str) -> NoReturn:
         """Print the usage and the message, and end with 2."""
         if wrong := re.search(r"invalid choice: '(.*)' \(choose from (.*)\)", message):
             word, choices = wrong[1], [choice.strip("'") for choice in wrong[2].split(", ")]
-            message = f"{message}; {_did_you_mean(word, choices)}"
+            message = f"{message}; {suggestion(word, choices)}"
         super().error(message)
-
-
-def _did_you_mean(word: str, known: Iterable[str]) -> str:
-    return f"did you mean {', '.join(nearest_names(word, tuple(known)))}?"
 
 
 PERSON = ("sex", "stature", "mass", "percentile", "proportions", "age", "detail", "hands")

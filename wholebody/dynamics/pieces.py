@@ -16,10 +16,16 @@ from wholebody.geometry.contact_rows import ContactRowBuilder, compiled_kernel
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 from wholebody.scene.matter.body import MassProperties, mass_properties
-from wholebody.scene.matter.materials import MATERIALS, Material, surface
+from wholebody.scene.matter.materials import MATERIALS, Material, Surface, surface
 from wholebody.scene.scene import Scene
 
 HUMAN = MATERIALS["human"]  # of every figure
+
+
+def surface_of(scene: Scene, first: str, second: str) -> Surface:
+    """What happens where two segments or things touch."""
+    one, other = (scene.objects[name].material if name in scene.objects else HUMAN for name in (first, second))
+    return surface(one, other)
 
 
 class PlacedProximity(Proximity):

@@ -28,6 +28,7 @@ LEVER = 0.06
 (Chaffin, Andersson & Martin, "Occupational Biomechanics", chapter 6)."""
 
 ROUND = 5.0  # N m: smaller moments than this of either side count as none, so that the derivative is continuous
+NARROW = 0.01  # m: of soles nearer than this, seen from above, as if they were so far apart
 FEET = ("left_sole", "right_sole")
 MOST = 3400.0
 """N: compression that NIOSH's action limit allows (1981)."""
@@ -43,14 +44,14 @@ StrengthOf = Annotated[Strength, _strength]
 class Statics(NamedTuple):
     """Torques that hold a person under forces, and their derivatives.
 
-    The ground's force is split over both soles by where it presses between them, each part through a point as far from
-    its sole as the whole from the line of both. Somebody whose legs bear nothing, on a seat, has none: torques of the
-    legs are then those of hanging legs, and are left out.
+    The ground's force is split over both soles by where it presses between them, seen from above, each part through a
+    point as far from its sole as the whole from the line of both. Who sits, whose legs bear nothing, has none:
+    torques of the legs are then those of hanging legs, and are left out.
     """
 
     loads: Loads
     body: range | None  # the person's joints in the model of several figures; None of one alone
-    feet: tuple[inputs.Place, ...]  # the soles; none for who sits
+    feet: tuple[inputs.Place, ...]  # the soles that bear, one or two; none for who sits
     joints: Indices  # (k,) in the tangent, of the joints with published strength
     carriers: Indices  # (k,) their joints in the model
     upper: Array  # (k,) greatest torque towards positive angles [N m]
@@ -84,26 +85,27 @@ class Statics(NamedTuple):
         return found + (self._ground(state) if self.feet else [])
 
     def _ground(self, state: State) -> list[tuple[int, Array, Array, Array, Array]]:
-        left, right = (state.frame(one.frame).translation for one in self.feet)
-        d_left, d_right = (
-            point_rows(state, point, one.joint) for point, one in zip((left, right), self.feet, strict=True)
-        )
-        height = 0.5 * float(left[2] + right[2])
+        soles = [np.asarray(state.frame(one.frame).translation) for one in self.feet]
+        moves = [point_rows(state, sole, one.joint) for sole, one in zip(soles, self.feet, strict=True)]
+        middle, d_middle = np.mean(soles, axis=0), np.mean(moves, axis=0)
+        height = float(middle[2])
         at, d_at = pressure(state, self.loads, self.body, height)
         carried = self.body or range(1, state.model.njoints)
         weight = GRAVITY * sum(state.model.inertias[k].mass for k in carried)
         whole = np.array((0.0, 0.0, weight)) - self.loads.vectors.sum(axis=0)
-        d_height = 0.5 * (d_left + d_right)[2]
-        d_at += np.outer(whole[:2] / whole[2], d_height)  # of where it presses at another height
-        at, d_at = np.append(at, height), np.vstack([d_at, d_height])
-        line, d_line = left - right, d_left - d_right
-        length = float(line @ line)
+        d_at += np.outer(whole[:2] / whole[2], d_middle[2])  # of where it presses at another height
+        at, d_at = np.append(at, height), np.vstack([d_at, d_middle[2]])
+        if len(soles) == 1:
+            return [(self.feet[0].joint, at, d_at, whole, np.zeros_like(d_at))]
+        (left, right), (d_left, d_right), level = soles, moves, np.array((1.0, 1.0, 0.0))
+        line, d_line = level * (left - right), level[:, None] * (d_left - d_right)
+        length = max(float(line @ line), NARROW**2)
         share = float(line @ (at - right)) / length
         d_share = ((at - right) @ d_line + line @ (d_at - d_right) - 2.0 * share * (line @ d_line)) / length
         if not 0.0 < share < 1.0:
             share, d_share = min(max(share, 0.0), 1.0), np.zeros_like(d_share)
         off = at - share * left - (1.0 - share) * right
-        d_off = d_at - share * d_left - (1.0 - share) * d_right - np.outer(line, d_share)
+        d_off = d_at - share * d_left - (1.0 - share) * d_right - np.outer(left - right, d_share)
         return [
             (one.joint, foot + off, d_foot + d_off, part * whole, np.outer(whole, sign * d_share))
             for one, foot, d_foot, part, sign in (

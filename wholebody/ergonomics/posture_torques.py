@@ -6,19 +6,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array, brief
+from wholebody.base.arrays import Array, brief, with_values
 from wholebody.ergonomics.angles import SIDES, check_person
+from wholebody.ergonomics.exertion import Exertion, statics_of
 from wholebody.ergonomics.work import LOAD
 from wholebody.figures.figure import Figure
-from wholebody.motion.clip import Clip
-from wholebody.motion.clip_torques import clip_torques
-from wholebody.motion.stance import standing_feet
+from wholebody.figures.state import State
 from wholebody.motion.strength import Strength
+from wholebody.scene.scene import Scene
+from wholebody.tasks.forces import GRAVITY, Force
 
 LEGS = ("hip", "knee", "ankle", "toe")
+RAISED = 0.03  # m: a sole higher than this over the lower one bears nothing
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ class StaticTorques:
 def static_torques(
     figure: Figure, q: Array, *, load: float = 0.0, seated: bool = False, strength: Strength | None = None
 ) -> StaticTorques:
-    """Torques that hold a posture and a load, by inverse dynamics (`pin.rnea`) without motion.
+    """Torques that hold a posture and a load, as of `Exertion`.
 
     The weight of the body and of the load rests on the soles of the feet that are lowest. Of somebody seated it rests
     on the seat, so joints of the legs are left out.
@@ -83,29 +84,19 @@ def static_torques(
     strength = Strength() if strength is None else checks.instance(
         strength, Strength, "static_torques: strength", "give wb.motion.Strength(percentile=50, sex='female')"
     )  # fmt: skip
-    carrying = with_load(person, load)
-    clip = Clip(carrying, np.array([q, q]), 1.0, "posture")
-    stands = standing_feet(clip, [f"{side}_foot" for side in SIDES])
-    # coefficient between soles and ground, as for `wb.motion.torques`
-    found = clip_torques(clip, stands, strength, 0.8, None)
-    torques, shares = {}, {}
-    for name in person.joints:
-        joint = person.model.joints[person.joint_id(name)]
-        if joint.nv != 1 or (seated and name.split("_")[1] in LEGS):
-            continue
-        torques[name] = float(found.torque[0, joint.idx_v])
-        if np.isfinite(found.lower[joint.idx_v]) or np.isfinite(found.upper[joint.idx_v]):
-            shares[name] = float(found.share[0, joint.idx_v])
-    return StaticTorques(torques, shares)
-
-
-def with_load(figure: Figure, load: float) -> Figure:
-    """The figure with half of a mass, kg, in each palm."""
-    if load == 0.0:
-        return figure
-    model = figure.model.copy()
-    for side in SIDES:
-        palm = model.frames[figure.frame_id(f"{side}_palm")]
-        held = pin.Inertia(0.5 * load, palm.placement.translation, np.zeros((3, 3)))
-        model.inertias[palm.parentJoint] = model.inertias[palm.parentJoint] + held
-    return Figure(figure.name, model, figure.geometry, figure.detail, figure.describe(), figure.visual)
+    held = [Force(f"{side}_palm", (0.0, 0.0, -0.5 * GRAVITY * load)) for side in SIDES if load]
+    statics = statics_of(Scene(person), Exertion(held, strength=strength, standing=not seated))
+    state = State(person.model).update(q)
+    low = min((state.frame(one.frame).translation[2] for one in statics.feet), default=0.0)
+    bearing = tuple(one for one in statics.feet if state.frame(one.frame).translation[2] <= low + RAISED)
+    names = [name for name in person.joints if not (seated and name.split("_")[1] in LEGS)]
+    joints = {name: joint for name in names if (joint := person.model.joints[person.joint_id(name)]).nv == 1}
+    columns = np.array([joint.idx_v for joint in joints.values()], dtype=np.intp)
+    torque, _ = with_values(statics, feet=bearing).torques(state, columns, state.column_joint[columns])
+    lower, upper = (limit[columns] for limit in strength.limits(person))
+    share = np.abs(torque) / np.where(torque >= 0.0, upper, -lower)
+    known = np.isfinite(lower) | np.isfinite(upper)
+    return StaticTorques(
+        dict(zip(joints, torque.tolist(), strict=True)),
+        {name: one for name, one, is_known in zip(joints, share.tolist(), known, strict=True) if is_known},
+    )

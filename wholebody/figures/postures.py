@@ -10,9 +10,10 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
 from wholebody.figures.description import Articulated
+from wholebody.geometry.pieces import swept_points
 
 GAP = 0.004
 """Least distance of any two pieces in a named posture, metres; arms and legs move outwards if a build needs it."""
@@ -29,8 +30,11 @@ def stand(figure: Articulated, degrees: Mapping[str, float]) -> Array:
     q = figure.clamp(figure.with_joints(q, values))
     spread = [name for name in figure.joints if name.endswith(("shoulder_abduction", "hip_abduction"))]
     free: Array = q
+    reach = np.array([swept_points(piece.geometry).reach for piece in figure.geometry.geometryObjects])
+    pairs = np.array([(pair.first, pair.second) for pair in figure.geometry.collisionPairs]).reshape(-1, 2)
+    within = reach[pairs].sum(axis=1) + GAP
     for _ in range(45):
-        close = _close_segments(figure, free)
+        close = _close_segments(figure, free, pairs, within)
         if not close:
             break
         moved = {
@@ -53,26 +57,32 @@ def _moves(abduction: str, segment: str) -> bool:
     return segment.startswith(side) and segment.endswith(leg) == (part == "hip") and not segment.endswith("clavicle")
 
 
-def _close_segments(figure: Articulated, q: Array) -> set[str]:
-    data, geometry = figure.model.createData(), figure.geometry
-    geometry_data = pin.GeometryData(geometry)
-    pin.updateGeometryPlacements(figure.model, data, geometry, geometry_data, q)
-    pin.computeDistances(geometry, geometry_data)
+def _close_segments(figure: Articulated, q: Array, pairs: Indices, within: Array) -> set[str]:
+    """Segments with pieces nearer to others than `GAP`, of pairs (k, 2) whose origins are `within` (k,) then."""
+    pieces, placed = figure.geometry.geometryObjects, _placed(figure, q)
+    centers = np.array([place.translation for place in placed])
+    apart = np.linalg.norm(centers[pairs[:, 0]] - centers[pairs[:, 1]], axis=1)
+    at = [coal.Transform3s(place.rotation, place.translation) for place in placed]
     close: set[str] = set()
-    for pair, result in zip(geometry.collisionPairs, geometry_data.distanceResults, strict=True):
-        if result.min_distance < GAP:
-            close.update(geometry.geometryObjects[k].name.partition(":")[0] for k in (pair.first, pair.second))
+    for a, b in pairs[apart < within].tolist():
+        shapes, result = (pieces[a].geometry, pieces[b].geometry), coal.DistanceResult()
+        if coal.distance(shapes[0], at[a], shapes[1], at[b], coal.DistanceRequest(), result) < GAP:
+            close.update(pieces[k].name.partition(":")[0] for k in (a, b))
     return close
+
+
+def _placed(figure: Articulated, q: Array) -> list[pin.SE3]:
+    """Placements of the pieces in the world."""
+    data = figure.model.createData()
+    pin.forwardKinematics(figure.model, data, q)
+    return [data.oMi[piece.parentJoint] * piece.placement for piece in figure.geometry.geometryObjects]
 
 
 def lowest(figure: Articulated, q: Array) -> float:
     """Height of the lowest point of all pieces, metres."""
-    data = figure.model.createData()
-    geometry_data = pin.GeometryData(figure.geometry)
-    pin.updateGeometryPlacements(figure.model, data, figure.geometry, geometry_data, q)
     return min(
         -support(piece.geometry, placement, np.array([0.0, 0.0, -1.0]))
-        for piece, placement in zip(figure.geometry.geometryObjects, geometry_data.oMg, strict=True)
+        for piece, placement in zip(figure.geometry.geometryObjects, _placed(figure, q), strict=True)
     )
 
 

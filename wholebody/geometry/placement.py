@@ -74,8 +74,7 @@ def unit_vector(value: object, what: str) -> tuple[float, float, float]:
     length = math.hypot(x, y, z)
     if not 1e-9 <= length <= 1e9:
         raise InputError(
-            f"{what} is {[x, y, z]} and has no direction; give a vector of a length from 1e-09 to 1e+09, such as "
-            "(0, 0, 1)"
+            f"{what} is {[x, y, z]} and has no direction; give a vector of a length from 1e-9 to 1e9, such as (0, 0, 1)"
         )
     return x / length, y / length, z / length
 

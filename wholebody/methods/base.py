@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -179,16 +179,18 @@ class SolvingTracker(NotCopyable):
         self._method = method
         self._asked = copy.copy(problem)  # one for all steps, so that methods can reuse what they build for it
 
-    def step(self, q: Array) -> SolvedStep:
-        """A whole solve from the posture q (nq,); what things that moved meanwhile met is named."""
+    def step(self, q: Array) -> Step:
+        """The same as `frame`; what things that moved meanwhile met is named."""
         q = begun(self.problem, q)
         self.workspace.refresh()
-        motion, step = self.workspace.next_frame(q), self.frame(q)
-        if motion is None:
-            return step
-        return with_values(step, collisions=judged(self.workspace, motion, q, step.q))
+        motion = self.workspace.next_frame(q)
+        step: Any = self.frame(q)
+        if motion is not None:
+            step = with_values(step, collisions=judged(self.workspace, motion, q, step.q))
+        made: Step = step
+        return made
 
-    def frame(self, q: Array, tolerance: float | None = None) -> SolvedStep:
+    def frame(self, q: Array, tolerance: float | None = None) -> Step:
         """A whole solve from the posture q (nq,)."""
         if tolerance is not None:
             tolerance = TOLERANCE(tolerance, "tolerance")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -36,6 +35,7 @@ class Ending:
     judgement: Assessment | None = None  # the assessment of the posture, if the search has made it already
     # number of quadratic programs that each solver closed; empty for a method without programs
     programs: Mapping[str, int] = field(default_factory=dict)
+    method: str = ""  # what was run, where that says more than the method's name
 
 
 def assessed_tolerance(tolerance: float) -> float:
@@ -51,10 +51,8 @@ def meets(judgement: Assessment, tolerance: float) -> bool:
     return judgement.holds(enough) and judgement.met(enough)
 
 
-def concluded(
-    problem: Problem, ending: Ending, *, method: str, tolerance: float, control: Control, began: float
-) -> Solution:
-    """The solution of a problem, whose search began at `began` by `time.perf_counter`."""
+def concluded(problem: Problem, ending: Ending, *, method: str, tolerance: float, control: Control) -> Solution:
+    """The solution of a problem, whose search began with its control."""
     judgement = assess(problem, ending.q) if ending.judgement is None else ending.judgement
     enough = assessed_tolerance(tolerance)
     if control.undefined is not None:
@@ -75,11 +73,11 @@ def concluded(
     return Solution(
         q=ending.q,
         status=status,
-        seconds=time.perf_counter() - began,
+        seconds=control.seconds,
         iterations=ending.iterations,
         assessment=judgement,
         trace=ending.trace,
-        method=method,
+        method=ending.method or method,
         message=said + "".join(after),
         programs=ending.programs,
     )

@@ -33,17 +33,23 @@ class _Budget(threading.local):
         """The share of it that has passed; 0 without a bound."""
         if self.seconds == np.inf:
             return 0.0
-        return 1.0 - (self.until - time.thread_time() + compile_seconds()) / self.seconds
+        return 1.0 - (self.until - _now("thread_time")) / self.seconds
 
 
 BUDGET = _Budget()
+
+
+def _now(clock: str) -> float:
+    """What a clock of `time` shows, without compiling."""
+    shown: float = getattr(time, clock)() - compile_seconds(clock)
+    return shown
 
 
 @contextmanager
 def within_budget(seconds: float) -> Iterator[None]:
     """Inside it searches of this thread end after so many seconds of the processor, with the best posture so far."""
     before = BUDGET.seconds, BUDGET.until
-    BUDGET.seconds, BUDGET.until = seconds, time.thread_time() - compile_seconds() + seconds
+    BUDGET.seconds, BUDGET.until = seconds, _now("thread_time") + seconds
     try:
         yield
     finally:
@@ -84,7 +90,7 @@ class Control:
         self.undefined: UndefinedTermError | None = None
         self.undefined_at, self._told = 0, 0
         self._time_limit, self._progress, self._longest = time_limit, progress, longest
-        self._began, self._began_at = self._now(), time.monotonic()
+        self._began, self._began_at = _now("thread_time"), _now("monotonic")
         self._handler: Any = None
         self._entered = False
 
@@ -93,15 +99,17 @@ class Control:
         """Whether the solve has to end now. From the first time this is asked on, Ctrl-C ends it."""
         if self._entered:
             self._listen()
-        if not self.reason and self._may_be_over and self._passed > 1.0:
+        # the clock is read at a fraction of the cost of a thread's processor time
+        may_be = self._time_limit is not None or self.seconds > self._longest
+        if not self.reason and may_be and self._passed > 1.0:
             limit, kind = (self._longest, " of processor time") if self._time_limit is None else (self._time_limit, "")
             self.reason = f"the time limit of {limit:g} s{kind} ended it"
         return bool(self.reason) or BUDGET.spent > 1.0
 
     @property
-    def _may_be_over(self) -> bool:
-        """Whether so much time went by; the clock is read at a fraction of the cost of a thread's processor time."""
-        return self._time_limit is not None or time.monotonic() - self._began_at > self._longest
+    def seconds(self) -> float:
+        """Time on the clock since it began, without compiling."""
+        return _now("monotonic") - self._began_at
 
     @property
     def spent(self) -> float:
@@ -110,10 +118,9 @@ class Control:
 
     @property
     def _passed(self) -> float:
-        return (self._now() - self._began) / (self._longest if self._time_limit is None else self._time_limit)
-
-    def _now(self) -> float:
-        return (time.thread_time() if self._time_limit is None else time.monotonic()) - compile_seconds()
+        if self._time_limit is None:
+            return (_now("thread_time") - self._began) / self._longest
+        return self.seconds / self._time_limit
 
     def message(self, judgement: Assessment) -> str:
         """Why the solve was ended, and the remaining errors; empty if it was not ended."""

@@ -175,12 +175,13 @@ class _Judge:
 
     def report(self, result: MethodResult, run: Run) -> AvoidanceReport:
         """What a method made of the clip."""
-        said = [result.message, "the caller ended it" if run.ended else "", run.work.left_out, self.foreseen]
-        result, change = with_values(result, message="; ".join(part for part in said if part)), None
+        change = None
         if self._loads is not None and self._strength is not None:
             places = None if result.times is None else result.times / self._clip.dt
             change = load_change(self._loads, self._clip.with_q(result.q), places, self._strength, self.feet)
-        return judged(self._was, self.terms, self.asked, result, run.work, self._name, change)
+        report = judged(self._was, self.terms, self.asked, result, run.work, self._name, change)
+        more = ["the caller ended it" if run.ended else "", run.work.left_out, "" if report.solved else self.foreseen]
+        return replace(report, message="; ".join(filter(None, [report.message, *more])))
 
 
 def freed(method: Avoider, run: Run) -> MethodResult:

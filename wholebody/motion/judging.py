@@ -274,12 +274,14 @@ def _ends(was: ClipCheck) -> str:
     """Which of the ends that are to be kept collide, and where the clip could begin or end."""
     free = np.flatnonzero(was.depth <= DEPTH)
     told = []
-    for word, frame, cut in (("first", 0, "clip[{}:]"), ("last", len(was.depth) - 1, "clip[:{} + 1]")):
+    for word, frame in (("first", 0), ("last", len(was.depth) - 1)):
         if was.depth[frame] > DEPTH:
             worst = max(was.contacts, key=lambda contact: contact.depth[frame], default=None)
             pair = f" ({worst.first} and {worst.second})" if worst is not None else ""
-            mend = cut.format(free[0] if word == "first" else free[-1]) if len(free) else "without keep_ends"
+            mend = "leave keep_ends out"
+            if len(free):
+                mend = f"give clip[{free[0]}:]" if word == "first" else f"give clip[:{free[-1] + 1}]"
             told.append(
-                f"the {word} posture overlaps by {1e3 * was.depth[frame]:.1f} mm{pair} and cannot be kept; give {mend}"
+                f"the {word} posture overlaps by {1e3 * was.depth[frame]:.1f} mm{pair} and cannot be kept; {mend}"
             )
     return "; ".join(told)

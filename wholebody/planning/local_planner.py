@@ -40,6 +40,7 @@ class LocalPlanner(Protocol):
 
     searches: ClassVar[int]  # how many paths are looked for, of which the shortest counts; more = shorter, later
     tries: ClassVar[int]  # shortcuts in a row that fail; more = shorter paths, later
+    partial: bool  # whether one joint may move in another way than before, and all others as they did
 
     def admit(self, q: Array) -> None:
         """Let motions be as near to things as the posture q (nq,) is, which is an end of the whole motion."""
@@ -53,6 +54,9 @@ class LocalPlanner(Protocol):
         Empty where there is none.
         """
 
+    def through(self, path: Array) -> list[Array]:
+        """Postures of a path (n, nq) without the first, where all motions between are free and allowed; else none."""
+
     def settled(self, path: Array) -> tuple[Array, Mask]:
         """Postures (n, nq) near those of a path that keep constraints, and which of the motions between are blocked."""
 
@@ -63,10 +67,11 @@ class Geodesics:
     searches: ClassVar[int] = 8
     tries: ClassVar[int] = 30
 
-    def __init__(self, problem: Problem, workspace: Workspace, resolution: float = 0.2) -> None:
-        """Take a problem without constraints, and the length of a part of a motion, radians."""
-        self._workspace, self._model, self._resolution = workspace, workspace.model, resolution
+    def __init__(self, problem: Problem, workspace: Workspace) -> None:
+        """Take a problem without constraints."""
+        self._workspace, self._model = workspace, workspace.model
         self._clearance = problem.clearance
+        self.partial = not problem.scene.figure.roots  # motions of free bodies became no shorter, but later
         self._required = problem.clearance + np.full(len(workspace.table.pairs), MARGIN)
         pieces = workspace.geometry.geometryObjects
         centres = np.array([np.linalg.norm(piece.placement.translation) for piece in pieces])
@@ -111,6 +116,16 @@ class Geodesics:
         parts = self._parts(motion)
         return [*(np.asarray(pin.integrate(self._model, q, k / parts * motion)) for k in range(1, parts)), target]
 
+    def through(self, path: Array) -> list[Array]:
+        """See `LocalPlanner`."""
+        room = self._room(path[0])
+        for q, there in pairwise(path):
+            ahead = self._room(there)
+            if not self._joins(q, np.asarray(pin.difference(self._model, q, there)), room, ahead):
+                return []
+            room = ahead
+        return list(path[1:])
+
     def settled(self, path: Array) -> tuple[Array, Mask]:
         """See `LocalPlanner`."""
         rooms, blocked = [self._room(q) for q in path], []
@@ -119,7 +134,8 @@ class Geodesics:
         return path, np.array(blocked)
 
     def _parts(self, motion: Array) -> int:
-        return max(1, int(np.ceil(np.abs(motion).max(initial=0.0) / self._resolution)))
+        # rad, m: length of a part of a motion
+        return max(1, int(np.ceil(np.abs(motion).max(initial=0.0) / 0.2)))
 
     def _room(self, q: Array) -> Array | None:
         """(pairs,) by how much distances exceed what is required at least, metres; None where one does not."""
@@ -170,6 +186,7 @@ class TrackedMotions:
         self._goal = Posture(problem.start).resolve(problem.scene, problem.start)
         self._attraction = Attraction(problem.start, np.ones(self._model.nv))
         self._held = holds(problem)
+        self.partial = not self._held  # what is held takes all joints along
         self._problem.goals = (self._goal,) if self._held else ()
         self._problem.measures = () if self._held else (self._attraction,)
         self._problem.clearances = problem.clearances + MARGIN
@@ -188,12 +205,19 @@ class TrackedMotions:
 
     def joined(self, q: Array, target: Array, most: float) -> list[Array]:
         """See `LocalPlanner`; a geodesic if it may be, as it costs a tenth of steps."""
-        way = [] if self._held else self._geodesics.joined(q, target, most)
-        states = (self._problem.scene.state(at) for at in way)
-        if way and all(largest_violation(self._problem, at) <= ALLOWED for at in states):
+        if not self._held and (way := self._allowed(self._geodesics.joined(q, target, most))):
             return way
         way, met = self.towards(q, target, most)
         return way if met else []
+
+    def through(self, path: Array) -> list[Array]:
+        """See `LocalPlanner`; by geodesics."""
+        return self._allowed(self._geodesics.through(path))
+
+    def _allowed(self, way: list[Array]) -> list[Array]:
+        """Postures (nq,) of a motion that keep the constraints; none where one does not."""
+        states = (self._problem.scene.state(at) for at in way)
+        return way if all(largest_violation(self._problem, at) <= ALLOWED for at in states) else []
 
     def towards(self, q: Array, target: Array, most: float = np.inf) -> tuple[list[Array], bool]:
         """See `LocalPlanner`; ends where the motion is longer than `most`, radians and metres."""

@@ -36,7 +36,8 @@ KEPT = 1e-4  # m, rad: by which limits, constraints and clearances may be missed
 PASSED = 5e-4  # m: overlap between two frames that counts
 OVER = 1.001  # of the limits of velocity and acceleration: the last slowing may end a little above them
 ENDS = 8  # postures that meet goals; more = ends that are reached more easily, for a solve each
-ENOUGH = 1000  # samples of all trees, after which no other search begins; more = shorter motions, later
+ENOUGH = 600  # samples of trees that look for a shorter motion after the first; more = shorter motions, later
+NEARER = 0.95  # of the length of the best motion: what others are shorter than
 ROUNDS = 50  # of the trees, until they get another end
 
 
@@ -222,8 +223,8 @@ class _Search:
         """The shortest of some paths, with shortcuts, and how it was found; or None and why there is none."""
         model, best, most, samples, runs = self._problem.scene.model, None, np.inf, 0, 0
         while not runs or (runs < self._local.searches and samples < ENOUGH and not self._ended()):
-            path, trees = self._path()
-            runs, samples = runs + 1, samples + trees.samples
+            path, trees = self._path(NEARER * most, np.inf if not runs else ENOUGH - samples)
+            runs, samples = runs + 1, samples + trees.samples * (runs > 0)
             if path is None:
                 break
             if not trees.samples:
@@ -237,16 +238,21 @@ class _Search:
             return None, f"no posture meets the goals: {self._said}"
         return None, "no motion was found within the time limit"
 
-    def _path(self) -> tuple[list[Array] | None, RRTConnect]:
-        """A path from the start to an end by new trees, which stay empty where it is straight."""
+    def _path(self, most: float, samples: float) -> tuple[list[Array] | None, RRTConnect]:
+        """A path from the start to an end by new trees, which stay empty where it is straight.
+
+        The trees grow towards at most so many samples, through which a path can be shorter than `most`, radians and
+        metres (as in anytime RRTs, Ferguson and Stentz 2006).
+        """
         start, model, rounds = self._problem.start, self._problem.scene.model, 0
         trees = RRTConnect(self._local, model, start)
-        for reached in self._reached:
+        ends = [q for q in self._reached if self._apart(start, q) < most]
+        for reached in ends:
             trees.add_end(reached)
-        while rounds == 0 or not self._ended():
-            if rounds % ROUNDS == 0 or not self._reached:
+        while rounds == 0 or (rounds < samples and not self._ended()):
+            if rounds % ROUNDS == 0 or not ends:
                 end = next(self._ends, None)
-                if end is None and not self._reached:
+                if end is None and not ends:
                     break
                 if end is not None and end.q is None:
                     self._said = self._said or end.why
@@ -254,18 +260,27 @@ class _Search:
                 if end is not None and end.q is not None:
                     self._local.admit(end.q)
                     self._reached.append(end.q)
-                    way, met = self._local.towards(start, end.q)
-                    if met:
-                        return [start, *way[:-1], end.q], trees
-                    trees.add_end(end.q)
+                    if self._apart(start, end.q) < most:
+                        ends.append(end.q)
+                        way, met = self._local.towards(start, end.q)
+                        if met:
+                            return [start, *way[:-1], end.q], trees
+                        trees.add_end(end.q)
+                if not ends:
+                    continue
             rounds += 1
-            near = self._reached[self._rng.integers(len(self._reached))]
+            near = ends[self._rng.integers(len(ends))]
             middle = np.asarray(pin.interpolate(model, start, near, self._rng.uniform()))
-            spread = self._spreads[self._rng.integers(len(self._spreads))]
-            path = trees.grow(self._sampler.near(middle, spread))
+            sample = self._sampler.near(middle, self._spreads[self._rng.integers(len(self._spreads))])
+            if self._apart(start, sample) + min(self._apart(sample, q) for q in ends) > most:
+                continue
+            path = trees.grow(sample)
             if path is not None:
                 return path, trees
         return None, trees
+
+    def _apart(self, q: Array, other: Array) -> float:
+        return float(np.linalg.norm(pin.difference(self._problem.scene.model, q, other)))
 
 
 def _smoothed(problem: Problem, local: LocalPlanner, path: list[Array], pace: Pace) -> Plan:

@@ -13,6 +13,7 @@ from wholebody.base.arrays import Array
 from wholebody.planning.local_planner import LocalPlanner
 
 WORTH = 0.98  # of the length of a part: a shortcut is at most as long
+LEAST = 0.01  # rad, m: by which a part becomes shorter where one joint moves evenly
 CORNER = 2.0  # points: width of the filter of what is left of corners; larger = rounder, less exact
 MIXTURES = 8  # of the filtered path and the free one; more = smoother beside things, and later
 SPREAD = 0.05  # of the length of a path: width of the filter; larger = smoother, farther off
@@ -27,14 +28,34 @@ def length(model: pin.Model, path: Sequence[Array]) -> float:
 def shortcut(
     model: pin.Model, path: list[Array], local: LocalPlanner, rng: np.random.Generator, ended: Callable[[], bool]
 ) -> list[Array]:
-    """A shorter path: parts of it are replaced by motions of the local planner, until several tries in a row fail."""
+    """A shorter path: until several tries in a row fail, parts of it are replaced by motions of the local planner.
+
+    In every other try one degree of freedom moves evenly from one end of a part to the other, and the rest as before
+    (partial shortcuts, Geraerts and Overmars 2007).
+    """
     failed = 0
     while failed < local.tries and len(path) > 2 and not ended():
         first, last = sorted(rng.choice(len(path), 2, replace=False).tolist())
-        way = local.joined(path[first], path[last], WORTH * length(model, path[first : last + 1]))
+        part = path[first : last + 1]
+        most = WORTH * length(model, part)
+        alone = local.partial and failed % 2
+        way = _evened(model, part, local, rng) if alone else local.joined(path[first], path[last], most)
         path = [*path[: first + 1], *way, *path[last + 1 :]] if way else path
         failed = 0 if way else failed + 1
     return path
+
+
+def _evened(model: pin.Model, part: list[Array], local: LocalPlanner, rng: np.random.Generator) -> list[Array]:
+    """A part of a path in which a degree of freedom that turns back moves evenly, without its first posture."""
+    away = places(model, part)
+    wasted = np.abs(np.diff(away, axis=0)).sum(axis=0) - np.abs(away[-1])
+    if len(part) < 3 or wasted.max() < LEAST:
+        return []
+    freedom = int(rng.choice(len(wasted), p=np.maximum(wasted, 0.0) / np.maximum(wasted, 0.0).sum()))
+    steps = np.linalg.norm(np.diff(away, axis=0), axis=1)
+    away[1:, freedom] = away[-1, freedom] * np.cumsum(steps) / steps.sum()
+    even = _postures(model, part, away)
+    return local.through(even) if length(model, list(even)) < length(model, part) - LEAST else []
 
 
 def resampled(model: pin.Model, path: Sequence[Array], count: int) -> Array:
@@ -78,6 +99,6 @@ def _filtered(free: Array, spread: float) -> Array:
     return np.asarray(gaussian_filter1d(mirrored, spread, axis=0, mode="nearest")[count - 1 : 2 * count - 1])
 
 
-def _postures(model: pin.Model, path: Array, away: Array) -> Array:
+def _postures(model: pin.Model, path: Sequence[Array] | Array, away: Array) -> Array:
     """The postures (n, nq) of such differences, between the ends of a path."""
     return np.array([path[0], *(pin.integrate(model, path[0], place) for place in away[1:-1]), path[-1]])

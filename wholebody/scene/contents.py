@@ -291,9 +291,7 @@ class SceneContents(checks.FixedAttributes):
 
     def _free_name(self, name: str) -> str:
         if name in self._objects or name in self.figure.segments or name in self.figure.members:
-            raise InputError(
-                f"the scene already has a {name!r}; give the new object another name, or move() the old one"
-            )
+            raise InputError(f"the scene already has {name!r}; give the new object another name, or move() the old one")
         return name
 
     def _build(self) -> SceneGeometry:
@@ -328,7 +326,7 @@ def _warn_of_units(name: str, place: pin.SE3, shape: Shape | None = None) -> Non
     """Warn of a place and a size that are hardly metres."""
     # m: a thing farther than this from the origin is probably placed in millimetres
     if (far := max(map(abs, place.translation.tolist()))) > 100.0:
-        told = f"{name!r} is {far:.4g} m away; lengths are in metres, so divide millimetres by 1000"
+        told = f"{name!r} is {far:.4g} m away; lengths are in metres, so divide millimetres by 1000, centimetres by 100"
         checks.warn(told)
     extent = _extent(shape)
     if max(extent) > WIDEST_LIKELY and min(extent) > THICKEST_LIKELY:

@@ -225,7 +225,8 @@ def accommodation(
         people: by name, as `wb.people` and `wb.boundary` make them; `wb.people(100)` if left out.
         sees: (3,) a point that has to be seen without turning the head, metres; None for none.
         method: name or settings, see `study`; if left out with a function, "qp" with a smaller budget, as neighbours'
-            answers are starts.
+            answers are starts. It leaves out the measures where nothing of them is counted, that is, nobody is to see
+            and nothing is adjustable: postures are then possible ones, not those that people prefer.
         jobs: people at a time.
         folder: keeps the records, see `solve_many`.
         progress: see `study`.
@@ -250,8 +251,10 @@ def accommodation(
     who = {name: loaded_person(one) for name, one in given.items()}
     order = sorted(who, key=lambda name: ("", 0.0) if (one := who[name]) is None else (one.sex, one.stature))
     population = {name: given[name] for name in order}
+    make = TaskFile(checks.path(task, "task")) if isinstance(task, (str, os.PathLike)) else task
+    variants = [Variant(make, person, None, None) for person in population.values()]
     if method is None and callable(task):
-        method = QP(budget=BUDGET)
+        method = QP(budget=BUDGET, measures=point is not None or _has_settings(variants[0]))
     run = partial(Running.checked, "accommodation", jobs=jobs, cluster=None, seconds=None, progress=progress)
     # Who reaches and fits does not depend on how low the measure is: jumps between people are no reason to solve again.
     varied = {"people": population, "targets": None, "layouts": None}
@@ -266,8 +269,6 @@ def accommodation(
         for one in records
     )
     seen = None
-    make = TaskFile(checks.path(task, "task")) if isinstance(task, (str, os.PathLike)) else task
-    variants = [Variant(make, person, None, None) for person in population.values()]
     if point is not None:
         seen = tuple(  # a problem that failed is not made again
             one.q is not None and sight(variant().scene, one.q, point).seen
@@ -280,6 +281,15 @@ def accommodation(
     )
     sexes = tuple("" if one is None else one.sex for one in persons)
     return Accommodation(records, sexes, sizes, reaches, fits, seen, _settings(variants, records))
+
+
+def _has_settings(variant: Variant) -> bool:
+    """Whether somebody's scene has what is adjustable; where it cannot be made, which the records tell, it may have."""
+    try:
+        members = variant().scene.figure.members.values()
+    except Exception:  # of a task of the user's own
+        return True
+    return any(member.figure.name == ADJUSTABLE for member in members)
 
 
 def _settings(variants: Sequence[Variant], records: Records) -> dict[str, tuple[float, ...]]:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 from wholebody.base import checks
@@ -89,8 +90,9 @@ def solve_many(
     The answers are the same whatever `jobs` is. A problem that fails, or whose process ends, has a record that says so
     and ends no other. Without a deadline and with the package's own terms alone, problems are solved in this process,
     and beside it in others once these are ready, which are kept for the next call. A problem that is not solved from
-    its own start is tried from the answers of up to four solved ones beside it in the order given, of figures with as
-    many coordinates; `SolveRecord.neighbour` names the one that led to its answer.
+    its own start is tried from the answers of two solved ones beside it in the order given, of figures with as many
+    coordinates; of four where two factors of a study vary. `SolveRecord.neighbour` names the one that led to its
+    answer.
 
     Args:
         problems: the problems; a mapping gives them names, otherwise they are numbered from "0".
@@ -186,7 +188,8 @@ def run_cases(
             over = _run(work, order, running, keep, alone, begun)
     if not over and waiting:
         family = Family(order, done, partial(_computed, order, running), keep)
-        _ = solve_from_neighbours(family) or (linked and lowers and (lower(family) or name_changes(family)))
+        before_it = {k: j for run in (*linked, *heads) for j, k in pairwise(run)}
+        _ = solve_from_neighbours(family, before_it) or (linked and lowers and (lower(family) or name_changes(family)))
     return Records([done.get(k, order[k].record) for k in range(len(order))])
 
 

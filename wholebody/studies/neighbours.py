@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import radians
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +14,8 @@ from wholebody.base.arrays import Array, Indices
 from wholebody.studies.records import SolveRecord
 from wholebody.studies.solving import Case, most_turned, solve_from
 
-NEIGHBOURS = 4  # answers of others that are tried for one problem: more find more, and cost where there is no answer
+NEIGHBOURS = 2  # answers of others that are tried for one problem, for each of at most two factors that vary: more find
+# more, and cost where there is no answer
 TRIES = 4  # more solves of a case whose posture jumps: its own start, both neighbours, and one that changed since
 JUMP = radians(10.0)  # a posture that turns a joint further from one case to the next is another strategy
 LOWER = 1e-3  # part of a measure: less is the tolerance of a solve, no better posture
@@ -33,18 +35,25 @@ class Family(NamedTuple):
     keep: Callable[[int, SolveRecord], bool]  # puts a record into its place; whether the caller ends the run
 
 
-def solve_from_neighbours(family: Family) -> bool:
-    """Try answers of solved cases as starts of neighbours until nothing new is solved; whether the caller ended it."""
+def solve_from_neighbours(family: Family, linked: Mapping[int, int] = MappingProxyType({})) -> bool:
+    """Try answers of solved cases as starts of neighbours until nothing new is solved; whether the caller ended it.
+
+    `linked` are cases that warm-started at the answer of another one, by number: that is not tried again.
+    """
     order, done, compute, keep = family
     tried: dict[int, dict[int, int]] = {k: {} for k, one in done.items() if one.q is not None and not one.solved}
+    for k, j in linked.items():
+        if k in tried and j in done and done[j].solved:
+            tried[k][j] = 1
     places = np.array([case.place for case in order], dtype=np.intp)
+    most = NEIGHBOURS * min(max(int((places != places[0]).any(axis=0).sum()), 1), 2)
     while True:
         solved = np.array(sorted(j for j, one in done.items() if one.solved and one.q is not None), dtype=np.intp)
         sizes = np.array([len(done[j].q) for j in solved.tolist()], dtype=np.intp)  # type: ignore[arg-type]
         work = {}
         for k in (k for k in tried if not done[k].solved):
             alike = solved[sizes == len(done[k].q)]  # type: ignore[arg-type]
-            if near := _nearest(alike, np.abs(places[alike] - places[k]).sum(axis=1), tried[k]):
+            if near := _nearest(alike, np.abs(places[alike] - places[k]).sum(axis=1), tried[k], most):
                 work[k] = near
         found = compute(solve_from, {k: (k, done[j].q) for k, (j, _) in work.items()})
         for k, (j, distance) in work.items():
@@ -55,15 +64,15 @@ def solve_from_neighbours(family: Family) -> bool:
             return False
 
 
-def _nearest(solved: Indices, distances: Indices, tried: Mapping[int, int]) -> tuple[int, int] | None:
+def _nearest(solved: Indices, distances: Indices, tried: Mapping[int, int], most: int) -> tuple[int, int] | None:
     """The nearest solved case that was not tried, and how far it is; None where enough were tried."""
-    # After `NEIGHBOURS` only those nearer than all before: an answer spreads from neighbour to neighbour.
+    # After `most` only those nearer than all before: an answer spreads from neighbour to neighbour.
     left = ~np.isin(solved, [*tried])
     if not left.any():
         return None
     distance = int(distances[left].min())
     j = int(solved[left & (distances == distance)][0])
-    return (j, distance) if len(tried) < NEIGHBOURS or distance < min(tried.values()) else None
+    return (j, distance) if len(tried) < most or distance < min(tried.values()) else None
 
 
 def lower(family: Family) -> bool:

@@ -83,8 +83,10 @@ def _warm_answer(problem: Problem, method: Method, q: Array) -> dict[str, Any] |
         begun = begun_at(problem, q)
         # Whether all is met near there is asked first: it takes a tenth of the search for what is closest, which is
         # of no use here.
-        if isinstance(plain, QP) and not next(replace(plain, measures=False).minima(begun, [begun.start])).solved:
-            return None
+        if isinstance(plain, QP):
+            met = next(replace(plain, measures=False).minima(begun, [begun.start]))
+            if not met.solved or not plain.measures:
+                return answer_of(met) if met.solved else None
         solution = plain.solve(begun)
     except WholebodyError:
         return None

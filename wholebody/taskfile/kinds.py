@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from wholebody.base import fields
-from wholebody.base.checks import color, flag, shown, text, unit_hint
-from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.base.checks import color, flag, plain, shown, text, unit_hint
+from wholebody.base.errors import InputError, UnknownNameError, either
 from wholebody.base.fields import Check, Range, Vector, check_of
 from wholebody.figures.anthropometry import DIMENSION
 from wholebody.figures.figure import Figure
@@ -45,8 +45,8 @@ class Number(Kind):
     @property
     def words(self) -> str:
         """Range and unit."""
-        one = self.range
-        return f"{'whole number' if one.whole else 'number'} from {one.low:g} to {one.high:g} {one.unit}".strip()
+        ends = f"from {plain(self.range.low)} to {plain(self.range.high)} {self.range.unit}"
+        return f"{'whole number' if self.range.whole else 'number'} {ends}".strip()
 
     def read(self, value: Any, where: Where) -> float:
         """Return the number."""
@@ -135,7 +135,7 @@ class Choice(Kind):
     @property
     def words(self) -> str:
         """The words."""
-        return " or ".join(f'"{option}"' for option in self.options)
+        return either(f'"{option}"' for option in self.options)
 
     def read(self, value: Any, where: Where) -> str:
         """Return the word."""
@@ -251,7 +251,7 @@ class Part(Kind):
         if not isinstance(value, dict):
             raise where.fault(f"{shown(value)} is no {self.noun}; write {{ {self.example} }}")
         if self.chooser and self.chooser not in value:
-            choices = " or ".join(f'{self.chooser} = "{name}"' for name in self.forms)
+            choices = either(f'{self.chooser} = "{name}"' for name in self.forms)
             raise where.fault(f"the {self.noun} has no {self.chooser}; write {choices}")
         data = {name: entry for name, entry in value.items() if name != self.chooser}
         choice = Choice(tuple(self.forms))

@@ -15,6 +15,10 @@ from wholebody.taskfile.kinds import Form, Key, Table, values_of
 from wholebody.taskfile.schema import TABLES, TOP
 from wholebody.taskfile.where import Where
 
+_ROBOT = "a robot; name it by path = {0!r} in the [figure] of a task file, or see it by `wholebody show {0}`"
+OTHERS = {".urdf": _ROBOT, ".xml": _ROBOT, ".json": "no {1}; `wholebody show {0}` shows a result"}
+"""What a file is that is no task file, by the ending of its name, and what to do with it."""
+
 
 class Entry(NamedTuple):
     """One table of the file, checked."""
@@ -71,6 +75,8 @@ def contents_of(path: Path, kind: str, keys: tuple[Key, ...], known: Mapping[str
         there = sorted(file.name for file in path.parent.glob("*.toml")) if os.path.isdir(path.parent) else []
         place = "" if path.parent == Path() else one_line(str(path.parent))
         raise UnknownNameError(kind, path.name, there, place) from None
+    if other := OTHERS.get(path.suffix.lower()):
+        raise FileFormatError(f"{one_line(path.name)} is {other.format(one_line(path.name), kind)}")
     data, where, names = parsed_toml(text, path.name), Where(path, text), {key.name: key for key in keys}
     plain = {name: value for name, value in data.items() if name not in known}
     for name in plain:

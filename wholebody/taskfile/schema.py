@@ -122,6 +122,7 @@ _FORCE = _form(tasks.Force, "frame force", frame=FRAME, force=_NEWTONS)
 FORCES = Several(Part("force", 'frame = "right_palm", force = [0.0, 0.0, -98.0]', {"": _FORCE}), 0)
 _STRENGTH = _form(Strength, "percentile sex", sex=Choice(("male", "female")))
 STRENGTH = Part("strength", 'percentile = 50, sex = "male"', {"": _STRENGTH})
+_STRENGTHS: dict[str, Kind] = {"forces": FORCES, "strength": STRENGTH, "person": kinds.MEMBER}
 _FIELD = _form(ergonomics.FieldOfView, "horizontal up down declination")
 VIEW = Part(
     "field of view", "horizontal = 0.26, up = 0.26, down = 0.26, declination = 0.26", {"": _FIELD}, note=", rad"
@@ -137,7 +138,7 @@ CONSTRAINTS = {
     "stand": _form(tasks.Stand, "on feet balance margin knees", feet=Several(SEGMENT), knees=Several(SEGMENT)),
     "loaded_balance": _form(ergonomics.LoadedBalance, "forces feet margin", forces=FORCES, feet=Several(SEGMENT)),
     "strength_limit": _form(
-        ergonomics.StrengthLimit, "forces strength standing share compression", forces=FORCES, strength=STRENGTH
+        ergonomics.StrengthLimit, "forces strength standing person share compression", **_STRENGTHS
     ),
     "look": _form(ergonomics.Look, "at view eyes", view=VIEW, eyes=FRAME),
     **{name: replace(form, keys=form.keys[:-1]) for name, form in CONTACTS.items()},  # a constraint has no weight
@@ -150,7 +151,7 @@ MEASURES = {
     "displacement": _form(tasks.Displacement, "weight"),
     "rhythm": _form(tasks.Rhythm, "weight style"),
     "stance": _form(tasks.Stance, "feet weight", feet=Several(SEGMENT)),
-    "exertion": _form(ergonomics.Exertion, "forces strength standing weight", forces=FORCES, strength=STRENGTH),
+    "exertion": _form(ergonomics.Exertion, "forces strength standing person weight", **_STRENGTHS),
     "potential_energy": _form(tasks.PotentialEnergy, "weight"),
 }
 

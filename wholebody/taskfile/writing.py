@@ -180,7 +180,7 @@ def _term(term: Any, forms: dict[str, Any], what: str, number: int) -> dict[str,
     found: dict[str, Any] = {"type": kind}
     for key in forms[kind].keys:
         value = getattr(term, key.name, None)
-        if value is not None and (key.required or not (isinstance(value, tuple) and not value)):
+        if value is not None and (key.required or not (isinstance(value, (str, tuple)) and not value)):
             found[key.name] = _plain(value, key.kind)
     if isinstance(term, PlacementTerm):
         written = next(name for name in ("at", "placement", "target") if hasattr(term, name))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
-from functools import wraps
+from functools import lru_cache, wraps
 from math import isfinite
 from numbers import Integral
 from typing import Any
@@ -38,11 +38,13 @@ def in_words(term: object) -> str:
 def is_own(term: object) -> bool:
     """Whether a term is of a class of one's own, or stands for one."""
     inner = getattr(term, "term", getattr(term, "goal", None))
-    return not _is_ours(type(term)) or (inner is not None and is_own(inner))
+    kind: Any = type(term)
+    return not _is_ours(kind) or (inner is not None and is_own(inner))
 
 
-def _is_ours(kind: type) -> bool:
-    return kind.__module__.partition(".")[0] == _OURS
+@lru_cache(maxsize=256)
+def _is_ours(kind: Any) -> bool:
+    return bool(kind.__module__.partition(".")[0] == _OURS)
 
 
 def check_answers(kind: type, table: Mapping[str, Check]) -> None:

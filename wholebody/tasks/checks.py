@@ -10,7 +10,7 @@ import numpy as np
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array
-from wholebody.base.errors import InputError, TermError, UndefinedTermError
+from wholebody.base.errors import InputError, TermError, UndefinedTermError, either
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks import answers
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
@@ -26,10 +26,10 @@ def checked_terms(terms: Any, kinds: type | tuple[type, ...], what: str) -> Sequ
     listed = checks.listed(terms, what, f"{what}=[...]")
     for number, term in enumerate(listed):
         if not isinstance(term, kinds):
-            wanted = " or ".join(kind.__name__ for kind in (kinds if isinstance(kinds, tuple) else (kinds,)))
+            wanted = either(kind.__name__ for kind in (kinds if isinstance(kinds, tuple) else (kinds,)))
             home = next((name for name, taken in KINDS.items() if isinstance(term, taken)), "")
             home = "constraints" if home == "bounds" else home
-            correction = f"give it in {home}=[...]" if home else "see wholebody.tasks"
+            correction = f"give it in {home}=[...]" if home else "give terms such as wb.Hold('left_foot')"
             raise InputError(f"{what}[{number}] is {checks.a(type(term))}, not a {wanted}; {correction}")
     return listed
 

@@ -101,11 +101,13 @@ def point(value: object, where: str) -> Array:
 
 def check_reachable(place: Array, where: str) -> None:
     """Refuse a position that cannot be in metres."""
-    distance = math.hypot(*place)
+    distance = math.hypot(*place.tolist())  # the square of a large one is no number
     if distance <= FAR:
         return
     if distance > FARTHEST:
-        raise InputError(f"{where} is {distance:.4g} m away; lengths are in metres, so divide millimetres by 1000")
+        raise InputError(
+            f"{where} is {distance:.4g} m away; lengths are in metres: divide millimetres by 1000, centimetres by 100"
+        )
     warnings.warn(f"{where} is {distance:.3g} m away; lengths are in metres: divide centimetres by 100", stacklevel=3)
 
 

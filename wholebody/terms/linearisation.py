@@ -170,14 +170,6 @@ class Lineariser:
         """The terms as arrays."""
         return self._plan
 
-    def rows(self) -> list[int]:
-        """How many rows each goal, and then each constraint, has."""
-        others = iter(self._plan.others)
-        return [
-            next(others).rows if entries is None else sum(entry.rows for entry in entries)
-            for entries in (*self._plan.goals, *self._plan.constraints)
-        ]
-
     def relaxed(self, depth: float) -> Lineariser:
         """The same, with less distance asked of every pair by `depth` metres; both move one workspace."""
         other = copy(self)
@@ -200,7 +192,7 @@ class Lineariser:
                 squared = squared + weight * curvature
         goals = self._plan.goal_rows
         terms: list[Goal | Constraint] = [*self.goals, *self.constraints]
-        found = term_planes(terms, self.rows(), self.state) if planes and self._plan.others else None
+        found = term_planes(terms, self._plan.rows, self.state) if planes and self._plan.others else None
         gap, contact, clearance = (part[:count].copy() for part in self._gaps)
         contacts = Contacts(*[part.copy() for part in contacts])
         return Linearisation(

@@ -57,6 +57,7 @@ class TermPlan(NamedTuple):
     other_measures: tuple[Measure, ...]  # measures of other classes
     goals: tuple[list[Entry] | None, ...]  # entries of each goal; None for one of another class
     constraints: tuple[list[Entry] | None, ...]  # the same of each constraint
+    rows: tuple[int, ...]  # of each goal, then of each constraint
 
     @property
     def squares(self) -> int:
@@ -89,7 +90,7 @@ class TermPlan(NamedTuple):
             if [entry[:2] for entry in entries] != [entry[:2] for entry in known]:
                 return None
             for entry, before in zip(entries, known, strict=True):
-                if not np.array_equal(entry.edges, before.edges):
+                if entry.edges is not before.edges and not np.array_equal(entry.edges, before.edges):
                     return None
                 start, _, columns = self.layout[entry.table, :3].tolist()
                 place = start + columns * filled[entry.table]
@@ -105,7 +106,7 @@ def make_plan(limits: Limits, terms: Terms, dt: float | None, state: State) -> T
     model, (goals, constraints, bounds, measures) = state.model, terms
     parts: dict[int, list[Row]] = {table: [] for table in range(kinds.EDGE + 1)}
     others: list[OtherTerm] = []
-    row = 0
+    row, counts = 0, list[int]()
 
     def add(term: Goal | Constraint, value: Callable[[State], Array]) -> list[Entry] | None:
         nonlocal row
@@ -113,6 +114,7 @@ def make_plan(limits: Limits, terms: Terms, dt: float | None, state: State) -> T
         if entries is None:
             others.append(OtherTerm(term, value, row, int(np.size(value(state)))))
             row += others[-1].rows
+            counts.append(others[-1].rows)
             return None
         for entry in entries:
             numbers = (row, *entry.integers)
@@ -121,6 +123,7 @@ def make_plan(limits: Limits, terms: Terms, dt: float | None, state: State) -> T
                 parts[kinds.EDGE] += [((0,), edge) for edge in entry.edges]
             parts[entry.table].append((numbers, entry.floats))
             row += entry.rows
+        counts.append(sum(entry.rows for entry in entries))
         return entries
 
     goal_entries = tuple(add(goal, goal.error) for goal in goals)
@@ -153,7 +156,7 @@ def make_plan(limits: Limits, terms: Terms, dt: float | None, state: State) -> T
     floats, integers, layout = _packed(parts)
     return TermPlan(
         floats, integers, layout, state.support.astype(np.int8), goal_rows, row - goal_rows, tuple(others),
-        other_bounds, other_measures, goal_entries, constraint_entries,
+        other_bounds, other_measures, goal_entries, constraint_entries, tuple(counts),
     )  # fmt: skip
 
 

@@ -48,7 +48,7 @@ def exhibit(script: Path) -> Exhibit:
             said += ran.stderr.strip().splitlines()[-1] if failed and ran.stderr.strip() else ""
         except subprocess.TimeoutExpired:
             said, failed = f"it was ended after {LONGEST:g} s", True
-        pages = sorted(folder.rglob("*.html"))
+        pages, pictures = sorted(folder.rglob("*.html")), folder.rglob("*.png")
         return Exhibit(
             name=script.stem,
             story=ast.get_docstring(module) or "",
@@ -56,7 +56,8 @@ def exhibit(script: Path) -> Exhibit:
             numbers="\n".join(line for line in said.splitlines() if str(folder) not in line),
             seconds=time.perf_counter() - began,
             pictures=tuple(
-                base64.b64encode(file.read_bytes()).decode("ascii") for file in sorted(folder.rglob("*.png"))
+                base64.b64encode(file.read_bytes()).decode("ascii")
+                for file in sorted(pictures, key=lambda file: file.stat().st_mtime_ns)  # in the order of the story
             ),
             scene=pages[0].read_text("utf-8") if pages else "",
             failed=failed,

@@ -8,7 +8,7 @@ import pytest
 import wholebody as wb
 from wholebody.bench.suite.problem_sets.registry import problem_set
 from wholebody.methods import control
-from wholebody.methods.qp.method import LONGEST
+from wholebody.methods.qp.method import QP
 
 
 def test_feet_get_onto_a_board_that_they_begin_under() -> None:
@@ -47,7 +47,7 @@ def test_the_clock_does_not_change_the_answer(monkeypatch: pytest.MonkeyPatch) -
     problem = problem_set("drivers").make(15, 0).problem
     quick = wb.solve(problem, wb.QP(measures=False))
     clock = iter([0.0])
-    monkeypatch.setattr(control.time, "thread_time", lambda: next(clock, 0.9 * LONGEST))
+    monkeypatch.setattr(control.time, "thread_time", lambda: next(clock, 0.9 * QP.longest))
     monkeypatch.setattr(control.time, "monotonic", lambda: 0.0)
     slow = wb.solve(problem, wb.QP(measures=False))
     assert quick.solved

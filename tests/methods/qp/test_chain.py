@@ -10,6 +10,7 @@ import pytest
 from scipy.optimize import minimize
 
 import wholebody as wb
+from wholebody.bench.suite.problem_sets import robots
 from wholebody.bench.suite.stability.bodies import spatial_arm
 from wholebody.figures.description import Limits
 from wholebody.figures.state import State
@@ -19,7 +20,7 @@ from wholebody.methods.qp import chain_kernel
 from wholebody.methods.qp.chain import from_seeds, goal_entries
 from wholebody.methods.qp.chain_kernel import Goals
 from wholebody.methods.qp.plain_chain import Chains, PlainChain
-from wholebody.methods.qp.settings import Budget
+from wholebody.methods.qp.settings import Settings
 from wholebody.tasks.base import Goal
 from wholebody.terms.entries import RESIDUAL, Entry
 
@@ -32,9 +33,9 @@ def arm() -> wb.Figure:
 
 
 def found(problem: wb.Problem, tolerance: float = 1e-6, *, measures: bool = False, progress=None):
-    budget = Budget(tolerance, 60, 1000, 40, 0, measures, 0)
+    settings = Settings(tolerance=tolerance, iterations=60, measures=measures)
     with problem.borrow() as workspace:
-        return from_seeds(problem, workspace, budget, Control(progress=progress))
+        return from_seeds(problem, workspace, settings, Control(progress=progress))
 
 
 def whole_chain(model: pin.Model, limits: Limits) -> PlainChain:
@@ -343,3 +344,15 @@ def test_an_end_that_the_assessment_refuses_is_searched_again(arm, monkeypatch, 
     assert solution.solved, solution.message
     assert wb.assess(problem, solution.q).penetration < 1e-5
     assert solution.iterations > len(met.trace)
+
+
+def test_a_joint_may_have_to_turn_by_more_than_half_a_turn():
+    """A joint whose range is less than a turn has each angle once, however far from the start that is."""
+    figure, ready = robots.known_arm("panda")
+    limits = figure.limits
+    shares = np.array([0.907, 0.013, 0.604, 0.097, 0.873, 0.96, 0.034])  # of the ranges; the last is 3.5 rad from there
+    witness = limits.lower + shares * (limits.upper - limits.lower)
+    problem = wb.Problem(wb.Scene(figure), ready, goals=[wb.Frame("tool", figure.placement(witness, "tool"))])
+    assert wb.assess(problem, witness).holds(0.0)
+    assert wb.solve(problem).solved
+    assert wb.solve_many([problem])[0].message == "solved directly"

@@ -77,21 +77,28 @@ def _joints(person: Person) -> tuple[Joint, ...]:
 
 
 def joint_limits(person: Person, row: Mapping[str, str]) -> tuple[float, float]:
-    """Least and greatest angle of a joint, degrees; how far the clavicle rises follows from overhead reach."""
-    # From 45 years on scaled by means of 45 to 69 over 20 to 44 (Soucie et al. 2011), or at most the older mean.
+    """Least and greatest angle of a joint, degrees; how far the clavicle rises follows from overhead reach.
+
+    From 45 years on scaled by means of 45 to 69 over 20 to 44 (Soucie et al. 2011), or at most the older mean. Where
+    soft parts meet, who is stouter than the median person ends earlier (Park et al. 2010).
+    """
     limits = {"lower": float(row["lower_deg"]), "upper": float(row["upper_deg"])}
     if row["name"].endswith("_clavicle_elevation"):
         limits["upper"] = person.size("elevation")
     # Years from which on the ranges of motion are those of older people: the bands of Soucie et al. (2011).
-    if person.age is None or person.age < 45.0:
-        return limits["lower"], limits["upper"]
-    for change in table("age_ranges"):
+    is_older = person.age is not None and person.age >= 45.0
+    for change in table("age_ranges") if is_older else ():
         if row["name"].endswith(f"_{change['joint']}"):
             end = change["limit"]
             young, old = (change[f"{person.column}_{band}"] for band in ("20_44", "45_69"))
             size = abs(limits[end])
             size = size * float(old) / float(young) if young else min(size, float(old))
             limits[end] = math.copysign(size, limits[end])
+    for change in table("girth_ranges"):
+        if row["name"].endswith(f"_{change['joint']}"):
+            usual = make_person(person.sex, age=person.age)
+            beyond = person.size(change["dimension"]) - usual.size(change["dimension"])
+            limits[change["limit"]] -= float(change["degrees_per_metre"]) * max(beyond, 0.0)
     return limits["lower"], limits["upper"]
 
 

@@ -47,7 +47,7 @@ class Reach:
     def __init__(self, model: pin.Model, start: Array, resting: Balls, joint: Indices, frozen: Iterable[int]) -> None:
         """Read the joints; `start` (nq,) counts as possible, `resting` are balls around pieces in their joints (n,)."""
         self._model, self._start, self._frozen = model, start, set(frozen)
-        data = model.createData()
+        self.placed = data = model.createData()
         pin.forwardKinematics(model, data, start)
         self._still: dict[int, pin.SE3] = {}
         self._ranges: dict[int, Range | None] = {}
@@ -132,6 +132,8 @@ class Reach:
 
 def still_dofs(problem: Problem) -> list[int]:
     """Degrees of freedom (tangent indices) that the bounds of a problem keep as at the start."""
+    if not problem.bounds:
+        return []
     state = State(problem.scene.model).update(problem.start)
     still = np.zeros(problem.scene.model.nv, dtype=bool)
     for bound in problem.bounds:
@@ -150,14 +152,14 @@ def reachable_pairs(problem: Problem, still: Iterable[int], numbers: Indices) ->
     joint, pairs = table.joint, table.pairs[numbers]
     center = np.array([piece.placement.translation for piece in pieces]).reshape(-1, 3)
     reach = Reach(scene.model, problem.start, Balls(center, table.reach, np.arange(len(pieces))), joint, still)
-    views, model, state = [(reach.seen_from(0), 0.0)], scene.model, State(scene.model).update(problem.start)
+    views, model = [(reach.seen_from(0), 0.0)], scene.model
     # m: largest displacement of a piece by errors of holds; an accepted answer has less
     views += [(balls, 1e-3) for balls in held_balls(scene.figure, reach, problem.constraints)]
     rests, kept = np.zeros(model.njoints, dtype=bool), set(still)
     for j in range(model.njoints):
         dofs = range(model.idx_vs[j], model.idx_vs[j] + model.nvs[j]) if j else ()
         rests[j] = (not j or rests[model.parents[j]]) and kept.issuperset(dofs)
-    at = [state.data.oMi[piece.parentJoint] * piece.placement for piece in pieces]  # of those that rest, in the world
+    at = [reach.placed.oMi[piece.parentJoint] * piece.placement for piece in pieces]  # of those that rest, in the world
     open_, fixed = np.ones(len(pairs), dtype=bool), rests[joint[pairs]]
     row = np.flatnonzero(fixed[:, 0] != fixed[:, 1])
     side = fixed[row, 1].astype(np.intp)  # of the piece that is fixed

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -156,15 +155,14 @@ class OneCall(Outside[Built], ABC):
 
     def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture; InputError as in `prepare`."""
-        began = time.perf_counter()
         built, figure = self.ready(problem), problem.scene.figure
         entry = TraceEntry(0.0, 0.0, 0.0, 0.0)
-        with problem.borrow(), Control(None, progress) as control:
+        with Control(None, progress) as control, problem.borrow():
             q, met = self.found(built, problem)
             q = figure.clamp(problem.start if q is None else q)
             control.tell(entry)
         ending = Ending(q, True, 1, (entry,), self.way, "time", "" if met else self.failure)
-        return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
+        return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control)
 
 
 def _same(first: Any, second: Any) -> bool:

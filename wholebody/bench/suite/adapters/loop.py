@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from abc import ABC
 from typing import Any, ClassVar, NamedTuple, Protocol
 
@@ -64,7 +63,6 @@ class Loop(Outside[Stepper], ABC):
 
     def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture; InputError where the tool cannot express the problem, or its scene changed."""
-        began = time.perf_counter()
         stepper, room = self.ready(problem), self._room(problem)
         longest = self.longest * max(1.0, size(problem.scene.figure))  # the tool bounds turns and lengths apart
         most = 200 if self.iterations is None else self.iterations  # most, where nothing else is said
@@ -73,13 +71,13 @@ class Loop(Outside[Stepper], ABC):
         if room:
             # Where things move, rows keep what is beyond a clearance, and ask for the goal beside it.
             settings = with_values(settings, best=False, least=min(10, most))
-        with problem.borrow() as workspace, Control(None, progress) as control:
+        with Control(None, progress) as control, problem.borrow() as workspace:
             stepper.begin(room)
             run = Iteration(problem, workspace, stepper, settings, control)
             run.go()
         failure = f"{self.name} gave up at step {run.steps} ({run.failure})" if run.failure else ""
         ending = Ending(run.q, run.converged, run.steps, tuple(run.trace), f"in {run.steps} steps", "steps", failure)
-        return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
+        return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control)
 
     def _room(self, problem: Problem) -> float:
         """What to keep beyond clearances because things move [m]: as far as one moved since the last solve, or more."""

@@ -96,7 +96,8 @@ class Standing(NamedTuple):
     """A method over all sets: those that it takes whole, those of which it solves 98 %, and where it solves least.
 
     `slowness`: its time over that of the method that others are compared with, on the problems that both solve;
-    `false_claims`: answers called solved that are off by more than 1 mm.
+    `false_claims`: answers called solved that are off by more than 1 mm; `efforts`: median and 90 % of the effort above
+    the best known, as a share, of what it solves while goals stand still.
     """
 
     method: str
@@ -107,6 +108,7 @@ class Standing(NamedTuple):
     slowness: Interval
     false_claims: int
     deepest_mm: float
+    efforts: tuple[float, float]
 
 
 def choices(results: Results, rows: Sequence[Summary]) -> list[Choice]:
@@ -153,6 +155,8 @@ def standings(results: Results, rows: Sequence[Summary]) -> list[Standing]:
             continue
         judged = [row for row in mine if row.refused < row.cases]
         worst = min(judged, key=lambda row: row.success.value, default=None)
+        still = (family for family in results.sets if not results.moving(family))
+        above = [effort for family in still for effort in efforts_of(results, family, adapter).values()]
         found.append(
             Standing(
                 adapter,
@@ -163,6 +167,7 @@ def standings(results: Results, rows: Sequence[Summary]) -> list[Standing]:
                 ratio(times(results, results.sets, adapter), base) if base else NOTHING,
                 sum(row.false_claims for row in mine),
                 max((row.deepest_mm for row in judged if isfinite(row.deepest_mm)), default=nan),
+                (middle(above), middle(above, 0.9)),
             )
         )
     return sorted(found, key=lambda one: (-one.dependable, one.slowness.value if one.slowness.cases else inf))
