@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import numpy as np
@@ -92,6 +93,17 @@ def test_those_refused_are_in_no_share() -> None:
 def test_a_task_that_refuses_everybody_is_refused() -> None:
     with pytest.raises(wb.InputError, match="everybody is refused; the first, b: the task"):
         wb.accommodation(lambda *given: None, {"a": {"sex": "male"}, "b": {"sex": "female"}})  # type: ignore[arg-type]
+
+
+def test_a_task_that_ends_its_process_ends_nothing_else() -> None:
+    def task(figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:
+        if figure.describe().person.stature < 1.70:
+            sys.exit("no room")
+        return standing(figure, target, layout)
+
+    found = wb.accommodation(task, {"low": {"sex": "male", "stature": 1.65}, "high": {"sex": "male", "stature": 1.75}})
+    assert [one.outcome for one in found.records] == ["ended", "solved"]
+    assert "no room" in found.records[0].message
 
 
 SITTING = {  # dimension, sex, share of ANSUR II's people at or below a value, metres

@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wholebody.base import checks
+from wholebody.base.batches import own_child
 from wholebody.base.charts import Shown, new_chart
-from wholebody.base.errors import InputError
+from wholebody.base.errors import InputError, WholebodyError
 from wholebody.ergonomics.vision import sight
 from wholebody.figures.adjustable import ADJUSTABLE
 from wholebody.figures.figure import Figure
@@ -254,7 +255,7 @@ def accommodation(
     make = TaskFile(checks.path(task, "task")) if isinstance(task, (str, os.PathLike)) else task
     variants = [Variant(make, person, None, None) for person in population.values()]
     if method is None and callable(task):
-        method = QP(budget=BUDGET, measures=point is not None or _has_settings(variants[0]))
+        method = QP(budget=BUDGET, measures=point is not None or _may_have_settings(variants[0]))
     run = partial(Running.checked, "accommodation", jobs=jobs, cluster=None, seconds=None, progress=progress)
     # Who reaches and fits does not depend on how low the measure is: jumps between people are no reason to solve again.
     varied = {"people": population, "targets": None, "layouts": None}
@@ -283,8 +284,15 @@ def accommodation(
     return Accommodation(records, sexes, sizes, reaches, fits, seen, _settings(variants, records))
 
 
+def _may_have_settings(variant: Variant) -> bool:
+    """Whether somebody's scene has what is adjustable; true where it cannot be made, which the records tell."""
+    try:  # a task of the user's own can end the process that makes it
+        return bool(own_child().call(_has_settings, variant, seconds=0.0))
+    except WholebodyError:
+        return True
+
+
 def _has_settings(variant: Variant) -> bool:
-    """Whether somebody's scene has what is adjustable; where it cannot be made, which the records tell, it may have."""
     try:
         members = variant().scene.figure.members.values()
     except Exception:  # of a task of the user's own
