@@ -120,6 +120,12 @@ def parsed_toml(text: str, name: str) -> dict[str, Any]:
         raise FileFormatError(f"{name}:{line}: a number has thousands of digits; write fewer") from None
 
 
+@cache
+def packaged_toml(path: Path) -> dict[str, Any]:
+    """What a TOML file of the package says; whoever reads it changes nothing."""
+    return parsed_toml(path.read_text("utf-8"), path.name)
+
+
 def check_file(path: str | PathLike[str], kind: str) -> None:
     """Check a path before a library reads it: raises like `read_bytes`, without reading."""
     with _opened(path, kind, LARGEST):

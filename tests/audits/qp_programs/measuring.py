@@ -13,9 +13,8 @@ import numpy as np
 
 from tests.audits.qp_programs.recording import Recorded
 from tests.audits.templates import TEMPLATES
-from wholebody.bench.report import render
 from wholebody.bench.statistics import Interval, quantile, share
-from wholebody.bench.tables import filled, of
+from wholebody.bench.tables import filled, of, render
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import ACTIVE_SET, QPSolver
 from wholebody.methods.qp.solvers.osqp_solver import ActiveSetSolver

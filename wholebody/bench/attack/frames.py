@@ -11,8 +11,7 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.bench.attack.case import Verdict, chosen
-from wholebody.bench.attack.judging import Pairs, apart, extent
+from wholebody.bench.attack.judging import Pairs, Verdict, apart, chosen, extent
 from wholebody.bench.attack.scenes import Body, Thing, body, clear, shape, somewhere, xyzquat
 from wholebody.bench.attack.solves import scene_of
 from wholebody.bench.suite.problem_sets.things import Occupied, coal_distance

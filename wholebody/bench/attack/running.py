@@ -20,12 +20,11 @@ from wholebody.base.errors import UnknownNameError, WholebodyError
 from wholebody.base.files import Scratch
 from wholebody.base.runner import ONE_THREAD, Child, Job, allow_processor, run_jobs
 from wholebody.bench.attack import frames, inputs, solves, terms, ways
-from wholebody.bench.attack.case import KINDS, Case, Verdict
-from wholebody.bench.report import render
+from wholebody.bench.attack.judging import KINDS, Case, Verdict
 from wholebody.bench.rows import Row, texts, times
 from wholebody.bench.rows import report as tables_of
 from wholebody.bench.statistics import wilson
-from wholebody.bench.tables import write_text
+from wholebody.bench.tables import render, write_text
 
 CASES = {
     "argument": inputs.argument,

@@ -10,8 +10,7 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.bench.attack.case import chosen
-from wholebody.bench.attack.judging import Pairs
+from wholebody.bench.attack.judging import Pairs, chosen
 from wholebody.bench.suite.problem_sets.things import Occupied
 from wholebody.figures.packaged_urdf import task_paths, urdf_path
 from wholebody.figures.urdf.writing import exact

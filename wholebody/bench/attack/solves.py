@@ -14,8 +14,7 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.bench.attack.case import Verdict, chosen
-from wholebody.bench.attack.judging import Judged, Pairs, judge
+from wholebody.bench.attack.judging import Judged, Pairs, Verdict, chosen, judge
 from wholebody.bench.attack.scenes import Body, Thing, body, clear, inside, xyzquat
 from wholebody.bench.suite.problem_sets.things import Occupied
 from wholebody.methods import installed_methods

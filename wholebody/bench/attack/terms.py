@@ -16,7 +16,7 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.bench.attack.case import Verdict, chosen
+from wholebody.bench.attack.judging import Verdict, chosen
 from wholebody.figures.state import State, Wrench
 from wholebody.problem import Problem
 from wholebody.solution import Solution

@@ -13,8 +13,7 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.errors import WholebodyError
-from wholebody.bench.attack.case import Verdict, chosen
-from wholebody.bench.attack.judging import Pairs, judge
+from wholebody.bench.attack.judging import Pairs, Verdict, chosen, judge
 from wholebody.bench.attack.scenes import Body, Thing, body, clear, inside, xyzquat
 from wholebody.bench.attack.solves import scene_of
 from wholebody.bench.suite.problem_sets.things import Occupied

@@ -232,7 +232,7 @@ def files(arguments: argparse.Namespace) -> int:
 
 def _compared(arguments: argparse.Namespace) -> int:
     """Follow recordings by both tools; figures of files may go about freely."""
-    from wholebody.bench.measure.retargeting import compare, totals
+    from wholebody.bench.measure.files import compare, totals
     from wholebody.figures import load
 
     names = arguments.figure or ["human"]

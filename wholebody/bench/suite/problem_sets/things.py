@@ -17,7 +17,8 @@ from wholebody.figures.urdf.writing import exact
 from wholebody.geometry.pieces import swept_points
 from wholebody.geometry.placement import placement
 
-KINDS = ("box", "sphere", "capsule", "hull")
+Make = Callable[[int, np.random.Generator], tuple[str, wb.Shape]]
+"""Makes the thing of a number: its kind and its shape."""
 
 
 def coal_distance(first: Any, at: pin.SE3, second: Any, there: pin.SE3, exact: bool = False) -> float:
@@ -132,7 +133,7 @@ def add_things(
     room: float,
     rng: np.random.Generator,
     space: Sequence[Sequence[float]] = ((-0.6, -1.0, 0.1), (1.2, 1.0, 2.0)),
-    make: Callable[[int, np.random.Generator], tuple[str, wb.Shape]] | None = None,
+    make: Make | None = None,
 ) -> None:
     """Put random things into a box of space [m], clear of what is taken up; they may cross. `make`: kind and shape."""
     for number in range(count):
@@ -151,18 +152,13 @@ def add_things(
 
 
 def household_thing(number: int, rng: np.random.Generator) -> tuple[str, wb.Shape]:
-    """The kinds of `KINDS` in turn."""
-    kind = KINDS[number % len(KINDS)]
-    return kind, random_shape(kind, rng)
-
-
-def random_shape(kind: str, rng: np.random.Generator) -> wb.Shape:
-    """A box, sphere, capsule or hull of the size of household things."""
+    """A box, sphere, capsule or hull in turn, of the size of household things."""
+    kind = ("box", "sphere", "capsule", "hull")[number % 4]
     if kind == "box":
-        edges = rng.uniform(0.05, 0.5, 3)
-        return wb.Box((float(edges[0]), float(edges[1]), float(edges[2])))
+        x, y, z = rng.uniform(0.05, 0.5, 3).tolist()
+        return kind, wb.Box((x, y, z))
     if kind == "sphere":
-        return wb.Sphere(float(rng.uniform(0.03, 0.2)))
+        return kind, wb.Sphere(float(rng.uniform(0.03, 0.2)))
     if kind == "capsule":
-        return wb.Capsule(float(rng.uniform(0.02, 0.1)), float(rng.uniform(0.1, 0.6)))
-    return wb.Hull(rng.normal(size=(30, 3)) * rng.uniform(0.03, 0.12, 3))
+        return kind, wb.Capsule(float(rng.uniform(0.02, 0.1)), float(rng.uniform(0.1, 0.6)))
+    return kind, wb.Hull(rng.normal(size=(30, 3)) * rng.uniform(0.03, 0.12, 3))

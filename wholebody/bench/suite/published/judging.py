@@ -9,7 +9,6 @@ from math import inf, isfinite, nan
 from pathlib import Path
 from typing import Any
 
-from wholebody.bench.report import formatted, spanned, words
 from wholebody.bench.statistics import Interval, median, share, shifted_geometric_mean
 from wholebody.bench.suite.published.answers import SEEDS, Answer, Answers
 from wholebody.bench.suite.published.rebuilt import (
@@ -22,7 +21,7 @@ from wholebody.bench.suite.published.rebuilt import (
     read_json,
     worst_of,
 )
-from wholebody.bench.tables import flat
+from wholebody.bench.tables import flat, formatted, spanned, words
 
 TIMEOUT = 10.0  # s: that a failure counts with in a mean time
 ANSWERED, REFUSED, UNANSWERED = "answered", "refused", "unanswered"

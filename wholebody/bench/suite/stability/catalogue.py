@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cache, partial
+from functools import partial
 from math import inf, nan
 from pathlib import Path
 from typing import Any, Literal
@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.checks import known
-from wholebody.base.files import parsed_toml
+from wholebody.base.files import packaged_toml
 from wholebody.bench.suite.adapters.base import Adapter
 from wholebody.bench.suite.stability.bodies import human_arm, planar_arm, sliding_tool, spatial_arm, star
 from wholebody.figures.figure import Figure
@@ -137,10 +137,8 @@ def cases(chosen: Iterable[str] | None = None) -> tuple[HardCase, ...]:
     return tuple(_case(name, given) for name, given in listed.items() if name in wanted)
 
 
-@cache
 def _data() -> dict[str, Any]:
-    file = Path(__file__).with_name("cases.toml")
-    return parsed_toml(file.read_text("utf-8"), file.name)
+    return packaged_toml(Path(__file__).with_name("cases.toml"))
 
 
 def _case(name: str, given: Mapping[str, Any]) -> HardCase:

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from wholebody.bench import plot_style
-from wholebody.bench.report import render
 from wholebody.bench.rows import Figure, Row
 from wholebody.bench.suite.stability.asking import INSIDE, Cell, Judged
 from wholebody.bench.suite.stability.catalogue import Answer, HardCase, Kind
+from wholebody.bench.tables import render
 
 BROKEN = 1e-4  # m, rad: farther than this a constraint does not hold
 
