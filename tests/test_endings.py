@@ -17,7 +17,7 @@ from wholebody.figures.packaged_urdf import write_human
 from wholebody.studies.records import Records
 from wholebody.tracking.track_files import write_track
 from wholebody.tracking.tracks import Track
-from wholebody.view.filmstrip import write_filmstrip
+from wholebody.view.side_by_side import write_filmstrip
 
 TASK = Path(__file__).parent.parent / "examples" / "tasks" / "shelf.toml"
 

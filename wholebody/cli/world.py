@@ -161,7 +161,7 @@ def _animation(
 
     from wholebody.bench.measure.frames import moments
     from wholebody.view import Viewer
-    from wholebody.view.filmstrip import write_filmstrip
+    from wholebody.view.side_by_side import write_filmstrip
     from wholebody.view.viewed_scene import ViewedWorld
 
     viewed = ViewedWorld(scene.scene, frames[-1].placements)

@@ -26,7 +26,7 @@ from wholebody.dynamics.pieces import HUMAN
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
 from wholebody.dynamics.step_program import SKIN
 from wholebody.geometry.contact_rows import ContactRowBuilder, compiled_kernel
-from wholebody.scene.matter.materials import surface
+from wholebody.scene.matter.body import surface
 from wholebody.scene.scene import Scene
 
 BOUNCE = 0.05  # m/s: slower approaches do not bounce

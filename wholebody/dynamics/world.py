@@ -27,7 +27,7 @@ from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.geometry.continuous.passing_through import INSIDE
 from wholebody.geometry.proximity import Contacts
 from wholebody.methods.newton.assembly_bodies import AssemblyBodies
-from wholebody.scene.matter.materials import Surface, surface
+from wholebody.scene.matter.body import Surface, surface
 from wholebody.scene.moving_obstacles import Collision
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import NotCopyable

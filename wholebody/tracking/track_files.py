@@ -18,7 +18,7 @@ from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, InputError
 from wholebody.base.files import checked_target, read_text, write
 from wholebody.figures.figure import Figure
-from wholebody.figures.joined import one_figure
+from wholebody.figures.loading import one_figure
 from wholebody.tracking.tracks import LARGEST as LARGEST_VALUE
 from wholebody.tracking.tracks import Track
 

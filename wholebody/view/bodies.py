@@ -11,7 +11,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.joining import joint_in
-from wholebody.figures.link_visuals import drawn_of
+from wholebody.figures.link_pieces import drawn_of
 from wholebody.figures.surface import surface_of
 from wholebody.geometry.pieces import box_corners
 from wholebody.view import drawing, style

@@ -15,7 +15,7 @@ from wholebody.base.checks import a
 from wholebody.base.errors import InputError
 from wholebody.geometry.proximity import Contacts
 from wholebody.scene.geometry_model import SceneGeometry
-from wholebody.scene.moving_scene import MovingScene
+from wholebody.scene.moving_obstacles import MovingScene
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace
 from wholebody.view.style import LOOK, Color

@@ -11,7 +11,7 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.bench.attack.judging import Pairs, chosen
-from wholebody.bench.suite.problem_sets.things import Occupied
+from wholebody.bench.suite.problem_sets.things import Occupied, turned
 from wholebody.figures.packaged_urdf import task_paths, urdf_path
 from wholebody.figures.urdf.writing import exact
 
@@ -199,7 +199,7 @@ def somewhere(rng: np.random.Generator, placed: Occupied, size: float) -> pin.SE
     """A place about a figure."""
     middle, spread = _extent(placed)
     reach = 1.3 * spread + 0.5 * size
-    return pin.SE3(pin.Quaternion(_turn(rng)).matrix(), middle + rng.uniform(-reach, reach, 3))
+    return pin.SE3(pin.Quaternion(turned(rng)).matrix(), middle + rng.uniform(-reach, reach, 3))
 
 
 def _extent(placed: Occupied) -> tuple[Array, float]:
@@ -226,7 +226,7 @@ def inside(rng: np.random.Generator, placed: Occupied, size: float, depth: float
     start = placed.places[int(rng.integers(placed.count))]
     direction = rng.normal(size=3)
     direction /= np.linalg.norm(direction)
-    turn = pin.Quaternion(_turn(rng)).matrix()
+    turn = pin.Quaternion(turned(rng)).matrix()
     near, far = 0.0, 4.0 * (_extent(placed)[1] + size)
 
     def at(way: float) -> pin.SE3:
@@ -249,8 +249,3 @@ def inside(rng: np.random.Generator, placed: Occupied, size: float, depth: float
 def xyzquat(at: pin.SE3) -> tuple[float, ...]:
     """Return a placement as seven numbers."""
     return tuple(float(x) for x in pin.SE3ToXYZQUAT(at))
-
-
-def _turn(rng: np.random.Generator) -> Array:
-    turn = rng.normal(size=4)
-    return np.asarray(turn / np.linalg.norm(turn))

@@ -13,7 +13,7 @@ import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.errors import FileFormatError, InputError, WholebodyError, one_line
 from wholebody.bench.rows import Figure, Row, measured_ms
-from wholebody.geometry.gltf_document import GltfDocument
+from wholebody.geometry.gltf import GltfDocument
 from wholebody.motion.checking import check
 from wholebody.motion.clip import Clip
 from wholebody.motion.files import READERS

@@ -10,8 +10,8 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
+from wholebody.figures.anthropometry import RELAXED, Dimensions
 from wholebody.figures.body_spec import Solid, place
-from wholebody.figures.dimensions import RELAXED, Dimensions
 from wholebody.figures.sizes import TRUNK
 
 # Turn a capsule's own axis z into y, and into x.

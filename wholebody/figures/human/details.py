@@ -18,8 +18,8 @@ import pinocchio as pin
 
 from wholebody.base.arrays import with_values
 from wholebody.figures import hulls
+from wholebody.figures.anthropometry import Dimensions
 from wholebody.figures.body_spec import Solid, place
-from wholebody.figures.dimensions import Dimensions
 from wholebody.figures.human import capsules
 from wholebody.figures.tables import table
 

@@ -11,8 +11,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import FileFormatError
-from wholebody.figures.link_pieces import LinkShape
-from wholebody.figures.link_visuals import MANY, thinned
+from wholebody.figures.link_pieces import MANY, LinkShape, thinned
 from wholebody.figures.mjcf.compiled import Compiled, placement
 from wholebody.figures.mjcf.model import RobotModel
 from wholebody.figures.robot_figure import COLOR

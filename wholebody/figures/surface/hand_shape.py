@@ -8,8 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.figures.anthropometry import Person
-from wholebody.figures.dimensions import FINGER_BASES, Dimensions, keyed_hand
+from wholebody.figures.anthropometry import FINGER_BASES, Dimensions, Person, keyed_hand
 from wholebody.figures.figure import Figure
 from wholebody.figures.hand import FINGERS, PARTS, hand_figure_of, part_radius
 from wholebody.figures.surface.fields import Field, ellipsoid, placed, round_cone, union

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.figures.dimensions import Dimensions
+from wholebody.figures.anthropometry import Dimensions
 from wholebody.figures.surface.fields import (
     Field,
     ball,

@@ -9,9 +9,8 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.figures.anthropometry import Person
+from wholebody.figures.anthropometry import Dimensions, Person
 from wholebody.figures.body_spec import Solid
-from wholebody.figures.dimensions import Dimensions
 from wholebody.figures.human.capsules import SPREAD
 from wholebody.figures.human.figure import figure_of
 from wholebody.figures.human.spec import human_spec

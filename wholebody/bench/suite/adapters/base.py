@@ -29,10 +29,6 @@ LADDER: tuple[Budget, ...] = tuple((tol, None) for tol in (1e-1, 3e-2, 1e-2, 3e-
 """Tolerances from cheap to exact; each adapter begins and ends where it makes sense for it."""
 
 
-def _nothing(method: Any, problem: Problem) -> None:
-    pass
-
-
 @dataclass(frozen=True)
 class Adapter:
     """A method as it takes part in comparisons.
@@ -46,7 +42,7 @@ class Adapter:
     name: str
     make: Callable[[float, int | None], Method]
     loose: tuple[Budget, ...]
-    prepare: Callable[[Any, Problem], None] = _nothing
+    prepare: Callable[[Any, Problem], None] = lambda method, problem: None
     hindered: Callable[..., Method] | None = None
     setup: str = ""
     differences: tuple[str, ...] = ()

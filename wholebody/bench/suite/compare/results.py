@@ -262,7 +262,9 @@ class Store:
             raise FileFormatError(f"{self.path}: it was cut off before its first line; remove it and run again")
         try:
             found, *chunks = [json.loads(line) for line in lines]
-            self.chunks = [_chunk(value) for value in chunks]
+            for value in chunks:
+                records = tuple(Record(**each) for each in value.pop("records"))
+                self.chunks.append(Chunk(records=records, **value))
         except (ValueError, TypeError, KeyError) as error:
             raise FileFormatError(f"{self.path}: not a file of this command ({error}); give another --out") from None
         if found != wanted:
@@ -275,11 +277,6 @@ class Store:
         if len(whole) < len(data):
             with self.path.open("r+b") as file:
                 file.truncate(len(whole))
-
-
-def _chunk(value: dict[str, Any]) -> Chunk:
-    records = tuple(Record(**inner) for inner in value.pop("records"))
-    return Chunk(records=records, **value)
 
 
 def _short(value: Any) -> str:

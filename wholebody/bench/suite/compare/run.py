@@ -227,7 +227,7 @@ def run(
     for chunk in store.chunks:
         plan.note(chunk)
     began = time.perf_counter()
-    before = sum(_seconds(chunk) for chunk in store.chunks)
+    before = sum(each.building + sum(each.spent.values()) + sum(each.swept.values()) for each in store.chunks)
     done = {(chunk.set, chunk.number) for chunk in store.chunks}
     end = began + 60.0 * settings.minutes - before / jobs
     for chunk in spread(work, _tasks(settings, plan, done, end), jobs, cluster):
@@ -264,10 +264,6 @@ def turned(adapters: tuple[Adapter, ...], number: int) -> tuple[Adapter, ...]:
     # The order is turned by five methods from case to case, so that a family does not stay together.
     first = 5 * number % len(adapters)
     return adapters[first:] + adapters[:first]
-
-
-def _seconds(chunk: Chunk) -> float:
-    return chunk.building + sum(chunk.spent.values()) + sum(chunk.swept.values())
 
 
 def _check_built(store: Store) -> None:

@@ -157,6 +157,5 @@ def _gap(scene: wb.Scene, q: Array, touch: Touch) -> float:
 def _goal(figure: wb.Figure, q: Array, touch: Touch, turned: bool) -> wb.Relative:
     """The palm where it is in the posture q, as seen from the segment."""
     palm = f"{touch.hand}_palm"
-    state = bodies.alone(figure).state(q)
-    base, hand = (pin.SE3(state.frame(figure.frame_id(name))) for name in (touch.segment, palm))
-    return wb.Relative(palm, touch.segment, base.actInv(hand), orientation=turned)
+    there = figure.placement(q, touch.segment).actInv(figure.placement(q, palm))
+    return wb.Relative(palm, touch.segment, there, orientation=turned)

@@ -19,7 +19,7 @@ from wholebody.base.errors import InputError
 from wholebody.bench.suite.problem_sets.things import hull_obj, shape_of
 from wholebody.bench.suite.published.rebuilt import VERSION, model_of
 from wholebody.figures.figure import Figure
-from wholebody.figures.joined import one_figure
+from wholebody.figures.loading import one_figure
 from wholebody.figures.urdf.writing import add_joint, exact, urdf_axis
 
 Meshes = dict[str, str]
