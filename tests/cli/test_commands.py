@@ -278,7 +278,7 @@ def test_help_is_there_and_light() -> None:
 
 UNUSED = (
     *("wholebody.cli.clip", "wholebody.cli.bench", "wholebody.motion.clip", "wholebody.tracking.drag"),
-    *("wholebody.methods.newton.assembly", "wholebody.figures.surface.surface", "scipy.ndimage", "scipy.spatial"),
+    *("wholebody.methods.newton.assembly", "wholebody.figures.surface.making", "scipy.ndimage", "scipy.spatial"),
     *("asyncio", "jinja2", "matplotlib", "rich.progress", "tornado", "trimesh"),
 )
 

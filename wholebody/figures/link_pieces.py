@@ -20,7 +20,6 @@ from wholebody.base.checks import known, shown
 from wholebody.base.errors import InputError, WholebodyError
 from wholebody.base.fields import Range
 from wholebody.figures.figure import Figure
-from wholebody.figures.surface.nets import clustered
 from wholebody.geometry.convex import HULL_VERTICES, coacd_version, convex_pieces, mesh_hull
 from wholebody.geometry.hull import hull_piece
 from wholebody.geometry.mesh_cache import ConvexPieces, cached, cached_entry
@@ -235,6 +234,8 @@ def mesh_parts(path: str, scale: tuple[float, ...]) -> MeshParts:
 
 def thinned(vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
     """Vertices (k, 3) and faces (l, 3) of a mesh without what is finer than `FINE`."""
+    from wholebody.figures.surface.nets import clustered  # who draws nothing does not load how surfaces are made
+
     kept = clustered(vertices, faces, np.floor(vertices / FINE).astype(np.int64))
     used, local = np.unique(kept, return_inverse=True)
     return vertices[used], local.reshape(-1, 3)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from wholebody.figures.surface.surface import Bound, divided, strongest
+from wholebody.figures.surface.making import Bound, divided, strongest
 
 SIDE = 9
 

@@ -13,10 +13,10 @@ import pytest
 
 from wholebody.figures import load
 from wholebody.figures.anthropometry import design_cases
-from wholebody.figures.surface import Bone, Surface, surface_of
+from wholebody.figures.surface import Bone, Surface, making, surface_of
 from wholebody.figures.surface import surface as surfaces
+from wholebody.figures.surface.making import Part, person_parts
 from wholebody.figures.surface.person_shape import PersonShape
-from wholebody.figures.surface.surface import Part, person_parts
 from wholebody.geometry.mesh_cache import VARIABLE, cache_state
 
 PEOPLE: dict[str, dict[str, Any]] = {
@@ -50,7 +50,7 @@ def bent(figure: Any, bones: Sequence[Bone], parts: Iterable[tuple[Any, Any]], q
         else:
             place = data.oMf[figure.frame_id(bone.instead)].homogeneous @ bone.rest
         if bone.parent is not None:
-            place = surfaces.halfway(data.oMf[figure.frame_id(bone.parent)].homogeneous, place)
+            place = making.halfway(data.oMf[figure.frame_id(bone.parent)].homogeneous, place)
         moved.append(place @ np.linalg.inv(bone.bind))
     found = []
     for vertices, weights in parts:
@@ -243,9 +243,9 @@ def test_what_is_kept_equals_what_is_made(tmp_path: Path, monkeypatch: pytest.Mo
     first = kept()
     assert cache_state().entries == 1
     with monkeypatch.context() as patch:
-        patch.setattr(surfaces, "hand_surface", None)  # it is not made again
+        patch.setattr(making, "hand_surface", None)  # it is not made again
         second = kept()
-    made = surfaces.hand_surface(hand.describe().person, "left")
+    made = making.hand_surface(hand.describe().person, "left")
     for one, other, third in zip(first.patches, second.patches, made.patches, strict=True):
         assert one[:3] == other[:3] == third[:3]
         for mine, theirs, new in zip(one[3:], other[3:], third[3:], strict=True):

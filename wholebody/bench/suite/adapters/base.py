@@ -35,15 +35,13 @@ class Adapter:
 
     `make`: a fresh method from a tolerance and the most iterations; `loose`: budgets from cheap to exact, those of
     feasibility only before the others; `prepare`: builds what a solve needs, untimed, or raises InputError where the
-    method cannot express a problem; `hindered`: a method whose quadratic programs are never finished, None where `make`
-    with one iteration stands for it; `setup` and `differences`: sentences for reports.
+    method cannot express a problem; `setup` and `differences`: sentences for reports.
     """
 
     name: str
     make: Callable[[float, int | None], Method]
     loose: tuple[Budget, ...]
     prepare: Callable[[Any, Problem], None] = lambda method, problem: None
-    hindered: Callable[..., Method] | None = None
     setup: str = ""
     differences: tuple[str, ...] = ()
 

@@ -32,11 +32,10 @@ FRAME = 1.0 / 60.0  # s: a frame of a screen
 
 @dataclass(frozen=True)
 class Posed:
-    """A problem to solve once, with the most iterations (None: the method's own), or by a method that is `hindered`."""
+    """A problem to solve once, with the most iterations (None: the method's own)."""
 
     problem: Problem
     iterations: int | None = None
-    hindered: bool = False
 
 
 @dataclass(frozen=True)
@@ -161,7 +160,7 @@ def asked(ask: Mapping[str, Any]) -> Question:
     constraints += [StepLimit(speed)] if np.isfinite(speed) else []
     problem = Problem(scene, q, goals=goals, constraints=constraints)
     if "legs" not in ask:
-        return Posed(problem, ask.get("iterations"), ask.get("hindered", False))
+        return Posed(problem, ask.get("iterations"))
     frames = tuple(frame for leg in ask["legs"] for frame in _frames(problem, leg))
     return Stream(problem, frames, ask.get("dt", FRAME), speed)
 
