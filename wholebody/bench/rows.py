@@ -80,6 +80,11 @@ def table(rows: Sequence[Row]) -> str:
     return "\n".join(lines)
 
 
+def told(row: Row) -> str:
+    """A row in one line."""
+    return f"{row.case}, {row.tool}: {', '.join(f'{name} {value}' for name, value in row.figures.items())}"
+
+
 def read_rows(path: Path) -> tuple[dict[str, str], list[Row]]:
     """The facts and the rows that `write_rows` wrote, without empty figures; FileFormatError for another file."""
     facts: dict[str, str] = {}

@@ -19,7 +19,7 @@ import numpy as np
 from wholebody.base.errors import UnknownNameError, WholebodyError
 from wholebody.base.files import Scratch
 from wholebody.base.runner import ONE_THREAD, Child, Job, allow_processor, run_jobs
-from wholebody.bench.attack import frames, inputs, solves, terms, ways
+from wholebody.bench.attack import frames, inputs, solves, terms
 from wholebody.bench.attack.judging import KINDS, Case, Verdict
 from wholebody.bench.rows import Row, texts, times
 from wholebody.bench.rows import report as tables_of
@@ -30,8 +30,8 @@ CASES = {
     "argument": inputs.argument,
     "file": inputs.file,
     "solve": solves.case,
-    "stream": ways.stream,
-    "sweep": ways.sweep,
+    "stream": frames.stream,
+    "sweep": frames.sweep,
     "contact": terms.contact,
     "own-term": terms.own_term,
     "pairs": frames.pairs,

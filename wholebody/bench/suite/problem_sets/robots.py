@@ -22,6 +22,7 @@ from wholebody.bench.suite.problem_sets import bodies
 from wholebody.bench.suite.problem_sets.bodies import CLEARANCE, ROOM, alone, fitted, floor_scene, is_free, until_found
 from wholebody.bench.suite.problem_sets.case import numbers
 from wholebody.bench.suite.problem_sets.things import Occupied, add_things
+from wholebody.bench.tables import render
 from wholebody.figures.self_pairs import random_postures
 
 of_arm = numbers("robot_arm")
@@ -183,39 +184,28 @@ def _urdf(name: str, axes: list[Axis], tool: tuple[float, ...], ends_m: list[flo
     """The file: every link is a cylinder from its joint to the next one."""
     ends = [axis.at for axis in axes] + [tool]
     radii = np.linspace(ends_m[0], ends_m[-1], len(ends))
-    lines = [f'<robot name="{name}">']
-    lines += [_link(f"link{number}", end, float(radii[number])) for number, end in enumerate(ends)]
-    lines.append('<link name="tool"/>')
-    for number, axis in enumerate(axes, start=1):
-        lines.append(
-            f'<joint name="axis{number}" type="revolute"><parent link="link{number - 1}"/><child link="link{number}"/>'
-            f'<origin xyz="{_numbers(axis.at)}"/><axis xyz="{axis.axis}"/>'
-            f'<limit lower="{axis.low}" upper="{axis.high}" effort="100" velocity="3"/></joint>'
-        )
-    lines.append(
-        f'<joint name="grip" type="fixed"><parent link="link{len(axes)}"/><child link="tool"/>'
-        f'<origin xyz="{_numbers(tool)}"/></joint>'
-    )
-    return "\n".join([*lines, "</robot>"])
+    links = [_link(f"link{number}", end, float(radii[number])) for number, end in enumerate(ends)]
+    joints = [
+        {"name": f"axis{number}", "kind": "revolute", "at": _numbers(axis.at), "axis": axis.axis,
+         "limit": f'lower="{axis.low}" upper="{axis.high}" effort="100" velocity="3"'}
+        for number, axis in enumerate(axes, start=1)
+    ] + [{"name": "grip", "kind": "fixed", "at": _numbers(tool)}]  # fmt: skip
+    links.append({"name": "tool"})
+    for joint, parent, child in zip(joints, links, links[1:], strict=False):
+        joint |= {"parent": parent["name"], "child": child["name"]}
+    return render("robot.urdf", name=name, links=links, joints=joints)
 
 
-def _link(name: str, end: tuple[float, ...], radius: float) -> str:
+def _link(name: str, end: tuple[float, ...], radius: float) -> dict[str, str]:
     way = np.array(end)
     length = float(np.linalg.norm(way))
-    middle = _numbers(tuple(0.5 * way))
-    if length < of_arm.short_m:
-        shape = f'<geometry><sphere radius="{radius:.4f}"/></geometry>'
-        turn = (0.0, 0.0, 0.0)
-    else:
-        shape = f'<geometry><cylinder radius="{radius:.4f}" length="{length:.4f}"/></geometry>'
-        turn = (0.0, float(np.arccos(way[2] / length)), float(np.arctan2(way[1], way[0])))
     mass = 20.0 * length + 0.5
-    spin = 0.1 * mass * length**2 + 1e-3
-    return (
-        f'<link name="{name}"><inertial><mass value="{mass:.3f}"/><origin xyz="{middle}"/>'
-        f'<inertia ixx="{spin:.5f}" ixy="0" ixz="0" iyy="{spin:.5f}" iyz="0" izz="{spin:.5f}"/></inertial>'
-        f'<collision><origin xyz="{middle}" rpy="{_numbers(turn)}"/>{shape}</collision></link>'
-    )
+    link = {"name": name, "middle": _numbers(tuple(0.5 * way)), "mass": f"{mass:.3f}"}
+    link["spin"] = f"{0.1 * mass * length**2 + 1e-3:.5f}"
+    if length < of_arm.short_m:
+        return link | {"shape": f'<sphere radius="{radius:.4f}"/>'}
+    turn = (0.0, float(np.arccos(way[2] / length)), float(np.arctan2(way[1], way[0])))
+    return link | {"rpy": _numbers(turn), "shape": f'<cylinder radius="{radius:.4f}" length="{length:.4f}"/>'}
 
 
 def _numbers(values: tuple[float, ...]) -> str:
