@@ -15,13 +15,13 @@ from wholebody.base.errors import InputError
 from wholebody.figures.anthropometry import Dimensions, Person, describe, make_person
 from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, place
 from wholebody.figures.hand import palm_axes
-from wholebody.figures.human import capsules, details, fingers
+from wholebody.figures.human import details, fingers
 from wholebody.figures.sizes import MIDDLE_TIP
 from wholebody.figures.tables import keyed, table
 
 DETAILS: dict[str, Callable[[Dimensions], tuple[Solid, ...]]] = {
     "spheres": details.spheres,
-    "capsules": capsules.solids,
+    "capsules": details.solids,
     "hulls": details.polyhedra,
 }
 

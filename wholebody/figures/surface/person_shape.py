@@ -11,7 +11,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.figures.anthropometry import Dimensions, Person
 from wholebody.figures.body_spec import Solid
-from wholebody.figures.human.capsules import SPREAD
+from wholebody.figures.human.details import SPREAD
 from wholebody.figures.human.figure import figure_of
 from wholebody.figures.human.spec import human_spec
 from wholebody.figures.surface.fields import (
