@@ -15,7 +15,7 @@ from wholebody.methods.ccd.chain import ChainResolver
 from wholebody.scene.moving_obstacles import MovingScene
 from wholebody.tracking.live import LiveDrag
 
-SETTLING = 60
+SETTLING = 400
 
 
 @pytest.fixture
