@@ -64,14 +64,8 @@ def height_field(compiled: Compiled, geom: int) -> list[Array]:
             run = list(cells)
             (a, b), (c, d) = grid[row : row + 2, [run[0], run[-1] + 1]]
             tops = [(a, d, c), (a, b, d)] if plane[0] == "bent" else [(a, b, c, d)]
-            found += [_prism(np.array(top), below) for top in tops]
+            found += [np.concatenate([top, [(x, y, -below) for x, y, _ in top]]) for top in tops]
     return found
-
-
-def _prism(top: Array, below: float) -> Array:
-    bottom = np.array(top)
-    bottom[:, 2] = -below
-    return np.concatenate([top, bottom])
 
 
 def visual_of(compiled: Compiled, robot: RobotModel) -> pin.GeometryModel | None:

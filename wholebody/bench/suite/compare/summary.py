@@ -8,6 +8,7 @@ from math import inf, isfinite, nan
 from operator import attrgetter
 from typing import Any, NamedTuple
 
+from wholebody.base.errors import one_line
 from wholebody.bench.statistics import (
     LEAST,
     LEVEL,
@@ -139,19 +140,15 @@ def left_out(settings: Settings, chunks: Sequence[Chunk], rows: Sequence[Summary
     """Sentences on refusals, failures, what there was no time for, and problems that could not be built."""
     asked, said = {family.name: settings.asked(family) for family in settings.sets}, list[str]()
     for row in rows:
-        where, (cases, sweep) = f"`{row.method}`, {words(row.set)}", asked[row.set]
+        where, (cases, sweep), why = f"`{row.method}`, {words(row.set)}", asked[row.set], one_line(row.said, 110)
         if row.refused:
-            said.append(f"{where}: refuses {row.refused} of {row.cases}: {_cut(row.said)}")
+            said.append(f"{where}: refuses {row.refused} of {row.cases}: {why}")
         elif row.failed or row.overtime:
-            said.append(f"{where}: {row.failed} without an answer, {row.overtime} ended for time: {_cut(row.said)}")
+            said.append(f"{where}: {row.failed} without an answer, {row.overtime} ended for time: {why}")
         if row.cases < cases or (row.swept < sweep and row.refused < row.cases):
             said.append(f"{where}: {row.cases} of {cases} problems, {row.swept} of {sweep} at all budgets, for time")
     faults = [f"{words(chunk.set)} {chunk.number} could not be built: {chunk.fault}" for chunk in chunks if chunk.fault]
     return said + faults
-
-
-def _cut(text: str) -> str:
-    return text if len(text) <= 110 else text[:107] + "..."
 
 
 @dataclass(frozen=True)
