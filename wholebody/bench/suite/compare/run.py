@@ -116,30 +116,23 @@ class Plan:
     """Keeps count of what things cost, and says who may go on."""
 
     def __init__(self, settings: Settings, jobs: int) -> None:
-        self._settings = settings
         self._total = 60.0 * settings.minutes * jobs
-        self._keys = [(family.name, adapter.name) for family in settings.sets for adapter in settings.adapters]
-        self._place = {key: place for place, key in enumerate(self._keys)}
-        count = len(self._keys)
-        self._spent, self._cases = np.zeros(count), np.zeros(count)
-        self._swept, self._sweeps = np.zeros(count), np.zeros(count)
-        self._levels = np.array(
-            [len(settings.ladder(adapter, family.moving)) for family in settings.sets for adapter in settings.adapters]
-        )
+        self._levels = {
+            (family.name, adapter.name): len(settings.ladder(adapter, family.moving))
+            for family in settings.sets
+            for adapter in settings.adapters
+        }
+        self._spent: dict[tuple[str, str], list[float]] = {key: [] for key in self._levels}
+        self._swept: dict[tuple[str, str], list[float]] = {key: [] for key in self._levels}
         self._asked = {family.name: settings.asked(family) for family in settings.sets}
         self._building: dict[str, list[float]] = {family.name: [] for family in settings.sets}
 
     def note(self, chunk: Chunk) -> None:
         """Take a finished chunk into account."""
         self._building[chunk.set].append(chunk.building)
-        for adapter, seconds in chunk.spent.items():
-            place = self._place[chunk.set, adapter]
-            self._spent[place] += seconds
-            self._cases[place] += 1
-        for adapter, seconds in chunk.swept.items():
-            place = self._place[chunk.set, adapter]
-            self._swept[place] += seconds
-            self._sweeps[place] += 1
+        for known, taken in ((self._spent, chunk.spent), (self._swept, chunk.swept)):
+            for adapter, seconds in taken.items():
+                known[chunk.set, adapter].append(seconds)
 
     def cases(self, family: str) -> int:
         """How many cases of a set there is time to build."""
@@ -158,29 +151,30 @@ class Plan:
 
     def allowed(self) -> dict[tuple[str, str], Allowed]:
         """Cases of every method in every set, by what is known of the costs now."""
-        one, sweep = self._costs()
-        built = sum(self.cases(name) * self._built(name) for name in self._building)
-        most = np.array([self.cases(family) for family, _ in self._keys], dtype=float)
-        swept = np.array([self._asked[family][1] for family, _ in self._keys], dtype=float)
-        cases, sweeps = share_out(one, sweep, most, np.minimum(most, swept), self._total - built)
-        return {key: Allowed(int(cases[place]), int(sweeps[place])) for key, place in self._place.items()}
+        one, sweep, built = self._costs()
+        most = np.array([self.cases(family) for family, _ in self._levels], dtype=float)
+        swept = np.array([self._asked[family][1] for family, _ in self._levels], dtype=float)
+        counts = share_out(one, sweep, most, np.minimum(most, swept), self._total - built)
+        return {key: Allowed(int(cases), int(sweeps)) for key, cases, sweeps in zip(self._levels, *counts, strict=True)}
 
     @property
     def share(self) -> float:
         """Seconds of a method in a set, if all had the same."""
-        return self._total / len(self._keys)
+        return self._total / len(self._levels)
 
     def seconds(self, allowed: dict[tuple[str, str], Allowed]) -> float:
         """What all cases that are allowed will have taken."""
-        one, sweep = self._costs()
-        counts = np.array([allowed[key] for key in self._keys], dtype=float)
-        built = sum(self.cases(name) * self._built(name) for name in self._building)
+        one, sweep, built = self._costs()
+        counts = np.array([allowed[key] for key in self._levels], dtype=float)
         return float(one @ counts[:, 0] + sweep @ counts[:, 1]) + built
 
-    def _costs(self) -> tuple[Array, Array]:
-        one = self._spent / np.maximum(self._cases, 1.0)
-        known = self._swept / np.maximum(self._sweeps, 1.0)
-        return one, np.where(self._sweeps > 0, known, one * self._levels)  # as long at every budget, until it is known
+    def _costs(self) -> tuple[Array, Array, float]:
+        """Seconds of a case (n,) and of a sweep (n,) of each method in each set, and to build all cases."""
+        one = {key: float(np.mean(self._spent[key] or [0.0])) for key in self._levels}
+        # as long at every budget, until it is known
+        sweep = [float(np.mean(self._swept[key] or [one[key] * levels])) for key, levels in self._levels.items()]
+        built = sum(self.cases(name) * self._built(name) for name in self._building)
+        return np.array(list(one.values())), np.array(sweep), built
 
 
 def share_out(one: Array, sweep: Array, most: Array, most_swept: Array, total: float) -> tuple[Array, Array]:
