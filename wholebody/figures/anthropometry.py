@@ -239,7 +239,6 @@ def _made(sex: str, stature: float, mass: float, age: float | None, stated: tupl
 
 
 def _stated(proportions: Mapping[str, float] | None) -> dict[str, float]:
-    """Proportions, checked."""
     if proportions is None:
         return {}
     if not isinstance(proportions, Mapping):

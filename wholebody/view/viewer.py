@@ -235,7 +235,6 @@ class Viewer:
         self._show_again()
 
     def _show_again(self) -> None:
-        """Show the posture that is shown as it was asked for."""
         if self._shown is not None:
             q, problem, overlaps = self._shown
             self.show(q, problem=problem, pieces=self._composition.pieces, overlaps=overlaps)

@@ -52,7 +52,6 @@ def _rod(rng: np.random.Generator) -> tuple[wb.Shape, Any]:
 
 
 def _hit(rng: np.random.Generator) -> tuple[wb.Shape, Any]:
-    """A box, a table or a rod."""
     which = int(rng.integers(3))
     if which == 0:
         x, y, z = rng.uniform(0.05, 0.5, 3)

@@ -23,7 +23,6 @@ def _run(case: str, tool: str, figures: Mapping[str, Figure], columns: Mapping[s
 
 
 def _spent(milliseconds: Array, name: str = "") -> dict[str, Figure]:
-    """Mean, p95, p99 and longest of frames."""
     front = f"{name} " if name else ""
     return {
         f"{front}mean ms": float(milliseconds.mean()),

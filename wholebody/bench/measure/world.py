@@ -22,6 +22,7 @@ import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.bench.rows import Figure, Row, measured_ms
 from wholebody.bench.suite.problem_sets.things import coal_distance
+from wholebody.bench.tables import render
 from wholebody.tracking.moving_goals import retarget
 
 DENSITY = 700.0  # kg/m3
@@ -131,19 +132,8 @@ class _Mujoco:
     def __init__(self, drop: Drop) -> None:
         import mujoco
 
-        bodies = []
-        for size, place in zip(drop.sizes, drop.places, strict=True):
-            kind = "sphere" if len(size) == 1 else "box"
-            half = " ".join(str(x if len(size) == 1 else 0.5 * x) for x in size)
-            at = " ".join(map(str, place))
-            bodies.append(
-                f'<body pos="{at}"><freejoint/><geom type="{kind}" size="{half}" density="{DENSITY}"/></body>'
-            )
-        text = (
-            f'<mujoco><option timestep="{1.0 / 480.0}" gravity="0 0 {-GRAVITY}" cone="elliptic"/>'
-            f'<default><geom friction="{drop.friction} 0 0" condim="3"/></default><worldbody>'
-            f'<geom type="plane" size="50 50 1"/>{"".join(bodies)}</worldbody></mujoco>'
-        )
+        things = list(zip(drop.sizes, drop.places.tolist(), strict=True))
+        text = render("drop.xml", drop=drop, things=things, dt=1.0 / 480.0, gravity=GRAVITY, density=DENSITY)
         self._mujoco: Any = mujoco
         self._model = mujoco.MjModel.from_xml_string(text)
         self._data = mujoco.MjData(self._model)

@@ -112,7 +112,6 @@ OF_SETS = ("quick", "sets", "cases", "minutes", "jobs", "cluster", "update_docs"
 
 
 def _compare_on_task(arguments: argparse.Namespace) -> int:
-    """Compare methods on one's own task."""
     from rich.console import Console
 
     from wholebody.bench.rows import chart
@@ -137,7 +136,6 @@ def _compare_on_task(arguments: argparse.Namespace) -> int:
 
 
 def _again(arguments: argparse.Namespace) -> int:
-    """Run a published comparison again, and compare the two."""
     _alone(arguments, "again", OF_A_LOCK)
     from wholebody.bench.suite.adapters.registry import missing
     from wholebody.bench.suite.compare import run as comparison

@@ -209,7 +209,6 @@ class PersonShape:
         return Garment("trousers", COLORS.trousers, body, low, high, 0.024, self._claims(segments), cuts)
 
     def _calf(self, side: str, sign: float) -> Field:
-        """The muscle behind the shank."""
         length, radius = self.person.length("left_shank"), self.person.radius("calf")
         shape = ellipsoid(
             (-0.20 * radius, sign * 0.02 * radius, -0.27 * length), (0.90 * radius, 0.90 * radius, 0.24 * length)

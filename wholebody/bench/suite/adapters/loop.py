@@ -241,7 +241,6 @@ class TaskStepper:
         return np.asarray(velocity, dtype=float)
 
     def _goal(self, goal: Any) -> Any:
-        """The task of a goal."""
         cost = goal.weight**0.5
         if isinstance(goal, wb.Point):
             name = self._named(goal.place, goal.resolved_offset)

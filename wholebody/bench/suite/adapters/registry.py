@@ -89,7 +89,6 @@ def missing() -> Mapping[str, str]:
 
 
 def _rows() -> dict[str, _Row]:
-    """All methods, in the order of reports."""
     rows = {f"qp/{solver}".removesuffix("/"): _Row(partial(qp_adapter, solver))
             for solver in ("", "active_set", "osqp", "daqp")}  # fmt: skip
     for solver, need in _texts()["solvers"].items():

@@ -119,7 +119,6 @@ def _on_arm(hand: str, along: tuple[float, float], around: tuple[float, float], 
 
 
 def _on_hip(hand: str, rng: np.random.Generator) -> Touch:
-    """A place on the side of the pelvis."""
     out = 1.0 if hand == "left" else -1.0
     normal = np.array((rng.uniform(-0.3, 0.6), out, rng.uniform(-0.1, 0.3)))
     axis = np.array((0.0, 0.05 * out, 0.03))
