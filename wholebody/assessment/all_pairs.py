@@ -13,7 +13,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.errors import InputError
 from wholebody.base.pool import Pool
 from wholebody.figures.state import State
@@ -209,7 +209,7 @@ class NearPairs(NamedTuple):
         if not corners:
             return rows, numbers
         normals, points = np.array([corner[1] for corner in corners]), np.array([corner[2] for corner in corners])
-        wrenches = np.hstack([normals, np.cross(points, normals)])
+        wrenches = np.hstack([normals, cross(points, normals)])
         joints = np.array([self._joint(piece) for piece in self.pair.ravel().tolist()]).reshape(-1, 2)[numbers]
         for side, sign in ((1, 1.0), (0, -1.0)):
             for joint in set(joints[:, side].tolist()) - {0}:

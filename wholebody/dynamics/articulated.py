@@ -18,7 +18,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, cross
 from wholebody.dynamics import impulse_kernel
 from wholebody.dynamics.coupling import Actuated
 from wholebody.dynamics.frame import EngineFrame
@@ -106,7 +106,7 @@ class Articulated:
         """Momentum [kg m/s] and angular momentum about the world's origin [kg m2/s], (6,)."""
         centroidal = pin.computeCentroidalMomentum(self._model, self._data, self.q, self.velocity)
         linear = np.array(centroidal.linear)
-        return np.concatenate([linear, centroidal.angular + np.cross(self._data.com[0], linear)])
+        return np.concatenate([linear, centroidal.angular + cross(self._data.com[0], linear)])
 
     def _inertia(self, q: Array) -> Array:
         upper = np.triu(pin.crba(self._model, self._data, q))
@@ -166,7 +166,7 @@ class Articulated:
         middle = 0.5 * (near.point_a + near.point_b)[contact]
         normal = wrench[:, :3]
         height = (normal * middle).sum(axis=1)
-        place = np.cross(normal, wrench[:, 3:]) + height[:, None] * normal
+        place = cross(normal, wrench[:, 3:]) + height[:, None] * normal
         limits = self._limits(time)
         count = len(contact) + len(limits)
         bodies = sorted({name for row in contact for name in self._owners(near.pair[row]) if name in names})
@@ -179,7 +179,7 @@ class Articulated:
             + [pin.getJointJacobian(model, self._data, joint, pin.WORLD) for joint in range(1, model.njoints)]
         )
         axes_of = _axes(normal)
-        directions_of = np.concatenate([axes_of, np.cross(place[:, None], axes_of)], axis=2)
+        directions_of = np.concatenate([axes_of, cross(place[:, None], axes_of)], axis=2)
         moves = directions_of @ (jacobians[rows.second[kept]] - jacobians[rows.first[kept]])
         made.figure[: 3 * len(contact)] = moves.reshape(-1, model.nv)
         made.gap[: len(contact)] = rows.gap[kept]
@@ -323,6 +323,6 @@ class Articulated:
 
 def _axes(normal: Array) -> Array:
     """(m, 3, 3) normals (m, 3) and two tangents of each, one a row."""
-    first = np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=1)])
+    first = cross(normal, np.eye(3)[np.abs(normal).argmin(axis=1)])
     first /= np.linalg.norm(first, axis=1)[:, None]
-    return np.stack([normal, first, np.cross(normal, first)], axis=1)
+    return np.stack([normal, first, cross(normal, first)], axis=1)

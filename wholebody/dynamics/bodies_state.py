@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices, Mask, cross
 from wholebody.dynamics.motion_kernel import Bodies
 from wholebody.dynamics.pieces import Pieces
 from wholebody.scene.scene import Scene
@@ -97,4 +97,4 @@ class BodiesState:
         turned = self.bodies.rotation[free]
         local = np.einsum("bij,bi->bj", turned, self.spin[free])
         own = np.einsum("bij,bjk,bk->bi", turned, self.pieces.inertia[free], local)
-        return np.concatenate([linear.sum(axis=0), (np.cross(self.bodies.position[free], linear) + own).sum(axis=0)])
+        return np.concatenate([linear.sum(axis=0), (cross(self.bodies.position[free], linear) + own).sum(axis=0)])

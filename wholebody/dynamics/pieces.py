@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices, Mask, cross
 from wholebody.base.compiled import compiled
 from wholebody.base.errors import InputError
 from wholebody.dynamics import motion_kernel
@@ -236,7 +236,7 @@ class ContactFinder:
         normal = rows.wrench[:, :3].copy()
         middle = 0.5 * (contacts.point_a + contacts.point_b)
         height = (normal * middle[owner]).sum(axis=1)
-        point = np.cross(normal, rows.wrench[:, 3:]) + height[:, None] * normal
+        point = cross(normal, rows.wrench[:, 3:]) + height[:, None] * normal
         kept = needed(owner, len(contacts.distance), normal, point, rows.gap, 1e-5)  # m: see `TOUCH`
         owner, normal, point = owner[kept], normal[kept], point[kept]
         bodies: Indices = self.pieces.body[contacts.pair[owner]]

@@ -17,7 +17,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, cross
 from wholebody.base.checks import TIME_STEP
 from wholebody.base.errors import InputError
 from wholebody.dynamics import motion_kernel
@@ -267,7 +267,7 @@ class RigidBodies:
         record.work += float(work.sum())
         self._joints.project_velocities(state, state.bodies.twist, state.bodies.moving)
         program.settle(before.kept, work)
-        wrench = np.hstack([impulse, np.cross(program.points.point, impulse)])
+        wrench = np.hstack([impulse, cross(program.points.point, impulse)])
         np.add.at(record.impulse, program.points.bodies[:, 1], wrench)
         np.add.at(record.impulse, program.points.bodies[:, 0], -wrench)
         record.contacts = int((impulse != 0.0).any(axis=1).sum())
@@ -318,12 +318,12 @@ class RigidBodies:
     def _record(self, events: Array, program: StepProgram, record: FrameRecord) -> None:
         points, state, number = program.points, self.state, events[:, 0].astype(np.intp)  # squeezed bodies: thousands
         bodies, place, impulse = points.bodies[number], points.point[number], events[:, 2:]
-        wrench = np.hstack([impulse, np.cross(place, impulse)])
+        wrench = np.hstack([impulse, cross(place, impulse)])
         for side, sign in ((0, 1.0), (1, -1.0)):
             np.add.at(record.impulse, bodies[:, side], -sign * wrench)
             given = state.bodies.given[bodies[:, side]]
             body = bodies[given, side]
-            velocity = state.velocity[body] + np.cross(state.spin[body], place[given] - state.bodies.position[body])
+            velocity = state.velocity[body] + cross(state.spin[body], place[given] - state.bodies.position[body])
             record.work += sign * float((impulse[given] * velocity).sum())
         named = [(self.names[first], self.names[second]) for first, second in bodies.tolist()]
         record.events += [

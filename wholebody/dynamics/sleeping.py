@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices, Mask, cross
 from wholebody.dynamics import solve_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.pieces import ContactFinder
@@ -115,7 +115,7 @@ class Sleepers:
         """Greatest speed (k,), within the first body of each pair, that the second one has as a rigid body, m/s."""
         state, own, other = self._state, both[:, 0], both[:, 1]
         arm = state.bodies.position[own] - state.bodies.position[other]
-        at_centre = state.velocity[other] + np.cross(state.spin[other], arm)
+        at_centre = state.velocity[other] + cross(state.spin[other], arm)
         spin = np.linalg.norm(state.spin[other], axis=1)
         return np.asarray(np.linalg.norm(at_centre, axis=1) + spin * state.pieces.lever[own])
 

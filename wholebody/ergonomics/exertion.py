@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Range
 from wholebody.ergonomics.angles import check_person
@@ -63,12 +63,12 @@ class Statics(NamedTuple):
         torque = np.array(pin.computeGeneralizedGravity(model, data, state.q))[joints]
         moves = np.array(pin.computeGeneralizedGravityDerivatives(model, data, state.q))[joints]
         for joint, point, rows, force, turn in self._acting(state):
-            moment = np.cross(point, force)
-            d_moment = np.cross(rows.T, force) + np.cross(point, turn.T)  # (nv, 3)
+            moment = cross(point, force)
+            d_moment = cross(rows.T, force) + cross(point, turn.T)  # (nv, 3)
             reaches = state.support[joint][joints][:, None]
             linear, angular = state.columns[joints, :3], state.columns[joints, 3:]
             torque -= reaches[:, 0] * (linear @ force + angular @ moment)
-            axis = np.hstack([np.cross(angular, force), np.cross(linear, force) + np.cross(angular, moment)])
+            axis = np.hstack([cross(angular, force), cross(linear, force) + cross(angular, moment)])
             turned = (axis @ state.jacobian) * state.support[carriers]
             moves -= reaches * (turned + linear @ turn + angular @ d_moment.T)
         return torque, moves
@@ -205,10 +205,9 @@ class Exertion(SumOfSquares):
         """Look up the joints and their strength."""
         return filled(self, statics=statics_of(scene, self))
 
-    def curvature(self, state: State) -> Array:
+    def curvature_of(self, rows: Array, state: State) -> Array:
         """(nv,) the diagonal of Gauss and Newton."""
-        moves = self.statics.efforts(state)[1]
-        return np.asarray(2.0 * np.einsum("ij,ij->j", moves, moves) + 1e-6)
+        return np.asarray(2.0 * np.einsum("ij,ij->j", rows, rows) + 1e-6)
 
     def squares(self, state: State) -> tuple[Array, Array]:
         """The shares and their derivative."""

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask, cross
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range
 from wholebody.figures.state import State, Wrench
@@ -238,8 +238,8 @@ class Look(Constraint):
         local, frame = self._local(state), state.frame(self.place.frame)
         squared, slope = self.view.squared(local)
         slope = slope * (0.5 * self.view.horizontal / max(1.0, sqrt(squared)))
-        force, moment = frame.rotation @ slope, frame.rotation @ np.cross(local, slope)
-        return Wrench(np.hstack([force, moment + np.cross(frame.translation, force)])[None], self.place.joint)
+        force, moment = frame.rotation @ slope, frame.rotation @ cross(local, slope)
+        return Wrench(np.hstack([force, moment + cross(frame.translation, force)])[None], self.place.joint)
 
     def _local(self, state: State) -> Array:
         """The point in the eyes' axes (3,), at least `NEAREST` away [m]."""

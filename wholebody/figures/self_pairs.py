@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, cross
 from wholebody.figures.description import ExcludedPair, limits_of
 from wholebody.figures.state import State, root_freedoms
 from wholebody.geometry.proximity import Contacts, PairTable, Proximity
@@ -225,7 +225,7 @@ class _Parting:
 
     def _corrected(self, q: Array, near: Contacts) -> Array:
         joint = self.proximity.table.joint
-        lever = np.cross(near.point_a, near.normal)
+        lever = cross(near.point_a, near.normal)
         rows = self.state.rows(np.hstack([near.normal, lever]), joint[near.pair[:, 1]], joint[near.pair[:, 0]])
         wanted = 1.5 * APART - near.distance
         free = self.movable.copy()

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, cross
 from wholebody.base.checks import instance, posture, whole
 from wholebody.base.errors import InputError
 from wholebody.figures.description import ROOT_JOINT
@@ -183,7 +183,7 @@ class State:
             mass, moment = self._moments(joints)
             moved = self.support[joints.start : joints.stop].T  # a column moves what hangs on its joint
             linear, turn = self.columns[:, :3], self.columns[:, 3:]
-            rows = (moved @ mass)[:, None] * linear + np.cross(turn, moved @ moment)
+            rows = (moved @ mass)[:, None] * linear + cross(turn, moved @ moment)
             return self.folded(rows.T / mass.sum())
         if self._spare is None:
             self._spare = self.model.createData()

@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, cross
 from wholebody.base.errors import InputError
 
 SMALLEST = 1e-4
@@ -104,10 +104,10 @@ def swept_points(geometry: Any) -> SweptPoints:
 
 def normal_across(axis_a: Array, axis_b: Array) -> Array:
     """Unit vector (3,) across the axes of two pieces that meet exactly, where coal has no normal; axes may be zero."""
-    normal = np.cross(axis_a, axis_b)
+    normal = cross(axis_a, axis_b)
     if np.linalg.norm(normal) < 1e-9:
         along = axis_a if axis_a.any() else axis_b if axis_b.any() else np.array([1.0, 0.0, 0.0])
-        normal = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+        normal = cross(along, np.eye(3)[np.argmin(np.abs(along))])
     return np.asarray(normal / np.linalg.norm(normal))
 
 
@@ -121,7 +121,7 @@ def _convex_faces(geometry: Any, points: Array) -> Array:
     """Outward planes of a coal.Convex, coplanar triangles merged."""
     triangles = hull_triangles(geometry)
     a, b, c = points[triangles[:, 0]], points[triangles[:, 1]], points[triangles[:, 2]]
-    normals = np.cross(b - a, c - a)
+    normals = cross(b - a, c - a)
     length = np.linalg.norm(normals, axis=1)
     solid = length > 1e-14
     normals, a = normals[solid] / length[solid, None], a[solid]

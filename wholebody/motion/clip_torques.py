@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask, cross
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
@@ -200,7 +200,7 @@ def clip_torques(
             mine = stand.owner == foot
             force[k, foot] = total[:3]
             pressure[k, foot] = _pressure(forces[mine], stand.points[mine])
-            moment[k, foot] = total[3:] - np.cross(pressure[k, foot], total[:3])
+            moment[k, foot] = total[3:] - cross(pressure[k, foot], total[:3])
         both[k] = _pressure(forces, stand.points)
         outside[k] = dynamics.outside(loads, stand)
     lower, upper = torque_limits(figure, strength)

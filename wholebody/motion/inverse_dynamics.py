@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
@@ -89,7 +89,7 @@ def ground_forces(wrench: Array, about: Array, points: Array, friction: float) -
     rims = np.column_stack([friction * np.cos(around), friction * np.sin(around), np.ones(count)])
     directions = np.tile(rims, (len(points), 1))
     arms = np.repeat(points - about, count, axis=0)
-    columns = np.hstack([directions, np.cross(arms, directions)]).T
+    columns = np.hstack([directions, cross(arms, directions)]).T
     # scaled to the wrench, so that e means the same for a mouse and an elephant
     scale = max(float(np.linalg.norm(wrench[:3])), 1.0)
     stacked = np.vstack([columns, even * np.eye(columns.shape[1])])
@@ -291,7 +291,7 @@ def foot_wrenches(forces: Array, stand: Stand, soles: Soles) -> list[Array]:
     found = []
     for foot in range(len(soles.joints)):
         mine = stand.owner == foot
-        turning = np.cross(stand.points[mine], forces[mine]).sum(axis=0)
+        turning = cross(stand.points[mine], forces[mine]).sum(axis=0)
         found.append(np.concatenate([forces[mine].sum(axis=0), turning]))
     return found
 
@@ -306,7 +306,7 @@ def zero_moment_point(wrench: Array, height: float) -> Array:
 
 def moved(wrench: Array, center: Array) -> Array:
     """A wrench (6,) about another point than the world's origin."""
-    found: Array = np.concatenate([wrench[:3], wrench[3:] - np.cross(center, wrench[:3])])
+    found: Array = np.concatenate([wrench[:3], wrench[3:] - cross(center, wrench[:3])])
     return found
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask, cross
 from wholebody.figures.figure import Figure
 from wholebody.geometry.pieces import box_corners
 from wholebody.motion.roles import Roles
@@ -104,7 +104,7 @@ def rest_axes(motion: SkeletonMotion, roles: Roles) -> Array | None:
     if np.linalg.norm(left) < 1e-6:
         return None
     left /= np.linalg.norm(left)
-    return np.stack([np.cross(left, up), left, up], axis=1)
+    return np.stack([cross(left, up), left, up], axis=1)
 
 
 class Proportions:
@@ -245,9 +245,9 @@ def _pelvis(source: _Body, motion: SkeletonMotion) -> Array:
     top = next((role for role in ("shoulders", "neck", "chest", "head") if source.has(role, "hips")), None)
     up = np.tile([0.0, 0.0, 1.0], (len(left), 1)) if top is None else source.way("hips", top)
     y = left / np.maximum(np.linalg.norm(left, axis=1, keepdims=True), SMALL)
-    x = np.cross(y, up)
+    x = cross(y, up)
     x /= np.maximum(np.linalg.norm(x, axis=1, keepdims=True), SMALL)
-    found = np.stack([x, y, np.cross(x, y)], axis=2)
+    found = np.stack([x, y, cross(x, y)], axis=2)
     flat = np.abs(np.linalg.det(found) - 1.0) > RIGID
     found[flat] = motion.rotations[flat, 0]
     return found
@@ -279,9 +279,9 @@ def _hand_turn(motion: SkeletonMotion, joint: dict[str, int], side: str, axes: A
 def _frame(along: Array, towards: Array) -> Array:
     """Orthonormal axes (3, 3): x along the first direction, z as near to the second one as it can be."""
     x = along / np.linalg.norm(along)
-    y = np.cross(towards, x)
+    y = cross(towards, x)
     y /= np.linalg.norm(y)
-    return np.stack([x, y, np.cross(x, y)], axis=1)
+    return np.stack([x, y, cross(x, y)], axis=1)
 
 
 def soles(

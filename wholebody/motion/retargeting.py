@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, cross
 from wholebody.base.checks import function, instance, known, warn
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
@@ -245,7 +245,7 @@ def errors_of(motion: SkeletonMotion, clip: Clip, roles: Roles) -> dict[str, Arr
         theirs, ours = end - start, places[ends[1]] - places[ends[0]]
         lengths = np.linalg.norm(theirs, axis=1) * np.linalg.norm(ours, axis=1)
         if lengths.min() > 1e-9:
-            across = np.linalg.norm(np.cross(theirs, ours), axis=1)
+            across = np.linalg.norm(cross(theirs, ours), axis=1)
             found[" to ".join(ends)] = np.arctan2(across, np.einsum("ni,ni->n", theirs, ours))
     return found
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask, cross
 from wholebody.base.checks import settle
 from wholebody.base.errors import InputError
 from wholebody.base.fields import called
@@ -142,6 +142,6 @@ def across(axis: Array) -> Array:
     """(3, 3) rows: two directions perpendicular to a unit vector, and the vector itself."""
     helper = np.zeros(3)
     helper[int(np.argmin(np.abs(axis)))] = 1.0
-    first = np.cross(axis, helper)
+    first = cross(axis, helper)
     first /= np.linalg.norm(first)
-    return np.array([first, np.cross(axis, first), axis])
+    return np.array([first, cross(axis, first), axis])

@@ -228,6 +228,15 @@ class Bound(Term, ABC):
         """
 
 
+class Expansion(NamedTuple):
+    """A measure about a state: its value, gradient (nv,), curvature (nv,), and rows R (k, nv) where it has squares."""
+
+    value: float
+    gradient: Array
+    curvature: Array
+    rows: Array | None
+
+
 class Measure(Term, ABC):
     """A cost to minimise. Value, gradient and curvature are without the weight; the problem multiplies them by it.
 
@@ -274,3 +283,9 @@ class Measure(Term, ABC):
         together; methods that take rows use the rows in its place (Gauss and Newton), the others use the diagonal.
         """
         return None
+
+    def expansion(self, state: State) -> Expansion:
+        """All of these at once."""
+        squares = self.squares(state)
+        rows = None if squares is None else squares[1]
+        return Expansion(self.value(state), self.gradient(state), self.curvature(state), rows)

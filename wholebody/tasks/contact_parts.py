@@ -14,8 +14,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Mask, with_values
-from wholebody.figures.state import State
+from wholebody.base.arrays import Array, Mask, cross, with_values
+from wholebody.figures.state import State, Wrench
 from wholebody.tasks.axis import equidistant_error, equidistant_jacobian
 from wholebody.tasks.base import Constraint, Goal, SupportingPlanes, filled
 from wholebody.tasks.inputs import Place
@@ -83,7 +83,7 @@ class OwnSurface(NamedTuple):
         moves = np.array([foot(other, near.pieces[1], center + FOOT_STEP * way, state) - there for way in across])
         arm = tip - there
         wrench = through(tip, across) - through(center, moves / FOOT_STEP)
-        wrench[:, 3:] += np.cross(across, arm)
+        wrench[:, 3:] += cross(across, arm)
         return across @ arm, between(state, wrench, near.against, near.joint)
 
 
@@ -241,13 +241,12 @@ class Over(NamedTuple):
 
 def through(point: Array, forces: Array) -> Array:
     """Wrenches (k, 6) of forces (k, 3) through a point (3,)."""
-    return np.hstack([forces, forces @ pin.skew(point).T])
+    return np.concatenate((forces, forces @ pin.skew(point).T), axis=1)
 
 
 def between(state: State, wrench: Array, joint: int, against: int) -> Array:
     """Rows (m, nv) of wrenches (m, 6) on one joint against another."""
-    count = len(wrench)
-    return state.rows(wrench, np.full(count, joint, dtype=np.intp), np.full(count, against, dtype=np.intp))
+    return state.wrench_jacobian(Wrench(wrench, joint, against))
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, with_values
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Measure, Surroundings, filled
+from wholebody.tasks.base import Expansion, Measure, Surroundings, filled
 
 LEAST_CURVATURE = 1e-6
 """Curvature [1/rad^2] of degrees of freedom without weight: positive, as methods require, and far below any in use."""
@@ -36,9 +36,19 @@ class SumOfSquares(Measure):
         return np.asarray(2.0 * residuals @ rows)
 
     def curvature(self, state: State) -> Array:
+        """(nv,) that of the residuals' derivatives, `curvature_of`."""
+        return self.curvature_of(self.squares(state)[1], state)
+
+    def curvature_of(self, rows: Array, state: State) -> Array:
         """(nv,) row sums of ``2 |R|' |R|``, which bound the second derivative of Gauss and Newton."""
-        steep = np.abs(self.squares(state)[1])
+        steep = np.abs(rows)
         return np.asarray(2.0 * steep.sum(axis=1) @ steep + LEAST_CURVATURE)
+
+    def expansion(self, state: State) -> Expansion:
+        """All of these from the same residuals."""
+        residuals, rows = self.squares(state)
+        gradient = np.asarray(2.0 * residuals @ rows)
+        return Expansion(float(residuals @ residuals), gradient, self.curvature_of(rows, state), rows)
 
 
 class SquaredDistance(NamedTuple):
@@ -216,7 +226,7 @@ class RotationEffort(SumOfSquares):
             weights[list(ball.idx_v)] = 0.0
         return filled(self, balls=balls, others=SquaredDistance.build(start, weights))
 
-    def curvature(self, state: State) -> Array:
+    def curvature_of(self, rows: Array, state: State) -> Array:
         """(nv,) that of the other joints, and row sums of the squares' second derivative of Gauss and Newton."""
         result: Array = self.others.curvature.copy()
         for ball in self.balls:

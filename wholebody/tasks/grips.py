@@ -18,7 +18,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, with_values
+from wholebody.base.arrays import Array, cross, with_values
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.geometry.hull import coal_convex
@@ -74,7 +74,7 @@ def rim_of(thing: Surface, outwards: Array, state: State) -> Face | None:
         level = up - (up @ n) * n
     e = level / np.linalg.norm(level)
     at = thing.placed(0, state)
-    local = np.array([n, e, np.cross(n, e)]) @ at.rotation
+    local = np.array([n, e, cross(n, e)]) @ at.rotation
     thick = 0.5 * (_support(shapes, n) + _support(shapes, -n))
     # share of a ring's radius along which its rim counts as straight: it turns by 14 degrees
     return Face(thing, at.actInv(center + radius * e), local, np.array([thick, thick, 0.25 * radius]))

@@ -10,7 +10,7 @@ from typing import Annotated, Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask, cross
 from wholebody.base.checks import known
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Names
@@ -187,7 +187,7 @@ class TwistRow(NamedTuple):
         x, y, _ = seen[2]
         # The limb turns by w in the world and by w' in the axes of the central rotation.
         turn = np.array([(sine * y - cosine * x) / square, (-cosine * y - sine * x) / square, 1.0])
-        along = np.cross(seen[:, 2], self.part.slope @ self.part.center)
+        along = cross(seen[:, 2], self.part.slope @ self.part.center)
         wrench = np.zeros((1, 6))
         wrench[0, 3:] = base @ (along - self.part.sign * turn)
         row += state.rows(wrench, np.array([self.limb.joint]), np.array([self.reference.joint]))[0]

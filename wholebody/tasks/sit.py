@@ -8,7 +8,7 @@ from typing import NamedTuple
 import coal
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.checks import shown
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
@@ -90,7 +90,7 @@ class Sit(ContactTerm):
             upper = joined(scene, self.trunk, [*behind, *_trunk(scene, place, trunk)])
             middle = seat.at(state)[0]
             side = face(scene, self.back, _level(middle - _middle(at_back, state, middle, where), where), state, where)
-            to_left = _level(np.cross(UP, side.at(state)[1][2]), where)
+            to_left = _level(cross(UP, side.at(state)[1][2]), where)
             lower = joined(scene, self.pelvis, [self.pelvis])
             # m: how far the pelvis may be from the back; more, and the figure slouches
             parts += [Gap(upper, at_back, side), Near(lower, at_back, 0.06, side)]

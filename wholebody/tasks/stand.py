@@ -8,7 +8,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.checks import shown, some
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Names
@@ -165,7 +165,7 @@ class Stance(SumOfSquares):
             rows[:2] += between(state, through(b.translation, axes), joint, against)
         left, ahead = one.rotation[:, 1], other.rotation[:, 0]
         values[2] = left @ ahead
-        rows[2] = between(state, np.append(np.zeros(3), np.cross(ahead, left))[None], joints[1], joints[0])[0]
+        rows[2] = between(state, np.append(np.zeros(3), cross(ahead, left))[None], joints[1], joints[0])[0]
         factors = np.sqrt(STANCE_WEIGHTS)
         return factors * (values - self.rest), factors[:, None] * rows
 
@@ -234,6 +234,6 @@ class SolePolygon(NamedTuple):
         values[begin] = np.einsum("ij,ij->i", normals[:, :2], arm)
         rows[begin] = normals @ moves
         for corner, part in ((begin, 1.0 - share), (end, share)):
-            wrench = np.hstack([normals, np.cross(points[corner], normals)])
+            wrench = np.hstack([normals, cross(points[corner], normals)])
             rows[begin] -= part[:, None] * state.rows(wrench, self.joints[corner], np.zeros_like(corner))
         return values, rows

@@ -24,6 +24,8 @@ from wholebody.tasks.base import Surroundings
 
 POINT = 1e-9  # m: radius of the ball that stands for a point
 ACCURACY = 1e-9  # m: to which coal computes a distance; coarser, and a normal is noise
+_REQUEST = coal.DistanceRequest()
+_REQUEST.gjk_tolerance = _REQUEST.epa_tolerance = ACCURACY
 
 
 class Surface(NamedTuple):
@@ -127,13 +129,9 @@ def nearest(first: Surface, second: Surface, state: State) -> Nearest:
     """The nearest points of two surfaces, by coal; of several pairs of pieces, those of the nearest pair."""
     ours = [first.placed(k, state) for k in range(len(first.shapes))]
     theirs = [second.placed(k, state) for k in range(len(second.shapes))]
-    origins, others = (np.array([place.translation for place in placed]) for placed in (ours, theirs))
-    apart = origins[:, None] - others
-    least = np.sqrt(np.einsum("ijk,ijk->ij", apart, apart)) - np.add.outer(first.reach, second.reach)
     best: tuple[float, Any, int, int] | None = None
-    for number in np.argsort(least, axis=None, kind="stable").tolist():
-        i, j = divmod(number, len(theirs))
-        if best is not None and least[i, j] > best[0]:
+    for least, i, j in _pairs(first, ours, second, theirs):
+        if best is not None and least > best[0]:
             break
         result = between_pieces(first.shapes[i], ours[i], second.shapes[j], theirs[j])
         if best is None or result.min_distance < best[0]:
@@ -141,19 +139,29 @@ def nearest(first: Surface, second: Surface, state: State) -> Nearest:
     assert best is not None
     distance, result, i, j = best
     normal = np.array(result.normal)
-    if not np.linalg.norm(normal) > 0.5:  # the direction between the origins; up where they coincide
-        length = float(np.linalg.norm(others[j] - origins[i]))
-        normal = (others[j] - origins[i]) / length if length > 0.0 else np.array((0.0, 0.0, 1.0))
-    middle = 0.5 * (np.array(result.getNearestPoint1()) + np.array(result.getNearestPoint2()))
+    if not normal @ normal > 0.25:  # the direction between the origins; up where they coincide
+        apart = theirs[j].translation - ours[i].translation
+        length = float(np.linalg.norm(apart))
+        normal = apart / length if length > 0.0 else np.array((0.0, 0.0, 1.0))
+    middle = 0.5 * (result.getNearestPoint1() + result.getNearestPoint2())
     return Nearest(distance, normal, middle, second.joints[j], first.joints[i], (i, j))
 
 
-def between_pieces(first: Any, placed: Any, second: Any, other: Any) -> Any:
-    """Coal's distance of two shapes at their placements (pin.SE3)."""
-    request, result = coal.DistanceRequest(), coal.DistanceResult()
-    request.gjk_tolerance = request.epa_tolerance = ACCURACY
-    at, there = (coal.Transform3s(place.rotation, place.translation) for place in (placed, other))
-    coal.distance(first, at, second, there, request, result)
+def _pairs(
+    first: Surface, ours: Sequence[pin.SE3], second: Surface, theirs: Sequence[pin.SE3]
+) -> list[tuple[float, int, int]]:
+    """Pairs of pieces after a lower bound of their distance, the least first."""
+    if len(ours) == len(theirs) == 1:
+        return [(-np.inf, 0, 0)]
+    apart = np.array([place.translation for place in ours])[:, None] - [place.translation for place in theirs]
+    least = np.sqrt(np.einsum("ijk,ijk->ij", apart, apart)) - np.add.outer(first.reach, second.reach)
+    return sorted((bound, i, j) for i, row in enumerate(least.tolist()) for j, bound in enumerate(row))
+
+
+def between_pieces(first: Any, placed: pin.SE3, second: Any, other: pin.SE3) -> Any:
+    """Coal's distance of two shapes at their placements."""
+    result = coal.DistanceResult()
+    coal.distance(first, coal.Transform3s(placed), second, coal.Transform3s(other), _REQUEST, result)
     return result
 
 

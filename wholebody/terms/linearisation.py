@@ -20,7 +20,7 @@ from wholebody.geometry.memory_views import RESULT_DOUBLES
 from wholebody.geometry.proximity import ContactBuffer, Contacts
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.answers import is_own
-from wholebody.tasks.base import MOST_PLANES, Bound, Constraint, Goal, Measure, Term
+from wholebody.tasks.base import MOST_PLANES, Bound, Constraint, Expansion, Goal, Term
 from wholebody.tasks.bounds import StepLimit
 from wholebody.tasks.checks import check_row_count, undefined
 from wholebody.terms.plan import OtherTerm, TermPlan, Terms, checked_count, make_plan
@@ -191,14 +191,13 @@ class Lineariser:
         nv, rows = self.state.model.nv, len(self._value)
         squares = np.empty((self._plan.squares, nv))
         value, box, measure = np.empty(rows), np.empty((2, nv)), np.empty((3 if len(squares) else 2, nv + 1))
-        contacts, count = self._pass(q, within, (value, box, measure, squares))
+        contacts, count, expansions = self._pass(q, within, (value, box, measure, squares))
         jacobian = self._jacobian[: rows + count].copy()
         squared = measure[2, :nv] if len(squares) else np.zeros(nv)
-        for term in self._plan.other_measures:
-            part = term.squares(self.state)
-            if part is not None:
-                squares = np.vstack([squares, sqrt(2.0 * term.weight) * part[1]])
-                squared = squared + term.weight * term.curvature(self.state)
+        for weight, (_, _, curvature, slopes) in expansions:
+            if slopes is not None:
+                squares = np.vstack([squares, sqrt(2.0 * weight) * slopes])
+                squared = squared + weight * curvature
         goals = self._plan.goal_rows
         terms: list[Goal | Constraint] = [*self.goals, *self.constraints]
         found = term_planes(terms, self.rows(), self.state) if planes and self._plan.others else None
@@ -213,15 +212,20 @@ class Lineariser:
     def packed(self, q: Array, within: float) -> PackedLinearisation:
         """What `at` returns, in arrays that the next call overwrites."""
         value, box, measure = self._value, self._box, self._measure
-        contacts, count = self._pass(q, within, (value, box, measure, self._no_squares))
+        contacts, count, _ = self._pass(q, within, (value, box, measure, self._no_squares))
         gap, contact, clearance = self._gaps
         return PackedLinearisation(
             self.state.q, self._plan.goal_rows, value, self._jacobian[: len(value) + count], contacts, gap[:count],
             contact[:count], clearance[:count], measure, box,
         )  # fmt: skip
 
-    def _pass(self, q: Array, within: float, room: tuple[Array, Array, Array, Array]) -> tuple[Contacts, int]:
-        """Contacts at a posture, and how many rows; both are overwritten by the next call, `room` takes values."""
+    def _pass(
+        self, q: Array, within: float, room: tuple[Array, Array, Array, Array]
+    ) -> tuple[Contacts, int, list[tuple[float, Expansion]]]:
+        """Contacts at a posture, how many rows, and other measures with their weights; `room` takes values.
+
+        Contacts and rows are overwritten by the next call.
+        """
         state, plan, near, within = self.state.update(q), self._plan, self.workspace.proximity, within + self._largest
         index, placed = near.ask(state.data, within, self._clearances[1])
         if len(index) > self._near.size:
@@ -241,9 +245,12 @@ class Lineariser:
             self._evaluate(plan.others, value, self._jacobian)
         if plan.other_bounds:
             self._bound(plan.other_bounds, box)
-        if plan.other_measures:
-            self._measure_others(plan.other_measures, measure)
-        return contacts, gaps
+        expansions = [(term.weight, term.expansion(state)) for term in plan.other_measures]
+        for weight, found in expansions:
+            measure[0, -1] += weight * found.value
+            measure[0, :-1] += weight * found.gradient
+            measure[1, :-1] += weight * found.curvature
+        return contacts, gaps, expansions
 
     def undefined(self, q: Array) -> UndefinedTermError | None:
         """Why a term of one's own is not finite at a posture (nq,); None where all are, or where there are none."""
@@ -313,13 +320,6 @@ class Lineariser:
             # a joint out of its limits comes back no faster than the bound lets it
             low, high = bound.bounds(self.state, self.dt)
             np.clip(box, low, high, out=box)
-
-    def _measure_others(self, measures: Sequence[Measure], measure: Array) -> None:
-        state = self.state
-        for term in measures:
-            measure[0, -1] += term.weight * term.value(state)
-            measure[0, :-1] += term.weight * term.gradient(state)
-            measure[1, :-1] += term.weight * term.curvature(state)
 
 
 @lru_cache(maxsize=1)

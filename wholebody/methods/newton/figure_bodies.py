@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices, Mask, cross
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.memory_views import placement_view
@@ -116,7 +116,7 @@ class FigureBodies:
         (child, parent), (slides, turns) = self._ends, self._axes
         first, second = x[child], x[parent]
         along, about = (quat.rotate(first[:, 3:], axes) for axes in (slides, turns))  # in the world
-        lever = about + quat.cross(first[:, :3] - second[:, :3], along)
+        lever = about + cross(first[:, :3] - second[:, :3], along)
         spins = quat.spin(first[:, 3:]), quat.spin(second[:, 3:])
         ours = np.hstack([along, np.einsum("ki,kij->kj", about, spins[0])])
         theirs = -np.hstack([along, np.einsum("ki,kij->kj", lever, spins[1])])

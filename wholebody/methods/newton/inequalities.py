@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, cross
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.newton import quaternions as quat
@@ -237,7 +237,7 @@ class ContactSet:
         gap = np.full(count, FAR)
         wrench = rows.wrench[order]
         normal[at] = wrench[:, :3]
-        place[at] = quat.cross(wrench[:, :3], wrench[:, 3:])  # n x (p x n): the point, up to a shift along n
+        place[at] = cross(wrench[:, :3], wrench[:, 3:])  # n x (p x n): the point, up to a shift along n
         gap[at] = rows.gap[order] - clearance[rows.contact[order]]
         # a point of both bodies, at the same position now: its gap grows by n . (v_second - v_first)
         first, second = (

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, cross
 
 CONJUGATE = np.array((-1.0, -1.0, -1.0, 1.0))
 
@@ -23,7 +23,7 @@ CONJUGATE = np.array((-1.0, -1.0, -1.0, 1.0))
 def product(a: Array, b: Array) -> Array:
     """Hamilton product of quaternions, (..., 4)."""
     v, w, p, s = a[..., :3], a[..., 3:], b[..., :3], b[..., 3:]
-    vector = w * p + s * v + np.cross(v, p)
+    vector = w * p + s * v + cross(v, p)
     return np.concatenate([vector, w * s - (v * p).sum(axis=-1, keepdims=True)], axis=-1)
 
 
@@ -78,15 +78,6 @@ def rotate_form(c: Array, force: Array) -> Array:
     result[:, :3, :3] = outer + outer.transpose(0, 2, 1) - inner[:, None, None] * np.eye(3)
     result[:, :3, 3] = result[:, 3, :3] = cross(c, force)
     result[:, 3, 3] = inner
-    return result
-
-
-def cross(a: Array, b: Array) -> Array:
-    """Cross products (k, 3), without the overhead of numpy's."""
-    result = np.empty(np.broadcast(a, b).shape)
-    result[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
-    result[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
-    result[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
     return result
 
 

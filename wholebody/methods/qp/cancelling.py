@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, cross
 from wholebody.geometry.penetration import global_depth, least_separation
 from wholebody.geometry.proximity import Contacts
 from wholebody.problem import Problem
@@ -83,7 +83,7 @@ def _moved(problem: Problem, workspace: Workspace, q: Array, joints: tuple[int, 
         error = np.concatenate([target.translation - here.translation, pin.log3(target.rotation @ here.rotation.T)])
         if float(np.abs(error[:3]).max()) <= ROOM:
             break
-        turning = np.cross(here.translation, np.eye(3))
+        turning = cross(here.translation, np.eye(3))
         wrenches = np.block([[np.eye(3), turning], [np.zeros((3, 3)), np.eye(3)]])
         rows = state.rows(wrenches, joint, against)
         # added to the squared singular values, m^2; more: steps fall short near stretched limbs
