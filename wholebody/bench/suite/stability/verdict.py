@@ -136,11 +136,6 @@ class Result:
         """How many of a method's answers are acceptable."""
         return sum(self.verdicts[case.name, method].acceptable for case in self.cases)
 
-    def of_kind(self, kind: Kind) -> list[tuple[str, HardCase, Verdict]]:
-        """All verdicts of a kind: method, case and verdict, method by method."""
-        found = [(method, case, self.verdicts[case.name, method]) for method in self.methods for case in self.cases]
-        return [one for one in found if one[2].kind == kind]
-
     def short_of_best(self, case: HardCase) -> list[tuple[str, list[str]]]:
         """Answers to a case that neither solve it nor are as good as can be: signs with figures, and their methods."""
         found: dict[str, list[str]] = {}
