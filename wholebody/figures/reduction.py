@@ -35,9 +35,9 @@ def reduced_parts(
     frames = {frame.name: frame for frame in small.frames}
     description = Description(
         groups={
-            name: kept
+            name: left
             for name, members in old.groups.items()
-            if (kept := tuple(joint for joint in members if joint in names))
+            if (left := tuple(joint for joint in members if joint in names))
         },
         chains={
             name: Chain(tuple(joint for joint in chain.joints if joint in names), chain.tip)
