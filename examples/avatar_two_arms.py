@@ -8,14 +8,14 @@ from pathlib import Path
 from presenting import command_line, film, report_frames
 
 import wholebody as wb
-from wholebody.tracking import Recording, Track, follow
+from wholebody.tracking import Recording, follow
 from wholebody.tracking.scenes import script
 
 WALL = 1.2  # m: distance of the wall in front of the avatar's start
 REACHING = {"shoulder_flexion": 85.0, "elbow_flexion": 12.0, "shoulder_abduction": 10.0, "wrist_flexion": -35.0}
 
 
-def build() -> tuple[wb.Scene, Track]:
+def build() -> tuple[wb.Scene, wb.Clip]:
     """An avatar in front of a wall, and a tracker that moves its hands 10 cm into it and back."""
     avatar = wb.load("avatar")
     scene = wb.Scene(avatar)

@@ -8,14 +8,14 @@ import numpy as np
 from presenting import OAK, command_line, film, report_frames
 
 import wholebody as wb
-from wholebody.tracking import Recording, Track, follow, posed
+from wholebody.tracking import Recording, follow
 
 TOP = 0.75  # m: height of the table
 FRAMES = 150
 DT = 1 / 60  # s
 
 
-def build() -> tuple[wb.Scene, Track]:
+def build() -> tuple[wb.Scene, wb.Clip]:
     """A hand over a table, and a tracker that goes 4 cm below its top while the glove bends the fingers."""
     hand = wb.load("hand", side="right")
     scene = wb.Scene(hand)
@@ -26,7 +26,7 @@ def build() -> tuple[wb.Scene, Track]:
     roots = [(-0.3 + 0.4 * s, 0.0, z, *rest[3:7]) for s, z in zip(share, height, strict=True)]
     bend = 0.4 * (1.0 - np.cos(4.0 * np.pi * share)) / 2.0
     angles = {f"right_{finger}_pip_flexion": bend for finger in ("index", "middle", "ring", "little")}
-    return scene, posed(hand, roots=roots, angles=angles, posture="open", dt=DT, name="hand")
+    return scene, wb.motion.posed(hand, roots=roots, angles=angles, posture="open", dt=DT, name="hand")
 
 
 def main(out: Path = Path("pictures"), pictures: bool = True) -> Recording:

@@ -9,7 +9,6 @@ import pytest
 
 import wholebody as wb
 from wholebody.tracking.loop import FrameLoop
-from wholebody.tracking.tracks import Track
 
 ELBOW = "right_elbow_flexion"
 SAID = r"'right_elbow_flexion'.* is 90 rad, far out of its limits; 90 degrees are 1.571"
@@ -40,7 +39,6 @@ def shown(scene: wb.Scene) -> wb.Viewer:
         lambda scene, q: wb.Problem(scene, goals=[wb.Posture(q)]),
         lambda scene, q: wb.assess(wb.Problem(scene), q),
         lambda scene, q: wb.Clip(scene.figure, np.array([scene.figure.neutral, q]), 0.02),
-        lambda scene, q: Track.of(scene.figure, [q], 0.02).check(scene.figure),
         lambda scene, q: FrameLoop(scene, scene.figure.neutral).frame(q),
         lambda scene, q: scene.figure.reduced("left_arm", q),
         lambda scene, q: wb.QP().tracker(wb.Problem(scene), 0.02).step(q),

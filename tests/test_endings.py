@@ -15,8 +15,6 @@ from wholebody.cli.main import main
 from wholebody.figures.anthropometry import make_person
 from wholebody.figures.packaged_urdf import write_human
 from wholebody.studies.records import Records
-from wholebody.tracking.track_files import write_track
-from wholebody.tracking.tracks import Track
 from wholebody.view.side_by_side import write_filmstrip
 
 TASK = Path(__file__).parent.parent / "examples" / "tasks" / "shelf.toml"
@@ -64,7 +62,6 @@ WRITERS: dict[str, tuple[Callable[[Path], Any], tuple[str, ...]]] = {
     "ReachMap.html": (lambda path: reached().html(path), (".htm", ".html")),
     "write_task": (lambda path: wb.taskfile.write_task(wb.Scene(hand()), path), (".toml",)),
     "write_result": (solved, (".json",)),
-    "write_track": (lambda path: write_track(Track.of(hand(), postures(), 0.1), path), (".csv",)),
     "Clip.write": (
         lambda path: wb.Clip(hand(), postures(), 0.1).write(path),
         (".bvh", ".csv", ".glb", ".npz", ".txt"),
@@ -86,7 +83,7 @@ def test_what_cannot_be_written_is_refused_with_what_can(name: str, tmp_path: Pa
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("name", ["Viewer.save", "ReachMap.save", "write_task", "write_track", "Clip.write"])
+@pytest.mark.parametrize("name", ["Viewer.save", "ReachMap.save", "write_task", "Clip.write"])
 def test_what_can_is_written_whatever_the_case(name: str, tmp_path: Path) -> None:
     write, endings = WRITERS[name]
     for ending in set(endings) - {".png"}:

@@ -12,7 +12,7 @@ import pytest
 import wholebody as wb
 from wholebody.assessment import all_pairs
 from wholebody.assessment.all_pairs import AllPairs
-from wholebody.geometry import pair_distances
+from wholebody.geometry import hull, pair_distances, polygonal
 from wholebody.geometry.large_models import TABLED, geometry_model
 from wholebody.motion.checking import check
 
@@ -148,3 +148,24 @@ def test_a_scene_of_three_thousand_things_is_as_one_of_few() -> None:
         assert copied.contacts(q, 0.05).distance == pytest.approx(contacts.distance, abs=2e-6)
     scene.move("thing 5", at=(0.0, 0.0, 1.0))
     assert "thing 5" in {scene.piece_owner[piece] for piece in scene.overlapping(q).pair.ravel().tolist()}
+
+
+def test_hulls_of_like_shapes_are_found_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of cylinders of any size, of rings of one size, and of one hull that many things have."""
+    found: list[str] = []
+    search = hull._solid_hull
+    monkeypatch.setattr(hull, "_solid_hull", lambda cloud, what: (found.append(what), search(cloud, what))[1])
+    polygonal._unit_cylinder.cache_clear()
+    polygonal.torus_pieces.cache_clear()
+    rng = np.random.default_rng(0)
+    solid, scene = wb.Hull(rng.normal(size=(20, 3))), wb.Scene(wb.load("avatar"))
+    for number, (radius, length) in enumerate(rng.uniform(0.01, 0.5, size=(10, 2))):
+        for shape in (wb.Cylinder(radius, length), wb.Torus(0.3, 0.02), solid):
+            scene.add(shape, name=f"{type(shape).__name__}{number}", at=(5.0, 0.0, float(number)))
+    for number, piece in enumerate(scene.geometry.geometryObjects):
+        if piece.name.startswith("Cylinder"):
+            own = np.array(piece.geometry.points())
+            again = hull.hull_piece(own, "as it is")
+            assert len(own) == len(np.array(again.geometry.points())) == 2 * polygonal.SIDES, number
+    names = [what for what in found if what != "as it is"]
+    assert sorted(names) == sorted(["Cylinder", "Hull", "Hull", *["Torus"] * polygonal.SECTORS])

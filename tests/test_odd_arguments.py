@@ -202,7 +202,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     q = arm.neutral
     state = State(arm.model)
     places = [(0.2, 0.1, 1.0), (0.2, 0.12, 1.0)]
-    track = tracking.Track.of(arm, np.array([q, q, q, q]), 0.1)
+    track = wb.Clip(arm, np.array([q, q, q, q]), 0.1)
     solve_it = partial(solvable, path)
     person = wb.Scene(human())
 
@@ -590,19 +590,11 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "FrameLoop.frame", Call(tracking.FrameLoop(there, q).frame, {"tracked": q})
     recording = tracking.follow(there, track)
     yield "judge", Call(tracking.judge, {"scene": there, "recording": recording})
-    tracked = {"q": [q, q], "dt": 0.1, "joints": arm.joints, "name": "it"}
-    yield "Track", Call(tracking.Track, tracked, lambda made: made.check(arm))
-    yield "Track.check", Call(track.check, {"figure": arm})
-    yield "Track.of", Call(tracking.Track.of, {"figure": arm, "q": [q, q], "dt": 0.1, "name": "it"})
-    yield "Track.part", Call(track.part, {"first": 0, "last": 2})
-    yield "Track.repeated", Call(track.repeated, {"frames": 2})
     moved = {"figure": arm, "roots": None, "angles": {"joint1": [0.1]}, "posture": q, "dt": 0.1, "name": "it"}
-    yield "posed", Call(tracking.posed, moved)
-    yield "posed(angle)", Call(lambda v: tracking.posed(arm, angles={"joint1": v}, dt=0.1), {"v": [0.1, 0.2]})
+    yield "posed", Call(wb.motion.posed, moved)
+    yield "posed(angle)", Call(lambda v: wb.motion.posed(arm, angles={"joint1": v}, dt=0.1), {"v": [0.1, 0.2]})
     hand = human()
-    yield "posed(roots)", Call(lambda v: tracking.posed(hand, roots=v, dt=0.1), {"v": [at, at]})
-    yield "read_track", Call(tracking.read_track, {"path": path / "track.csv", "figure": arm})
-    yield "write_track", Call(tracking.write_track, {"track": track, "path": path / "track.csv"})
+    yield "posed(roots)", Call(lambda v: wb.motion.posed(hand, roots=v, dt=0.1), {"v": [at, at]})
     yield "resampled", Call(tracking.resampled, {"figure": arm, "motion": track, "name": "finer"})
     yield "gallery", Call(tracking.gallery, {"figure": hand})
     yield "build_scene", Call(tracking.build_scene, {"name": "hand_on_table", "frames": 3, "seed": 0, "dt": 0.1})
@@ -618,7 +610,6 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     pair_of = wb.Scene({"one": arm, "two": arm}).figure
     yield "Clip.part", Call(wb.Clip(pair_of, [pair_of.neutral], 0.1).part, {"name": "two"})
     yield "Clip.with_q", Call(clip.with_q, {"q": [q], "name": "other"})
-    yield "Clip.from_track", Call(wb.Clip.from_track, {"track": track, "figure": arm})
     yield "Clip.plot", Call(clip.plot, {"joints": arm.joints[:2]})
     yield "Clip.write", Call(clip.write, {"path": path / "clip.npz"})
     for method in ("mirrored", "velocities", "accelerations"):
@@ -939,7 +930,7 @@ NAMES = [name for name in surface() if fed(name)]
 def every(folder: Path) -> dict[str, list[tuple[str, Call]]]:
     """Return all calls by the name of what is called; variants have the same name with something in brackets."""
     q = figure(folder).neutral
-    tracking.write_track(tracking.Track.of(figure(folder), np.array([q, q]), 0.1), folder / "track.csv")
+    wb.Clip(figure(folder), np.array([q, q]), 0.1).write(folder / "track.csv")
     found: dict[str, list[tuple[str, Call]]] = {}
     for name, call in calls(folder):
         found.setdefault(name.partition("(")[0], []).append((name, call))

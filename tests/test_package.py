@@ -22,8 +22,8 @@ ROOMS = (
     *("version", "base", "geometry", "figures", "scene", "tasks", "terms", "problem", "assessment", "solution"),
     *(
         "methods",
-        "tracking",
         "motion",
+        "tracking",
         "planning",
         "dynamics",
         "ergonomics",

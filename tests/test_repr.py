@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 import wholebody as wb
-from wholebody.tracking import Track
 
 
 def test_scene_problem_and_solution_in_three_lines() -> None:
@@ -53,14 +52,13 @@ def test_what_has_long_arrays_is_shown_in_a_line() -> None:
     figure = wb.load("human")
     q = np.tile(figure.posture("standing"), (200, 1))
     scene = wb.Scene(figure)
-    track = Track.of(figure, q, 0.02)
     shown = [
         wb.Clip(figure, q, 0.02),
         wb.Hull(np.random.default_rng(0).normal(size=(100, 3))),
         wb.World(scene),
         wb.Viewer(scene),
     ]
-    for each in [*shown, track]:
+    for each in shown:
         assert len(repr(each)) < 200
         assert "\n" not in repr(each)
     assert "200 frames" in repr(shown[0])

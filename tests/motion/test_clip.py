@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 
 import wholebody as wb
 from wholebody.figures.figure import Figure
-from wholebody.tracking import Track
 
 SYMMETRIC = ("shoulder", "elbow", "wrist", "palm", "hip", "knee", "ankle", "toe_tip")
 
@@ -191,15 +190,6 @@ def test_a_figure_without_two_sides_is_not_mirrored(planar_arm: Callable[..., Fi
         wb.Clip(wb.load("hand"), [wb.load("hand").neutral], 0.1).mirrored()  # type: ignore[arg-type]
     bent = wb.Clip(arm, [[0.3, -0.2]], 0.1)  # type: ignore[arg-type]
     assert bent.mirrored().q == pytest.approx(-bent.q)  # an arm in a plane is its own mirror image
-
-
-def test_tracks_become_clips(human: Figure) -> None:
-    track = Track.of(human, [human.neutral] * 3, 0.02, "recorded")
-    clip = wb.Clip.from_track(track, human)
-    assert clip.q == pytest.approx(track.q)
-    assert (clip.dt, clip.name) == (0.02, "recorded")
-    with pytest.raises(wb.UnknownNameError):
-        wb.Clip.from_track(track, wb.load("hand"))
 
 
 def test_a_written_clip_is_read_again_without_loss(human: Figure, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import wholebody as wb
 from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
 from wholebody.bench.suite.problem_sets.robots import known_arm
 from wholebody.tasks import Balance
-from wholebody.tracking import Track, follow, judge
+from wholebody.tracking import follow, judge
 from wholebody.tracking.live_subjects import handle_frames
 
 TURNED = (1.4, 0.1, 0.0, 0.0, 0.0, 1.0, 0.0)  # faces the other
@@ -306,7 +306,7 @@ def test_a_tracked_person_is_stopped_by_another(overlap: str, anna: wb.Figure, b
     place = figure.model.joints[figure.joint_id("ben/root")].idx_q
     frames = np.tile(figure.neutral, (20, 1))
     frames[:, place] -= np.linspace(0.0, 0.85, len(frames))  # until he is inside of her
-    recording = follow(scene, Track.of(figure, frames, 1 / 30), overlap=overlap)
+    recording = follow(scene, wb.Clip(figure, frames, 1 / 30), overlap=overlap)
     judged = judge(scene, recording)
     assert judged.tracked_depth.max() > 0.05
     assert judged.depth.max() < 1e-3

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.studies.sending import Sender
+from wholebody.studies.solving import Sender
 
 ARM = Path(__file__).resolve().parents[2] / "examples" / "tasks" / "arm.urdf"
 PLACES = [(0.4, 0.1 * k, 0.5) for k in range(-2, 3)]

@@ -37,7 +37,7 @@ def test_a_figure_that_is_a_root_alone_is_followed(tmp_path: Path) -> None:
 def test_arms_crossed_before_the_chest_come_back(least_distance: Any) -> None:
     """The scene from before the forearms cross until the tracked ones were apart for half a second."""
     made = build_scene("self_collision")
-    part = made.track.part(440, 600)
+    part = made.track[440:600]
     free = np.array([least_distance(made.scene, q) for q in part.q]) > -1e-6
     released = int(np.flatnonzero(~free)[-1]) + 1
     assert 100 < released < len(free) - IN_TIME

@@ -10,8 +10,6 @@ import pytest
 import wholebody as wb
 from wholebody.tracking.inner_paths import resampled, timed
 from wholebody.tracking.loop import follow
-from wholebody.tracking.track_files import read_track, write_track
-from wholebody.tracking.tracks import Track
 
 DT = 0.1
 
@@ -42,7 +40,7 @@ def test_a_file_of_a_motion_goes_along_its_paths(planar_arm, tmp_path) -> None:
     start, inner, other, end = (np.array((0.02 * angle, 0.2, 0.2)) for angle in (0, 3, 5, 1))
     way = ((0.0, start), (0.3, inner), (0.55, other), (1.0, end))
     motion = SimpleNamespace(q=np.array((start, end, end)), dt=DT, paths=((), way, ()))
-    track = read_track(write_track(resampled(arm, motion), tmp_path / "way.csv"), arm)
+    track = wb.read_clip(resampled(arm, motion).write(tmp_path / "way.csv"), arm)
     for share, q in way:
         place = share * DT / track.dt
         rows = track.q[int(place)], track.q[min(int(place) + 1, len(track) - 1)]
@@ -66,7 +64,7 @@ def test_a_viewer_plays_the_way_round_a_thing() -> None:
     palm = wb.Scene(figure).state(q).frame(figure.frame_id(figure.frames[-1])).translation
     scene = wb.Scene(figure).add(wb.Sphere(0.05), name="ball", at=palm + (0.6, 0.0, 0.0))
     places = [palm + (0.6 - 0.1 * number, 0.0, 0.0) for number in range(8)]
-    recording = follow(scene, Track.of(figure, [q] * 8, 1 / 60), moves={"ball": places})
+    recording = follow(scene, wb.Clip(figure, [q] * 8, 1 / 60), moves={"ball": places})
     inner = sum(max(0, len(path) - 2) for path in recording.paths[1:])
     assert inner > 0
     seen = []

@@ -11,7 +11,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.tasks import ReachCones
-from wholebody.tracking import FrameLoop, Track, follow
+from wholebody.tracking import FrameLoop, follow
 from wholebody.tracking.qp_strategy import CLEARANCE
 
 
@@ -23,7 +23,7 @@ def at(hand: wb.Figure, x: float, z: float, posture: str = "relaxed") -> Any:
 
 def test_free_motion_is_followed_exactly(hand: wb.Figure, scene: wb.Scene) -> None:
     q = np.array([at(hand, 0.01 * k, 0.5) for k in range(20)])
-    shown = follow(scene, Track.of(hand, q, 1 / 60), rigid=True)
+    shown = follow(scene, wb.Clip(hand, q, 1 / 60), rigid=True)
     np.testing.assert_allclose(shown.q, q, atol=1e-9)
     assert not shown.pairs.any()
     assert not shown.joints.any()
@@ -37,7 +37,7 @@ def test_the_hand_slides_on_the_table_as_a_whole(
     resting = hand.posture(posture)[2]  # of the wrist, with the lowest point at z = 0
     heights = np.concatenate([np.linspace(0.15, -0.08, 25), np.full(25, -0.08)])
     q = np.array([at(hand, 0.004 * k, z, posture) for k, z in enumerate(heights)])
-    recording = follow(scene, Track.of(hand, q, 1 / 60), rigid=True)
+    recording = follow(scene, wb.Clip(hand, q, 1 / 60), rigid=True)
     assert min(least_distance(scene, shown) for shown in recording.q) > 0.0
     last = recording.q[-1]
     # The nearest place is straight above: the height at which the lowest point is one clearance over the table.
@@ -49,7 +49,7 @@ def test_the_hand_slides_on_the_table_as_a_whole(
 def test_the_rigid_hand_is_displaced_by_its_global_depth(hand: wb.Figure, scene: wb.Scene, least_distance: Any) -> None:
     """With ccd: pure translation along the table's normal, the fingers exactly as the glove has them."""
     q = np.array([at(hand, 0.004 * k, z) for k, z in enumerate(np.linspace(0.15, -0.05, 40))])
-    recording = follow(scene, Track.of(hand, q, 1 / 60), overlap="ccd", rigid=True)
+    recording = follow(scene, wb.Clip(hand, q, 1 / 60), overlap="ccd", rigid=True)
     assert min(least_distance(scene, shown) for shown in recording.q) >= 0.0
     np.testing.assert_allclose(recording.q[:, 3:], q[:, 3:], atol=1e-9)
     np.testing.assert_allclose(recording.q[-1, :2], q[-1, :2], atol=1e-3)
@@ -66,7 +66,7 @@ def test_opposed_normals_cancel_and_the_last_free_place_is_kept(hand: wb.Figure,
         scene.add(wb.Box((0.3, 0.2, 0.4)), name=name, at=(0.4, sign * 0.13, 0.2))
     q = np.array([at(hand, x, 0.2) for x in np.linspace(-0.2, 0.3, 40)])
     for overlap, allowed in (("ccd", 1e-3), ("qp", 1e-5)):
-        recording = follow(scene, Track.of(hand, q, 1 / 60), overlap=overlap, rigid=True)
+        recording = follow(scene, wb.Clip(hand, q, 1 / 60), overlap=overlap, rigid=True)
         assert min(least_distance(scene, shown) for shown in recording.q) > -allowed
         assert least_distance(scene, q[-1]) < -0.005
         assert recording.q[-1, 0] < q[-1, 0] - 0.05
@@ -108,13 +108,13 @@ def test_the_same_seed_gives_the_same_frames(hand: wb.Figure) -> None:
     runs = []
     for _ in range(2):
         scene = wb.Scene(hand).add(wb.HalfSpace(), name="table")
-        runs.append(follow(scene, Track.of(hand, q, 1 / 60), seed=5, rigid=True).q)
+        runs.append(follow(scene, wb.Clip(hand, q, 1 / 60), seed=5, rigid=True).q)
     np.testing.assert_array_equal(runs[0], runs[1])
 
 
 def test_a_start_in_penetration_is_freed_and_noted(hand: wb.Figure, scene: wb.Scene, least_distance: Any) -> None:
     deep = at(hand, 0.0, 0.02)
-    recording = follow(scene, Track.of(hand, [deep, deep], 1 / 60), rigid=True)
+    recording = follow(scene, wb.Clip(hand, [deep, deep], 1 / 60), rigid=True)
     assert recording.notes[0].startswith("frame 0: ")
     assert "inside table" in recording.notes[0]
     assert recording.notes[1] == ""
@@ -130,7 +130,7 @@ def test_a_start_that_cannot_be_freed_is_refused() -> None:
     wrist = data.oMf[arm.frame_id("right_hand")].translation
     scene.add(wb.Box((0.8, 0.7, 0.6)), name="boulder", at=wrist + [0.03, -0.36, 0.05])
     with pytest.raises(wb.InputError, match=r"frame 0: right_hand is .* mm inside boulder.*begin the track outside"):
-        follow(scene, Track.of(arm, [place], 1 / 60))
+        follow(scene, wb.Clip(arm, [place], 1 / 60))
 
 
 def test_a_dropped_out_frame_is_held_and_noted(hand: wb.Figure, scene: wb.Scene) -> None:

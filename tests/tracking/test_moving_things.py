@@ -245,7 +245,7 @@ def test_a_whole_track_with_a_thing_that_moves_is_judged_with_it(planar_arm) -> 
     q = np.array([0.1, 0.2, 0.2])
     ys = np.concatenate([np.linspace(0.5, 0.1, 30), np.linspace(0.1, 0.5, 20)])
     places = [(0.7, float(y), 0.0) for y in ys]
-    track = tracking.Track.of(scene.figure, np.tile(q, (50, 1)), DT)
+    track = wb.Clip(scene.figure, np.tile(q, (50, 1)), DT)
     recording = tracking.follow(scene, track, moves={"ball": places})
     assert scene.objects["ball"].placement.translation == pytest.approx([0.7, 0.5, 0.0])
     assert np.abs(recording.q - q).max() > 0.1  # it gave way

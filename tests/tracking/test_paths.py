@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.tracking.paths import circle, read_path, spread
+from wholebody.tracking.path_following import circle, read_path, spread
 
 
 def test_a_circle_is_round_flat_and_closed() -> None:

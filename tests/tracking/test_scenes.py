@@ -12,19 +12,19 @@ import pytest
 import wholebody as wb
 from wholebody.assessment.motion import assess_motion
 from wholebody.tasks import ReachCones
-from wholebody.tracking import InteractionScene, Recording, Track, build_scene, follow, gallery, judge
+from wholebody.tracking import InteractionScene, Recording, build_scene, follow, gallery, judge
 
 BEFORE, AFTER = 7, 19
 
 
 @cache
-def first_contact(name: str) -> tuple[InteractionScene, Track]:
+def first_contact(name: str) -> tuple[InteractionScene, wb.Clip]:
     """A scene, and its track from just before it first goes into something; made once for both ways out."""
     made = build_scene(name)
     assert len(made.track) >= 600
     coarse = np.arange(0, len(made.track), 6)
     first = int(coarse[np.argmax(assess_motion(made.scene, made.track.q[coarse], 1.0).depth > 5e-3)])
-    return made, made.track.part(first - BEFORE, first + AFTER)
+    return made, made.track[first - BEFORE : first + AFTER]
 
 
 @pytest.mark.parametrize(

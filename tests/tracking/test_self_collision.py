@@ -12,7 +12,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.assessment.motion import assess_motion
-from wholebody.tracking import Track, follow
+from wholebody.tracking import follow
 
 ALONG, ACROSS = 41, 9  # points on a capsule's axis, and along each edge of a box
 
@@ -79,7 +79,7 @@ def test_no_limb_enters_the_body(avatar: wb.Figure, limbs: Callable[..., Any], o
     shares = np.sin(np.linspace(0.0, 0.5 * np.pi, 15)) ** 2
     tracked = [np.asarray(pin.interpolate(avatar.model, there, inside, share)) for share in shares]
     tracked = [*tracked, *[inside] * 3, *tracked[::-1], *[back] * 20]
-    recording = follow(scene, Track.of(avatar, tracked, 1 / 60), overlap=overlap)
+    recording = follow(scene, wb.Clip(avatar, tracked, 1 / 60), overlap=overlap)
     assert sampled_depth(scene, inside) > 0.02
     assert sampled_depth(scene, inside) == pytest.approx(
         assess_motion(scene, np.array([inside]), 1.0).depth[0], rel=0.25

@@ -1,4 +1,4 @@
-"""Tracks: what they hold, and what is refused with frame and place."""
+"""Clips of placements and angles, scripted ones, and CSV files, whose faults are told with their line."""
 
 from __future__ import annotations
 
@@ -10,59 +10,12 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.tracking import Track, posed, read_track, write_track
+from wholebody.motion import posed
 from wholebody.tracking.scenes import script, smooth
 
 
-def track(hand: wb.Figure, frames: int = 5) -> Track:
-    return Track.of(hand, np.tile(hand.neutral, (frames, 1)), 0.02, "glove")
-
-
-def test_values_that_are_not_finite_are_named_by_frame_and_joint(hand: wb.Figure) -> None:
-    q = np.tile(hand.neutral, (5, 1))
-    q[3, 7] = np.nan
-    with pytest.raises(wb.InputError, match=r"glove: frame 3, joint right_index_mcp_flexion is nan"):
-        Track.of(hand, q, 0.02, "glove")
-    q = np.tile(hand.neutral, (5, 1))
-    q[2, 1] = np.inf
-    with pytest.raises(wb.InputError, match=r"frame 2, value 1 of the root"):
-        Track.of(hand, q, 0.02)
-
-
-def test_wrong_shapes_and_steps_are_refused(hand: wb.Figure) -> None:
-    for q in (np.zeros((0, hand.model.nq)), hand.neutral):
-        with pytest.raises(wb.InputError, match="at least one frame"):
-            Track.of(hand, q, 0.02)
-    with pytest.raises(wb.InputError, match="do not fit 18 joints"):
-        Track.of(hand, np.zeros((3, 20)), 0.02)
-    with pytest.raises(wb.InputError, match="dt is 0"):
-        Track.of(hand, [hand.neutral], 0.0)
-
-
-def test_a_track_of_another_figure_is_refused(hand: wb.Figure) -> None:
-    q = np.tile(hand.neutral, (4, 1))
-    renamed = ("index_curl", *hand.joints[1:])
-    with pytest.raises(wb.UnknownNameError, match="no joint is called 'index_curl'"):
-        Track(q, 0.02, renamed).check(hand)
-    with pytest.raises(wb.InputError, match="lacks right_index_mcp_flexion"):
-        Track(q[:, 1:], 0.02, hand.joints[1:]).check(hand)
-    with pytest.raises(wb.InputError, match="another order"):
-        Track(q, 0.02, hand.joints[::-1]).check(hand)
-    q[2, 3:7] *= 1.2
-    with pytest.raises(wb.InputError, match="frame 2, the root's quaternion"):
-        Track.of(hand, q, 0.02).check(hand)
-    track(hand).check(hand)
-
-
-def test_parts_and_repetitions(hand: wb.Figure) -> None:
-    q = np.tile(hand.neutral, (4, 1))
-    q[:, 0] = range(4)
-    whole = Track.of(hand, q, 0.02)
-    assert whole.part(1, 3).q[:, 0].tolist() == [1.0, 2.0]
-    assert whole.repeated(6).q[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 0.0, 1.0]
-    for bad in (lambda: whole.part(3, 3), lambda: whole.repeated(0)):
-        with pytest.raises(wb.InputError):
-            bad()
+def track(hand: wb.Figure, frames: int = 5) -> wb.Clip:
+    return wb.Clip(hand, np.tile(hand.neutral, (frames, 1)), 0.02, "glove")
 
 
 def test_placements_and_glove_angles(hand: wb.Figure) -> None:
@@ -81,14 +34,14 @@ def test_placements_and_glove_angles(hand: wb.Figure) -> None:
 
 def test_files_give_back_what_was_written(hand: wb.Figure, tmp_path: Path) -> None:
     written = track(hand)
-    path = write_track(written, tmp_path / "glove.csv")
-    read = read_track(path, hand)
+    path = written.write(tmp_path / "glove.csv")
+    read = wb.read_clip(path, hand)
     np.testing.assert_array_equal(read.q, written.q)
     assert read.dt == pytest.approx(written.dt)
     lines = path.read_text().splitlines()
     columns = [line.split(",") for line in lines]
     path.write_text("\n".join(",".join(reversed(line)) for line in columns))
-    np.testing.assert_array_equal(read_track(path, hand).q, written.q)
+    np.testing.assert_array_equal(wb.read_clip(path, hand).q, written.q)
 
 
 @pytest.mark.parametrize(
@@ -133,23 +86,23 @@ def test_files_give_back_what_was_written(hand: wb.Figure, tmp_path: Path) -> No
     ],
 )
 def test_broken_files_are_named_by_line(hand: wb.Figure, tmp_path: Path, change: Any, message: str) -> None:
-    path = write_track(track(hand), tmp_path / "glove.csv")
+    path = track(hand).write(tmp_path / "glove.csv")
     path.write_text("\n".join(change(path.read_text().splitlines())))
     with pytest.raises(wb.WholebodyError, match=message):
-        read_track(path, hand)
+        wb.read_clip(path, hand)
 
 
 @pytest.mark.parametrize("rate", [119.88, 120.0, 60.0, 30.0])
 def test_times_of_three_decimals_have_their_mean_step(rate: float, hand: wb.Figure, tmp_path: Path) -> None:
-    path = write_track(track(hand), tmp_path / "glove.csv")
+    path = track(hand).write(tmp_path / "glove.csv")
     header, *lines = path.read_text().splitlines()
     values = [line.partition(",")[2] for line in lines]
     made = [f"{k / rate:.3f},{values[k % len(values)]}" for k in range(600)]
     path.write_text("\n".join([header, *made]))
-    assert 1.0 / read_track(path, hand).dt == pytest.approx(rate, rel=5e-4)
+    assert 1.0 / wb.read_clip(path, hand).dt == pytest.approx(rate, rel=5e-4)
     path.write_text("\n".join([header, *made[:300], *made[302:]]))
     with pytest.raises(wb.FileFormatError, match="line 302: the time step changes"):
-        read_track(path, hand)
+        wb.read_clip(path, hand)
 
 
 @pytest.mark.parametrize("unit", [" [deg]", "_deg", " (°)", "(Degrees)"])
@@ -157,7 +110,7 @@ def test_columns_may_be_few_and_in_degrees(unit: str, hand: wb.Figure, tmp_path:
     path = tmp_path / "glove.csv"
     path.write_text(f"time,right_index_mcp_flexion{unit}\n0.0,0\n0.1,45\n0.2,90\n")
     with pytest.warns(UserWarning, match=r"no column for root_x.* and \d+ more; they stay as in the neutral posture"):
-        read = read_track(path, hand)
+        read = wb.read_clip(path, hand)
     found = [hand.joint_values(q) for q in read.q]
     neutral = hand.joint_values(hand.neutral)
     assert [values["right_index_mcp_flexion"] for values in found] == pytest.approx([0.0, np.pi / 4, np.pi / 2])
@@ -190,9 +143,9 @@ def test_a_table_without_names_has_the_order_of_the_figure(tmp_path):
     path = tmp_path / "walk1_subject1.csv"
     np.savetxt(path, q, delimiter=",", fmt="%.9f")
     with pytest.warns(UserWarning, match="no names; the columns were taken as root_x to"):
-        track = read_track(path, figure)
+        track = wb.read_clip(path, figure)
     assert track.dt == pytest.approx(1.0 / 30.0)
     np.testing.assert_allclose(track.q, q, atol=1e-8)
     np.savetxt(path, q[:, 1:], delimiter=",", fmt="%.9f")
     with pytest.raises(wb.FileFormatError, match=rf"no names of columns, and {q.shape[1] - 1} numbers where"):
-        read_track(path, figure)
+        wb.read_clip(path, figure)

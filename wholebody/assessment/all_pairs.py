@@ -42,7 +42,6 @@ class AllPairs:
     """
 
     def __init__(self, built: SceneGeometry) -> None:
-        """Allocate."""
         self._built, self.state = built, State(built.model)
         pairs = built.table.pairs
         self._distances = PairDistances(built.geometry, pairs)
@@ -112,18 +111,14 @@ class AllPairs:
         """Let `distance` be exact for all pairs that are nearer than `within` metres, (pairs,) or one for all."""
         if self._bounds is None:
             return
-        number = self._below(within)
+        beyond = np.greater_equal(self.distance, within, out=self._near)
+        number = np.flatnonzero(np.logical_not(beyond, out=beyond))  # those whose bound is not a number too
         number = number[self._row[number] < 0]
         table = self._built.table
         pair = table.pairs[number]
         between = _between_boxes(self._distances.placed[pair], table.half[pair])
         self.distance[number] = np.maximum(self.distance[number], between)
         self._ask(number[~(self.distance[number] >= np.broadcast_to(within, self.distance.shape)[number])])
-
-    def _below(self, within: Array | float) -> Indices:
-        """Pairs (k,) that are nearer, and those whose bound is not a number."""
-        beyond = np.greater_equal(self.distance, within, out=self._near)
-        return np.flatnonzero(np.logical_not(beyond, out=beyond))
 
     def _ask(self, number: Indices) -> None:
         """Ask coal for pairs (k,)."""
@@ -210,16 +205,14 @@ class NearPairs(NamedTuple):
             return rows, numbers
         normals, points = np.array([corner[1] for corner in corners]), np.array([corner[2] for corner in corners])
         wrenches = np.hstack([normals, cross(points, normals)])
-        joints = np.array([self._joint(piece) for piece in self.pair.ravel().tolist()]).reshape(-1, 2)[numbers]
+        pieces = self.built.geometry.geometryObjects
+        joints = np.array([[int(pieces[k].parentJoint) for k in pair] for pair in self.pair.tolist()])[numbers]
         for side, sign in ((1, 1.0), (0, -1.0)):
             for joint in set(joints[:, side].tolist()) - {0}:
                 moved = joints[:, side] == joint
                 jacobian = pin.getJointJacobian(state.model, state.data, joint, pin.WORLD)
                 rows[moved] += sign * wrenches[moved] @ jacobian.reshape(6, -1)  # of one degree of freedom it is (6,)
         return rows, numbers
-
-    def _joint(self, piece: int) -> int:
-        return int(self.built.geometry.geometryObjects[piece].parentJoint)
 
     def _patch(self, row: int) -> list[tuple[Array, Array]]:
         """Normal and place of the witness point and of the corners of the contact patch."""

@@ -105,7 +105,6 @@ class FirstOrder:
 
     @contextmanager
     def _lent(self) -> Iterator[State]:
-        """A state at the posture."""
         with all_pairs(self._built).borrow() as pairs:
             yield pairs.state.update(self._q)
 

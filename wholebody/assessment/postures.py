@@ -82,7 +82,6 @@ def judged(problem: Problem, numbers: Numbers, q: Array) -> Judged:
 
 
 def _distance(problem: Problem) -> Any:
-    """The squared distance that is the only measure of a problem."""
     measure: Any = problem.measures[0]
     return measure.distance
 

@@ -75,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.cli.tables import print_rows
     from wholebody.methods.solve import method_named
     from wholebody.taskfile import read_task
-    from wholebody.tracking.paths import spread
+    from wholebody.tracking.path_following import spread
 
     method_named(arguments.method)
     task = read_task(arguments.task)
@@ -160,7 +160,7 @@ def _corners(problem: Problem, goal: int, arguments: argparse.Namespace) -> Any:
     from wholebody.base.files import is_file
     from wholebody.tasks.inputs import point
     from wholebody.tracking.dragging import present_position, target_position
-    from wholebody.tracking.paths import circle, read_path
+    from wholebody.tracking.path_following import circle, read_path
 
     if arguments.path == "line":
         end = target_position(problem, goal) if arguments.to is None else point(arguments.to, "--to")

@@ -220,7 +220,6 @@ class Articulated:
         return owners[pair[0]], owners[pair[1]]
 
     def _surface(self, first: str, second: str) -> tuple[float, float]:
-        """Restitution and friction of two segments or things."""
         objects = self._scene.objects
         made_of = [objects[name].material if name in objects else HUMAN for name in (first, second)]
         found = surface(made_of[0], made_of[1])
@@ -241,7 +240,6 @@ class Articulated:
         return min(time, max(float(hits.min(initial=time)), SHORTEST))
 
     def _bounce(self, inertia: Array, points: Points) -> Array:
-        """Resolve the impacts of points that touch; the impulses (m, 3)."""
         speed = self._relative(points)
         approach = speed[::3]
         hit = (approach < -BOUNCE) & (points.gap - SKIN <= SHORTEST * np.abs(approach))

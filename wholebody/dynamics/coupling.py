@@ -221,7 +221,6 @@ class Actuated:
         return stiffness, critical if self.damping is None else self._spread(self.damping, "Actuated: damping")
 
     def _spread(self, gains: float | Mapping[str, float], what: str) -> Array:
-        """Numbers for all freedoms (nv,)."""
         model, figure = self.figure.model, self.figure
         if not isinstance(gains, Mapping):
             return np.full(model.nv, number(gains, what, 0.0, MOST))

@@ -69,7 +69,6 @@ def _islands(points: Indices, impulse: Array, contacts: int, bodies: Bodies) -> 
 
 @compiled(inner=True)
 def _owner(points: Indices, c: int, bodies: Bodies, root: Indices) -> int:
-    """The island of a point."""
     a, b = points[c, 0], points[c, 1]
     return int(root[a if bodies.moving[a] else b])
 

@@ -23,7 +23,6 @@ class Joints:
     """All joints of a scene, as points."""
 
     def __init__(self, scene: Scene, pieces: Pieces) -> None:
-        """Join what the scene's bodies say, where they stand."""
         self._pieces = pieces
         bodies, anchors, world = [], [], []
         for number in np.flatnonzero(pieces.dynamic).tolist():
@@ -47,7 +46,6 @@ class Joints:
         solve_kernel.join(np.arange(len(self)), self.points.bodies, pieces.dynamic, self._island)
 
     def _points(self, number: int, joint: BallJoint) -> list[Array]:
-        """Points of a joint in the thing's axes."""
         at = np.array(joint.at)
         if not isinstance(joint, Hinge):
             return [at]
@@ -57,7 +55,6 @@ class Joints:
         return [at - far * axis, at + far * axis]
 
     def __len__(self) -> int:
-        """How many joint points there are."""
         return len(self.points.bodies)
 
     def linked(self, number: int) -> Mask:

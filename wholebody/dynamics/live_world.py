@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import copy
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,6 @@ from numpy.typing import ArrayLike
 from wholebody.base.arrays import Array
 from wholebody.base.checks import choice, instance, known, numbers
 from wholebody.base.errors import InputError
-from wholebody.dynamics.coupling import Actuated, Spring
 from wholebody.dynamics.world import World
 from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
@@ -47,36 +46,26 @@ class LiveWorld:
         held: frames that the tracked posture keeps where they are.
         taken: the handle that the mouse holds; "" for none.
         give_way: who takes an overlap of the figure with a thing that moves by itself, see `World`.
-        ways: what `give_way` may be; "figure" alone for a `wb.Actuated` figure.
+        ways: what `give_way` may be.
         methods, chosen: of the tracker: "qp" alone.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        start: Array | None = None,
-        *,
-        constraints: Sequence[Any] | None = None,
-        spring: Spring | Actuated | None = None,
-        give_way: str = "figure",
-    ) -> None:
-        """Begin at a start (nq,), with constraints of the tracked posture: the soles of people are held by default.
-
-        Holds of handles can be released.
+    def __init__(self, scene: Scene, start: Array | None = None, *, give_way: str = "figure") -> None:
+        """Begin at a start (nq,), with the soles of people held until they are released.
 
         Raises:
-            InputError: the scene is none, or a start, constraints or spring that `Problem` or `World` refuses.
+            InputError: the scene is none, or a start that `Problem` or `World` refuses.
         """
         instance(scene, Scene, "LiveWorld: scene", "make one with wb.Scene(figure)")
-        self._given, self._spring = scene, spring
+        self._given = scene
         self.give_way: str = choice(give_way, GIVE_WAY, "LiveWorld: give_way")
         empty = Scene(scene.figure)
         soles = [Hold(name) for name in handle_frames(scene.figure.frames) if name.endswith("_sole")]
-        stated = Problem(empty, start, constraints=soles if constraints is None else constraints, balance=False)
+        stated = Problem(empty, start, constraints=soles, balance=False)
         self._subject = LiveProblem(stated)
         self.handles, self.held = tuple(self._subject.handles), set(self._subject.held)
         self.things = things_of(scene)
-        self.ways = GIVE_WAY[:1] if isinstance(spring, Actuated) else GIVE_WAY
+        self.ways = GIVE_WAY
         self.methods, self.chosen = {"qp": "qp"}, "qp"
         self._begin()
         self.take(self.handles[0])
@@ -85,7 +74,7 @@ class LiveWorld:
 
     def _begin(self) -> None:
         self.scene, self.taken = copy.copy(self._given), ""
-        self.world = World(self.scene, self._subject.q, spring=self._spring, give_way=self.give_way)
+        self.world = World(self.scene, self._subject.q, give_way=self.give_way)
         self._bodies = frozenset(() if self.world.engine is None else self.world.engine.bodies)
         self._state = self.scene.state(self.world.q)
         self._tracked, self._goals, self._renewed = np.array(self.world.q), dict[str, Array](), dict[str, float]()
@@ -224,7 +213,6 @@ class LiveWorld:
                 self._goals[name] = self._goals[name] + share * (self._places[name] - self._goals[name])
 
     def _track(self) -> Array:
-        """The tracked posture of this frame."""
         if not self._goals:
             return self._tracked
         if self._tracker is None:

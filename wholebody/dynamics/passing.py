@@ -27,7 +27,6 @@ class StepStart:
     """The start of a step: positions, rotations and velocities, and the pairs within margins (n,) of both bodies."""
 
     def __init__(self, state: BodiesState, near: Contacts, margin: Array, finder: ContactFinder) -> None:
-        """Keep it."""
         self.near, self.margin, self.kept = near, margin, state.copies()
         self._finder, self._active = finder, state.active
 

@@ -205,7 +205,6 @@ class ContactFinder:
     """Finds near pairs and their contact points for one run of the engine."""
 
     def __init__(self, pieces: Pieces) -> None:
-        """Build the tables of the pieces."""
         self.pieces = pieces
         self._proximity = PlacedProximity(pieces.table)
         # six points of a contact beside its witness points: a box on a box has four, two crossed planks have six;

@@ -198,7 +198,9 @@ class RigidBodies:
             state.give(number, before, after, dt)
         self._sleepers.wake_where_put(self._finder, ended)
         count = int(np.ceil(dt / STEP - 1e-9))
-        record = FrameRecord(self._stops(), np.zeros((len(self.names), 6)), work=self._pushed)
+        # early ends of steps: eight for a dozen bodies, as each costs a step of all of them
+        stops = 96 // max(12, int(state.bodies.moving.sum()))
+        record = FrameRecord(stops, np.zeros((len(self.names), 6)), work=self._pushed)
         self._pushed = 0.0
         self._find_near(dt / count)
         for number in range(count):
@@ -214,10 +216,6 @@ class RigidBodies:
         return record.finished(self.names, self.energy(), self._sleepers.count)
 
     # ---- a step
-
-    def _stops(self) -> int:
-        """Early ends of steps that a frame may have: eight for a dozen bodies, as each costs a step of all of them."""
-        return 96 // max(12, int(self.state.bodies.moving.sum()))
 
     def _step(self, time: float, record: FrameRecord) -> None:
         """Advance by at most a time: to its end, to the next impact, or to where a shorter step leads."""

@@ -61,7 +61,6 @@ class StepProgram:
     """
 
     def __init__(self, state: BodiesState, points: ContactPoints, gravity: Array, joints: Joints) -> None:
-        """Compute the rows of the points."""
         self.state, self.points, self.gravity, self.joints = state, points, gravity, joints
         pieces = state.pieces
         self._restitution, self._friction = pieces.restitution[points.pair], pieces.friction[points.pair]

@@ -27,6 +27,7 @@ from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.geometry.continuous.passing_through import INSIDE
 from wholebody.geometry.proximity import Contacts
 from wholebody.methods.newton.assembly_bodies import AssemblyBodies
+from wholebody.motion.clip import MOST_FRAMES, Clip
 from wholebody.scene.matter.body import Surface, surface
 from wholebody.scene.moving_obstacles import Collision
 from wholebody.scene.scene import Scene
@@ -35,7 +36,6 @@ from wholebody.tracking.frame import FRAME, Frame
 from wholebody.tracking.loop import FrameLoop, invalid_reason
 from wholebody.tracking.overlaps import GIVE_WAY, Overlap, overlaps
 from wholebody.tracking.scenes import InteractionScene, SceneFile
-from wholebody.tracking.tracks import MOST_FRAMES, Track
 
 Advance = tuple[Array, Frame, Mapping[str, Array], EngineFrame | None]
 """The posture that was wanted, the frame, impulses on things, and what the things did."""
@@ -161,7 +161,6 @@ class World(NotCopyable):
         }
 
     def __repr__(self) -> str:
-        """One line."""
         return f"World of {self.scene.figure.name!r} and {len(self._bodies)} bodies, {1e3 * self.dt:g} ms a frame"
 
     @property
@@ -201,7 +200,8 @@ class World(NotCopyable):
         Raises:
             InputError: objects were added to or removed from the scene, or tracked consists of no numbers.
         """
-        self._check_fresh()
+        if self.scene.revision != self._revision:
+            raise InputError("objects of the scene were added or removed; make a new world")
         began, note = time.perf_counter(), ""
         if tracked is not None:
             goal = array(tracked, "tracked", f"{self.scene.model.nq} numbers")
@@ -296,10 +296,6 @@ class World(NotCopyable):
                 deepest.setdefault(both, -float(near.distance[row]))
         return tuple(Collision(*both, depth, True) for both, depth in deepest.items())
 
-    def _check_fresh(self) -> None:
-        if self.scene.revision != self._revision:
-            raise InputError("objects of the scene were added or removed; make a new world")
-
 
 def _check_yielding(spring: Spring | Actuated | None, give_way: str) -> None:
     if isinstance(spring, Actuated) and give_way == "both":
@@ -329,5 +325,5 @@ def standing_scene(name: str, scene: Scene, q: Array, *, frames: int, dt: float 
     frames = whole(frames, "frames", 1, MOST_FRAMES)
     if not any(thing.body is not None for thing in scene.objects.values()):
         raise InputError(f"{name}: nothing moves by itself; give an object a density or a mass")
-    track = Track.of(scene.figure, np.tile(posture(q, scene.model.nq), (frames, 1)), dt, name)
+    track = Clip(scene.figure, np.tile(posture(q, scene.model.nq), (frames, 1)), dt, name)
     return InteractionScene(name, "things move around a figure that stands", scene, track)

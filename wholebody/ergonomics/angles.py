@@ -137,8 +137,6 @@ def check_person(figure: object, what: str) -> Figure:
 
 
 class _Body:
-    """Places and axes of a posture."""
-
     def __init__(self, figure: Figure, q: Array) -> None:
         model, data = figure.model, figure.model.createData()
         pin.framesForwardKinematics(model, data, q)

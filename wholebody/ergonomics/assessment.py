@@ -71,7 +71,6 @@ class Ergonomics:
         return made
 
     def __str__(self) -> str:
-        """The table, a row a line."""
         table = [("score", "left", "right", "worse"), *self.rows()]
         wide = [max(len(row[column]) for row in table) for column in range(3)]
         return "\n".join(

@@ -54,7 +54,6 @@ class Owas(Checked):
         return str(published("owas")["actions"][self.category - 1])
 
     def __str__(self) -> str:
-        """The code in words."""
         digits = {"back": self.back, "arms": self.arms, "legs": self.legs, "loads": self.load}
         words = [published("owas")[name][digit - 1] for name, digit in digits.items()]
         return f"{self.code}: back {words[0]}, arms {words[1]}, {words[2]}, {words[3]}"

@@ -61,7 +61,6 @@ class Work(Checked):
     back_supported: bool | None = None
 
     def __post_init__(self) -> None:
-        """Check the values."""
         super().__post_init__()
         if self.seated and self.walking:
             raise InputError("Work: a person who walks is not seated; leave one of them out")

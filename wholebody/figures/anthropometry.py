@@ -128,8 +128,7 @@ class Person:
 
     def segment_mass(self, segment: str) -> float:
         """Mass of a segment, kilograms; all of them add up to the mass of the body."""
-        total = sum(float(row[f"mass_{self.column}"]) for row in table("segments"))
-        return self.segment(segment, "mass") / total * self.mass
+        return self.segment(segment, "mass") / _whole(self.column) * self.mass
 
     def source_length(self, segment: str) -> float:
         """Length [m] of a segment between de Leva's landmarks; these differ most for the thighs of women."""
@@ -156,6 +155,12 @@ class Person:
     def radius(self, part: str) -> float:
         """Radius of a part with a circumference, metres."""
         return self.size(f"{part}_circumference") / (2.0 * math.pi)
+
+
+@lru_cache(maxsize=2)
+def _whole(column: str) -> float:
+    """Sum of the shares of the mass that all segments have."""
+    return sum(float(row[f"mass_{column}"]) for row in table("segments"))
 
 
 def dimension_names() -> tuple[str, ...]:

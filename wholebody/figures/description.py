@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
 from types import MappingProxyType
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -153,8 +153,18 @@ def copied(figure: Articulated, q: Array) -> Array:
     return np.array(q)
 
 
+class PieceName(NamedTuple):
+    """What of a piece decides which others it is tested against."""
+
+    name: str
+    segment: str
+
+
+Named = TypeVar("Named", Solid, PieceName)
+
+
 def chosen_pairs(
-    solids: Sequence[Solid], reason: Callable[[Solid, Solid], str | None]
+    solids: Sequence[Named], reason: Callable[[Named, Named], str | None]
 ) -> tuple[tuple[tuple[str, str], ...], tuple[ExcludedPair, ...]]:
     """The pairs of pieces that are tested, by name, and those that are not, for which there is a reason."""
     told = [(a.name, b.name, reason(a, b)) for a, b in combinations(solids, 2)]

@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, cross
 from wholebody.base.errors import InputError
 from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
 
@@ -56,7 +56,7 @@ def hull_piece(points: ArrayLike, what: str = "hull", vertices: tuple[int, int] 
     number = np.full(len(hull.points), -1)
     number[used] = np.arange(len(used))
     faces = number[hull.simplices]
-    normals = np.cross(corners[faces[:, 1]] - corners[faces[:, 0]], corners[faces[:, 2]] - corners[faces[:, 0]])
+    normals = cross(corners[faces[:, 1]] - corners[faces[:, 0]], corners[faces[:, 2]] - corners[faces[:, 0]])
     inward = np.einsum("ij,ij->i", normals, hull.equations[:, :3]) < 0
     faces[inward] = faces[inward][:, [0, 2, 1]]
     return Piece(coal_convex(corners, faces), pin.SE3(np.eye(3), centre), float(hull.volume))

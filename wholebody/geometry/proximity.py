@@ -114,7 +114,9 @@ class PairTable:
     def __init__(self, model: pin.Model, geometry: pin.GeometryModel, pairs: Indices | None = None) -> None:
         """Read the pieces, and the pairs where they are not given; an InputError for what is no convex piece."""
         self.model, self.geometry = model, geometry
-        self.swept = [swept_points(piece.geometry) for piece in geometry.geometryObjects]
+        shapes = [piece.geometry for piece in geometry.geometryObjects]  # things of one size share them
+        swept = {id(shape): swept_points(shape) for shape in {id(shape): shape for shape in shapes}.values()}
+        self.swept = [swept[id(shape)] for shape in shapes]
         self.pairs: Indices = pairs_of(geometry) if pairs is None else pairs
         self.joint: Indices = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
         self.reach = np.array([swept.reach for swept in self.swept]).reshape(-1)

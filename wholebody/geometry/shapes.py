@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from itertools import pairwise
 from os import PathLike
 from typing import Annotated, Literal, Protocol, TypeAlias, runtime_checkable
 
@@ -24,12 +23,7 @@ from wholebody.geometry.mesh_cache import ConvexPieces
 from wholebody.geometry.meshes import GLTF, Y_UP, read_mesh
 from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
 from wholebody.geometry.placement import unit_vector
-
-SIDES = 64
-"""Sides of the prism that stands for a cylinder: 64 are 0.12 % of the radius too far out; fewer are coarser."""
-
-SECTORS, TUBE_SIDES = 24, 12
-"""Pieces of a ring, and sides of its tube: 24 and 12 are 1 % of the radius and 4 % of the tube too far out."""
+from wholebody.geometry.polygonal import SIDES, cylinder_pieces, torus_pieces
 
 LENGTH = Range(SMALLEST, LARGEST, "m")
 Length: TypeAlias = Annotated[float, LENGTH]
@@ -159,9 +153,7 @@ class Cylinder(Shape):
 
     def pieces(self) -> tuple[Piece, ...]:
         """One coal Convex."""
-        ring = around(self.radius, SIDES)
-        ends = [np.column_stack([ring, np.full(SIDES, z)]) for z in (-0.5 * self.length, 0.5 * self.length)]
-        return (hull_piece(np.vstack(ends), "Cylinder"),)
+        return cylinder_pieces(self.radius, self.length)
 
     @property
     def added_volume(self) -> float:
@@ -197,25 +189,13 @@ class Torus(Shape):
 
     def pieces(self) -> tuple[Piece, ...]:
         """One coal Convex a sector: the hull of the tube's circles at both of its ends."""
-        across = around(self.tube, TUBE_SIDES)
-        outwards = 1.0 / math.cos(math.pi / SECTORS)
-        circles = []
-        for angle in np.linspace(0.0, 2.0 * math.pi, SECTORS + 1):
-            reach = (self.radius + across[:, 0]) * outwards
-            circles.append(np.column_stack([reach * math.cos(angle), reach * math.sin(angle), across[:, 1]]))
-        return tuple(hull_piece(np.vstack(pair), "Torus") for pair in pairwise(circles))
+        return torus_pieces(self.radius, self.tube)
 
     @property
     def added_volume(self) -> float:
         """What the pieces add to the ring, of the volume 2 pi^2 R r^2."""
         exact = 2.0 * math.pi**2 * self.radius * self.tube**2
         return sum(piece.volume for piece in self.pieces()) / exact - 1.0
-
-
-def around(radius: float, sides: int) -> Array:
-    """Corners (sides, 2) of the regular polygon around a circle."""
-    angles = 2.0 * math.pi * np.arange(sides) / sides
-    return np.column_stack([np.cos(angles), np.sin(angles)]) * (radius / math.cos(math.pi / sides))
 
 
 @dataclass(frozen=True)

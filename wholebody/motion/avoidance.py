@@ -21,13 +21,12 @@ from wholebody.base.checks import a, flag, function, instance, listed, shown, wa
 from wholebody.base.errors import InputError, UndefinedTermError, UnknownNameError
 from wholebody.methods.control import ctrl_c_ends_all
 from wholebody.motion.avoider import Avoider, MethodResult, Progress, Run, Watch, has_setting
-from wholebody.motion.checking import ClipCheck, check, same_joints
-from wholebody.motion.clip import Clip
+from wholebody.motion.checking import ClipCheck, check
+from wholebody.motion.clip import Clip, same_joints
 from wholebody.motion.clip_torques import torques
 from wholebody.motion.faults import DEPTH
-from wholebody.motion.foreseen import foreseen
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
-from wholebody.motion.judging import COLLISION, HELD, ROUNDING, AvoidanceReport, Avoided, judged
+from wholebody.motion.judging import COLLISION, HELD, ROUNDING, AvoidanceReport, Avoided, foreseen, judged
 from wholebody.motion.load_change import load_change
 from wholebody.motion.measures import MotionBounds, resolved
 from wholebody.motion.stance import StanceFeet, has_feet, usual_feet
@@ -200,7 +199,6 @@ def freed(method: Avoider, run: Run) -> MethodResult:
 
 
 def _bounds(given: tuple[Given, ...], was: ClipCheck, terms: FrameTerms, keep_ends: bool) -> MotionBounds:
-    """The bounds on jerk, speed and deviation, resolved for a clip."""
     stated = [term for term in given if isinstance(term, MotionBounds)]
     if len(stated) > 1:
         raise InputError("avoid: constraints has two wb.motion.MotionBounds; give one")

@@ -7,7 +7,7 @@ judges the answer. So a method has no judge, repair or report of its own.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
@@ -46,7 +46,6 @@ class Watch:
     """Tells the caller how far a method is, and remembers in `ended` whether the caller ended it."""
 
     def __init__(self, progress: Progress | None) -> None:
-        """Take what is called, or None."""
         self._progress, self.ended = progress, False
 
     def tell(self, share: float, note: str) -> bool:
@@ -133,26 +132,17 @@ class Follower:
         return solution.q
 
 
+@dataclass(eq=False)
 class Run:
-    """One clip while it is freed.
+    """One clip while it is freed."""
 
-    Attributes:
-        clip: the original.
-        terms: original postures, what holds in each of them, figure and things.
-        workspace: of this run alone.
-        clearance: least distance of every pair, metres.
-        watch: is told how far it is.
-        feet: segments or frames on which the figure stands.
-        work: counts programs and postures.
-    """
-
-    def __init__(
-        self, clip: Clip, terms: FrameTerms, workspace: Workspace, clearance: float, watch: Watch,
-        feet: tuple[str, ...] = (), work: Work | None = None,
-    ) -> None:  # fmt: skip
-        """Take what is needed; nothing is computed yet."""
-        self.clip, self.terms, self.workspace, self.clearance = clip, terms, workspace, clearance
-        self.watch, self.feet, self.work = watch, feet, Work() if work is None else work
+    clip: Clip  # the original
+    terms: FrameTerms  # original postures, what holds in each of them, figure and things
+    workspace: Workspace  # of this run alone
+    clearance: float  # least distance of every pair, metres
+    watch: Watch  # is told how far it is
+    feet: tuple[str, ...] = ()  # segments or frames on which the figure stands
+    work: Work = field(default_factory=Work)  # counts programs and postures
 
     @property
     def scene(self) -> Scene:
@@ -171,7 +161,7 @@ class Run:
 
     def of(self, terms: FrameTerms) -> Run:
         """The same run of other postures, or with something else held."""
-        return Run(self.clip, terms, self.workspace, self.clearance, self.watch, self.feet, self.work)
+        return replace(self, terms=terms)
 
     def frames(self, seconds: float, least: int) -> int:
         """How many frames a time has, at least so many."""

@@ -20,13 +20,12 @@ from wholebody.figures.figure import Figure
 from wholebody.motion.avoidance import as_avoider, avoid
 from wholebody.motion.avoider import Avoider
 from wholebody.motion.batch_table import AvoidedCase, BatchTable, first_twice
-from wholebody.motion.clip import Clip
+from wholebody.motion.clip import Clip, check_figure
 from wholebody.motion.frame_terms import Given, frame_terms
 from wholebody.motion.judging import Avoided
 from wholebody.motion.measures import deviation, foot_sliding, jerk_ratio
 from wholebody.motion.reading import read_clip
 from wholebody.motion.worn_equipment import NOTHING, Worn, dressed, label
-from wholebody.tracking.tracks import check_figure
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -293,7 +292,6 @@ def _read(path: str, figure: Figure) -> tuple[Array, float] | str:
 
 
 def _sources(given: Sequence[Any], figure: Figure | None, what: str) -> dict[str, Clip | Path]:
-    """The clips and files by name."""
     found: list[tuple[str, Clip | Path]] = []
     sources = [one if isinstance(one, Clip) else checks.path(one, f"{what}: a clip") for one in given]
     stems = Counter(one.stem for one in sources if isinstance(one, Path))

@@ -86,7 +86,6 @@ class BatchTable:
     """The folder of a batch. Each file is written whole; a clip is there before its row is."""
 
     def __init__(self, folder: Path) -> None:
-        """Open the folder, or make it."""
         self.folder = folder
         self._cases: dict[str, AvoidedCase] = {}
         self._originals: dict[str, str] = {}

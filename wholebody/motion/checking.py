@@ -13,12 +13,10 @@ from wholebody.assessment.motion import root_mean_square, third_differences, vel
 from wholebody.base.arrays import Array
 from wholebody.base.charts import Shown, new_chart, plain
 from wholebody.base.checks import function, instance, known, number
-from wholebody.base.errors import InputError
-from wholebody.figures.figure import Figure
 from wholebody.figures.state import root_freedoms
 from wholebody.geometry.continuous.swept_depth import SweptDepth
 from wholebody.geometry.proximity import PairTable
-from wholebody.motion.clip import Clip
+from wholebody.motion.clip import Clip, same_joints
 from wholebody.motion.clip_contacts import Contact, ContactTable, contact_as_dict
 from wholebody.motion.stance import Sliding, sliding
 from wholebody.scene.moving_obstacles import MovingScene
@@ -159,7 +157,6 @@ class ClipCheck(Shown):
         return chart
 
     def __repr__(self) -> str:
-        """One line."""
         return f"ClipCheck({str(self).splitlines()[0]!r})"
 
     def as_dict(self) -> dict[str, Any]:
@@ -267,15 +264,6 @@ def joint_jerk(clip: Clip) -> Array:
     """(n - 3, k) third difference of the k joint coordinates over time, without a free root; rad/s^3, m/s^3."""
     found = third_differences(clip.figure.model, clip.q, clip.dt)
     return found[:, ~root_freedoms(clip.figure.model)]
-
-
-def same_joints(clip: Clip, figure: Figure, what: str) -> None:
-    """Raise `InputError` if a figure does not take the postures of a clip."""
-    if figure.joints != clip.names or figure.model.nq != clip.q.shape[1]:
-        raise InputError(
-            f"{what}: the scene is of {figure.name}, which has other joints than {clip.figure.name} of {clip.name}; "
-            "make the scene with clip.figure"
-        )
 
 
 def beyond_limits(clip: Clip) -> tuple[Beyond, ...]:

@@ -21,8 +21,10 @@ from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.motion.mirroring import mirrored
 from wholebody.motion.thing_tracks import MIRROR as THING_MIRROR
 from wholebody.motion.thing_tracks import between, thing_tracks
-from wholebody.tracking.tracks import MOST_FRAMES, Track, check_figure, check_frames
 
+ROOT_SIZE = 7  # values of a free root
+LARGEST = 1e6  # of a value, radians or metres
+MOST_FRAMES = 1_000_000  # of a clip: ten hours at 30 frames a second; more would be gigabytes
 DRAWN = 8  # joints of `Clip.plot`
 ROUNDING = 1e-9
 """Share of a time step by which a time may be outside of a clip: the rounding of sums of steps."""
@@ -58,7 +60,6 @@ class Clip(Shown):
     things: Mapping[str, Array] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
-        """Check the values."""
         text(self.name, "the name of a clip")
         check_figure(self.figure, self.name)
         object.__setattr__(self, "dt", time_step(self.dt, f"{self.name}: dt"))
@@ -69,7 +70,13 @@ class Clip(Shown):
                 f"{self.name}: q has shape {q.shape}; give 1 to {MOST_FRAMES} frames of the {wanted} values of "
                 f"{self.figure.name}"
             )
-        check_frames(q, self.name, lambda column: column_name(self.figure, column))
+        if not (q.min(initial=0.0) >= -LARGEST and q.max(initial=0.0) <= LARGEST):  # NaN too, and without copies of q
+            bad = np.argwhere(~(np.abs(q) <= LARGEST))
+            frame, column = (int(k) for k in bad[0])
+            raise InputError(
+                f"{self.name}: frame {frame}, {column_name(self.figure, column)} is {q[frame, column]:g}; {len(bad)} "
+                f"values are not finite or beyond {LARGEST:g}; correct or cut those frames"
+            )
         self._normalise(q)
         self.figure.warn_of_angles(q, self.name)
         q.setflags(write=False)
@@ -78,7 +85,6 @@ class Clip(Shown):
         object.__setattr__(self, "things", thing_tracks(things, len(q), self.name) if things else {})
 
     def __repr__(self) -> str:
-        """One line."""
         return f"Clip({self.name!r} of {self.figure.name!r}: {len(self)} frames, one each {self.dt:g} s)"
 
     def _normalise(self, q: Array) -> None:
@@ -103,7 +109,6 @@ class Clip(Shown):
         return self.figure.joints
 
     def __len__(self) -> int:
-        """Return the number of frames."""
         return len(self.q)
 
     @property
@@ -266,12 +271,6 @@ class Clip(Shown):
             backward[k + 1] = pin.difference(model, self.q[k + 1], self.q[k])
         return forward, backward
 
-    @classmethod
-    def from_track(cls, track: Track, figure: Figure) -> Clip:
-        """The clip of a tracker's postures; the figure's joints in its order, or `InputError` or `UnknownNameError`."""
-        instance(track, Track, "Clip.from_track: track", "make one with Track.of(figure, q, dt)").check(figure)
-        return cls(figure, track.q, track.dt, track.name)
-
     def plot(self, joints: Sequence[str] | None = None) -> Any:
         """Draw values of joints over time, a matplotlib figure.
 
@@ -322,6 +321,20 @@ class Clip(Shown):
         from wholebody.motion.files import write_motion
 
         return write_motion(self, path, bare=bare)
+
+
+def same_joints(clip: Clip, figure: Figure, what: str) -> None:
+    """Raise `InputError` if a figure does not take the postures of a clip."""
+    if figure.joints != clip.names or figure.model.nq != clip.q.shape[1]:
+        raise InputError(
+            f"{what}: the scene is of {figure.name}, which has other joints than {clip.figure.name} of {clip.name}; "
+            "make the scene with clip.figure"
+        )
+
+
+def check_figure(figure: object, what: str) -> Figure:
+    """A figure; raises InputError where it is something else."""
+    return instance(figure, Figure, f"{what}: figure", "load one with wb.load('human')")
 
 
 def column_name(figure: Figure, column: int) -> str:

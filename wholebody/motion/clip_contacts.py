@@ -55,7 +55,6 @@ class ContactTable:
     """Depths of all pairs of owners, filled frame by frame."""
 
     def __init__(self, scene: Scene, frames: int) -> None:
-        """Number the pairs of owners of a scene."""
         owners, numbers = scene.piece_owner, dict[tuple[str, str], int]()
         pairs = scene.pair_table.pairs
         named = [(owners[a], owners[b]) for a, b in pairs.tolist()]

@@ -17,6 +17,7 @@ from wholebody.motion.clip import Clip
 from wholebody.motion.inverse_dynamics import ROOT, InverseDynamics, foot_wrenches
 from wholebody.motion.stance import FEET, standing_feet
 from wholebody.motion.strength import Strength, torque_limits
+from wholebody.motion.thing_tracks import steady
 
 CUTOFF = 6.0
 """Hz: noise of recordings lies above, most of walking below (D. A. Winter, "Biomechanics and motor control of human
@@ -180,8 +181,8 @@ def clip_torques(
     clip: Clip, stands: Mapping[str, Mask], strength: Strength, friction: float, cutoff: float | None
 ) -> Torques:
     """Torques of a clip that stands on given feet in given frames (foot -> (n,)); see `torques`."""
-    figure, steady = clip.figure, smoothed(clip, cutoff)
-    v, a = steady.velocities(), steady.accelerations()
+    figure, calm = clip.figure, smoothed(clip, cutoff)
+    v, a = calm.velocities(), calm.accelerations()
     dynamics = InverseDynamics(figure, tuple(stands), friction)
     count, nv = len(clip), figure.model.nv
     torque, missing = np.zeros((count, nv)), np.zeros((count, ROOT))
@@ -189,8 +190,8 @@ def clip_torques(
     both, outside = np.zeros((count, 3)), np.zeros(count)
     marks: Mask = np.array(list(stands.values()), dtype=bool).reshape(len(stands), count).T
     for k in range(count):
-        stand = dynamics.stand(steady.q[k], marks[k].tolist())
-        loads = dynamics.loads(steady.q[k], v[k], a[k], stand)
+        stand = dynamics.stand(calm.q[k], marks[k].tolist())
+        loads = dynamics.loads(calm.q[k], v[k], a[k], stand)
         torque[k] = loads.torque
         if not dynamics.free:
             continue
@@ -222,20 +223,12 @@ def smoothed(clip: Clip, cutoff: float | None = CUTOFF) -> Clip:
     reach = min(len(clip) - 1, int(np.ceil(3.0 * rate / cutoff)))
     if reach < 1:
         return clip
-    q = _continuous(clip)
-    steady = sosfiltfilt(sections, q, axis=0, padtype="odd", padlen=reach)
-    return clip.with_q(np.array([pin.normalize(clip.figure.model, posture) for posture in steady]))
-
-
-def _continuous(clip: Clip) -> Array:
-    """Postures whose quaternions do not change sign from frame to frame."""
     q: Array = clip.q.copy()
     for joint in clip.figure.model.joints:
         if joint.nq in (4, 7) and joint.nv in (3, 6):
-            part = q[:, joint.idx_q + joint.nq - 4 : joint.idx_q + joint.nq]
-            turns = np.sign(np.einsum("ij,ij->i", part[1:], part[:-1]))
-            part[1:] *= np.cumprod(np.where(turns < 0.0, -1.0, 1.0))[:, None]
-    return q
+            steady(q[:, joint.idx_q + joint.nq - 4 : joint.idx_q + joint.nq])
+    filtered = sosfiltfilt(sections, q, axis=0, padtype="odd", padlen=reach)
+    return clip.with_q(np.array([pin.normalize(clip.figure.model, posture) for posture in filtered]))
 
 
 def _pressure(forces: Array, points: Array) -> Array:

@@ -15,7 +15,6 @@ from wholebody.motion.frame_terms import FrameTerms
 from wholebody.scene.workspace import Workspace
 
 DIP = 8e-5  # m: a deeper overlap between two frames is a dip; `wb.check` allows 0.1 mm and may add 0.01 mm
-FEW = tuple(float(k) / 6.0 for k in range(1, 6))  # shares of a gap at which it is looked at
 DEPTH = 5e-5  # m: of an overlap that is to go; half of what counts as a collision
 
 
@@ -55,18 +54,6 @@ def dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, list[
     return {gap: _deepest(workspace, q[gap], q[gap + 1], numbers[:6]) for gap, numbers in found.items()}
 
 
-def sampled_dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> list[tuple[int, float]]:
-    """Places between frames that overlap, or nearly so, if some of them dip; a few of each gap are looked at."""
-    near, dipping = [], False
-    for gap in gaps:
-        depths = _depths(workspace, q[gap], q[gap + 1], FEW, 2e-4)
-        place = int(np.argmax(depths))
-        dipping |= depths[place] > 0.5 * DIP  # the deepest place may be elsewhere
-        if depths[place] > -2e-4:
-            near.append((gap, FEW[place]))
-    return near if dipping else []
-
-
 def _deepest(workspace: Workspace, before: Array, after: Array, numbers: Sequence[int]) -> list[float]:
     """Shares of the way between two postures (nq,) at which pairs are nearest, by their numbers."""
     # A corner dips in a hundredth of a gap: between the nearest of many places golden sections look.
@@ -100,14 +87,6 @@ def _deepest(workspace: Workspace, before: Array, after: Array, numbers: Sequenc
         if all(abs(deepest - other) > 0.01 for other in told):
             told.append(deepest)
     return told
-
-
-def _depths(
-    workspace: Workspace, before: Array, after: Array, shares: Sequence[float], within: float = 0.0
-) -> list[float]:
-    """Depth of the deepest overlap at shares of the way between two postures (nq,), metres; at least minus `within`."""
-    between = (np.asarray(pin.interpolate(workspace.model, before, after, share)) for share in shares)
-    return [-float(workspace.near(q, within).distance.min(initial=within)) for q in between]
 
 
 def depth(workspace: Workspace, q: Array, clearance: float = 0.0) -> float:

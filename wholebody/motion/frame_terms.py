@@ -69,7 +69,6 @@ class FrameTerms:
     _state: State = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Make the room in which feet are looked at."""
         object.__setattr__(self, "_state", State(self.scene.model))
 
     def held(self, frame: int) -> tuple[HeldTerm, ...]:
@@ -153,7 +152,8 @@ class FrameTerms:
 
     def step_bounds(self, frame: int) -> tuple[Array, Array]:
         """Least and greatest motion (nv,) from a frame to the next one that speed limits allow; see `bounds`."""
-        fastest, bounds = speed_limits(self.scene, self.dt), self.bounds(frame)
+        limit, bounds = np.array(self.scene.model.velocityLimit, dtype=float).reshape(-1), self.bounds(frame)
+        fastest = np.where(limit > 0.0, np.minimum(limit, 1e9) * self.dt, np.inf)
         return np.maximum(bounds.slowest, -fastest), np.minimum(bounds.fastest, fastest)
 
     def at(self, times: Array) -> FrameTerms:
@@ -214,7 +214,9 @@ def frame_terms(scene: Scene, q: Array, dt: float, constraints: Iterable[Given],
         elif isinstance(term, MotionBounds):
             largest = term.largest
         elif isinstance(term, (Constraint, Goal)):
-            _try(term, scene, q[0], f"avoid: constraints[{number}]")
+            resolved = term.resolve(scene, q[0])
+            ask = resolved.error if isinstance(resolved, Goal) else resolved.value
+            check_rows(f"avoid: constraints[{number}]", resolved, ask, State(scene.model).update(q[0]))
         elif isinstance(term, Bound):
             term.resolve(scene, q[0])
         else:
@@ -231,12 +233,6 @@ def frame_terms(scene: Scene, q: Array, dt: float, constraints: Iterable[Given],
     }
     grips = {number: shift for number, shift in found.items() if shift.any()}
     return FrameTerms(scene, q, dt, plain, stands, shifts(scene.figure, q, stands), grips, largest)
-
-
-def _try(term: HeldTerm, scene: Scene, q: Array, where: str) -> None:
-    state = State(scene.model).update(q)
-    resolved = term.resolve(scene, q)
-    check_rows(where, resolved, resolved.error if isinstance(resolved, Goal) else resolved.value, state)
 
 
 def _miss(term: HeldTerm, state: State) -> float:
@@ -259,9 +255,3 @@ def between(model: pin.Model, q: Array, places: Array) -> Array:
     shares = np.clip(places - first, 0.0, 1.0)
     after = np.minimum(first + 1, len(q) - 1)
     return np.array([pin.interpolate(model, q[k], q[m], s) for k, m, s in zip(first, after, shares, strict=True)])
-
-
-def speed_limits(scene: Scene, dt: float) -> Array:
-    """(nv,) largest change of each degree of freedom in one frame; infinite for what has no limit."""
-    limit = np.array(scene.model.velocityLimit, dtype=float).reshape(-1)
-    return np.where(limit > 0.0, np.minimum(limit, 1e9) * dt, np.inf)

@@ -148,11 +148,6 @@ class Touched:
         return contact.place + (thickness(pieces, point.place, into) + CLEARANCE) * contact.normal
 
 
-def _meet(rest: Foothold, contact: ThingContact) -> bool:
-    """Whether a part touches a thing while it seems to rest on the ground: then the thing is what it rests on."""
-    return rest.role == contact.role and rest.first < contact.end and contact.first < rest.end
-
-
 class Holds:
     """Where each of `points` is to be in each frame, and with which weight."""
 
@@ -171,7 +166,12 @@ class Holds:
         self.points, self._scale, self._surface, self._touched = points, scale, surface, touched
         self.over, self.ahead = max(1, round(OVER / dt)), max(1, round(AHEAD / dt))
         contacts = () if touched is None else touched.contacts
-        apart = [each for each in ground.footholds if not any(_meet(each, contact) for contact in contacts)]
+        # a part that touches a thing while it seems to rest on the ground rests on the thing
+        apart = [
+            rest
+            for rest in ground.footholds
+            if not any(one.role == rest.role and rest.first < one.end and one.first < rest.end for one in contacts)
+        ]
         self._stands: list[list[Foothold | ThingContact]] = [
             [each for each in (contacts if point.thing else apart) if each.role == point.role] for point in points
         ]

@@ -153,7 +153,6 @@ class InverseDynamics:
     """
 
     def __init__(self, figure: Figure, feet: Sequence[str], friction: float) -> None:
-        """Take a figure, and the coefficient of friction of the ground."""
         one_figure(figure, "dynamics: the figure")
         self._model, self._data, self._friction = figure.model, figure.model.createData(), friction
         self.feet = tuple(feet)

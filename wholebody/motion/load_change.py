@@ -135,7 +135,6 @@ class LoadChange:
         return chart
 
     def _torque_missed(self, joint: int) -> str:
-        """The sentence on a torque that is beyond its bound."""
         old, (lower, upper), now = self.before, self.bounds, self.after.torque[:, joint]
         high = now.max() / upper[joint] >= now.min() / lower[joint]
         sign, bound, strength = (1.0, upper, old.upper) if high else (-1.0, -lower, -old.lower)
@@ -159,7 +158,6 @@ class LoadChange:
         return f"it is {now:.3g} mm outside of the support of {feet} there, and was {before} before"
 
     def __str__(self) -> str:
-        """One sentence."""
         was, now = self.before, self.after
         return (
             f"most torque {was.largest_share:.0%} of a strength before, {now.largest_share:.0%} after; zero moment "

@@ -152,7 +152,6 @@ class MotionBounds(Checked):
     largest: Array | None = field(init=False, default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Check the values."""
         super().__post_init__()
         checks.warn_of_degrees(self.deviation or 0.0, "MotionBounds: deviation")
 

@@ -58,7 +58,6 @@ class Fitter:
     """Fits postures of a figure in its own workspace, so each thread needs its own."""
 
     def __init__(self, figure: Figure, layout: Layout, workspace: Workspace) -> None:
-        """Choose what goals are of."""
         self.figure, self.model, self.layout, self._workspace = figure, figure.model, layout, workspace
         self._state = workspace.state
         self._point_joints, self._point_parts = self._carried(layout.points)
@@ -100,7 +99,8 @@ class Fitter:
     def outside(self, q: Array) -> bool:
         """Whether a posture (nq,) has a limb outside of its reach cone."""
         self._state.update(q)
-        return bool((self._angles() < -CONE_SLACK).any())
+        cones = zip(self._cones, self._directions(), strict=True) if self._cones else ()
+        return any(cone.cone.signed_angle(along)[0] < -CONE_SLACK for cone, along in cones)
 
     def overlaps(self, q: Array) -> bool:
         """Whether a pair overlaps at a posture (nq,) by more than the clearance that rows ask for."""
@@ -208,13 +208,6 @@ class Fitter:
         worlds = np.einsum("cki,ck->ci", joints[self._limb_joints][:, :3], self._axes)
         found: Array = np.einsum("cki,ci->ck", joints[self._base_joints][:, :3], worlds)
         return np.asarray(np.einsum("ckj,ck->cj", self._base_turns, found))
-
-    def _angles(self) -> Array:
-        """(c,) angle of each limb to the edge of its cone, radians, positive inside."""
-        if not self._cones:
-            return np.zeros(0)
-        directions = self._directions()
-        return np.array([cone.cone.signed_angle(along)[0] for cone, along in zip(self._cones, directions, strict=True)])
 
     def _cone_rows(self) -> tuple[Array, Array]:
         """Angles (k,) of the limbs that are near to the edges of their cones, and their rows (k, nv)."""

@@ -12,13 +12,12 @@ from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, InputError, one_line
 from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
-from wholebody.motion.clip import Clip
+from wholebody.motion.clip import Clip, check_figure
 from wholebody.motion.files import FBX, SKELETONS, bvh, columns, gltf_reading, read_frames
 from wholebody.motion.files.base import Frames
 from wholebody.motion.retargeting import retarget
 from wholebody.motion.roles import column_names
 from wholebody.motion.skeleton import UNITS, UP, SkeletonMotion
-from wholebody.tracking.tracks import check_figure
 
 
 def read_skeleton(path: str | os.PathLike[str], *, unit: str | None = None, up: str | None = None) -> SkeletonMotion:
@@ -109,7 +108,6 @@ def read_clip(
 
 
 def _say(motion: SkeletonMotion, path: Path) -> None:
-    """Log what was recognised in a file."""
     for note in motion.notes:
         logging.getLogger(__name__).info("%s: %s", one_line(path.name), note)
 

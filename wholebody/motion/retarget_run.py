@@ -88,7 +88,10 @@ class Run:
             self.stay[:6] = 1.0  # nothing says where the figure is, so it stays
         limit = np.array(self.model.velocityLimit, dtype=float)
         self.most = np.where(limit > 0.0, np.minimum(limit, 1e9) * dt, np.inf)
-        self.slow, self.slow_most = _limited(self.model, SPARE * self.most)
+        # where a posture has the joints of one value that have a speed limit, and by how much they move in a frame
+        joints = [one for one in self.model.joints[1:] if one.nq == one.nv == 1 and np.isfinite(self.most[one.idx_v])]
+        self.slow: Indices = np.array([one.idx_q for one in joints], dtype=np.intp)
+        self.slow_most = np.array([SPARE * self.most[one.idx_v] for one in joints])
         self.levers = levers(figure)
         self.none = (np.zeros((len(self.fitter.layout.held), 3)),) * 2
         self.calm, self.spread = (normal(time, dt) for time in (CALM, SPREAD))
@@ -240,7 +243,6 @@ class Run:
         return np.asarray(near @ np.array([values[k + j] for j in away.tolist()]))
 
     def _alone(self, k: int) -> None:
-        """The posture within reach cones."""
         q = self._free[k]
         goals = self._goals(k, q, self.levers)
         for _ in range(8):
@@ -272,7 +274,6 @@ class Run:
         self._latest = self._first[k], self._first[k] - deviation if k else change
 
     def _spread(self, k: int) -> None:
-        """The posture from which the sweeps begin."""
         self._deviation[k] = self._mean(self._first, k, self.spread)
         self._found[k] = self.figure.clamp(pin.integrate(self.model, self._free[k], self._deviation[k]))
 
@@ -289,7 +290,6 @@ class Run:
         return q
 
     def _swept(self, k: int) -> None:
-        """The posture between its neighbours."""
         assert self.holds is not None
         last = self._came - 1
         near = [self._deviation[min(max(j, 0), last)] for j in range(k - 2, k + 3)]
@@ -324,7 +324,6 @@ class Run:
 
 
 def _layout(points: list[str], turns: list[str], roles: Roles, figure: Figure, held: list[HeldPoint]) -> Layout:
-    """What the goals of a figure are of."""
     place = {role: np.eye(len(points))[k] for k, role in enumerate(points)}
     for part in ("hip", "shoulder"):
         if {f"left_{part}", f"right_{part}"} <= place.keys():
@@ -350,13 +349,6 @@ def _layout(points: list[str], turns: list[str], roles: Roles, figure: Figure, h
         np.array(weights), np.array([TURNS[role.split("_")[-1]] for role in turns]),
         [(point.joint, point.place) for point in held],
     )  # fmt: skip
-
-
-def _limited(model: pin.Model, most: Array) -> tuple[Indices, Array]:
-    """Where a posture has the joints of one value that have a speed limit, and by how much they move in a frame."""
-    joints = [joint for joint in model.joints[1:] if joint.nq == joint.nv and joint.nq == 1]
-    kept = [(joint.idx_q, most[joint.idx_v]) for joint in joints if np.isfinite(most[joint.idx_v])]
-    return np.array([place for place, _ in kept], dtype=np.intp), np.array([speed for _, speed in kept])
 
 
 def normal(time: float, dt: float) -> Array:

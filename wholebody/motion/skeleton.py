@@ -10,7 +10,7 @@ from wholebody.base.arrays import Array, Indices, brief
 from wholebody.base.checks import array as checked_array
 from wholebody.base.checks import instance, listed, settle, text, time_step, whole
 from wholebody.base.errors import InputError
-from wholebody.tracking.tracks import LARGEST
+from wholebody.motion.clip import LARGEST
 
 UNITS = {
     "metres": 1.0,
@@ -58,7 +58,6 @@ class SkeletonMotion:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check the values."""
         text(self.name, "the name of a motion")
         object.__setattr__(self, "notes", tuple(listed(self.notes, f"{self.name}: notes", "[]")))
         names = tuple(listed(self.names, f"{self.name}: names", "['hips', 'spine']"))
@@ -85,7 +84,6 @@ class SkeletonMotion:
             raise InputError(f"{self.name}: rotations are no rotations; give orthonormal matrices")
 
     def __len__(self) -> int:
-        """Return the number of frames."""
         return len(self.positions)
 
     def rest(self) -> Array:

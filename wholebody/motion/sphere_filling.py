@@ -37,7 +37,6 @@ class Spheres(Shape):
     radii: Array
 
     def __post_init__(self) -> None:
-        """Check the values."""
         centers = array(self.centers, "Spheres centers", "an array of shape (n, 3)").copy()
         radii = array(self.radii, "Spheres radii", "an array of shape (n,)").copy()
         if radii.ndim != 1 or not len(radii) or centers.shape != (len(radii), 3) or not np.isfinite(centers).all():
@@ -82,7 +81,6 @@ class SphereFilling:
     protrusion: float
 
     def __str__(self) -> str:
-        """Return one line."""
         what = "the convex envelope" if self.envelope else "the solid"
         count = len(self.shape.radii)
         return (
@@ -151,8 +149,6 @@ def triangles_of(shape: Shape) -> tuple[Array, Faces]:
 
 
 class _Grid:
-    """Cells of a grid inside of a surface and around it."""
-
     def __init__(self, vertices: Array, faces: Faces, count: int) -> None:
         corners = vertices[faces]
         volume = abs(float(np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum()) / 6.0)

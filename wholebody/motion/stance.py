@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
-from typing import Any
+from typing import Annotated, Any
 
 import coal
 import numpy as np
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.errors import InputError
+from wholebody.base.fields import Checked, Names, Range
 from wholebody.figures.figure import Figure
 from wholebody.geometry.pieces import swept_points
 from wholebody.motion.clip import Clip
@@ -48,7 +49,7 @@ def has_feet(figure: Figure) -> bool:
 
 
 @dataclass(frozen=True)
-class StanceFeet:
+class StanceFeet(Checked):
     """Hold every foot that stands where it was: a constraint for `wb.avoid`.
 
     A frame stands where it is slow, and low above what is below it: the floor, a step, uneven ground. Of a foot of
@@ -69,17 +70,10 @@ class StanceFeet:
         >>> freed = wb.avoid(clip, scene, constraints=[wb.motion.StanceFeet(speed=0.2)])
     """
 
-    feet: Sequence[str] | None = None
-    speed: float = 0.15
-    height: float = 0.05
-    least: float = 0.1
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        if self.feet is not None:
-            object.__setattr__(self, "feet", tuple(checks.listed(self.feet, "StanceFeet: feet", "['left_foot']")))
-        for name, most in (("speed", 100.0), ("height", 10.0), ("least", 100.0)):
-            checks.settle(self, name, checks.number(getattr(self, name), f"StanceFeet: {name}", 0.0, most))
+    feet: Annotated[Sequence[str], Names("['left_foot']", 0)] | None = None
+    speed: Annotated[float, Range(0.0, 100.0)] = 0.15
+    height: Annotated[float, Range(0.0, 10.0)] = 0.05
+    least: Annotated[float, Range(0.0, 100.0)] = 0.1
 
     def names(self, figure: Figure) -> tuple[str, ...]:
         """Frames of the feet of a figure.

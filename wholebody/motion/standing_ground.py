@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Indices, Mask, with_values
 from wholebody.base.errors import InputError
+from wholebody.base.fields import Checked, Range
 from wholebody.base.files import checked_target
 from wholebody.motion.footholds import RestLimits, lowest, resting, speeds
 from wholebody.motion.roles import ROLES, skeleton_roles
@@ -21,7 +22,7 @@ from wholebody.motion.windows import long_runs, runs
 FEET = ("ankle", "toe")
 OTHERS = ("hand", "wrist", "knee")
 APART, SPREAD = 0.04, 0.06  # m: between two levels of a floor; within one level, by errors of a recording
-LARGEST, MOST_FRAMES = 1e6, 10**9  # m: greatest height; frames
+HEIGHT, MOST_FRAMES = Range(-1e6, 1e6, "m"), 10**9
 NEAR_GROUND = 0.12  # m: highest place of a knee's or wrist's joint above the ground on which it rests
 
 
@@ -36,8 +37,53 @@ class Foothold(NamedTuple):
     height: float  # of the ground there above the lowest level, metres
 
 
+def _by_role(given: object, what: str) -> Mapping[str, Any]:
+    found = checks.instance(given, Mapping, what, "give role to value, as wb.motion.ground(motion) has")
+    for role in found:
+        checks.known(role, ROLES, "role", what)
+    return found
+
+
+def _rests(given: object, what: str) -> Mapping[str, Mask]:
+    """True or false for each frame by role; zeros and ones too."""
+    found = {}
+    for role, mask in _by_role(given, what).items():
+        if isinstance(mask, np.ndarray) and mask.ndim == 1 and mask.dtype == bool:
+            found[role] = mask
+            continue
+        entries = checks.listed(mask, f"{what} of {role}", "True or False for each frame")
+        if not all(isinstance(one, (bool, np.bool_, int, float, np.number)) and one in (0, 1) for one in entries):
+            raise InputError(f"{what} of {role} are {checks.shown(mask)}; give True or False for each frame")
+        found[role] = np.array(entries, dtype=bool)
+    if len({len(mask) for mask in found.values()}) > 1:
+        lengths = ", ".join(f"{role} {len(mask)}" for role, mask in found.items())
+        raise InputError(f"{what} have different numbers of frames ({lengths}); give one for each frame")
+    return found
+
+
+def _lowest(given: object, what: str) -> Mapping[str, float]:
+    return {role: HEIGHT(height, f"{what} of {role}") for role, height in _by_role(given, what).items()}
+
+
+def _levels(given: object, what: str) -> tuple[float, ...]:
+    return tuple(HEIGHT(one, f"{what}: a level") for one in checks.listed(given, what, "(0.0, 0.15)"))
+
+
+def _footholds(given: object, what: str) -> tuple[Foothold, ...]:
+    found = []
+    for number, one in enumerate(checks.listed(given, what, "those of wb.motion.ground(motion)")):
+        where = f"{what}[{number}]"
+        checks.instance(one, Foothold, where, "give one of wb.motion.ground(motion), or one._replace(height=0.1)")
+        checks.known(one.role, ROLES, "role", where)
+        first = checks.whole(one.first, f"{where}: first", 0, MOST_FRAMES - 1)
+        end = checks.whole(one.end, f"{where}: end", first + 1, MOST_FRAMES)
+        place = checks.numbers(one.place, (3,), f"{where}: place")
+        found.append(Foothold(one.role, first, end, place, HEIGHT(one.height, f"{where}: height")))
+    return tuple(found)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Ground:
+class Ground(Checked):
     """The ground of a recording. `dataclasses.replace` makes a changed one.
 
     `wb.retarget` uses `footholds` (role, frames and height), `rests` and `lowest`; the others describe what was found.
@@ -51,39 +97,21 @@ class Ground:
         uneven: whether heights do not gather in levels; each foothold then has its own.
         dt: seconds from frame to frame.
 
+    Raises:
+        InputError: a value of the wrong kind or range.
+        UnknownNameError: a role that no joint has.
+
     Examples:
         >>> flat = wb.motion.ground(skeleton).tilt
     """
 
-    footholds: tuple[Foothold, ...]
-    rests: Mapping[str, Mask]
-    lowest: Mapping[str, float]
-    levels: tuple[float, ...]
-    tilt: float
+    footholds: Annotated[tuple[Foothold, ...], _footholds]
+    rests: Annotated[Mapping[str, Mask], _rests]
+    lowest: Annotated[Mapping[str, float], _lowest]
+    levels: Annotated[tuple[float, ...], _levels]
+    tilt: Annotated[float, Range(0.0, 90.0, "degrees")]
     uneven: bool
-    dt: float
-
-    def __post_init__(self) -> None:
-        """Check the values.
-
-        Raises:
-            InputError: a value of the wrong kind or range.
-            UnknownNameError: a role that no joint has.
-        """
-        listed = checks.listed(self.footholds, "Ground: footholds", "those of wb.motion.ground(motion)")
-        checks.settle(self, "footholds", tuple(_foothold(one, k) for k, one in enumerate(listed)))
-        rests = {role: _rest(mask, role) for role, mask in _by_role(self.rests, "rests").items()}
-        if len({len(mask) for mask in rests.values()}) > 1:
-            lengths = ", ".join(f"{role} {len(mask)}" for role, mask in rests.items())
-            raise InputError(f"Ground: rests have different numbers of frames ({lengths}); give one for each frame")
-        checks.settle(self, "rests", rests)
-        lowest = _by_role(self.lowest, "lowest").items()
-        checks.settle(self, "lowest", {role: _height(height, f"lowest of {role}") for role, height in lowest})
-        levels = checks.listed(self.levels, "Ground: levels", "(0.0, 0.15)")
-        checks.settle(self, "levels", tuple(_height(one, "a level") for one in levels))
-        checks.settle(self, "tilt", checks.number(self.tilt, "Ground: tilt", 0.0, 90.0, "degrees"))
-        checks.settle(self, "uneven", checks.flag(self.uneven, "Ground: uneven"))
-        checks.settle(self, "dt", checks.time_step(self.dt, "Ground: dt"))
+    dt: Annotated[float, checks.time_step]
 
     def below(self, frames: int) -> Array:
         """(frames,) height of the ground under the body, between footholds and over time, metres."""
@@ -99,7 +127,6 @@ class Ground:
         return np.asarray(np.interp(np.arange(frames), known, total[known] / count[known]))
 
     def __str__(self) -> str:
-        """One sentence."""
         shares = ", ".join(f"{role} {mask.mean():.0%}" for role, mask in self.rests.items() if mask.any())
         return f"ground: {self._kind()}, tilt {self.tilt:.1f} degrees; rests: {shares or 'none'}"
 
@@ -140,39 +167,6 @@ class Ground:
             drawing.legend(loc="outside right upper", fontsize="small")
         drawing.savefig(target)
         return os.fspath(target)
-
-
-def _height(value: object, what: str) -> float:
-    return checks.number(value, f"Ground: {what}", -LARGEST, LARGEST, "m")
-
-
-def _by_role(given: object, what: str) -> Mapping[str, Any]:
-    """A mapping whose names are roles."""
-    found = checks.instance(given, Mapping, f"Ground: {what}", "give role to value, as wb.motion.ground(motion) has")
-    for role in found:
-        checks.known(role, ROLES, "role", f"Ground: {what}")
-    return found
-
-
-def _rest(given: object, role: str) -> Mask:
-    """True or false for each frame; zeros and ones too."""
-    if isinstance(given, np.ndarray) and given.ndim == 1 and given.dtype == bool:
-        return given
-    entries = checks.listed(given, f"Ground: rests of {role}", "True or False for each frame")
-    if not all(isinstance(one, (bool, np.bool_, int, float, np.number)) and one in (0, 1) for one in entries):
-        raise InputError(f"Ground: rests of {role} are {checks.shown(given)}; give True or False for each frame")
-    return np.array(entries, dtype=bool)
-
-
-def _foothold(given: object, number: int) -> Foothold:
-    """A checked foothold."""
-    what = f"Ground: footholds[{number}]"
-    one = checks.instance(given, Foothold, what, "give one of wb.motion.ground(motion), or one._replace(height=0.1)")
-    checks.known(one.role, ROLES, "role", what)
-    first = checks.whole(one.first, f"{what}: first", 0, MOST_FRAMES - 1)
-    end = checks.whole(one.end, f"{what}: end", first + 1, MOST_FRAMES)
-    place = checks.numbers(one.place, (3,), f"{what}: place")
-    return Foothold(one.role, first, end, place, _height(one.height, f"footholds[{number}]: height"))
 
 
 NOTHING = Ground((), {}, {}, (0.0,), 0.0, False, 1.0)
@@ -262,7 +256,6 @@ def _tilt(places: Array, heights: Array, settled: Array) -> float:
 def _others(
     motion: SkeletonMotion, joint: int, role: str, holds: list[Foothold], above: Mapping[str, float]
 ) -> tuple[Mask, list[Foothold]]:
-    """When a hand or a knee rests on the ground, and where."""
     at, limits = motion.positions[:, joint], RestLimits()
     feet = [each for each in holds if each.role in above]
     middles, floors = np.array([each.place[:2] for each in feet]), np.array([each.height for each in feet])

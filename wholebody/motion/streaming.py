@@ -95,7 +95,6 @@ class Retargeter:
         self._run = Run(figure, like, self._roles, motion.dt, self._holds, world.workspace())
 
     def __repr__(self) -> str:
-        """In a line."""
         return f"Retargeter({self._like.name!r}, frames of {self._like.dt:g} s, {self.ahead} ahead)"
 
     @property

@@ -120,7 +120,6 @@ def _parts(motion: SkeletonMotion, limb: _Limb) -> list[int]:
 
 
 def _sided(motion: SkeletonMotion, places: Array, pair: list[_Limb], legs: list[_Limb]) -> list[_Limb]:
-    """The left and the right limb of a pair."""
     signs = [sum(_letter(motion.names[joint]) for joint in limb.joints) for limb in pair]
     if signs[0] * signs[1] < 0:
         return pair if signs[0] > 0 else pair[::-1]

@@ -32,12 +32,17 @@ def thing_tracks(given: Mapping[str, Iterable[PlacementLike]], frames: int, what
             )
         placed = [placement(row, f"{what}: things: {name}: frame {frame}") for frame, row in enumerate(rows)]
         values = np.array([pin.SE3ToXYZQUAT(one) for one in placed]).reshape(-1, 7)
-        # a quaternion may have either sign; neighbours get the same one, so that tracks can be compared and drawn
-        turned = np.concatenate([[1.0], np.sign((values[1:, 3:] * values[:-1, 3:]).sum(axis=1))])
-        values[:, 3:] *= np.cumprod(np.where(turned == 0.0, 1.0, turned))[:, None]
+        steady(values[:, 3:])
         values.setflags(write=False)
         found[name] = values
     return found
+
+
+def steady(turns: Array) -> Array:
+    """Quaternions (n, ..., 4), in place, each of the sign with which it is nearest to the one before."""
+    flips = np.where((turns[1:] * turns[:-1]).sum(axis=-1) < 0.0, -1.0, 1.0)
+    turns[1:] *= np.cumprod(flips, axis=0)[..., None]
+    return turns
 
 
 def between(track: Array, place: float) -> Array:

@@ -62,7 +62,6 @@ class Equipment:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        """Check the values."""
         where = f"Equipment {text(self.name, 'Equipment: name')!r}"
         instance(self.shape, Shape, f"{where}: shape", "give wb.Mesh('pack.obj'), wb.Box or another")
         text(self.to, f"{where}: to")

@@ -203,13 +203,14 @@ def assemble(figure: Figure, objects: Iterable[SceneObject], excluded: dict[tupl
         pieces.append(pin.GeometryObject(piece))
         owners.append(model.frames[piece.parentFrame].name)
     body = len(pieces)
+    made = {key: shape.pieces() for key, shape in {id(thing.shape): thing.shape for thing in things}.items()}
     for thing in things:
         frame = model.frames[figure.frame_id(thing.segment)] if thing.segment is not None else None
         base = frame.placement * thing.placement if frame is not None else thing.placement
         joint = frame.parentJoint if frame is not None else 0
         parent = figure.frame_id(thing.segment) if thing.segment is not None else 0
         pieces_of[thing.name] = []
-        for number, part in enumerate(thing.shape.pieces()):
+        for number, part in enumerate(made[id(thing.shape)]):
             name = f"{thing.name}:{number}"
             pieces_of[thing.name].append((len(pieces), part.placement))
             pieces.append(pin.GeometryObject(name, joint, parent, base * part.placement, part.geometry))

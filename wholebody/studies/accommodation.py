@@ -158,7 +158,6 @@ class Accommodation(Shown):
         return chart
 
     def _of_tried(self, good: tuple[bool, ...]) -> float:
-        """Share of those tried."""
         held = [one for one, tried in zip(good, self.tried, strict=True) if tried]
         return sum(held) / len(held) if held else math.nan
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from wholebody.base import checks
 from wholebody.base.arrays import brief
@@ -20,16 +20,13 @@ from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
 from wholebody.studies.neighbours import Family, Work, lower, name_changes, solve_from_neighbours
 from wholebody.studies.records import ENDED, Records, RecordStore, SolveRecord
-from wholebody.studies.sending import Sender, sent_to
-from wholebody.studies.solving import Case, Run, at_once, solve_runs
+from wholebody.studies.solving import Case, Run, Sender, at_once, sent_to, solve_runs
 from wholebody.tasks.answers import is_own
 
 MOST_JOBS = 4096
 LONGEST = 1e7  # s: a greater deadline of a solve is a mistake
 TOGETHER = 16  # cases of a job. More: fewer scenes are sent, and processes end less together
 RUN = 16  # problems that warm-start one from the other: longer = fewer cold starts, fewer processes busy at the end
-
-T = TypeVar("T")
 
 
 class SolveProgress(NamedTuple):
@@ -169,10 +166,14 @@ def run_cases(
         return tell is not None and tell(SolveProgress(len(done), len(order), record)) is True
 
     over = tell is not None and tell(SolveProgress(len(done), len(order), None)) is True
-    if not over:
-        single = [run[0] for run in numbered if len(run) == 1 and run[0] not in done]
-        with closing(_at_once(single, order, running)) as answers:
-            over = any(keep(k, _answered(order[k].record, answer)) for k, answer in answers)
+    single = [run[0] for run in numbered if len(run) == 1 and run[0] not in done]
+    if not over and hasattr(running.method, "batches") and _is_quick([order[k] for k in single], running):
+        with closing(at_once([order[k].make() for k in single], running.method, running.jobs)) as answers:
+            for place, answer in answers:
+                record = order[single[place]].record  # `replace` would take three times as long
+                over = keep(single[place], SolveRecord(record.name, factors=record.factors, **answer))
+                if over:
+                    break
     waiting = [run for run in numbered if any(k not in done for k in run)]
     # The first of each run begin at each other's answers, one after the other, and the rest of a run at its first: so
     # all runs are of one family of postures, whatever `jobs` is.
@@ -189,34 +190,10 @@ def run_cases(
     return Records([done.get(k, order[k].record) for k in range(len(order))])
 
 
-def _at_once(
-    numbers: Sequence[int], order: Sequence[Case], running: Running
-) -> Generator[tuple[int, dict[str, Any]], None, None]:
-    """Cases with what their records say, of those that the method answers many of at a time."""
-    if not (hasattr(running.method, "batches") and _is_quick([order[k] for k in numbers], running)):
-        return
-    for place, answer in at_once([order[k].make() for k in numbers], running.method, running.jobs):
-        yield numbers[place], answer
-
-
-def _answered(record: SolveRecord, answer: dict[str, Any]) -> SolveRecord:
-    """The record of a case with what came of it: `replace`, in a third of the time."""
-    return SolveRecord(record.name, factors=record.factors, **answer)
-
-
 def _computed(order: Sequence[Case], running: Running, function: Callable[..., Any], work: Work) -> dict[Any, Any]:
     """Answers of a function of `solving` by key, see `Family`."""
-    given, sender = {key: (order[k].make, *rest) for key, (k, *rest) in work.items()}, Sender()
-
-    def here(key: Any) -> Any:
-        return function([given[key]], running.method)[0]
-
-    def there(keys: list[Any], full: bool) -> Job:
-        sent = sender.sent([given[key] for key in keys], full)
-        return Job(keys, sent_to, (function, sent, running.method), running.seconds or 0.0)
-
-    cases = [order[k] for k, *_ in work.values()]
-    with closing(_done([*work], cases, running, (here, there))) as outcomes:
+    given = {key: ([k], (order[k].make, *rest)) for key, (k, *rest) in work.items()}
+    with closing(_answers(function, given, order, running)) as outcomes:
         return {key: answer for key, answer, error in outcomes if error is None and answer is not None}
 
 
@@ -225,19 +202,10 @@ def _run(
     alone: list[Sequence[int]], begun: Mapping[int, Any],
 ) -> bool:  # fmt: skip
     """Do runs; whether the caller ended them. Those of several cases whose process ended are left in `alone`."""
-    sender = Sender()
-
-    def made(run: Sequence[int]) -> Run:
-        return begun.get(run[0]), [order[k].make for k in run]
-
-    def here(run: Sequence[int]) -> Any:
-        return solve_runs([made(run)], running.method)[0]
-
-    def there(runs: list[Sequence[int]], full: bool) -> Job:
-        given = sender.sent([made(run) for run in runs], full)
-        return Job(runs, sent_to, (solve_runs, given, running.method), (running.seconds or 0.0) * len(runs[0]))
-
-    with closing(_done(work, [order[k] for run in work for k in run], running, (here, there))) as outcomes:
+    given: dict[Any, tuple[Sequence[int], Run]] = {
+        tuple(run): (run, (begun.get(run[0]), [order[k].make for k in run])) for run in work
+    }
+    with closing(_answers(solve_runs, given, order, running)) as outcomes:
         for run, answers, error in outcomes:
             if error is not None and len(run) > 1:
                 alone.extend([k] for k in run)
@@ -249,21 +217,31 @@ def _run(
     return False
 
 
-def _done(
-    work: Sequence[T], cases: Sequence[Case], running: Running,
-    ways: tuple[Callable[[T], Any], Callable[[list[T], bool], Job]],
-) -> Generator[tuple[T, Any, EndedError | None], None, None]:  # fmt: skip
-    """Do work, in this process too where nobody else's code can end it; `ways`: here, and as jobs of `shared`."""
-    here, there = ways
+def _answers(
+    function: Callable[..., Any], work: Mapping[Any, tuple[Sequence[int], Any]], order: Sequence[Case], running: Running
+) -> Generator[tuple[Any, Any, EndedError | None], None, None]:
+    """What a function of `solving` answers, by key; `work` has of each key the cases and what the function takes."""
+    # In this process too where nobody else's code can end it.
+    sender, keys = Sender(), [*work]
+    cases = [order[k] for numbers, _ in work.values() for k in numbers]
+
+    def here(key: Any) -> Any:
+        return function([work[key][1]], running.method)[0]
+
+    def there(some: list[Any], full: bool) -> Job:
+        given = sender.sent([work[key][1] for key in some], full)
+        seconds = (running.seconds or 0.0) * len(work[some[0]][0])
+        return Job(some, sent_to, (function, given, running.method), seconds)
+
     if _is_quick(cases, running):
-        yield from shared(work, running.jobs, here, there)
+        yield from shared(keys, running.jobs, here, there)
         return
     # Several in a job, since each job has its scene with it; those of a job whose process ended are done one by one. A
     # deadline is of one.
-    most = TOGETHER * len(work) // max(1, len(cases))  # pieces of work are runs of cases
-    size = 1 if running.seconds else max(1, min(most, len(work) // (4 * running.jobs)))
-    alone = list[list[T]]()
-    for chunks in ([[*work[k : k + size]] for k in range(0, len(work), size)], alone):
+    most = TOGETHER * len(keys) // max(1, len(cases))  # keys are of runs of cases
+    size = 1 if running.seconds else max(1, min(most, len(keys) // (4 * running.jobs)))
+    alone = list[list[Any]]()
+    for chunks in ([keys[k : k + size] for k in range(0, len(keys), size)], alone):
         with closing(run_batch((there(each, True) for each in chunks), running.jobs, running.cluster)) as outcomes:  # type: ignore[type-var]
             for job, _, answer, error in outcomes:
                 if error is not None and len(job.name) > 1:
@@ -280,8 +258,6 @@ def _is_quick(cases: Iterable[Case], running: Running) -> bool:
 
 @dataclass(frozen=True)
 class _Given:
-    """Gives a problem that was made before."""
-
     problem: Problem
 
     @property

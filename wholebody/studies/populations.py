@@ -57,7 +57,8 @@ def people(
         ]
         if not shares:
             raise InputError("people: percentiles is empty; give some, such as [5, 50, 95], or leave it out")
-        named = {f"P{_digits(share)}": share for share in shares}
+        # in as many digits as tell one from every other
+        named = {f"P{share:g}" if float(f"{share:g}") == share else f"P{share!r}": share for share in shares}
         return {
             f"{own} {name}": {"sex": own, "stature": population(own).quantile("stature", 0.01 * share)}
             for own in sexes
@@ -70,11 +71,6 @@ def people(
         drawn = population(own).sample(most, np.random.default_rng([rng, own == "male"]))
         found.update({f"{own} {number}": _options(own, values) for number, values in enumerate(drawn, 1)})
     return found
-
-
-def _digits(share: float) -> str:
-    """A percentile in as many digits as tell it from every other."""
-    return f"{share:g}" if float(f"{share:g}") == share else repr(share)
 
 
 def boundary(

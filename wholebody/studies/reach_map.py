@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from hashlib import sha256
 from typing import Any, NamedTuple
 
@@ -25,12 +25,12 @@ from wholebody.studies.reach_search import (
     SLACK,
     SURE,
     Asked,
-    Brick,
+    Search,
     Try,
     covered,
     distance_beyond,
     reach_balls,
-    search_brick,
+    search_places,
 )
 from wholebody.tasks import inputs
 
@@ -39,18 +39,23 @@ LEAST_EDGE, MOST_EDGE = 2, 6  # places along an edge of a brick
 
 
 class _Grid(NamedTuple):
-    """The grid of places."""
-
     axes: tuple[Array, Array, Array]
     places: Array
     cells: Indices
     number: dict[tuple[int, int, int], int]
 
-    def neighbours(self, place: int) -> tuple[int, ...]:
+    def neighbours(self, place: int) -> list[int]:
         """Numbers of the up to six places beside a place."""
         i, j, k = self.cells[place].tolist()
         near = ((i - 1, j, k), (i + 1, j, k), (i, j - 1, k), (i, j + 1, k), (i, j, k - 1), (i, j, k + 1))
-        return tuple(self.number[at] for at in near if at in self.number)
+        return [self.number[at] for at in near if at in self.number]
+
+    def beside(self, marked: Mask) -> Indices:
+        """(places,) how many of the places beside each are marked."""
+        padded = np.pad(marked.reshape([len(axis) for axis in self.axes]).astype(np.intp), 1)
+        counts = [np.roll(padded, way, axis)[1:-1, 1:-1, 1:-1] for axis in range(3) for way in (1, -1)]
+        found: Indices = np.sum(counts, axis=0).ravel()
+        return found
 
 
 def reach_map(
@@ -120,7 +125,7 @@ def reach_map(
 
 
 class _Search:
-    """The rounds of one map, and what is known of each place."""
+    """The waves of one map, and what is known of each place: places beside reached ones are searched from these."""
 
     def __init__(
         self, asked: Asked, grid: _Grid, jobs: int, cluster: str | None, progress: Callable[[int, int], Any] | None
@@ -133,22 +138,17 @@ class _Search:
         self._left = np.where(least > SLACK, least, 0.0)
         self._measure = np.zeros(count)
         self._q: dict[int, Array] = {}
-        self._tried: set[tuple[int, int]] = set()
+        self._tried: dict[int, set[int]] = {}  # places from which each was tried
         self._balls: dict[int, float] = {}
         self._solves, self._from_neighbours = 0, 0
         self._bricks = _bricks(grid)
         self._sent = packed(asked)
         self._key = sha256(self._sent).hexdigest()
-        self._over = False
 
     def run(self) -> None:
-        """All rounds."""
-        self._round(self._first())
-        for _ in range(12):  # most rounds in which bricks hand postures on to their neighbours
-            bricks = list(self._following())
-            if not bricks or self._over:
-                return
-            self._round(bricks)
+        """All waves."""
+        while (wave := self._wave()) and self._search(wave):
+            self._settle()
 
     def answer(self) -> ReachMap:
         """What was found."""
@@ -164,36 +164,61 @@ class _Search:
             int(self._from_neighbours),
         )  # fmt: skip
 
-    def _round(self, bricks: Sequence[Brick]) -> None:
-        """Search bricks beside each other, and take down what they found in their own order."""
-        found: dict[int, list[tuple[Try, int]]] = {}
-        sent = ((number, (self._key, self._sent, brick)) for number, brick in enumerate(bricks))
-        settled = len(self._verdict) - int(self._open().sum())
-        if self._tell(settled):
-            return
-        answers = spread(_numbered, sent, self._jobs, self._cluster)
+    def _wave(self) -> list[Search]:
+        """What is searched next: of each brick the places beside reached ones, or one; and missed places once more."""
+        places, reached, pairs = self._grid.places, self._verdict == REACHED, list[tuple[int, int]]()
+        known, beside = np.flatnonzero(reached), self._grid.beside(reached)
+        for members in self._bricks:
+            free = members[self._verdict[members] == NOT_TRIED]
+            near = free[beside[free] > 0].tolist()
+            pairs += [(place, next(k for k in self._grid.neighbours(place) if reached[k])) for place in near]
+            if len(free) and not near:
+                if len(known):  # the place that is farthest from all that are reached
+                    nearest = [self._nearest(place, known) for place in free.tolist()]
+                    farthest = max(range(len(free)), key=lambda k: nearest[k][1])
+                    pairs.append((int(free[farthest]), nearest[farthest][0]))
+                else:
+                    apart = np.linalg.norm(places[free] - places[members].mean(axis=0), axis=1)
+                    pairs.append((int(free[np.argmin(apart)]), -1))
+        for place in np.flatnonzero(self._verdict == MISSED).tolist():
+            if (
+                len(self._tried[place]) == 4
+            ):  # more finds more behind things, and takes longer at the border of the reach
+                continue
+            if beside[place] >= 3:
+                starts = [k for k in self._grid.neighbours(place) if reached[k]]
+            else:  # a reached place is nearer than what the missed one was missed by
+                begin, far = self._nearest(place, known)
+                starts = [begin] if far < SURE * self._left[place] else []
+            pairs += [(place, begin) for begin in starts if begin not in self._tried[place]][:1]
+        start = self._asked.problem.start
+        return [Search(place, begin, places[place], self._q.get(begin, start)) for place, begin in pairs]
+
+    def _search(self, wave: Sequence[Search]) -> bool:
+        """Search places beside each other, and take down in their order what was found; False where the caller ends."""
+        settled, total, found = len(self._verdict) - int((self._verdict == NOT_TRIED).sum()), len(self._verdict), []
+        size = max(1, min(16, len(wave) // (4 * self._jobs)))
+        sent = ((self._key, self._sent, [*wave[k : k + size]]) for k in range(0, len(wave), size))
+        if self._told(settled, total):
+            return False
+        answers = spread(search_places, sent, self._jobs, self._cluster)
         try:
-            for number, tries in answers:
-                found[number] = tries
-                settled += len({one.place for one, _ in tries})
-                if self._tell(settled):
+            for tries in answers:
+                found += tries
+                if self._told(min(settled + len(found), total), total):
                     break
         finally:
             answers.close()  # type: ignore[attr-defined]
-        for number in sorted(found):
-            for one, begin in found[number]:
-                self._take(one, begin)
-        self._settle()
+        for one in sorted(found, key=lambda one: one.place):
+            self._take(one)
+        return len(found) == len(wave)
 
-    def _tell(self, settled: int) -> bool:
-        total = len(self._verdict)
-        if self._progress is not None and self._progress(min(settled, total), total) is True:
-            self._over = True
-        return self._over
+    def _told(self, settled: int, total: int) -> bool:
+        return self._progress is not None and self._progress(settled, total) is True
 
-    def _take(self, one: Try, begin: int) -> None:
+    def _take(self, one: Try) -> None:
         place = one.place
-        self._tried.add((place, begin))
+        self._tried.setdefault(place, set()).add(one.begin)
         self._solves += not one.inside
         if one.reached:
             self._from_neighbours += self._verdict[place] == MISSED
@@ -225,54 +250,12 @@ class _Search:
             near = radii - np.linalg.norm(centers - places[place], axis=1)
             self._left[place] = max(float(near.max()), 0.0)
 
-    def _open(self) -> Mask:
-        return np.asarray(self._verdict == NOT_TRIED)
-
-    def _first(self) -> list[Brick]:
-        """One place of each brick, by a whole solve."""
-        bricks = []
-        for members in self._bricks:
-            free = members[self._open()[members]]
-            if len(free):
-                apart = np.linalg.norm(self._grid.places[free] - self._grid.places[members].mean(axis=0), axis=1)
-                bricks.append(self._brick([int(free[np.argmin(apart)])], []))
-        return bricks
-
-    def _following(self) -> Iterator[Brick]:
-        """Bricks with places that are open, or to be tried once more."""
-        open_, known = self._open(), np.flatnonzero(self._verdict == REACHED)
-        for members in self._bricks:
-            free, again = members[open_[members]].tolist(), []
-            for place in members[self._verdict[members] == MISSED].tolist():
-                begin, apart = self._nearest(self._grid.places[place], known)
-                # the reached place is nearer than what the missed one was missed by
-                if apart < SURE * self._left[place] and (place, begin) not in self._tried:
-                    again.append((place, begin))
-            if free or again:
-                yield self._brick(free, again, known)
-
-    def _nearest(self, place: Array, known: Indices) -> tuple[int, float]:
-        """Number of the reached place that is nearest to a place (3,), and its distance; inf without any."""
+    def _nearest(self, place: int, known: Indices) -> tuple[int, float]:
+        """Number of the reached place that is nearest to a place, and its distance; inf without any."""
         if not len(known):
             return -1, np.inf
-        apart = np.linalg.norm(self._grid.places[known] - place, axis=1)
+        apart = np.linalg.norm(self._grid.places[known] - self._grid.places[place], axis=1)
         return int(known[np.argmin(apart)]), float(apart.min())
-
-    def _brick(self, free: list[int], again: list[tuple[int, int]], known: Indices | None = None) -> Brick:
-        """Places to search, from all that is reached; without `known` by whole solves."""
-        near = {k: self._grid.neighbours(k) for k in [*free, *(place for place, _ in again)]}
-        wanted = {*near, *(other for others in near.values() for other in others), *(begin for _, begin in again)}
-        reached = {k: self._q[k] for k in sorted(wanted) if self._verdict[k] == REACHED}
-        if free and known is not None and not reached and len(known):
-            begin = self._nearest(self._grid.places[free].mean(axis=0), known)[0]
-            reached = {begin: self._q[begin]}
-        places = {k: self._grid.places[k] for k in wanted | reached.keys()}
-        tried = {pair for pair in self._tried if pair[0] in near}
-        return Brick(places, near, free, again, reached, known is None, tried)
-
-
-def _numbered(sent: tuple[int, Any]) -> tuple[int, list[tuple[Try, int]]]:
-    return sent[0], search_brick(sent[1])
 
 
 def _bricks(grid: _Grid) -> list[Indices]:

@@ -1,9 +1,9 @@
-"""The search of one brick of a reach map, each place from a neighbour that is reached; places provably out of reach."""
+"""Searches of the places of a reach map, each from a posture; places provably out of reach."""
 
 from __future__ import annotations
 
 import pickle
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -18,10 +18,20 @@ from wholebody.tasks import Point
 SURE = 0.95  # share of the distance to a missed place within which no place is searched: 1 trusts descents wholly
 
 
+class Search(NamedTuple):
+    """A place to search."""
+
+    place: int  # its number
+    begin: int  # the reached place whose posture is the start; -1 for the problem's own start, and a whole solve
+    at: Array  # (3,) metres
+    start: Array  # (nq,)
+
+
 class Try(NamedTuple):
     """A place that was searched."""
 
     place: int  # its number
+    begin: int  # see `Search`
     reached: bool  # whether a posture was found
     inside: bool  # whether the place contradicts the constraints, so that it was not searched
     left: float  # distance to the nearest posture that was found, metres
@@ -41,108 +51,34 @@ class Asked:
     whole: Method  # method of whole solves
     quick: Method  # method of those that begin at a neighbour
 
-    def at(self, place: Array, start: Array) -> Problem:
-        """The problem of a place (3,), from a start (nq,)."""
-        made = self.problem.with_start(start)
-        made.goals = (*self.problem.goals, Point(self.frame, place, offset=self.offset).resolve(made.scene, made.start))
-        return made
-
-
-@dataclass
-class Brick:
-    """Places that are searched together, in one process."""
-
-    places: dict[int, Array]  # number -> (3,) metres
-    # number -> numbers of the neighbours of a place, those of other bricks included
-    neighbours: dict[int, tuple[int, ...]]
-    open: list[int]  # places that are searched
-    again: list[tuple[int, int]]  # (place, neighbour) to be tried once more from there
-    reached: dict[int, Array]  # number -> posture (nq,) of what is reached already, here and around
-    whole: bool = False  # whether places are solved by whole solves from the problem's start
-    tried: set[tuple[int, int]] = field(default_factory=set)  # (place, neighbour) of tries of earlier rounds
-    tries: list[tuple[Try, int]] = field(default_factory=list)  # the answer
-
-    def search(self, asked: Asked) -> list[tuple[Try, int]]:
-        """Search the places: each try, with the neighbour that it began from, -1 for none."""
-        pending = dict.fromkeys(self.open)
-        if self.whole:
-            for place in pending:
-                self._try(asked, place, -1)
-            return self.tries
-        while pending or self.again:
-            if pending:
-                place, begin = self._next(pending)
-                del pending[place]
-                found = self._try(asked, place, begin)
-                if found.sure and not found.reached:
-                    near = SURE * found.left
-                    for other in [k for k in pending if np.linalg.norm(self.places[k] - self.places[place]) < near]:
-                        del pending[other]
-                if found.reached:
-                    self._once_more()
-            while self.again:
-                other, begin = self.again.pop(0)
-                if other not in self.reached and self._try(asked, other, begin).reached:
-                    self._once_more()
-        return self.tries
-
-    def _next(self, pending: dict[int, None]) -> tuple[int, int]:
-        """The next place and the reached place to begin from: a neighbour, else the place farthest from all."""
-        for place in pending:
-            for other in self.neighbours[place]:
-                if other in self.reached:
-                    return place, other
-        if not self.reached:
-            return next(iter(pending)), -1
-        numbers = list(self.reached)
-        there = np.array([self.places[k] for k in numbers])
-        apart = {k: np.linalg.norm(there - self.places[k], axis=1) for k in pending}
-        place = max(pending, key=lambda k: (float(apart[k].min()), -k))
-        return place, numbers[int(np.argmin(apart[place]))]
-
-    def _try(self, asked: Asked, place: int, begin: int) -> Try:
-        self.tried.add((place, begin))
-        start = self.reached.get(begin, asked.problem.start)
-        problem = asked.at(self.places[place], start)
+    def searched(self, search: Search) -> Try:
+        """Search a place."""
+        problem = self.problem.with_start(search.start)
+        goal = Point(self.frame, search.at, offset=self.offset).resolve(problem.scene, problem.start)
+        problem.goals = (*self.problem.goals, goal)
         with problem.borrow() as workspace:
-            inside = bool(contradictions(problem, workspace))
-        if inside:
-            found = Try(place, False, True, 0.0, False, 0.0, problem.start)
-        else:
-            solution = (asked.whole if self.whole or begin < 0 else asked.quick).solve(problem)
-            judged, q = solution.assessment, np.asarray(solution.q)
-            # only where the place is the only goal its residual is its distance from the reach
-            sure = not asked.problem.goals and solution.status == "unreachable"
-            found = Try(place, solution.solved, False, judged.goal_errors[-1], sure, judged.measure, q)
-        self.tries.append((found, begin))
-        if found.reached:
-            self.reached[place] = found.q
-        return found
-
-    def _once_more(self) -> None:
-        """Ask for another try of places that were not reached and of which many neighbours are."""
-        failed = {found.place for found, _ in self.tries if not (found.reached or found.inside)} - self.reached.keys()
-        for place in sorted(failed):
-            near = [other for other in self.neighbours[place] if other in self.reached]
-            tries = sum(pair[0] == place for pair in self.tried)
-            fresh = [other for other in near if (place, other) not in self.tried]
-            # starts of one place: more finds more places behind things, and takes longer at the border of
-            # the reach
-            # reached neighbours from which a place that was not reached is tried once more
-            if len(near) >= 3 and fresh and tries < 4 and (place, fresh[0]) not in self.again:
-                self.again.append((place, fresh[0]))
+            if contradictions(problem, workspace):
+                return Try(search.place, search.begin, False, True, 0.0, False, 0.0, problem.start)
+        solution = (self.whole if search.begin < 0 else self.quick).solve(problem)
+        judged = solution.assessment
+        # only where the place is the only goal its residual is its distance from the reach
+        sure = not self.problem.goals and solution.status == "unreachable"
+        return Try(
+            search.place, search.begin, solution.solved, False, judged.goal_errors[-1], sure, judged.measure,
+            np.asarray(solution.q),
+        )  # fmt: skip
 
 
 _known: dict[str, Asked] = {}
 
 
-def search_brick(sent: tuple[str, bytes, Brick]) -> list[tuple[Try, int]]:
-    """Search a brick, in any process; the problem is unpacked once a process."""
-    key, packed_asked, brick = sent
+def search_places(sent: tuple[str, bytes, list[Search]]) -> list[Try]:
+    """Search places, in any process; the problem is unpacked once a process."""
+    key, packed_asked, searches = sent
     if key not in _known:
         _known.clear()
         _known[key] = pickle.loads(packed_asked)
-    return brick.search(_known[key])
+    return [_known[key].searched(each) for each in searches]
 
 
 def covered(places: Array, center: Array, radius: Array) -> Mask:

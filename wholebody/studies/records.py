@@ -124,7 +124,6 @@ class Records(Shown, Sequence[SolveRecord]):
     """
 
     def __init__(self, records: Sequence[SolveRecord]) -> None:
-        """Keep the records."""
         listed = checks.listed(records, "Records: records", "those of wb.solve_many")
         for one in listed:
             checks.instance(one, SolveRecord, "Records: a record", "give those of wb.solve_many")
@@ -235,7 +234,6 @@ class RecordStore:
     """Records by the fingerprint of what was asked; a record is there whole or not at all."""
 
     def __init__(self, folder: Path) -> None:
-        """Open the folder, or make it."""
         make_folder(folder)
         self.path = folder / NAME
         try:

@@ -1,10 +1,14 @@
-"""Problems of many, solved in a process one by one, or of one form in batches; answers are what records say."""
+"""Problems of many, solved in a process one by one, or of one form in batches; what is sent to other processes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import hashlib
+import io
+import pickle
+from collections import OrderedDict
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -12,13 +16,13 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, as_dict
 from wholebody.base.batches import shared
 from wholebody.base.errors import WholebodyError, one_line
-from wholebody.base.runner import Job
+from wholebody.base.runner import Job, packed
 from wholebody.methods.base import Method
 from wholebody.methods.inputs import check_problem
 from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
+from wholebody.scene.scene import Scene
 from wholebody.studies.records import JUDGED, REFUSED, SolveRecord, answer_of
-from wholebody.studies.sending import Sender, sent_to
 from wholebody.tasks.bounds import Freeze
 
 Make = Callable[[], Problem]
@@ -134,7 +138,7 @@ def warmed(method: Any) -> Any:
         return method
 
 
-def at_once(problems: Sequence[Problem], method: Any, jobs: int) -> Iterator[tuple[int, dict[str, Any]]]:
+def at_once(problems: Sequence[Problem], method: Any, jobs: int) -> Generator[tuple[int, dict[str, Any]], None, None]:
     """Solve those problems that a method with `batches` answers many of at a time: place and record of each solved."""
     sender = Sender()
 
@@ -155,3 +159,72 @@ def _records(batch: Any, answers: Any) -> Iterator[tuple[int, dict[str, Any]]]:
         numbers = {name: values[k] for name, values in columns.items()}
         said = {"outcome": "solved", "message": "solved directly", "seconds": seconds}
         yield batch.places[k], {**said, "iterations": int(answers.iterations[k]), "q": answers.q[k].copy(), **numbers}
+
+
+class Sent(NamedTuple):
+    """What is sent to another process."""
+
+    value: bytes  # pickled, with scenes left out
+    scenes: dict[str, bytes]  # digest of each of its scenes to that scene, pickled
+
+    def read(self) -> Any:
+        """The value, with the scenes that this process has seen; KeyError for one that was not sent."""
+        return _Reader(self).load()
+
+
+class Sender:
+    """Pickles values; every scene is pickled once as long as nothing in it moves."""
+
+    def __init__(self) -> None:
+        self._scenes: dict[tuple[int, int, int], tuple[str, bytes, Scene]] = {}
+
+    def sent(self, value: Any, full: bool = True) -> Sent:
+        """A value, ready to be sent; in full, or without the scenes to a process that has seen them."""
+        into, scenes = io.BytesIO(), {}
+
+        def leave_out(given: object) -> str | None:
+            if not isinstance(given, Scene):
+                return None
+            key = id(given), given.revision, given.built.moves
+            if key not in self._scenes:
+                made = packed(given)
+                self._scenes[key] = hashlib.sha256(made).hexdigest(), made, given
+            digest, made, _ = self._scenes[key]
+            if full:
+                scenes[digest] = made
+            return digest
+
+        import cloudpickle
+
+        pickler = cloudpickle.Pickler(into)
+        pickler.persistent_id = leave_out
+        pickler.dump(value)
+        return Sent(into.getvalue(), scenes)
+
+
+def sent_to(function: Callable[..., Any], given: Sent, *others: Any) -> Any:
+    """What a function answers to a value that was sent; None where this process has not seen a scene of it."""
+    try:
+        value = given.read()
+    except KeyError:
+        return None
+    return function(value, *others)
+
+
+_SEEN: OrderedDict[str, Scene] = OrderedDict()
+"""Scenes that were sent to this process, the newest last."""
+
+
+class _Reader(pickle.Unpickler):
+    def __init__(self, sent: Sent) -> None:
+        super().__init__(io.BytesIO(sent.value))
+        self._scenes = sent.scenes
+
+    def persistent_load(self, digest: str) -> Scene:
+        """The scene with a digest."""
+        if digest not in _SEEN:
+            _SEEN[digest] = pickle.loads(self._scenes[digest])
+        _SEEN.move_to_end(digest)
+        while len(_SEEN) > 4:
+            _SEEN.popitem(last=False)
+        return _SEEN[digest]

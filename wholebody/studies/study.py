@@ -211,7 +211,6 @@ def loaded_person(given: Any) -> Person | None:
 
 
 def _named(given: Any, what: str) -> dict[str, Any]:
-    """Values by name."""
     if given is None:
         return {}
     if isinstance(given, Mapping):

@@ -7,7 +7,7 @@ from wholebody.tracking.dragging import (
 from wholebody.tracking.frame import Frame as Frame
 from wholebody.tracking.inner_paths import resampled as resampled
 from wholebody.tracking.loop import FrameLoop as FrameLoop, follow as follow
-from wholebody.tracking.paths import circle as circle, read_path as read_path, spread as spread
+from wholebody.tracking.path_following import circle as circle, read_path as read_path, spread as spread
 from wholebody.tracking.recording import Judgement as Judgement, Recording as Recording, judge as judge
 from wholebody.tracking.scenes import (
     SCENES as SCENES,
@@ -15,5 +15,3 @@ from wholebody.tracking.scenes import (
     build_scene as build_scene,
     gallery as gallery,
 )
-from wholebody.tracking.track_files import read_track as read_track, write_track as write_track
-from wholebody.tracking.tracks import Track as Track, posed as posed

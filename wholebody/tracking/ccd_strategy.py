@@ -83,7 +83,10 @@ class RigidTranslation:
         if q is None:
             q, note = shown, "the fingers would be inside each other or have no room; they stay"
         for _ in range(6):  # most steps a frame: 3.6 m/s at 60 frames a second
-            following = self._freed(q, self._toward(q, tracked))
+            drawn = self._toward(q, tracked)
+            following = self._displaced(drawn)
+            if following is None:  # the last free position of the motion (algorithm 1, step 4), by 8 halvings
+                following = last_free(self.model, q, drawn, lambda q: len(self._overlaps(q)[0]), 8)
             # m, rad: a step that brings the hand nearer by less than this ends the frame
             if self._root_distance(following, tracked) > self._root_distance(q, tracked) - 1e-5:
                 break
@@ -105,13 +108,6 @@ class RigidTranslation:
         way[:6] /= long
         way[6:] = 0.0
         return np.asarray(pin.integrate(self.model, q, way))
-
-    def _freed(self, free: Array, drawn: Array) -> Array:
-        """The moved hand displaced, or else the last free position of the motion (algorithm 1, step 4)."""
-        displaced = self._displaced(drawn)
-        if displaced is not None:
-            return displaced
-        return last_free(self.model, free, drawn, lambda q: len(self._overlaps(q)[0]), 8)  # halvings
 
     def _displaced(self, q: Array) -> Array | None:
         """The hand displaced by PD_g until nothing overlaps; None if that does not end."""

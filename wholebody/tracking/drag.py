@@ -143,7 +143,6 @@ class ProblemDrag:
         return spent
 
     def _frames(self) -> Iterator[Step]:
-        """The tracker's frames from the present posture, by one of `GoalMoves` after the other."""
         goal = moving_goal(self.problem, self._number)
         left, error = self._left()
         for share in self._moves.shares(error):

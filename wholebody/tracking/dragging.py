@@ -141,7 +141,8 @@ def drag_along(
     cpu: list[float] = []
     iterations: list[int] = []
     paths: list[tuple[tuple[float, Array], ...]] = [()]
-    while len(wall) < len(aims) or _lags(left, len(wall) - len(aims)):
+    # A figure that lags behind gets 120 frames at most, while it is over 1e-3 off and comes nearer by 1e-4 (m, rad).
+    while len(wall) < len(aims) or (len(wall) < len(aims) + 120 and left[-1] > 1e-3 and left[-2] - left[-1] > 1e-4):
         began = time.thread_time()
         frame = drag.to(aims[min(len(wall), len(aims) - 1)])
         cpu.append(time.thread_time() - began)
@@ -165,14 +166,6 @@ def drag_along(
         end=end,
         paths=(*paths, ()),
     )
-
-
-def _lags(left: list[float], late: int) -> bool:
-    """Whether a figure still approaches the last position, from the error in each frame."""
-    # m, rad: largest error at the end of the path for which no frames are added
-    # m, rad: a figure that approaches the goal by less in a frame is at rest
-    # most frames that are added for a figure that lags behind
-    return late < 120 and left[-1] > 1e-3 and left[-2] - left[-1] > 1e-4
 
 
 def judge_drag(problem: Problem, dragged: Dragged, *, goal: int = 0) -> DragJudgement:

@@ -12,7 +12,7 @@ from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import time_step, warn
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.tracking.tracks import Track, check_figure
+from wholebody.motion.clip import Clip, check_figure
 
 NEAR = 1e-3  # m, rad: from the track to a posture of a path at its time
 
@@ -52,8 +52,8 @@ def timed(postures: Sequence[Array], paths: Sequence[Sequence[tuple[float, Array
     return with_values(found, times=times)
 
 
-def resampled(figure: Figure, motion: Any, name: str = "track") -> Track:
-    """A track at a finer fixed rate, which goes straight from row to row along the inner paths of a motion.
+def resampled(figure: Figure, motion: Any, name: str = "clip") -> Clip:
+    """A clip at a finer fixed rate, which goes straight from row to row along the inner paths of a motion.
 
     Files of motion have one time step. The rate is the least power of two times the motion's at which all postures of
     the paths are met; a motion without paths keeps its rate. Where 64 rows a frame are not enough, a warning says how
@@ -62,7 +62,7 @@ def resampled(figure: Figure, motion: Any, name: str = "track") -> Track:
     Args:
         figure: the figure of the postures.
         motion: postures `q` (n, nq), `dt`, and maybe `paths`, such as a `Recording` or a `Dragged`.
-        name: of the track.
+        name: of the clip.
 
     Raises:
         InputError: it is no motion of this figure, or has no valid `dt`.
@@ -72,8 +72,7 @@ def resampled(figure: Figure, motion: Any, name: str = "track") -> Track:
         (6, 56)
     """
     model, dt = check_figure(figure, "resampled").model, time_step(getattr(motion, "dt", None), "resampled: dt")
-    plain = Track.of(figure, motion.q, dt, name)
-    plain.check(figure)
+    plain = Clip(figure, motion.q, dt, name)
     given, rows, finer, left = timed(list(plain.q), getattr(motion, "paths", ()), dt), plain.q, 1, 0.0
     while len(given.q) > len(plain.q):
         left = max(
@@ -88,7 +87,7 @@ def resampled(figure: Figure, motion: Any, name: str = "track") -> Track:
         rows = np.array([_between(model, given.q, place) for place in at])
     if left > NEAR:
         warn(f"{name}: the inner paths are met to {left:.2g} m or rad; 64 rows a frame get no nearer")
-    return Track.of(figure, rows, dt / finer, name)
+    return Clip(figure, rows, dt / finer, name)
 
 
 def _between(model: pin.Model, rows: Sequence[Array] | Array, place: float) -> Array:

@@ -197,7 +197,6 @@ class LiveDrag:
         return self._subject.stated(self.q, goals, self.held - {self.taken})
 
     def _placement(self, q: Array, name: str) -> pin.SE3:
-        """Placement of the handle of a frame at a posture (nq,)."""
         handle = self._subject.handles[name]
         return self._state.update(q).data.oMi[handle.joint] * handle.local
 

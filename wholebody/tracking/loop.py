@@ -25,6 +25,7 @@ from wholebody.geometry.proximity import PENETRATION
 from wholebody.methods.base import judged
 from wholebody.methods.inputs import SEED
 from wholebody.methods.qp.method import QP
+from wholebody.motion.clip import Clip, same_joints
 from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import Collision, FrameMotion
 from wholebody.scene.scene import Scene
@@ -34,7 +35,6 @@ from wholebody.tracking.frame import FRAME, Frame, OverlapStrategy, Resolution
 from wholebody.tracking.overlaps import GIVE_WAY, make_room
 from wholebody.tracking.qp_strategy import CLEARANCE, Attraction, QPStrategy, weights
 from wholebody.tracking.recording import Recording
-from wholebody.tracking.tracks import Track
 
 OVERLAPS = ("qp", "ccd")
 
@@ -276,7 +276,7 @@ def deepest_overlap(scene: Scene, q: Array) -> str:
 
 def follow(
     scene: Scene,
-    track: Track,
+    track: Clip,
     *,
     overlap: str = "qp",
     seed: int = 0,
@@ -297,18 +297,17 @@ def follow(
             and begins where the scene has it. The scene is left as it was.
 
     Raises:
-        UnknownNameError, InputError: the track does not fit the figure, or no posture near its start is free; frame
-            and place are named, before anything is computed.
+        UnknownNameError, InputError: the track is of another figure, or no posture near its start is free.
 
     Examples:
-        >>> track = wholebody.tracking.posed(human, angles={"right_elbow_flexion": [0.0, 0.1, 0.2]}, dt=1 / 60)
+        >>> track = wb.motion.posed(human, angles={"right_elbow_flexion": [0.0, 0.1, 0.2]}, dt=1 / 60)
         >>> wholebody.tracking.follow(scene, track).q.shape
         (3, 56)
     """
     instance(scene, Scene, "follow: scene", "make one with wb.Scene(figure)")
-    instance(track, Track, "follow: track", "make one with Track.of(figure, q, dt)")
+    instance(track, Clip, "follow: track", "make one with wb.Clip(figure, q, dt)")
     function(progress, "progress")
-    track.check(scene.figure)
+    same_joints(track, scene.figure, "follow")
     ways = frame_placements(scene, moves, len(track.q), "follow: moves")
     scene = copy.copy(scene) if ways else scene
     loop = FrameLoop(scene, track.q[0], overlap=overlap, dt=track.dt, seed=seed, rigid=rigid)

@@ -168,7 +168,7 @@ class Entanglement:
     def weights(self, shown: Array, tracked: Array) -> Array:
         """(nv,) factors of the weights for a frame from the posture `shown` towards `tracked`, both (nq,)."""
         factors = np.ones(self._model.nv)
-        if self._holding is not None and self._free(tracked):
+        if self._holding is not None and not len(self._workspace.near(tracked, -PENETRATION).distance):
             away = np.abs(pin.difference(self._model, shown, tracked))
             if not self._frames:  # the limb nearer to its tracked posture yields
                 self._giving = int(np.argmin([away[self._dofs[limb]].max() for limb in self._holding]))
@@ -202,6 +202,3 @@ class Entanglement:
         # limbs give way that only slide along each other.
         held = now.max() > 0.05 and was.max() - now.max() < 0.2 * possible
         self._holding = pair if held else None
-
-    def _free(self, tracked: Array) -> bool:
-        return not len(self._workspace.near(tracked, -PENETRATION).distance)

@@ -35,7 +35,7 @@ class Recording:
         moves: things that moved, with their placements at the ends of the frames.
 
     Examples:
-        >>> track = wholebody.tracking.posed(human, angles={"right_elbow_flexion": [0.0, 0.1]}, dt=1 / 60)
+        >>> track = wb.motion.posed(human, angles={"right_elbow_flexion": [0.0, 0.1]}, dt=1 / 60)
         >>> wholebody.tracking.follow(scene, track).overlap
         'qp'
     """
@@ -98,7 +98,7 @@ class Judgement:
             contact.
 
     Examples:
-        >>> track = wholebody.tracking.posed(human, angles={"right_elbow_flexion": [0.0] * 4}, dt=1 / 60)
+        >>> track = wb.motion.posed(human, angles={"right_elbow_flexion": [0.0] * 4}, dt=1 / 60)
         >>> wholebody.tracking.judge(scene, wholebody.tracking.follow(scene, track)).passed
         ()
     """
@@ -122,7 +122,7 @@ def judge(scene: Scene, recording: Recording) -> Judgement:
     """Assess a recording of a scene.
 
     Examples:
-        >>> track = wholebody.tracking.posed(human, angles={"right_elbow_flexion": [0.0] * 4}, dt=1 / 60)
+        >>> track = wb.motion.posed(human, angles={"right_elbow_flexion": [0.0] * 4}, dt=1 / 60)
         >>> judged = wholebody.tracking.judge(scene, wholebody.tracking.follow(scene, track))
         >>> bool(judged.depth.max() < 1e-3)
         True

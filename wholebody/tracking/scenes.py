@@ -24,10 +24,10 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
 from wholebody.geometry import shapes
 from wholebody.methods.inputs import SEED
+from wholebody.motion.clip import MOST_FRAMES, Clip
 from wholebody.scene.matter.body import BallJoint, Body, Hinge
 from wholebody.scene.scene import Scene
 from wholebody.tracking.frame import FRAME
-from wholebody.tracking.tracks import MOST_FRAMES, Track
 
 Place = tuple[float, float, float]
 Thing = Mapping[str, Any]
@@ -57,7 +57,7 @@ class InteractionScene:
     name: str
     about: str
     scene: Scene
-    track: Track
+    track: Clip
     rigid: bool = False
     eye: Place | None = None
     target: Place | None = None
@@ -68,7 +68,6 @@ class SceneFile:
     """Scenes with scripted trackers, of a TOML file such as `tracking/scenes.toml`, by name."""
 
     def __init__(self, path: Path) -> None:
-        """Read the file."""
         self._data = parsed_toml(path.read_text("utf-8"), path.name)
         self.scenes: Mapping[str, str] = {name: plan["about"] for name, plan in self._data["scenes"].items()}
 
@@ -99,11 +98,13 @@ class SceneFile:
         keys = plan["keys"] if "keys" in plan else self._data["scripts"][plan["script"]]
         pose = _hand_at if plan["figure"] == "hand" else self._standing_at
         track = script(figure, [(key[0], pose(figure, *key[1:])) for key in keys], dt=dt, seed=seed, name=name)
+        if frames is not None:
+            track = track.with_q(track.q[np.arange(frames) % len(track)])
         scene = self.furnish(Scene(figure), plan.get("room"))
         self._put(scene, plan.get("things", ()))
         eye, target = (tuple(plan[key]) for key in ("eye", "target"))
         return InteractionScene(
-            name, plan["about"], scene, track if frames is None else track.repeated(frames), plan["figure"] == "hand",
+            name, plan["about"], scene, track, plan["figure"] == "hand",
             eye, target, tuple(plan.get("see_through", ())),
         )  # fmt: skip
 
@@ -154,7 +155,7 @@ def _hand_at(figure: Figure, glove: str, at: Sequence[float], turn: float = 0.0,
 
 def script(
     figure: Figure, keys: Sequence[tuple[float, Array]], *, dt: float = FRAME, seed: int = 0, name: str = "script"
-) -> Track:
+) -> Clip:
     """Move through postures, at rest in each.
 
     Between two keys the share of the motion is ``10 s^3 - 15 s^4 + 6 s^5``, the straight movement of least jerk (Flash
@@ -172,7 +173,7 @@ def script(
         count = max(1, round(seconds / dt))
         for s in np.arange(1, count + 1) / count:
             frames.append(np.asarray(pin.interpolate(figure.model, before, after, smooth(float(s)))))
-    return Track.of(figure, _trembling(figure, np.array(frames), dt, np.random.default_rng(seed)), dt, name)
+    return Clip(figure, _trembling(figure, np.array(frames), dt, np.random.default_rng(seed)), dt, name)
 
 
 def smooth(s: float) -> float:

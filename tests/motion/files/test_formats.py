@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 
 import wholebody as wb
 from wholebody.figures.figure import Figure
-from wholebody.tracking.tracks import MOST_FRAMES
+from wholebody.motion.clip import MOST_FRAMES
 
 CLOSE = {".npz": 1e-14, ".csv": 1e-14, ".txt": 1e-6, ".bvh": 1e-4}
 """Radians and metres by which a file may change a value; near a gimbal lock three angles lose digits of a rotation."""

@@ -16,7 +16,6 @@ import wholebody as wb
 from wholebody.bench.attack.judging import CORPUS, Verdict, chosen
 from wholebody.figures.packaged_urdf import task_paths, urdf_path
 from wholebody.taskfile import read_result, read_task
-from wholebody.tracking.track_files import read_track
 
 _VALUE = rb'"[^"\n]*"|\[[^\[\]\n]*\]|-?\d+\.?\d*'
 _WORD = rb"[A-Za-z_]{2,}"
@@ -167,7 +166,7 @@ def _reader(rng: np.random.Generator) -> Reader:
         return Reader(lambda path: wb.Mesh(path).pieces(), _stored({name: stored}))
     if kind == "track":
         files = _stored({"track.csv": "track.csv"} | ROBOT)
-        return Reader(lambda path: read_track(path, wb.load(path.parent / "robot.urdf")), files)
+        return Reader(lambda path: wb.read_clip(path, wb.load(path.parent / "robot.urdf")), files)
     if kind == "result":
         return Reader(read_result, _stored({"result.json": "result.json"} | task))
     packaged = rng.random() < 0.15

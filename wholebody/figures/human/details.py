@@ -10,7 +10,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, with_values
+from wholebody.base.arrays import Array, cross, with_values
 from wholebody.figures.anthropometry import RELAXED, Dimensions
 from wholebody.figures.body_spec import Solid, box, ellipsoid, place, tapered
 from wholebody.figures.sizes import TRUNK
@@ -181,9 +181,9 @@ def _between(
     span = end - start
     length = float(np.linalg.norm(span))
     z = span / length
-    side = np.cross(z, [1.0, 0.0, 0.0]) if abs(z[0]) < 0.9 else np.cross(z, [0.0, 1.0, 0.0])
+    side = cross(z, np.array((1.0, 0.0, 0.0) if abs(z[0]) < 0.9 else (0.0, 1.0, 0.0)))
     side /= np.linalg.norm(side)
-    rotation = np.column_stack([np.cross(side, z), side, z])
+    rotation = np.column_stack([cross(side, z), side, z])
     center = 0.5 * (start + end)
     return Solid(name, segment, coal.Capsule(radius, length), pin.SE3(rotation, center))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import partial
+from functools import cache, lru_cache, partial
 from itertools import pairwise
 
 import numpy as np
@@ -12,7 +12,7 @@ import numpy as np
 from wholebody.base.arrays import with_values
 from wholebody.figures.anthropometry import Person, make_person
 from wholebody.figures.body_spec import BodySpec, Solid, geometry_of, model_of
-from wholebody.figures.description import Chain, Description, ExcludedPair, JointCone, chosen_pairs
+from wholebody.figures.description import Chain, Description, ExcludedPair, JointCone, PieceName, chosen_pairs
 from wholebody.figures.figure import Figure
 from wholebody.figures.hand import FINGERS, finger_degrees, finger_pair, is_finger
 from wholebody.figures.human.details import SPREAD, sphere_names
@@ -110,7 +110,8 @@ def human_chains(joints: set[str]) -> dict[str, Chain]:
     return {name: Chain(groups[name], tip) for name, tip in tips.items() if name in groups}
 
 
-def human_cones() -> dict[str, JointCone]:
+@cache
+def human_cones() -> Mapping[str, JointCone]:
     """Return the reach cones of shoulders (humerus in the thorax) and hips (femur in the pelvis)."""
     down = np.array([0.0, 0.0, -1.0])
     cones = {}
@@ -156,7 +157,12 @@ def avatar_figure(
 
 def body_pairs(solids: tuple[Solid, ...]) -> Pairs:
     """Return tested and excluded pairs of the capsules' and hulls' pieces."""
-    return chosen_pairs(solids, lambda a, b: _reason(a, b) or _reason(b, a))
+    return _pairs_of(tuple(PieceName(solid.name, solid.segment) for solid in solids))
+
+
+@lru_cache(maxsize=8)  # people differ in their sizes alone
+def _pairs_of(parts: tuple[PieceName, ...]) -> Pairs:
+    return chosen_pairs(parts, lambda a, b: _reason(a, b) or _reason(b, a))
 
 
 def sphere_pairs(solids: tuple[Solid, ...]) -> Pairs:
@@ -173,7 +179,7 @@ def sphere_pairs(solids: tuple[Solid, ...]) -> Pairs:
     return chosen_pairs(solids, reason)
 
 
-def _reason(a: Solid, b: Solid) -> str | None:
+def _reason(a: PieceName, b: PieceName) -> str | None:
     """Why the pair (a, b), in this order, is not tested; None if it is."""
     if a.segment == b.segment:
         return "same segment"
@@ -190,7 +196,7 @@ def _reason(a: Solid, b: Solid) -> str | None:
     return _resting(a, b, part_a, part_b)
 
 
-def _resting(a: Solid, b: Solid, part_a: str, part_b: str) -> str | None:
+def _resting(a: PieceName, b: PieceName, part_a: str, part_b: str) -> str | None:
     """Why soft parts of two segments overlap, or cannot meet; None if they can touch."""
     on_torso = a.segment in TRUNK and a.segment != "head"
     resting = {

@@ -20,9 +20,9 @@ from wholebody.methods.qp.method import QP
 from wholebody.methods.solve import method_for_motions
 from wholebody.motion.avoider import MethodResult, Run
 from wholebody.motion.bisection.prediction import Prediction, Predictor, path_planes
+from wholebody.motion.clip import MOST_FRAMES
 from wholebody.motion.windows import runs
 from wholebody.tasks import Freeze, Plane
-from wholebody.tracking.tracks import MOST_FRAMES
 
 Kind = Literal["linear", "quadratic"]
 
@@ -89,7 +89,6 @@ class Bisection(Checked):
     short: Annotated[int, COUNT] = 25
 
     def __post_init__(self) -> None:
-        """Check the settings."""
         super().__post_init__()
         method_for_motions(self.method)
 
@@ -103,7 +102,8 @@ class Bisection(Checked):
         # more iterations give a little less effort, and take long where planes and what is held contradict each other
         method = QP(restarts=0, iterations=50) if self.method == "qp" else method_for_motions(self.method)
         run = run.of(replace(run.terms, q=np.array([figure.clamp(q) for q in run.terms.q])))
-        ways = self._frozen(figure)
+        # what is frozen, and what else where a frame cannot be freed so
+        ways = ((tuple(figure.roots), ()) if figure.roots else ((),)) if self.frozen is None else (self.frozen,)
         for frozen in ways:
             given = (*run.terms.given, *([Freeze(*frozen)] if frozen else []))
             predictor = Predictor(run.of(replace(run.terms, given=given)), method, self.room)
@@ -114,14 +114,7 @@ class Bisection(Checked):
         hold_between(recursion, predictor)
         return MethodResult(recursion.q, repair=True, frozen=frozen)
 
-    def _frozen(self, figure: Figure) -> tuple[tuple[str, ...], ...]:
-        """What is frozen, and what else where a frame cannot be freed so."""
-        if self.frozen is not None:
-            return (self.frozen,)
-        return (tuple(figure.roots), ()) if figure.roots else ((),)
-
     def _points(self, figure: Figure, original: Array, frozen: tuple[str, ...]) -> tuple[int, ...]:
-        """The evaluation points of a clip."""
         if self.evaluation is not None:
             return self.evaluation
         moving = np.ones(figure.model.nv, dtype=bool)
@@ -142,7 +135,6 @@ class Recursion:
     """
 
     def __init__(self, predictor: Predictor, settings: Bisection) -> None:
-        """Begin at the original postures."""
         run = predictor.run
         self._run, self._predictor, self._settings = run, predictor, settings
         figure = run.scene.figure
@@ -192,7 +184,6 @@ class Recursion:
                 self._fill(min(frame, end), frame, max(frame, end))
 
     def _between(self, low: int, high: int) -> None:
-        """Free the frames between two that stay."""
         waiting = [(low, high)]
         while waiting and not self._ended():
             low, high = waiting.pop()

@@ -15,9 +15,9 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import TIME_STEP
 from wholebody.base.errors import FileFormatError, InputError, one_line
 from wholebody.base.files import packaged_table, title_of
+from wholebody.motion.clip import LARGEST, MOST_FRAMES
 from wholebody.motion.files.archive import read_arrays
 from wholebody.motion.skeleton import SkeletonMotion
-from wholebody.tracking.tracks import LARGEST, MOST_FRAMES
 
 BODY = 22
 """Joints whose poses every version has; SMPL's two hands are joints only there."""

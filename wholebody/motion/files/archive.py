@@ -11,21 +11,22 @@ from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.errors import FileFormatError, UnknownNameError, one_line
 from wholebody.base.files import LARGEST, read_bytes, title_of
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
+from wholebody.motion.clip import MOST_FRAMES, ROOT_SIZE
 from wholebody.motion.files.base import Frames, Motion
-from wholebody.motion.files.robot_arrays import robot_arrays
-from wholebody.tracking.tracks import MOST_FRAMES
+from wholebody.motion.thing_tracks import steady
 
 VERSION = 1  # of the layout of the arrays
 
 
 def write(motion: Motion, path: Path) -> Path:
-    """Write a clip as npz: `wholebody_clip` (version), `q`, `dt`, `name`, `joints`, `figure`; see `robot_arrays`.
+    """Write a clip as npz: `wholebody_clip` (version), `q`, `dt`, `name`, `joints`, `figure`; see `_robot_arrays`.
 
     Of things that move it has names, `things` (k,), and placements, `thing_placements` (k, n, 7).
     """
@@ -42,16 +43,53 @@ def write(motion: Motion, path: Path) -> Path:
         joints=np.array(motion.figure.joints, dtype=np.str_),
         figure=np.array(motion.figure.name),
         **moving,
-        **robot_arrays(motion),
+        **_robot_arrays(motion),
     )
     return write_file(path, data.getvalue())
+
+
+def _robot_arrays(motion: Motion) -> dict[str, Any]:
+    """What programs that train robots read; none of people, of robots without a free root or with other joints.
+
+    `root_pos`, `root_rot` (x, y, z, w) and `dof_pos` are those of GMR's files; `joint_pos`, `joint_vel` and the places
+    and velocities of bodies in the world (quaternions w, x, y, z) those of BeyondMimic and mjlab. Both have `fps`.
+    """
+    figure, q, dt = motion.figure, motion.q, motion.dt
+    model = figure.model
+    if figure.detail != "own" or figure.root != "free" or model.nq != ROOT_SIZE + len(figure.joints):
+        return {}
+    velocities = motion.velocities()
+    names = [name for name in figure.frames if model.frames[figure.frame_id(name)].type == pin.FrameType.BODY]
+    places, turns, moves = (np.empty((len(q), len(names), size)) for size in (3, 4, 6))
+    data, frames = model.createData(), [figure.frame_id(name) for name in names]
+    for k, posture in enumerate(q):
+        pin.forwardKinematics(model, data, posture, velocities[k])
+        pin.updateFramePlacements(model, data)
+        for number, frame in enumerate(frames):
+            places[k, number], turns[k, number] = np.split(pin.SE3ToXYZQUAT(data.oMf[frame]), [3])
+            moves[k, number] = pin.getFrameVelocity(model, data, frame, pin.LOCAL_WORLD_ALIGNED).vector
+    return {
+        "fps": np.array([1.0 / dt]),
+        "root_pos": q[:, :3],
+        "root_rot": q[:, 3:ROOT_SIZE],
+        "dof_pos": q[:, ROOT_SIZE:],
+        "joint_names": np.array(figure.joints, dtype=np.str_),
+        "joint_pos": q[:, ROOT_SIZE:],
+        "joint_vel": velocities[:, 6:],
+        "body_names": np.array(names, dtype=np.str_),
+        "body_pos_w": places,
+        "body_quat_w": steady(turns)[..., [3, 0, 1, 2]],
+        "body_lin_vel_w": moves[..., :3],
+        "body_ang_vel_w": moves[..., 3:],
+    }
 
 
 def read(path: Path, figure: Figure) -> Frames:
     """Read a clip that `write` wrote of a figure of the same joints."""
     arrays = read_arrays(path)
     if "wholebody_clip" not in arrays:
-        raise FileFormatError(f"{path.name}: is no clip of wholebody; its arrays are {_listed(arrays)}")
+        listed = ", ".join(one_line(name, 30) for name in list(arrays)[:6]) or "none"
+        raise FileFormatError(f"{path.name}: is no clip of wholebody; its arrays are {listed}")
     missing = [name for name in ("q", "dt", "name", "joints") if name not in arrays]
     if missing:
         raise FileFormatError(f"{path.name}: the arrays lack {', '.join(missing)}; write the clip anew")
@@ -85,7 +123,6 @@ def _things(path: Path, arrays: dict[str, NDArray[np.generic]], frames: int) -> 
 
 
 def _check_joints(path: Path, joints: list[str], figure: Figure) -> None:
-    """Check that the joints of a file are those of a figure, in the same order."""
     for joint in joints:
         if joint not in figure.joints:
             raise UnknownNameError("joint", joint, figure.joints, path.name)
@@ -138,7 +175,3 @@ def _holds_objects(file: IO[bytes], what: str) -> bool:
             f"{what} has shape {shape}, {size / 1e6:.0f} MB; give at most {LARGEST / 1e6:g} MB, or cut it into parts"
         )
     return False
-
-
-def _listed(arrays: dict[str, NDArray[np.generic]]) -> str:
-    return ", ".join(one_line(name, 30) for name in list(arrays)[:6]) or "none"

@@ -11,7 +11,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.checks import TIME_STEP, TIME_STEP_ASKED
 from wholebody.base.errors import FileFormatError, one_line
-from wholebody.tracking.tracks import LARGEST, MOST_FRAMES
+from wholebody.motion.clip import LARGEST, MOST_FRAMES
 
 Motion: TypeAlias = Any
 """What is written, a `Clip`: `figure`, `q` (n, nq), `dt`, `name` and `things`; the module of clips imports this one."""
@@ -75,10 +75,3 @@ def table(name: str, rows: Sequence[tuple[int, Sequence[str]]], columns: int) ->
                 f"{name}, line {line}: value {wrong + 1} is {one_line(words[wrong], 20)}; give finite numbers"
             )
     return found
-
-
-def steady(turns: Array) -> Array:
-    """Quaternions (n, ..., 4), each on the same half of the sphere as the one before."""
-    flips = np.where((turns[1:] * turns[:-1]).sum(axis=-1) < 0.0, -1.0, 1.0)
-    turns[1:] *= np.cumprod(flips, axis=0)[..., None]
-    return turns

@@ -65,8 +65,6 @@ def _unwrapped(rows: list[tuple[int, list[str]]], count: int, wide: int) -> list
 
 
 class _Hierarchy:
-    """Reads the lines of the joints."""
-
     def __init__(self, name: str, lines: list[tuple[int, str]]) -> None:
         self.name, self.lines = name, lines
         self.joints: list[BvhJoint] = []

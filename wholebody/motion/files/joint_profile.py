@@ -12,14 +12,13 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wholebody.base.arrays import Array
 from wholebody.base.errors import FileFormatError, InputError, one_line
 from wholebody.base.files import read_text, title_of
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
+from wholebody.motion.clip import ROOT_SIZE
 from wholebody.motion.files.base import LARGEST_FILE, Frames, Motion, frame_count, seconds, table
 from wholebody.motion.files.nodes import angles_about
-from wholebody.tracking.tracks import ROOT_SIZE
 
 GLOBAL = 6  # values of the pelvis: place and rotation
 
@@ -62,12 +61,8 @@ def read(path: Path, figure: Figure) -> Frames:
         line = frames[-1][0] if len(frames) < count else frames[count][0]
         raise FileFormatError(f"{name}, line {line}: {len(frames)} rows and not {count}; the file is cut off or wrong")
     values = table(name, frames, GLOBAL + figure.model.nq - ROOT_SIZE)
-    return Frames(_postures(values), dt, title_of(path))
-
-
-def _postures(values: Array) -> Array:
     turns = Rotation.from_euler("XYZ", values[:, 3:GLOBAL]).as_quat()
-    return np.hstack([values[:, :3], turns, values[:, GLOBAL:]])
+    return Frames(np.hstack([values[:, :3], turns, values[:, GLOBAL:]]), dt, title_of(path))
 
 
 def _check_figure(figure: Figure) -> None:

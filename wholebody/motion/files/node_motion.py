@@ -9,9 +9,9 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import FileFormatError, InputError
+from wholebody.motion.clip import MOST_FRAMES
 from wholebody.motion.skeleton import UNITS, UP, SkeletonMotion, longest_way
 from wholebody.motion.structure import limb_pairs, recognised_unit
-from wholebody.tracking.tracks import MOST_FRAMES
 
 
 class NodeMotion(NamedTuple):

@@ -23,15 +23,12 @@ class Chart:
         model: Pinocchio's model.
         original: (n, nq) the original postures.
         curved: indices in the tangent of the joints whose postures are no vectors, such as a free root.
-        straight: the other indices.
     """
 
     def __init__(self, model: pin.Model, original: Array) -> None:
-        """Read which joints are curved."""
         self.model, self.original = model, original
         dofs = [range(joint.idx_v, joint.idx_v + joint.nv) for joint in list(model.joints)[1:] if joint.nq != joint.nv]
         self.curved: Indices = np.array([index for part in dofs for index in part], dtype=np.intp)
-        self.straight: Indices = np.setdiff1d(np.arange(model.nv), self.curved).astype(np.intp)
         self._both = np.ix_(self.curved, self.curved)
 
     def __len__(self) -> int:
@@ -68,7 +65,9 @@ class Chart:
         if not len(curved) or not x[curved].any():
             return rows
         turned = np.asarray(pin.dIntegrate(self.model, self.original[frame], x, pin.ARG1))
-        return self._times(rows, turned)
+        result = np.array(rows)  # but for its curved joints the matrix is the identity
+        result[:, curved] = rows[:, curved] @ turned[self._both]
+        return result
 
     def between(self, before: Array, after: Array, share: float) -> tuple[Array, Array, Array]:
         """The posture at a share of the way between two (nq,), and its derivatives (nv, nv) with respect to both."""
@@ -84,20 +83,6 @@ class Chart:
         second = from_way @ np.asarray(pin.dDifference(model, before, after, pin.ARG1))
         return q, first, second
 
-    def _times(self, rows: Array, matrix: Array) -> Array:
-        """A product with a matrix (nv, nv) that is the identity but for its curved joints."""
-        curved, result = self.curved, np.array(rows)
-        result[:, curved] = rows[:, curved] @ matrix[self._both]
-        return result
-
-
-def second_differences(frames: int, seam_before: bool, seam_after: bool) -> Array:
-    """(k, n + 4) second differences over n frames and two on both sides, those across a seam included."""
-    full = np.zeros((frames + 2, frames + 4))
-    rows = np.arange(frames + 2)
-    full[rows, rows], full[rows, rows + 1], full[rows, rows + 2] = 1.0, -2.0, 1.0
-    return full[0 if seam_before else 2 : None if seam_after else frames]
-
 
 class Objective:
     """The objective of one window. It is quadratic in the deviations and does not change.
@@ -112,7 +97,10 @@ class Objective:
         self, frames: int, weights: Array, time: float, dt: float, seams: tuple[bool, bool], ends: Array | None = None
     ) -> None:  # fmt: skip
         """Lay out the bands, for weights (nv,) and tau `time` [s]; `ends` (4, nv): deviations beside the window."""
-        full, scale = second_differences(frames, *seams), (time / dt) ** 4
+        # second differences over the frames and two on both sides, those across a seam included
+        full, rows, scale = np.zeros((frames + 2, frames + 4)), np.arange(frames + 2), (time / dt) ** 4
+        full[rows, rows], full[rows, rows + 1], full[rows, rows + 2] = 1.0, -2.0, 1.0
+        full = full[0 if seams[0] else 2 : None if seams[1] else frames]
         inside, ends = full[:, 2:-2], np.zeros((4, len(weights))) if ends is None else ends
         beyond = full[:, [0, 1, -2, -1]] @ ends
         self.bands: Array = np.eye(frames) + scale * inside.T @ inside

@@ -225,7 +225,6 @@ class _Matrices:
         self._widest = int(lengths.max(initial=1)) - 1
 
     def _groups(self) -> None:
-        """The rows of each slack: those of one row, and the others."""
         share = self.share
         many = np.diff(share.indptr)
         self._squares = sp.csr_array(share.power(2).T)

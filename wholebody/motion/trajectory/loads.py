@@ -9,6 +9,8 @@ filtered original (`wholebody.motion.clip_torques.smoothed`) with the deviation 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -60,23 +62,31 @@ class LoadBounds(NamedTuple):
     outside: tuple[Array, ...]  # for each frame (e,) by how far it may lean outside of each edge of its support, metres
 
 
+@dataclass(frozen=True, eq=False)
 class ClipLoads:
-    """Loads of the frames of a clip and of deviations from it.
+    """Loads of the frames of a clip and of deviations from it."""
 
-    Attributes:
-        bounds: that the loads keep to.
-        base: (n, nq) the filtered postures.
-    """
+    clip: Clip
+    dynamics: InverseDynamics
+    stands: Sequence[Stand]  # of each frame
+    bounds: LoadBounds  # that the loads keep to
+    changed: Array | None = None  # (n, nq) postures made of those of the clip
+    defects: Defects | None = None  # of the loads of the rows
 
-    def __init__(
-        self, clip: Clip, dynamics: InverseDynamics, stands: Sequence[Stand], bounds: LoadBounds,
-        changed: Array | None = None, defects: Defects | None = None,
-    ) -> None:  # fmt: skip
-        """Look at a clip, or at postures made of it (n, nq), with defects of their loads."""
-        self._defects, self._changed = defects, changed
-        self.figure, self.dt, self.bounds, self._original = clip.figure, clip.dt, bounds, clip.q
-        self.base = on_filtered(clip.figure, clip.q, clip.q if changed is None else changed, clip.dt)
-        self.dynamics, self.stands = dynamics, stands
+    @property
+    def figure(self) -> Figure:
+        """Of the clip."""
+        return self.clip.figure
+
+    @cached_property
+    def base(self) -> Array:
+        """(n, nq) the filtered postures."""
+        model, original = self.figure.model, self.clip.q
+        # filtering the change would hide its accelerations
+        each = zip(
+            smoothed(self.clip, CUTOFF).q, original, original if self.changed is None else self.changed, strict=True
+        )
+        return np.array([pin.integrate(model, base, pin.difference(model, was, now)) for base, was, now in each])
 
     @classmethod
     def original(
@@ -87,7 +97,9 @@ class ClipLoads:
         base = smoothed(clip, CUTOFF).q
         lower, upper = torque_limits(clip.figure, strength)
         # Where a foot is held beside its place, the original stands in its own.
-        own, stands = soles_of(dynamics, base, feet, terms)
+        own = [dynamics.stand(q, [bool(marks[k]) for marks in feet.values()]) for k, q in enumerate(base)]
+        joints = dynamics.soles.joints
+        stands = [stand.shifted([terms.shift(k, joint) for joint in joints]) for k, stand in enumerate(own)]
         inside = tuple(np.zeros(len(each.normals)) for each in own)
         found = cls(clip, dynamics, own, LoadBounds(lower, upper, np.array([lower, upper]), inside))
         bounds = found._widened(stretch)
@@ -95,17 +107,17 @@ class ClipLoads:
             far if here is stand else np.full(len(stand.normals), far.max(initial=0.0))
             for far, here, stand in zip(bounds.outside, own, stands, strict=True)
         ]
-        return cls(clip, dynamics, stands, with_values(bounds, outside=tuple(outside)))
+        return replace(found, stands=stands, bounds=with_values(bounds, outside=tuple(outside)))
 
     def motion(self, before: Array, here: Array, after: Array) -> tuple[Array, Array]:
         """Velocity and acceleration (nv,) of the middle one of three postures (nq,), by central differences."""
         model = self.figure.model
         ahead, back = pin.difference(model, here, after), pin.difference(model, here, before)
-        return (ahead - back) / (2.0 * self.dt), (ahead + back) / self.dt**2
+        return (ahead - back) / (2.0 * self.clip.dt), (ahead + back) / self.clip.dt**2
 
     def gaps(self, frame: int, loads: Loads) -> tuple[Array, Array]:
         """Gaps of torques to their bounds (2 nv,), and of the zero moment point to its (e,); metres, see `LENGTH`."""
-        bounds, stand, defects = self.bounds, self.stands[frame], self._defects
+        bounds, stand, defects = self.bounds, self.stands[frame], self.defects
         needed = loads.torque if defects is None else loads.torque + defects.torque[frame]
         with np.errstate(invalid="ignore"):
             high = LENGTH * (bounds.upper - needed) / bounds.upper
@@ -128,18 +140,18 @@ class ClipLoads:
     def of(self, q: Array, times: Array | None = None) -> ClipLoads:
         """The same for as many other postures (n, nq), or for (m, nq) at other times (m,) of the clip, seconds."""
         if times is None:
-            clip = Clip(self.figure, self._original, self.dt)
-            return ClipLoads(clip, self.dynamics, self.stands, self.bounds, q, self._defects)
-        clip = Clip(self.figure, between(self.figure.model, self._original, times / self.dt), self.dt)
+            return replace(self, changed=q)
+        places = times / self.clip.dt
+        clip = Clip(self.figure, between(self.figure.model, self.clip.q, places), self.clip.dt)
         feet = np.array([len(np.unique(stand.owner)) for stand in self.stands])
-        frames = standing_frames(times / self.dt, feet).tolist()
+        frames = standing_frames(places, feet).tolist()
         bounds = with_values(self.bounds, outside=tuple(self.bounds.outside[frame] for frame in frames))
         return ClipLoads(clip, self.dynamics, [self.stands[frame] for frame in frames], bounds, q)
 
     def corrected(self, q: Array) -> ClipLoads:
         """The same with rows whose loads at postures (n, nq) are those that `wb.motion.torques` measures."""
         # The measurement filters and sees which feet stand; the difference is nearly the same for postures nearby.
-        own, clip = self.of(q), Clip(self.figure, q, self.dt)
+        own, clip = self.of(q), Clip(self.figure, q, self.clip.dt)
         steady, marks = smoothed(clip, CUTOFF).q, standing_feet(clip, self.dynamics.feet)
         torque, place = np.zeros((len(q), self.figure.model.nv)), np.zeros((len(q), 2))
         pressed: Mask = np.zeros(len(q), dtype=bool)
@@ -154,8 +166,7 @@ class ClipLoads:
             if pressed[frame] and len(self.stands[frame].normals):
                 height = self.stands[frame].height
                 place[frame] = zero_moment_point(seen.wrench, height) - zero_moment_point(told.wrench, height)
-        clip = Clip(self.figure, self._original, self.dt)
-        return ClipLoads(clip, self.dynamics, self.stands, self.bounds, self._changed, Defects(torque, place, pressed))
+        return replace(self, defects=Defects(torque, place, pressed))
 
     def worst(self) -> Array:
         """(n,) by how much loads are beyond their bounds, metres, see `LENGTH`; 0 where they are not."""
@@ -170,7 +181,7 @@ class ClipLoads:
 
     def timed(self, b: Array) -> TimedRows:
         """Rows of the loads of these postures, when they are passed at rates whose squares are b (n,) or about that."""
-        changes = np.gradient(b, self.dt)
+        changes = np.gradient(b, self.clip.dt)
         parts = [self._timed(frame, float(b[frame]), float(changes[frame])) for frame in range(1, len(b) - 1)]
         parts = [part for part in parts if len(part.gap)]
         if not parts:
@@ -226,7 +237,6 @@ class WindowLoads:
     """Loads of the frames of a window but the ends of the clip, with derivatives with respect to deviations."""
 
     def __init__(self, loads: ClipLoads, first: int, count: int) -> None:
-        """Take the frames from `first` on."""
         self._loads, self._first = loads, first
         self._chart = Chart(loads.figure.model, loads.base[first : first + count])
         self.frames = [k for k in range(count) if 0 < first + k < len(loads.base) - 1]
@@ -275,20 +285,12 @@ class WindowLoads:
 
     def _moved(self, before: Array, here: Array, after: Array, slopes: list[Array]) -> list[Array]:
         """The derivatives with respect to the tangents of the postures before, here and after."""
-        model, dt = self._loads.figure.model, self._loads.dt
+        model, dt = self._loads.figure.model, self._loads.clip.dt
         at, speed, push = slopes
         ahead = [np.asarray(pin.dDifference(model, here, after, arg)) for arg in (pin.ARG0, pin.ARG1)]
         back = [np.asarray(pin.dDifference(model, here, before, arg)) for arg in (pin.ARG0, pin.ARG1)]
         forward, backward = speed / (2.0 * dt) + push / dt**2, -speed / (2.0 * dt) + push / dt**2
         return [backward @ back[1], at + forward @ ahead[0] + backward @ back[0], forward @ ahead[1]]
-
-
-def on_filtered(figure: Figure, original: Array, changed: Array, dt: float) -> Array:
-    """(n, nq) postures whose loads are those of changed postures: the change on top of the filtered recording."""
-    # Filtering the change would hide its accelerations.
-    model, steady = figure.model, smoothed(Clip(figure, original, dt), CUTOFF).q
-    each = zip(steady, original, changed, strict=True)
-    return np.array([pin.integrate(model, base, pin.difference(model, was, now)) for base, was, now in each])
 
 
 def standing_frames(places: Array, feet: Array) -> Indices:
@@ -298,12 +300,3 @@ def standing_frames(places: Array, feet: Array) -> Indices:
     fewer = np.where(feet[below] < feet[above], below, above)
     found: Indices = np.where(feet[below] == feet[above], near, fewer)
     return found
-
-
-def soles_of(
-    dynamics: InverseDynamics, q: Array, stands: Mapping[str, Mask], terms: FrameTerms
-) -> tuple[list[Stand], list[Stand]]:
-    """Where each of postures (n, nq) stands, and where it stands while its feet are held; often the same objects."""
-    own = [dynamics.stand(posture, [bool(marks[k]) for marks in stands.values()]) for k, posture in enumerate(q)]
-    joints = dynamics.soles.joints
-    return own, [stand.shifted([terms.shift(k, joint) for joint in joints]) for k, stand in enumerate(own)]

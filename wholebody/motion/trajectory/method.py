@@ -63,7 +63,6 @@ class Trajectory(Checked):
     dynamics: Strength | None = None
 
     def __post_init__(self) -> None:
-        """Check the settings."""
         super().__post_init__()
         if self.dynamics is not None:
             checks.instance(self.dynamics, Strength, "Trajectory: dynamics", "give wb.motion.Strength(percentile=50)")

@@ -85,8 +85,6 @@ class SQPResult(NamedTuple):
 
 
 class _At(NamedTuple):
-    """A point of the iterations."""
-
     x: Array
     rows: list[Rows]
     objective: float

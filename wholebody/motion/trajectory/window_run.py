@@ -19,7 +19,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.motion.avoider import Run
 from wholebody.motion.clip import Clip
-from wholebody.motion.faults import FEW, Faults, depths_between, dips, sampled_dips
+from wholebody.motion.faults import Faults, depths_between, dips
 from wholebody.motion.measures import jerk_ratio
 from wholebody.motion.one_side import PASSED, followed, kept_beside
 from wholebody.motion.trajectory.deviations import Chart, Objective
@@ -140,7 +140,7 @@ class ClipRun:
             starts = ((_Attempt(x), _Way(early=True)) for x in self._starts(own, found.depths))
         else:
             x = own.deviations(begun[window.first : window.end])
-            dipping = tuple(self._dips(own, x, set(), met=False))
+            dipping = tuple(self._dips(own, x))
             starts = [(_Attempt(x, between=dipping), _Way(self._near, self._near))]
         best: _Attempt | None = None
         ended_early: list[_Attempt] = []
@@ -234,7 +234,7 @@ class ClipRun:
         work = self._run.work
         program = WindowProgram(own.evaluator, objective, own.limits, SETTINGS.iterations)
         program.add(begun.between)
-        x, radius, dipped, near = begun.x, way.radius, set[int](), list[Node]()
+        x, radius, near = begun.x, way.radius, list[Node]()
 
         def told(count: int, worst: float) -> bool:
             return own.cancel(count / SETTINGS.iterations)
@@ -257,26 +257,19 @@ class ClipRun:
             x, radius = found.x, NEARLY
             if found.end is End.EARLY:
                 return _Attempt(x, found.worst, 0, found.objective, True, program.between)
-            met = found.met or found.end is End.ROUGH
-            near = self._dips(own, x, dipped, met)
+            near = self._dips(own, x)
             before = len(program.nodes)
-            if met:
+            if found.met or found.end is End.ROUGH:
                 program.add(near)
             if len(program.nodes) == before:
                 break
         dipping = len({node.frame for node in near})
         return _Attempt(x, found.worst, dipping, found.objective, between=program.between)
 
-    def _dips(self, own: _Window, x: Array, dipped: set[int], met: bool) -> list[Node]:
-        """Places between frames with deviations x (n, nv) where motions dip, and beside; all in gaps `dipped`."""
-        # Those that dip now join these. Where nothing is missed in frames (`met`) what nearly dips is told too.
-        q, gaps = own.chart.postures(x), own.moved(x)
-        swept = dips(self._run.workspace, q, gaps)
-        places = [(gap, at + side) for gap, shares in swept.items() for at in shares for side in (0.0, -0.005, 0.005)]
-        places += [(gap, share) for gap in swept if gap in dipped for share in FEW]
-        dipped |= swept.keys()
-        if places and met:
-            places += sampled_dips(self._run.workspace, q, gaps)
+    def _dips(self, own: _Window, x: Array) -> list[Node]:
+        """Places between frames with deviations x (n, nv) where motions dip, and beside these."""
+        found = dips(self._run.workspace, own.chart.postures(x), own.moved(x))
+        places = [(gap, at + side) for gap, shares in found.items() for at in shares for side in (0.0, -0.005, 0.005)]
         return [Node(gap, float(np.clip(share, NEAREST, 1.0 - NEAREST))) for gap, share in places]
 
     def _passed(self, own: _Window, x: Array) -> float:
