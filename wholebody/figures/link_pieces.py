@@ -25,7 +25,7 @@ from wholebody.geometry.hull import hull_piece
 from wholebody.geometry.mesh_cache import ConvexPieces, cached, cached_entry
 from wholebody.geometry.meshes import EmptyMeshError, read_mesh, read_parts
 from wholebody.geometry.pieces import LARGEST, SMALLEST
-from wholebody.geometry.shapes import around
+from wholebody.geometry.polygonal import around
 
 CYLINDER_SIDES = 32
 """A cylinder becomes a prism around it with this many sides; its corners protrude by 0.5 % of the radius."""
