@@ -178,7 +178,7 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
     def plain(self: multistart.Multistart, start: Array) -> Any:
         probe = self._probe(start, 0.0)
         self._minima.add(probe.violation.total, probe.converged)
-        return self._descend(probe.q, "restart") if probe.violation.worst <= self.budget.tolerance else probe
+        return self._descend(probe.q, "restart") if probe.violation.worst <= self.settings.tolerance else probe
 
     def cold(self: WorkingSet, *given: Any) -> Any:
         self.reset()

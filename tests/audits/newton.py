@@ -260,7 +260,6 @@ class DragRow:
         iterations: Newton iterations a frame, mean.
         touching: share of the frames after which the hand touches the table.
         structures: patterns laid out: contacts that come or go in combinations not met before.
-        structure_ms: time of each.
         drift: greatest error of a constraint after any frame [m or rad].
         deepest: deepest overlap with the table after any frame [m].
     """
@@ -272,7 +271,6 @@ class DragRow:
     iterations: float
     touching: float
     structures: int
-    structure_ms: float
     drift: float
     deepest: float
 
@@ -307,7 +305,6 @@ def drag_row(frames: int, contacts: bool) -> DragRow:
         least.append(float(near.distance[table[near.number]].min(initial=np.inf)))
     distance = np.array(least)
     assert isinstance(drag.tracker, NewtonTracker)
-    structures, seconds = drag.tracker.laid_out
     return DragRow(
         case="with a table under the lower part of the circle" if contacts else "free",
         frames=frames,
@@ -315,8 +312,7 @@ def drag_row(frames: int, contacts: bool) -> DragRow:
         ms_95=float(np.percentile(times, 95)),
         iterations=float(np.mean(iterations)),
         touching=float((distance < TOUCHING).mean()),
-        structures=structures,
-        structure_ms=1e3 * seconds / max(structures, 1),
+        structures=drag.tracker.frame(frame.q).structures,
         drift=drift,
         deepest=max(0.0, -float(distance.min(initial=np.inf))),
     )

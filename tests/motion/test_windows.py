@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wholebody.motion.windows import Window, long_runs, outwards, runs, windows
+from wholebody.motion.windows import Window, long_runs, runs, windows
 
 
 def marked(count: int, *frames: int) -> np.ndarray:
@@ -32,15 +32,6 @@ def test_runs_have_every_mark_and_do_not_meet(marks: list[bool]) -> None:
 def test_windows_that_meet_are_one() -> None:
     assert windows(marked(30, 5, 10, 25), 2) == [Window(3, 13), Window(23, 28)]
     assert windows(marked(10, 0, 9), 3) == [Window(0, 4), Window(6, 10)]
-
-
-def test_outwards_visits_every_other_frame_once_from_its_neighbour() -> None:
-    visited = list(outwards(Window(2, 7), 4))
-    assert sorted(frame for frame, _ in visited) == [2, 3, 5, 6]
-    seen = {4}
-    for frame, neighbour in visited:
-        assert neighbour in seen
-        seen.add(frame)
 
 
 def test_short_runs_are_left_out() -> None:

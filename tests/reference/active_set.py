@@ -11,6 +11,19 @@ from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, Quadra
 from wholebody.methods.qp.settings import CORRECTIONS
 
 
+def same(one: ActiveSet, other: ActiveSet) -> bool:
+    """Whether both are the same set."""
+    return all(map(np.array_equal, one, other))
+
+
+def objective(program: QuadraticProgram, x: Array) -> float:
+    """What a program minimises, at x (n,)."""
+    residual = program.rows @ x - program.target
+    violated = np.maximum(program.least - program.elastic @ x, 0.0)
+    smooth = 0.5 * (program.diagonal * x) @ x + program.linear @ x
+    return float(smooth + 0.5 * program.weight @ residual**2 + 0.5 * program.elastic_weight @ violated**2)
+
+
 def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) -> QPSolution | None:
     """Return what `solve_from` returns."""
     active = guess
@@ -19,7 +32,7 @@ def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) ->
         if point is None:
             return None
         following = _corrected(program, active, point)
-        if following.same(active):
+        if same(following, active):
             return QPSolution(np.clip(point.x, program.lower, program.upper), active, True, 0)
         active = following if attempt < CORRECTIONS.at_once else _worst_corrected(program, active, following, point)
     return None

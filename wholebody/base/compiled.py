@@ -39,7 +39,6 @@ TOGETHER = (
     (
         "wholebody.methods.qp.escaping",
         "wholebody.methods.qp.turning",
-        "wholebody.methods.qp.solvers.split_form",
     ),
 )
 """Modules with compiled loops, in groups that call no loops of each other, those first that take longest to compile.

@@ -22,11 +22,10 @@ from wholebody.base.arrays import Array, Indices, cross
 from wholebody.dynamics import impulse_kernel
 from wholebody.dynamics.coupling import Actuated
 from wholebody.dynamics.frame import EngineFrame
-from wholebody.dynamics.pieces import HUMAN
+from wholebody.dynamics.pieces import surface_of
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
 from wholebody.dynamics.step_program import SKIN
 from wholebody.geometry.contact_rows import ContactRowBuilder, compiled_kernel
-from wholebody.scene.matter.body import surface
 from wholebody.scene.scene import Scene
 
 BOUNCE = 0.05  # m/s: slower approaches do not bounce
@@ -186,7 +185,7 @@ class Articulated:
         for c, row in enumerate(contact.tolist()):
             axes, directions, here = axes_of[c], directions_of[c], slice(3 * c, 3 * c + 3)
             owners = self._owners(near.pair[row])
-            made.restitution[c], made.friction[c] = self._surface(*owners)
+            made.restitution[c], made.friction[c] = surface_of(self._scene, *owners)
             for owner, sign in zip(owners, (-1.0, 1.0), strict=True):
                 if owner in names:
                     b = 6 * bodies.index(owner)
@@ -218,12 +217,6 @@ class Articulated:
     def _owners(self, pair: Array) -> tuple[str, str]:
         owners = self._workspace.owners
         return owners[pair[0]], owners[pair[1]]
-
-    def _surface(self, first: str, second: str) -> tuple[float, float]:
-        objects = self._scene.objects
-        made_of = [objects[name].material if name in objects else HUMAN for name in (first, second)]
-        found = surface(made_of[0], made_of[1])
-        return found.restitution, found.friction
 
     def _relative(self, points: Points) -> Array:
         """Velocities (3 m,) at the points along their axes, m/s."""

@@ -15,10 +15,16 @@ from wholebody.dynamics import motion_kernel
 from wholebody.geometry.contact_rows import ContactRowBuilder, compiled_kernel
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.proximity import Contacts, PairTable, Proximity
-from wholebody.scene.matter.body import MATERIALS, MassProperties, Material, mass_properties, surface
+from wholebody.scene.matter.body import MATERIALS, MassProperties, Material, Surface, mass_properties, surface
 from wholebody.scene.scene import Scene
 
 HUMAN = MATERIALS["human"]  # of every figure
+
+
+def surface_of(scene: Scene, first: str, second: str) -> Surface:
+    """What happens where two segments or things touch."""
+    one, other = (scene.objects[name].material if name in scene.objects else HUMAN for name in (first, second))
+    return surface(one, other)
 
 
 class PlacedProximity(Proximity):

@@ -22,13 +22,12 @@ from wholebody.base.errors import InputError
 from wholebody.dynamics.articulated import Articulated, Moved
 from wholebody.dynamics.coupling import Actuated, Coupling, PushedContacts, Spring
 from wholebody.dynamics.frame import EngineFrame, one_frame
-from wholebody.dynamics.pieces import HUMAN, segment_placements
+from wholebody.dynamics.pieces import segment_placements, surface_of
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.geometry.continuous.passing_through import INSIDE
 from wholebody.geometry.proximity import Contacts
 from wholebody.methods.newton.assembly_bodies import AssemblyBodies
 from wholebody.motion.clip import MOST_FRAMES, Clip
-from wholebody.scene.matter.body import Surface, surface
 from wholebody.scene.moving_obstacles import Collision
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import NotCopyable
@@ -154,7 +153,7 @@ class World(NotCopyable):
         owners = self._workspace.owners
         self._owner_of = {piece: name for piece, name in enumerate(owners) if name in self._bodies}
         self._surfaces = {
-            (piece, name): self._surface(owner, name)
+            (piece, name): surface_of(scene, owner, name)
             for piece, owner in enumerate(owners)
             for name in self._bodies
             if owner != name
@@ -269,12 +268,6 @@ class World(NotCopyable):
         near = self._workspace.near(q, 1.5e-3)  # m: the figure stops short of things by less
         contacts = PushedContacts(self.engine, self._workspace.state, self._workspace.table, near, self._owner_of)
         return contacts.push(self._coupling.velocity, self._surfaces)
-
-    def _surface(self, owner: str, body: str) -> Surface:
-        """What happens where a segment or thing touches a thing that moves by itself."""
-        objects = self.scene.objects
-        own = objects[owner].material if owner in objects else HUMAN
-        return surface(own, objects[body].material)
 
     def _user_moves(self) -> dict[str, tuple[pin.SE3, pin.SE3]]:
         """Things without a body that the user moved since the last frame, with both placements."""

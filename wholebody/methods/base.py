@@ -179,8 +179,8 @@ class SolvingTracker(NotCopyable):
         self._method = method
         self._asked = copy.copy(problem)  # one for all steps, so that methods can reuse what they build for it
 
-    def step(self, q: Array) -> SolvedStep:
-        """A whole solve from the posture q (nq,); what things that moved meanwhile met is named."""
+    def step(self, q: Array) -> Step:
+        """The same as `frame`; what things that moved meanwhile met is named."""
         q = begun(self.problem, q)
         self.workspace.refresh()
         motion, step = self.workspace.next_frame(q), self.frame(q)
@@ -188,7 +188,7 @@ class SolvingTracker(NotCopyable):
             return step
         return with_values(step, collisions=judged(self.workspace, motion, q, step.q))
 
-    def frame(self, q: Array, tolerance: float | None = None) -> SolvedStep:
+    def frame(self, q: Array, tolerance: float | None = None) -> Step:
         """A whole solve from the posture q (nq,)."""
         if tolerance is not None:
             tolerance = TOLERANCE(tolerance, "tolerance")

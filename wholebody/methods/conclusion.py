@@ -36,6 +36,7 @@ class Ending:
     judgement: Assessment | None = None  # the assessment of the posture, if the search has made it already
     # number of quadratic programs that each solver closed; empty for a method without programs
     programs: Mapping[str, int] = field(default_factory=dict)
+    method: str = ""  # what was run, where that says more than the method's name
 
 
 def assessed_tolerance(tolerance: float) -> float:
@@ -79,7 +80,7 @@ def concluded(
         iterations=ending.iterations,
         assessment=judgement,
         trace=ending.trace,
-        method=method,
+        method=ending.method or method,
         message=said + "".join(after),
         programs=ending.programs,
     )

@@ -22,13 +22,12 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Mask
 from wholebody.figures.state import State
-from wholebody.geometry.placement import placement
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import Status
 from wholebody.tasks.base import Bound
 from wholebody.tasks.frame import Frame, Hold, Orientation
-from wholebody.tasks.inputs import Place, find_place
+from wholebody.tasks.inputs import Place
 from wholebody.tasks.point import Point
 from wholebody.tasks.range_of_motion import CoupledRow, RangeOfMotion, ReachCones, TwistRow
 
@@ -91,7 +90,7 @@ class _Finder:
             if not isinstance(term, Hold) or term.relative_to is not None:
                 continue
             name = self._problem.constraint_names[number]
-            group, local = self._frame(term.frame)
+            group, local = self._frame(term.residual.place)
             here = self._at(group, local)
             if here is not None:
                 self._compare("infeasible", name, here, term.kept_at, term.orientation, self._fixed[group].by)
@@ -177,16 +176,16 @@ class _Finder:
             if not isinstance(goal, (Point, Frame, Orientation)):
                 continue
             name = f"goals[{number}], {type(goal).__name__}({goal.frame!r})"
-            group, local = self._frame(goal.frame)
+            group, local = self._frame(goal.place if isinstance(goal, Point) else goal.residual.place)
             here = self._at(group, local)
             if isinstance(goal, Frame):
-                target = placement(goal.target)
+                target = goal.residual.placement
                 if here is not None:
                     self._compare("unreachable", name, here, target, True, self._fixed[group].by)
                 else:
                     self._fixed[group] = _FixedGroup(target * local.inverse(), name)
             elif isinstance(goal, Point):
-                place, wanted = local.act(np.asarray(goal.offset, dtype=float)), np.asarray(goal.target, dtype=float)
+                place, wanted = local.act(goal.resolved_offset), goal.resolved_target
                 if here is not None:
                     away = float(np.linalg.norm(self._fixed[group].placement.act(place) - wanted))
                     self._report("unreachable", name, away, 0.0, self._fixed[group].by)
@@ -202,12 +201,12 @@ class _Finder:
         for number, goal in enumerate(self._problem.goals):
             if not isinstance(goal, (Point, Frame)):
                 continue
-            found = find_place(self._problem.scene, goal.frame, "")
+            found = goal.place if isinstance(goal, Point) else goal.residual.place
             place = self._problem.scene.model.frames[found.frame].placement
             if isinstance(goal, Point):
-                here, wanted = place.act(np.asarray(goal.offset, dtype=float)), np.asarray(goal.target, dtype=float)
+                here, wanted = place.act(goal.resolved_offset), goal.resolved_target
             else:
-                here, wanted = place.translation, placement(goal.target).translation
+                here, wanted = place.translation, goal.residual.target
             own = [k for k in np.flatnonzero(table.joint == found.joint).tolist() if self._depth(k, here) > -ON_SURFACE]
             pairs = np.isin(table.pairs, own).any(axis=1) & (table.joint[table.pairs] == 0).any(axis=1)
             deepest, thing = 0.0, -1
@@ -245,9 +244,8 @@ class _Finder:
         """Placement of a joint in its group."""
         return self._start.oMi[self._group[joint]].actInv(self._start.oMi[joint])
 
-    def _frame(self, name: str) -> tuple[int, pin.SE3]:
+    def _frame(self, place: Place) -> tuple[int, pin.SE3]:
         """The group that carries a frame, and the frame's placement in it."""
-        place = find_place(self._problem.scene, name, "")
         frame = self._problem.scene.model.frames[place.frame]
         return self._group[place.joint], self._local(place.joint) * frame.placement
 

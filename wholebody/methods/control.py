@@ -93,15 +93,12 @@ class Control:
         """Whether the solve has to end now. From the first time this is asked on, Ctrl-C ends it."""
         if self._entered:
             self._listen()
-        if not self.reason and self._may_be_over and self._passed > 1.0:
+        # the clock is read at a fraction of the cost of a thread's processor time
+        may_be = self._time_limit is not None or time.monotonic() - self._began_at > self._longest
+        if not self.reason and may_be and self._passed > 1.0:
             limit, kind = (self._longest, " of processor time") if self._time_limit is None else (self._time_limit, "")
             self.reason = f"the time limit of {limit:g} s{kind} ended it"
         return bool(self.reason) or BUDGET.spent > 1.0
-
-    @property
-    def _may_be_over(self) -> bool:
-        """Whether so much time went by; the clock is read at a fraction of the cost of a thread's processor time."""
-        return self._time_limit is not None or time.monotonic() - self._began_at > self._longest
 
     @property
     def spent(self) -> float:

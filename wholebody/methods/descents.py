@@ -10,7 +10,7 @@ from typing import Any, Generic, TypeVar
 from wholebody.base.arrays import Array
 from wholebody.methods.base import SolvedStep, SolvingTracker
 from wholebody.methods.conclusion import Ending, concluded
-from wholebody.methods.control import Control, Progress
+from wholebody.methods.control import LONGEST, Control, Progress
 from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
@@ -21,9 +21,11 @@ class Descends(ABC):
     """A dataclass of settings with `tolerance` and `time_limit`, and a search that `solve` and `tracker` run.
 
     In frames of a motion before its end goals are met to `on_the_way` [m, rad], if that is more than the tolerance.
+    Without a time limit a solve ends after `longest` seconds of processor time.
     """
 
     on_the_way = 0.0
+    longest = LONGEST
     tolerance: Any
     time_limit: Any
 
@@ -49,7 +51,7 @@ class Descends(ABC):
         """
         check_problem(problem, f"{type(self).__name__}.solve: problem")
         began = time.perf_counter()
-        with problem.borrow() as workspace, Control(self.time_limit, progress) as control:
+        with problem.borrow() as workspace, Control(self.time_limit, progress, self.longest) as control:
             ending = self._descend(problem, workspace, control)
         return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
 

@@ -194,7 +194,11 @@ class _Batch(NamedTuple):
 
         def work() -> Iterator[Job]:
             for each in waiting:
-                yield Job(each, _case, (self._clip(each.row.clip), each.worn, each.method, held), 0.0)
+                clip = self.sources[each.row.clip]
+                if not isinstance(clip, Clip):
+                    assert self.figure is not None
+                    clip = read_clip(self.table.original(each.row.clip), self.figure)
+                yield Job(each, _case, (clip, each.worn, each.method, held), 0.0)
 
         for outcome in run_batch(work(), self.jobs, self.cluster) if waiting else ():
             each = outcome.job.name
@@ -205,13 +209,6 @@ class _Batch(NamedTuple):
             clip = outcome.job.arguments[0]
             keep(replace(each.row, **found), None if q is None else Clip(clip.figure, q, dt, clip.name))
         return tuple(rows[each.row.stem] for each in asked)
-
-    def _clip(self, name: str) -> Clip:
-        source = self.sources[name]
-        if isinstance(source, Clip):
-            return source
-        assert self.figure is not None
-        return read_clip(self.table.original(name), self.figure)
 
 
 def _case(clip: Clip, worn: Worn, method: Avoider, held: AvoidOptions) -> tuple[dict[str, Any], Array | None, float]:

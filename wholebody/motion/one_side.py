@@ -15,7 +15,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.motion.avoider import Run
 from wholebody.motion.faults import depth, depths_between, dip_depth
-from wholebody.motion.windows import Window, outwards
+from wholebody.motion.windows import Window
 
 SHALLOW = 2e-3  # m: a deeper dip passes through something; others are arcs between postures in contact
 PASSED = 1e-2  # m: a deeper motion between two postures passes through something; less changes more frames
@@ -84,14 +84,14 @@ def followed(run: Run, window: Window, middle: int) -> Array:
     terms = run.terms
     q = np.array(terms.q[window.first : window.end])
     q[middle - window.first] = run.follower.freed(middle, terms.q[middle])
-    patience, calm, side = run.frames(0.25, 2), 0, 1
-    for frame, neighbour in outwards(window, middle):
-        if frame - neighbour != side:
-            calm, side = 0, frame - neighbour
-        if calm < patience:
-            here = run.follower.frame(frame, q[neighbour - window.first])
+    for side, frames in ((1, range(middle + 1, window.end)), (-1, range(middle - 1, window.first - 1, -1))):
+        calm = 0
+        for frame in frames:
+            here = run.follower.frame(frame, q[frame - side - window.first])
             q[frame - window.first] = here
             calm = calm + 1 if np.abs(here - terms.q[frame]).max() <= 1e-4 else 0
+            if calm == run.frames(0.25, 2):
+                break
     return q
 
 

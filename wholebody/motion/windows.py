@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -42,11 +41,3 @@ def windows(wrong: Mask, margin: int) -> list[Window]:
     for run in runs(wrong):
         near[max(0, run.first - margin) : min(count, run.end + margin)] = True
     return runs(near)
-
-
-def outwards(window: Window, middle: int) -> Iterator[tuple[int, int]]:
-    """Frames of a window from a middle one to both ends, each with its neighbour towards the middle."""
-    for frame in range(middle + 1, window.end):
-        yield frame, frame - 1
-    for frame in range(middle - 1, window.first - 1, -1):
-        yield frame, frame + 1

@@ -63,9 +63,9 @@ class Geodesics:
     searches: ClassVar[int] = 8
     tries: ClassVar[int] = 30
 
-    def __init__(self, problem: Problem, workspace: Workspace, resolution: float = 0.2) -> None:
-        """Take a problem without constraints, and the length of a part of a motion, radians."""
-        self._workspace, self._model, self._resolution = workspace, workspace.model, resolution
+    def __init__(self, problem: Problem, workspace: Workspace) -> None:
+        """Take a problem without constraints."""
+        self._workspace, self._model = workspace, workspace.model
         self._clearance = problem.clearance
         self._required = problem.clearance + np.full(len(workspace.table.pairs), MARGIN)
         pieces = workspace.geometry.geometryObjects
@@ -119,7 +119,8 @@ class Geodesics:
         return path, np.array(blocked)
 
     def _parts(self, motion: Array) -> int:
-        return max(1, int(np.ceil(np.abs(motion).max(initial=0.0) / self._resolution)))
+        # rad, m: length of a part of a motion
+        return max(1, int(np.ceil(np.abs(motion).max(initial=0.0) / 0.2)))
 
     def _room(self, q: Array) -> Array | None:
         """(pairs,) by how much distances exceed what is required at least, metres; None where one does not."""

@@ -125,7 +125,8 @@ def squared_rates(first: Array, second: Array, velocity: Array, acceleration: Ar
         most[k] = min(most[k], _largest(first[k], second[k], acceleration, most[k + 1]))
     b = np.zeros(count)
     for k in range(count - 1):
-        b[k + 1] = min(most[k + 1], b[k] + 2.0 * _fastest_rise(first[k], second[k], acceleration, b[k]))
+        *_, high, slope = _bounds_of_u(first[k], second[k], acceleration)
+        b[k + 1] = min(most[k + 1], b[k] + 2.0 * float((high + slope * b[k]).min(initial=1e12)))
     return b
 
 
@@ -147,9 +148,3 @@ def _largest(first: Array, second: Array, acceleration: Array, following: float)
     with np.errstate(divide="ignore", invalid="ignore"):
         crossing = np.where(steeper > 1e-12, (high[None, :] - low[:, None]) / steeper, np.inf)
     return float(max(0.0, crossing.min()))
-
-
-def _fastest_rise(first: Array, second: Array, acceleration: Array, b: float) -> float:
-    """The largest u at a point with b."""
-    _, _, high, slope = _bounds_of_u(first, second, acceleration)
-    return float((high + slope * b).min(initial=1e12))

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Mask, cross
+from wholebody.base.arrays import Array, cross
 from wholebody.base.checks import settle
 from wholebody.base.errors import InputError
 from wholebody.base.fields import called
@@ -59,6 +59,7 @@ class Axis(Goal):
         >>> look = wb.Axis("gaze", (1, 0, 0), toward=(0.55, -0.25, 0.95))
     """
 
+    angular = np.ones((), dtype=bool)  # of both rows
     frame: str
     axis: inputs.Direction
     _: KW_ONLY
@@ -80,11 +81,6 @@ class Axis(Goal):
     def resolve(self, scene: Surroundings, start: Array) -> Axis:
         """Find the frame."""
         return filled(self, place=inputs.find_place(scene, self.frame, "Axis"))
-
-    @property
-    def angular(self) -> Mask:
-        """Both rows are in radians."""
-        return np.ones((), dtype=bool)
 
     def error(self, state: State) -> Array:
         """(2,) the angle along the two directions perpendicular to the axis [rad]."""

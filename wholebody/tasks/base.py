@@ -106,7 +106,28 @@ class Term(Checked):
         return value(state), self.jacobian(state)  # type: ignore[attr-defined]
 
 
-class Goal(Term, ABC):
+class Rows(Term, ABC):
+    """Base of goals and constraints: a term with rows."""
+
+    @property
+    def angular(self) -> Mask:
+        """(m,) which rows are in radians, the others being in metres; a single value holds for all rows."""
+        return np.zeros((), dtype=bool)
+
+    def supporting_planes(self, state: State) -> SupportingPlanes | None:
+        """Inequalities that hold wherever the term is met, and that its own rows do not tell of to first order.
+
+        A row with kinks, such as the distance to a thing with edges, has one derivative on each side of a kink. The
+        planes on both sides of it say where the kink is. None, as here, for smooth rows.
+        """
+        return None
+
+    @abstractmethod
+    def jacobian(self, state: State) -> Wrench | Array:
+        """Derivative of the error or value: a `Wrench` of m rows or an array (m, nv)."""
+
+
+class Goal(Rows):
     """An equality that is met if possible: ``error(state) = 0``.
 
     Examples:
@@ -131,29 +152,12 @@ class Goal(Term, ABC):
         """Positive factor on the squared error [1/m^2 or 1/rad^2]; it decides which of two goals gives way."""
         return 1.0
 
-    @property
-    def angular(self) -> Mask:
-        """(m,) which rows are in radians, the others being in metres; a single value holds for all rows."""
-        return np.zeros((), dtype=bool)
-
-    def supporting_planes(self, state: State) -> SupportingPlanes | None:
-        """Inequalities that hold wherever the goal is met, and that its own rows do not tell of to first order.
-
-        An error with kinks, such as the distance to a thing with edges, has one derivative on each side of a kink. The
-        planes on both sides of it say where the kink is. None, as here, for a smooth error.
-        """
-        return None
-
     @abstractmethod
     def error(self, state: State) -> Array:
         """(m,) remaining error, in metres and radians; zero when the goal is met."""
 
-    @abstractmethod
-    def jacobian(self, state: State) -> Wrench | Array:
-        """Derivative of the error: a `Wrench` of m rows or an array (m, nv)."""
 
-
-class Constraint(Term, ABC):
+class Constraint(Rows):
     """An equality or inequality that always holds: ``lower <= value(state) <= upper``.
 
     Examples:
@@ -184,22 +188,9 @@ class Constraint(Term, ABC):
         """(m,) greatest allowed values, or one for all rows; inf for no bound, `lower` for an equality."""
         return np.full((), np.inf)
 
-    @property
-    def angular(self) -> Mask:
-        """(m,) which rows are in radians, the others being in metres; a single value holds for all rows."""
-        return np.zeros((), dtype=bool)
-
-    def supporting_planes(self, state: State) -> SupportingPlanes | None:
-        """Inequalities that hold wherever the constraint does; see `Goal.supporting_planes`."""
-        return None
-
     @abstractmethod
     def value(self, state: State) -> Array:
         """(m,) constrained values, in metres and radians."""
-
-    @abstractmethod
-    def jacobian(self, state: State) -> Wrench | Array:
-        """Derivative of the value: a `Wrench` of m rows or an array (m, nv)."""
 
 
 class Bound(Term, ABC):

@@ -159,14 +159,11 @@ class Near(NamedTuple):
 
     def rows(self, state: State) -> tuple[Array, Array]:
         """What is beyond, and a force along the normal."""
-        value, row = Gap(self.first, self.second).rows(state)
-        beyond = value - self.most
-        return (beyond, row) if beyond[0] > 0.0 else (np.zeros(1), np.zeros_like(row))
+        return beyond(*Gap(self.first, self.second).rows(state), np.array([-np.inf]), np.array([self.most]))
 
     def planes(self, state: State) -> SupportingPlanes:
         """The distance that they may be apart."""
-        value, row = Gap(self.first, self.second).rows(state)
-        return one_sided(value - self.most, row)
+        return ends(*Gap(self.first, self.second).rows(state), np.array([-np.inf]), np.array([self.most]))
 
 
 class Facing(NamedTuple):
@@ -222,14 +219,11 @@ class Over(NamedTuple):
 
     def rows(self, state: State) -> tuple[Array, Array]:
         """How far out it is along each axis."""
-        along, moves = self._along(state)
-        value = along - np.clip(along, self.low, self.high)
-        return value, np.where(((value != 0.0) | (self.low == self.high))[:, None], moves, 0.0)
+        return beyond(*self._along(state), self.low, self.high)
 
     def planes(self, state: State) -> SupportingPlanes:
         """The sides of the box."""
-        along, moves = self._along(state)
-        return one_sided(np.concatenate([along - self.high, self.low - along]), np.vstack([moves, -moves]))
+        return ends(*self._along(state), self.low, self.high)
 
     def _along(self, state: State) -> tuple[Array, Array]:
         """Coordinates (k,) of the origin along the axes, and their derivative (k, nv)."""
@@ -294,18 +288,22 @@ class TermOfParts(Constraint):
 class ContactTerm(TermOfParts, Goal):
     """A term all of whose rows are zero where the contact is made."""
 
-    @property
-    def upper(self) -> Array:
-        """Zero, as `lower`."""
-        return np.zeros(())
+    upper = np.zeros(())
 
     def error(self, state: State) -> Array:
         """(m,) the value: a goal is met where it is zero."""
         return self.value(state)
 
 
-def one_sided(value: Array, jacobian: Array) -> SupportingPlanes:
-    """Planes of values (k,) that are to be at most zero, with their derivative (k, nv); without those far beyond."""
+def beyond(value: Array, jacobian: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """What of values (k,) is out of their ranges, and the derivative (k, nv), which is zero within."""
+    excess = value - np.clip(value, low, high)
+    return excess, np.where(((excess != 0.0) | (low == high))[:, None], jacobian, 0.0)
+
+
+def ends(value: Array, jacobian: Array, low: Array, high: Array) -> SupportingPlanes:
+    """Planes of the ends of the ranges of values (k,) with their derivative (k, nv); without those far beyond."""
+    value, jacobian = np.concatenate([value - high, low - value]), np.vstack([jacobian, -jacobian])
     near = np.flatnonzero(np.isfinite(value) & (value <= PLANES_WITHIN))
     none = no_planes(jacobian.shape[1])
     return with_values(none, value=value[near], jacobian=jacobian[near], key=near)

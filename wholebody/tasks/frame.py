@@ -168,6 +168,7 @@ class Hold(PlacementTerm, Constraint):
         >>> feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]
     """
 
+    upper = np.zeros(())
     frame: str
     at: inputs.Target | None = None
     _: KW_ONLY
@@ -187,11 +188,6 @@ class Hold(PlacementTerm, Constraint):
     def kept_at(self) -> Any:
         """The placement at which the frame is held, in the world or in the other frame, once resolved."""
         return self.residual.placement
-
-    @property
-    def upper(self) -> Array:
-        """Zero, as `lower`."""
-        return np.zeros(())
 
     def value(self, state: State) -> Array:
         """(m,) difference in position [m] and orientation [rad]."""

@@ -25,7 +25,7 @@ from wholebody.geometry.hull import coal_convex
 from wholebody.geometry.pieces import swept_points
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import SupportingPlanes, filled
-from wholebody.tasks.contact_parts import Gap, Near, between, no_planes, one_sided, through
+from wholebody.tasks.contact_parts import Gap, Near, between, beyond, ends, no_planes, through
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.surfaces import Face, Surface, between_pieces, nearest, outermost
 
@@ -33,6 +33,7 @@ ROUNDNESS = 0.1  # largest deviation of a ring's pieces from a circle and its pl
 STEP = 1e-4  # m, rad: half of the differences that the derivative of a normal is made of
 SHORTEST = 1e-6  # length of a mean normal, and sine of an angle, below which they have no direction
 
+BELOW = np.array([-np.inf]), np.zeros(1)  # the range of what is to be at most zero
 AHEAD, BEHIND = ([pin.exp6(sign * STEP * axis) for axis in np.eye(6)] for sign in (1.0, -1.0))
 
 
@@ -96,22 +97,18 @@ class Crossing(NamedTuple):
 
     def rows(self, state: State) -> tuple[Array, Array]:
         """The two rows, and wrenches."""
-        value, rows = self._all(state)
-        low, high = np.array([-self.across, -self.high]), np.array([self.across, -self.low])
-        excess = value - np.clip(value, low, high)
-        return excess, np.where(((excess != 0.0) | (low == high))[:, None], rows, 0.0)
+        return beyond(*_beside(self.place, self.bar, 0, state), *self._room)
 
     def planes(self, state: State) -> SupportingPlanes:
         """The ends of the room along the bar, and those across the palm where it has room."""
-        value, rows = self._all(state)
-        ends = np.array([value[1] + self.low, -value[1] - self.high])
-        across = np.array([value[0] - self.across, -value[0] - self.across])
-        sides = 4 if self.across else 2
-        return one_sided(np.r_[ends, across][:sides], np.vstack([rows[1], -rows[1], rows[0], -rows[0]])[:sides])
+        open_ = slice(0 if self.across else 1, 2)
+        value, rows = _beside(self.place, self.bar, 0, state)
+        return ends(value[open_], rows[open_], *(side[open_] for side in self._room))
 
-    def _all(self, state: State) -> tuple[Array, Array]:
-        """What is across the palm and how far the bar's middle is along the bar (2,), and their derivative (2, nv)."""
-        return _beside(self.place, self.bar, 0, state)
+    @property
+    def _room(self) -> tuple[Array, Array]:
+        """Ranges (2,) of what is across the palm, and of how far the bar's middle is along the bar."""
+        return np.array([-self.across, -self.high]), np.array([self.across, -self.low])
 
 
 class Ahead(NamedTuple):
@@ -175,11 +172,11 @@ class Looking(NamedTuple):
 
     def rows(self, state: State) -> tuple[Array, Array]:
         """The angle beyond, and a moment."""
-        return _beyond_zero(*self._signed(state))
+        return beyond(*self._signed(state), *BELOW)
 
     def planes(self, state: State) -> SupportingPlanes:
         """The end of the range of angles."""
-        return one_sided(*self._signed(state))
+        return ends(*self._signed(state), *BELOW)
 
     def _signed(self, state: State) -> tuple[Array, Array]:
         """The angle beyond, negative within, and its derivative (1, nv)."""
@@ -191,11 +188,6 @@ class Looking(NamedTuple):
         wrench = np.zeros((1, 6))
         wrench[0, 3:] = slope * moment / max(float(np.linalg.norm(moment)), 1e-6)
         return np.array([angle - self.most]), between(state, wrench, self.place.joint, 0)
-
-
-def _beyond_zero(value: Array, row: Array) -> tuple[Array, Array]:
-    """What of a value (1,) is beyond zero, and its derivative (1, nv) there."""
-    return (value, row) if value[0] > 0.0 else (np.zeros(1), np.zeros_like(row))
 
 
 class Opposing(NamedTuple):
@@ -227,7 +219,7 @@ class Opposing(NamedTuple):
         """The end of the range of angles, where it is near."""
         # rad: of a step. Less: measures that pull beyond the end are taken back again and again; more: time.
         found = self._signed(state, -0.3)
-        return no_planes(state.model.nv) if found is None else one_sided(*found)
+        return no_planes(state.model.nv) if found is None else ends(*found, *BELOW)
 
     def _signed(self, state: State, least: float) -> tuple[Array, Array] | None:
         """The angle beyond, negative within, and its derivative (1, nv); None where it is not more than `least`."""

@@ -10,7 +10,7 @@ from typing import Annotated, Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array, Mask, cross
+from wholebody.base.arrays import Array, cross
 from wholebody.base.checks import known
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Names
@@ -48,6 +48,7 @@ class ReachCones(Constraint):
         >>> shoulder = wb.ReachCones(["left_shoulder"])
     """
 
+    angular = np.ones((), dtype=bool)  # of all rows
     names: Annotated[Sequence[str], Names("['left_shoulder']", least=0)] | None = None
     limbs: tuple[Limb, ...] = field(init=False, repr=False)  # each cone with its frames and joints
     _joints: NDArray[np.intp] = field(init=False, repr=False)
@@ -70,11 +71,6 @@ class ReachCones(Constraint):
             _joints=np.array([limb.limb.joint for limb in limbs], dtype=np.intp),
             _against=np.array([limb.reference.joint for limb in limbs], dtype=np.intp),
         )
-
-    @property
-    def angular(self) -> Mask:
-        """All rows are in radians."""
-        return np.ones((), dtype=bool)
 
     def value(self, state: State) -> Array:
         """(m,) signed angle to the edge of each cone, positive inside [rad]."""
@@ -222,6 +218,7 @@ class RangeOfMotion(Constraint):
         >>> neck = wb.RangeOfMotion(["neck"])
     """
 
+    angular = np.ones((), dtype=bool)  # of all rows
     names: Annotated[Sequence[str], Names("['neck']", least=0)] | None = None
     rows: tuple[Row, ...] = field(init=False, repr=False)  # each range with its frames and joints
     row_names: tuple[str, ...] = field(init=False, repr=False)  # its name
@@ -234,11 +231,6 @@ class RangeOfMotion(Constraint):
         names = tuple(ranges) if self.names is None else tuple(self.names)
         rows = [_row(ranges[known(name, ranges, "range of motion", "RangeOfMotion")], scene) for name in names]
         return filled(self, rows=tuple(rows), row_names=names)
-
-    @property
-    def angular(self) -> Mask:
-        """All rows are in radians."""
-        return np.ones((), dtype=bool)
 
     def value(self, state: State) -> Array:
         """(m,) angle to the end of each range, positive inside [rad]."""

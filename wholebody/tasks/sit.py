@@ -16,7 +16,7 @@ from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Level, Near, Over, Part, owner_pairs
-from wholebody.tasks.surfaces import Surface, face, joined, outermost, surface
+from wholebody.tasks.surfaces import Surface, face, joined, outermost, segments_on, surface
 
 UP = np.array((0.0, 0.0, 1.0))
 MARGIN = 0.08  # m: by which the middle of the pelvis is within the edges of the seat; half the seat if that is less
@@ -142,10 +142,7 @@ def upright(scene: Surroundings) -> State:
 
 def _trunk(scene: Surroundings, pelvis: inputs.Place, trunk: inputs.Place) -> list[str]:
     """Segments between the pelvis and the last of the trunk, which is among them."""
-    chain = [joint for joint in scene.model.supports[trunk.joint] if joint > pelvis.joint]
-    owners = zip(scene.piece_owner, scene.geometry.geometryObjects, strict=True)
-    segments = set(scene.figure.segments)
-    return [owner for owner, piece in owners if piece.parentJoint in chain and owner in segments]
+    return segments_on(scene, (joint for joint in scene.model.supports[trunk.joint] if joint > pelvis.joint))
 
 
 def _thighs(scene: Surroundings, pelvis: inputs.Place, trunk: inputs.Place) -> list[str]:

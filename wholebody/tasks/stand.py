@@ -20,7 +20,7 @@ from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.contact_parts import Facing, Gap, Over, Part, TermOfParts, between, owner_pairs, through
 from wholebody.tasks.distance import SumOfSquares
 from wholebody.tasks.sit import UP, upright
-from wholebody.tasks.surfaces import Surface, face, joined, outermost, segments_beyond, surface
+from wholebody.tasks.surfaces import Surface, face, joined, outermost, segments_beyond, segments_on, surface
 
 FLESH = 0.03  # m: how much farther ahead than the ankle a shin may be on which somebody kneels
 STANCE_WEIGHTS = np.array((60.0, 60.0, 4.0))  # of a `Stance`: 1/m^2, 1/m^2, 1/rad^2: ESTIMATE
@@ -172,11 +172,7 @@ class Stance(SumOfSquares):
 
 def _knee(scene: Surroundings, place: inputs.Place, shank: str) -> Surface:
     """A shank with the segment above it, whose end at the knee rests beside it."""
-    above, segments = int(scene.model.parents[place.joint]), set(scene.figure.segments)
-    pieces = zip(scene.piece_owner, scene.geometry.geometryObjects, strict=True)
-    return joined(
-        scene, shank, [shank, *(one for one, piece in pieces if piece.parentJoint == above and one in segments)]
-    )
+    return joined(scene, shank, [shank, *segments_on(scene, [int(scene.model.parents[place.joint])])])
 
 
 def _lows(bears: Surface, rest: State, under: Array, within: float) -> tuple[list[Array], list[int]]:

@@ -231,9 +231,13 @@ def outermost(shape: Any, placement: pin.SE3, direction: Array, swept: SweptPoin
     return np.asarray(swept.points @ placement.rotation.T + placement.translation + swept.radius * direction)
 
 
+def segments_on(scene: Surroundings, joints: Iterable[int]) -> list[str]:
+    """Segments with pieces on some joints."""
+    segments, wanted = set(scene.figure.segments), set(joints)
+    owners = zip(scene.piece_owner, scene.geometry.geometryObjects, strict=True)
+    return list(dict.fromkeys(one for one, piece in owners if piece.parentJoint in wanted and one in segments))
+
+
 def segments_beyond(scene: Surroundings, joint: int) -> list[str]:
     """Segments on a joint and beyond it, such as a foot with its toes, or a hand with its fingers."""
-    segments = set(scene.figure.segments)
-    owners = zip(scene.piece_owner, scene.geometry.geometryObjects, strict=True)
-    beyond = [owner for owner, piece in owners if joint in scene.model.supports[piece.parentJoint]]
-    return [owner for owner in dict.fromkeys(beyond) if owner in segments]
+    return segments_on(scene, (k for k in range(scene.model.njoints) if joint in scene.model.supports[k]))

@@ -66,8 +66,6 @@ def roots(targets: Array, places: Integers, q: Array, value: Array, jacobian: Ar
     With log M = (v, w), v = J p: [[A, B A], [0, A]], A the transpose of J, B the derivative of v by the rotation
     (Chirikjian 2011, section 10.6, in the form of Pinocchio's Jlog6).
     """
-    if not len(targets):
-        return
     own, change, left, bend = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     angle, way, along = np.empty(3), np.empty(3), np.empty(3)
     for e in range(len(targets)):
@@ -118,8 +116,6 @@ def roots(targets: Array, places: Integers, q: Array, value: Array, jacobian: Ar
 @compiled(inner=True)
 def root_distances(tables: Array, places: Integers, q: Array, measure: Array) -> None:
     """Squared distance of a free root, see `tasks.distance.SquaredDistance`; its curvature is always the same."""
-    if not len(tables):
-        return
     at, target, error, slope = np.zeros((1, 3), dtype=np.int64), np.empty((1, 12)), np.zeros(6), np.zeros((6, 6))
     last = measure.shape[1] - 1
     for e in range(len(tables)):
@@ -145,8 +141,6 @@ def rhythms(
     squares: Array,
 ) -> None:
     """See `tasks.Rhythm`; `squares` is as for `kernel.linearise`."""
-    if not len(elevations) + len(lumbars):
-        return
     slopes, at = np.empty(5), np.empty(5, dtype=np.int64)
     for e in range(len(elevations)):
         flexion, abduction = q[elevation_places[e, 1]], q[elevation_places[e, 2]]
@@ -181,8 +175,6 @@ def rhythms(
 @compiled(inner=True, error_model="numpy")
 def balls(tables: Array, places: Integers, q: Array, measure: Array, squares: Array, first: int) -> None:
     """Ball joints, see `tasks.distance.BallJoint`; their squares begin at the row `first`."""
-    if not len(tables):
-        return
     turn, axes, part, away = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     vector, left, slopes, at = np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(3, dtype=np.int64)
     for e in range(len(tables)):
@@ -261,8 +253,6 @@ def heights(
     measure: Array,
 ) -> None:
     """See `tasks.PotentialEnergy`."""
-    if not len(tables):
-        return
     nv = measure.shape[1] - 1
     row = np.empty(nv)
     centre = np.empty(3)

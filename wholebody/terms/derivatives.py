@@ -105,7 +105,7 @@ def check_derivatives(term: Goal | Constraint | Measure, scene: Scene, q: ArrayL
             entry = float(given[row, dof]), float(measured[row, dof])
             worst = (float(difference[row, dof]) / scale, row, dof, *entry, here, scale)
     share, row, dof, mine, true, where, scale = worst
-    joint = next((j for j in range(1, model.njoints) if dof in _dofs(model, j)), 0)
+    joint = next((j for j in range(1, model.njoints) if 0 <= dof - model.idx_vs[j] < model.nvs[j]), 0)
     name = next((root for root, k in figure.roots.items() if k == joint), str(model.names[joint]))
     return DerivativeCheck(
         type(term).__name__, max(share, 0.0) * scale, row, name, mine, true, where, share <= AGREEMENT
@@ -120,10 +120,6 @@ def _inside(scene: Scene, q: Array) -> Array:
     q = q.copy()
     q[limits.idx_q] = np.clip(q[limits.idx_q], limits.lower + room, limits.upper - room)
     return q
-
-
-def _dofs(model: pin.Model, joint: int) -> range:
-    return range(model.joints[joint].idx_v, model.joints[joint].idx_v + model.joints[joint].nv)
 
 
 def _value(term: Any, state: State) -> Array:

@@ -40,8 +40,6 @@ def _placed(joints: Array, joint: int, tables: Array, e: int, first: int, place:
 @compiled(inner=True, error_model="numpy")
 def residuals(tables: Array, entries: Integers, joints: Array, wrench: Array, value: Array) -> None:
     """See `tasks.residuals.PlacementResidual`."""
-    if not len(tables):
-        return
     room = np.empty((5, 4, 3))
     frame, base, change, left, angle = room[0], room[1], room[2, :3], room[3, :3], room[4, 0]
     for e in range(len(tables)):
@@ -133,8 +131,6 @@ def inverse_left(angle: Array, left: Array) -> None:
 @compiled(inner=True)
 def planes(tables: Array, entries: Integers, joints: Array, wrench: Array, value: Array) -> None:
     """See `tasks.Plane`."""
-    if not len(tables):
-        return
     place = np.empty(3)
     for e in range(len(tables)):
         row, joint = entries[e, 0], joints[entries[e, 1]]
@@ -153,8 +149,6 @@ def planes(tables: Array, entries: Integers, joints: Array, wrench: Array, value
 @compiled(inner=True, error_model="numpy")
 def axis_errors(tables: Array, entries: Integers, joints: Array, wrench: Array, value: Array) -> None:
     """See `tasks.Axis`."""
-    if not len(tables):
-        return
     frame, axes, direction = np.empty((4, 3)), np.empty((3, 3)), np.empty(3)
     turn, place = frame[:3].T, frame[3]
     change, move = np.empty((2, 3)), np.empty((2, 3))
@@ -214,8 +208,6 @@ def axis_errors(tables: Array, entries: Integers, joints: Array, wrench: Array, 
 @compiled(inner=True, error_model="numpy")
 def cones(tables: Array, entries: Integers, edges: Array, joints: Array, wrench: Array, value: Array) -> None:
     """See `tasks.ReachCones` and `figures.reach_cones.ReachCone.signed_angle`."""
-    if not len(tables):
-        return
     turn, world, local, outward = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
     for e in range(len(tables)):
         row, limb, reference = entries[e, 0], joints[entries[e, 1]], joints[entries[e, 2]]
@@ -236,8 +228,6 @@ def cones(tables: Array, entries: Integers, edges: Array, joints: Array, wrench:
 @compiled(inner=True, error_model="numpy")
 def twists(tables: Array, entries: Integers, joints: Array, wrench: Array, value: Array) -> None:
     """See `tasks.range_of_motion.TwistRow`."""
-    if not len(tables):
-        return
     limb, base, seen, along = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
     for e in range(len(tables)):
         row = entries[e, 0]

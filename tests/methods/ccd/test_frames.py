@@ -259,3 +259,28 @@ def test_a_forearm_that_an_edge_moves_aside_keeps_its_direction_to_its_round_end
         most = max(most, float(np.degrees(np.linalg.norm(pin.log3(shown.rotation.T @ tracked.rotation)))))
     assert np.linalg.norm(shown.translation - tracked.translation) > 0.02
     assert most < 0.5
+
+
+@pytest.mark.parametrize(("frames", "width", "at"), [(30, 0.10, 0.11), (8, 0.14, 0.15)])
+def test_a_forearm_that_a_table_lifts_keeps_its_direction(
+    frames: int, width: float, at: float, avatar: wb.Figure
+) -> None:
+    """A level table, not flush with the forearm, rises by 80 mm; the elbow rises as much as the wrist."""
+    turns = {"right_shoulder_flexion": 0.64, "right_shoulder_abduction": 0.3, "right_elbow_flexion": 1.03}
+    start = avatar.with_joints(avatar.posture("standing"), turns)
+    joint, wrist = (avatar.placement(start, name).translation for name in ("right_forearm", "right_hand"))
+    under = joint + at * (wrist - joint) / np.linalg.norm(wrist - joint)
+    scene = wb.Scene(avatar).add(wb.Box((width, 0.1, 0.04)), name="table")
+    low, high = -0.4, 0.0
+    for _ in range(25):
+        scene.move("table", at=under + (0.0, 0.0, 0.5 * (low + high)))
+        touches = len(scene.contacts(start, 1e-4).distance) > 0
+        low, high = (low, 0.5 * (low + high)) if touches else (0.5 * (low + high), high)
+    q, rng, most = start, np.random.default_rng(0), 0.0
+    for frame in range(frames + 10):
+        scene.move("table", at=under + (0.0, 0.0, low + 0.08 * min((frame + 1) / frames, 1.0)))
+        q = resolve_overlap(scene, q, start, rng).q
+        shown, tracked = (avatar.placement(posture, "right_forearm") for posture in (q, start))
+        most = max(most, float(np.degrees(np.linalg.norm(pin.log3(shown.rotation.T @ tracked.rotation)))))
+    assert shown.translation[2] - tracked.translation[2] > 0.06
+    assert most < 1.0

@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.methods.newton.test_linear_algebra import jacobian_of
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.methods.newton.assembly import Assembly
@@ -221,7 +222,7 @@ def test_the_nearest_place_of_a_chain_is_found_from_far(seed: int) -> None:
     # no way along the equations is left: the gradient is a combination of their gradients
     x = made.variables()
     gradient = system.weight * (x - start)
-    jacobian = system.pattern.dense(system.values(x))
+    jacobian = jacobian_of(system.pattern, system.values(x))
     left = gradient - jacobian.T @ np.linalg.lstsq(jacobian.T, gradient, rcond=1e-9)[0]
     assert np.abs(left).max() < 1e-6
 

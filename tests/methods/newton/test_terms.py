@@ -10,7 +10,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.methods.newton.figure_bodies import FigureBodies
-from wholebody.methods.newton.measures import Objective
+from wholebody.methods.newton.measures import FigureObjective
 from wholebody.methods.newton.terms import constraint_equations, goal_equations
 
 
@@ -69,16 +69,15 @@ def test_the_objective_has_the_measures_gradient(human: wb.Figure) -> None:
     measures = [wb.Effort(0.5), wb.Displacement(), wb.Discomfort(2.0)]
     problem = wb.Problem(wb.Scene(human), "standing", measures=measures)
     bodies = FigureBodies(human)
-    objective = Objective(problem, bodies, problem.workspace().state)
+    objective = FigureObjective(problem, bodies, problem.workspace().state)
     for q in _postures(human):
         x = bodies.variables(q)
-        assert objective.value(x) == pytest.approx(wb.assess(problem, q).measure)
+        assert objective.value(q) == pytest.approx(wb.assess(problem, q).measure)
         objective.renew(q)
         everything = np.concatenate([x, (0, 0, 0, 0, 0, 0, 1.0)]).reshape(-1, 7)
-        ((root, place),) = objective.roots
-        assert place == 0
-        apart = objective.rows.residual(everything)[:, 0], root.residual(everything)[0]
-        force = objective.stiffness * np.concatenate(apart)
+        force = objective.stiffness * np.concatenate(
+            [rows.residual(everything).ravel() for rows in objective.batches()]
+        )
         gradient = sum(term.weight * term.gradient(problem.scene.state(q)) for term in problem.measures)
         joints = [j for j in human.model.joints[1:] if j.nq == 1 and j.shortname().startswith("JointModelR")]
         wanted = gradient[[*(j.idx_v for j in joints), *range(6)]]

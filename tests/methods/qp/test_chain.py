@@ -19,7 +19,7 @@ from wholebody.methods.qp import chain_kernel
 from wholebody.methods.qp.chain import from_seeds, goal_entries
 from wholebody.methods.qp.chain_kernel import Goals
 from wholebody.methods.qp.plain_chain import Chains, PlainChain
-from wholebody.methods.qp.settings import Budget
+from wholebody.methods.qp.settings import Settings
 from wholebody.tasks.base import Goal
 from wholebody.terms.entries import RESIDUAL, Entry
 
@@ -32,9 +32,9 @@ def arm() -> wb.Figure:
 
 
 def found(problem: wb.Problem, tolerance: float = 1e-6, *, measures: bool = False, progress=None):
-    budget = Budget(tolerance, 60, 1000, 40, 0, measures, 0)
+    settings = Settings(tolerance=tolerance, iterations=60, measures=measures)
     with problem.borrow() as workspace:
-        return from_seeds(problem, workspace, budget, Control(progress=progress))
+        return from_seeds(problem, workspace, settings, Control(progress=progress))
 
 
 def whole_chain(model: pin.Model, limits: Limits) -> PlainChain:

@@ -9,7 +9,7 @@ import pytest
 import wholebody as wb
 from wholebody.assessment.postures import Numbers, judged
 from wholebody.bench.suite.stability.bodies import spatial_arm
-from wholebody.methods.qp.chain_batch_kernel import reach_all
+from wholebody.methods.qp.chain_kernel import reach_all
 from wholebody.tasks.base import Goal
 
 START = np.array([-0.4, 0.5, 0.9, 0.0, 0.5, 0.0])

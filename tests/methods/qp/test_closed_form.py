@@ -9,10 +9,13 @@ import pytest
 import wholebody as wb
 from wholebody.bench.suite.problem_sets.robots import known_arm
 from wholebody.figures.description import Limits
-from wholebody.methods.qp.chain import branches, goal_entries
+from wholebody.methods.qp.chain import goal_entries
 from wholebody.methods.qp.chain_kernel import Goals
-from wholebody.methods.qp.plain_chain import PlainChain
+from wholebody.methods.qp.closed_form import compiled_kernel
+from wholebody.methods.qp.closed_form_kernel import BRANCHES
+from wholebody.methods.qp.plain_chain import Chains, PlainChain
 from wholebody.methods.qp.settings import SEEDS
+from wholebody.terms.entries import placement_floats
 
 X, Y, Z = np.eye(3)
 TILTED = np.array([0.6, 0.0, 0.8])
@@ -41,6 +44,29 @@ def arm(name: str, rng: np.random.Generator, most: float = 2.0 * np.pi) -> tuple
     return model, PlainChain(model, limits, tuple(range(1, model.nq + 1)))
 
 
+def branches(figure: wb.Figure, frame: str, placement: pin.SE3, at: np.ndarray) -> np.ndarray:
+    """Postures (k, nq) with a frame at a placement, by the closed form of its arm, the nearest to `at` (nq,) first."""
+    # All with six joints, samples with seven, some off by what limits take away. None where it has no closed form.
+    model = figure.model
+    known = model.frames[figure.frame_id(frame)]
+    chain = Chains(model, figure.limits).of(frozenset((known.parentJoint,)))
+    if chain is None or chain.arm is None:
+        return np.zeros((0, model.nq))
+    floats = [placement_floats(known.placement), np.zeros(12), placement.translation, placement.rotation.ravel()]
+    goals = Goals(np.concatenate(floats)[None], np.zeros((1, 6), dtype=np.int64))
+    near = chain.angles(at)
+    found = chain.branches(goals, np.array([near, np.zeros_like(near)]))
+    return np.array([chain.posture(values, at) for values in found.cheaper(np.inf)]).reshape(-1, model.nq)
+
+
+def angles_of(chain: PlainChain, goal: np.ndarray, held: np.ndarray | None = None) -> np.ndarray:
+    """Values (8 v, n) of all branches for a goal (36,), NaN for none, with (v,) values of a joint that is held."""
+    values = np.ones(1) if held is None else held
+    found = np.empty((len(values), BRANCHES, len(chain.idx_v)))
+    compiled_kernel().branches(chain.arm, goal, values, found)
+    return found.reshape(-1, len(chain.idx_v))
+
+
 def goal_of(chain: PlainChain, place: pin.SE3, frame: pin.SE3) -> np.ndarray:
     """The goal that a frame in the last joint is at a placement, as the loops take it."""
     return np.array([*frame.rotation.T.ravel(), *frame.translation, *np.zeros(12), *place.translation,
@@ -62,7 +88,7 @@ def test_every_branch_is_a_posture_of_the_placement_and_the_known_one_is_among_t
         for _ in range(20):
             known, frame = rng.uniform(-3.0, 3.0, model.nq), pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(size=3))
             place = end(known, frame)
-            found = chain.angles_of(goal_of(chain, place, frame), known[[chain.held]] if chain.held >= 0 else None)
+            found = angles_of(chain, goal_of(chain, place, frame), known[[chain.held]] if chain.held >= 0 else None)
             real = found[np.isfinite(found).all(axis=1)]
             for q in real:
                 np.testing.assert_allclose(end(q, frame).homogeneous, place.homogeneous, atol=1e-6)
@@ -119,7 +145,7 @@ def test_no_posture_of_seven_joints_that_is_free_takes_less_effort():
         assert solution.solved, solution.message
         weights = problem.measures[0].distance.weights
         values = np.linspace(lower[chain.held], upper[chain.held], 10_000)
-        found = chain.angles_of(chain.goals(goal_entries(problem)).tables[0], values)
+        found = angles_of(chain, chain.goals(goal_entries(problem)).tables[0], values)
         found += 2.0 * np.pi * np.round((start - found) / (2.0 * np.pi))
         inside = ((found >= lower) & (found <= upper)).all(axis=1)
         effort = np.where(inside, (found - start) ** 2 @ weights, np.inf)

@@ -9,9 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
+from tests.reference.active_set import objective
 from wholebody.base.arrays import with_values
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
-from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver
+from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver, _structure
 from wholebody.methods.qp.solvers.registry import make_solver, solver_names
 from wholebody.methods.qp.solvers.split_form import SCALING, scaled_split
 
@@ -84,7 +85,9 @@ def test_osqps_arrays_are_those_of_the_scaled_split_form(program):
     )
     assert workspace.hessian == pytest.approx(form.diagonal)
     assert workspace.gradient == pytest.approx(form.linear)
-    assert workspace.matrix().toarray() == pytest.approx(np.vstack([np.eye(n, len(form.linear)), form.matrix]))
+    matrix = _structure(n, workspace.m, workspace.slots, workspace.pattern.tobytes())[1].copy()
+    matrix.data[:] = workspace.values
+    assert matrix.toarray() == pytest.approx(np.vstack([np.eye(n, len(form.linear)), form.matrix]))
     assert workspace.low == pytest.approx(np.concatenate([form.box[0], form.least]))
     high = np.append(form.least[: workspace.m], np.full(workspace.slots, SCALING.infinite))
     assert workspace.high == pytest.approx(np.concatenate([form.box[1], high]))
@@ -99,7 +102,7 @@ def test_the_scaled_form_is_the_same_program(program):
     x = rng.uniform(program.lower, program.upper)
     r, s = program.rows @ x - program.target, np.maximum(program.least - program.elastic @ x, 0.0)
     z = np.concatenate([SCALING.x * x, np.sqrt(program.weight) * r, np.sqrt(program.elastic_weight) * s])
-    assert 0.5 * (form.diagonal * z) @ z + form.linear @ z == pytest.approx(program.value(x), rel=1e-9)
+    assert 0.5 * (form.diagonal * z) @ z + form.linear @ z == pytest.approx(objective(program, x), rel=1e-9)
     rows = form.matrix @ z
     assert rows[:m] == pytest.approx(form.least[:m], abs=1e-9 * (1.0 + np.abs(form.least[:m]).max(initial=0.0)))
     assert (rows[m:] >= form.least[m:] - 1e-9 * np.abs(form.least[m:]) - 1e-12).all()

@@ -8,6 +8,7 @@ import pytest
 from tests.methods.qp.test_programs import by_quadprog
 from tests.reference import active_set as reference
 from tests.reference import semismooth_newton
+from tests.reference.active_set import same
 from wholebody.base.arrays import with_values
 from wholebody.methods.qp.active_set import minimise, solve_from
 from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram
@@ -67,7 +68,7 @@ def test_the_compiled_loop_is_the_array_code(k):
             assert np.abs(x - expected).max() < 1e-10
             if iterations < 300:
                 assert used == its_used
-                assert active.same(its_active)
+                assert same(active, its_active)
 
 
 def test_correcting_a_set_takes_the_smaller_system():

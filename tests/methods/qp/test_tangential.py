@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.reference import active_set as reference
+from tests.reference.active_set import same
 from wholebody.base.arrays import with_values
 from wholebody.methods.qp.active_set import room_for
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
@@ -81,7 +82,7 @@ def test_a_near_bound_stays_held_and_the_way_to_a_far_one_is_tangential(off, alo
     lower = np.array([-off, -2.0, -2.0])
     program = with_values(free_program(3), linear=np.array([9.0, -1.0, 0.5]), lower=lower, upper=np.full(3, 2.0))
     split, answer = parts(program)
-    assert answer.active.same(ActiveSet(*np.array([[True, False, False], [False] * 3]), np.zeros(0, dtype=bool)))
+    assert same(answer.active, ActiveSet(*np.array([[True, False, False], [False] * 3]), np.zeros(0, dtype=bool)))
     assert split.tangential == pytest.approx([along, 1.0, -0.5])
 
 

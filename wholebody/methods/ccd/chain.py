@@ -10,7 +10,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.methods.ccd.guards import Kept, cone_guards, guards
 from wholebody.methods.ccd.limbs import Limbs, Vector, rotated, seen_from, three
-from wholebody.methods.ccd.links import Link, LinkFinder, Overlap
+from wholebody.methods.ccd.links import Link, LinkFinder
 from wholebody.methods.ccd.sweep import Aims
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace
@@ -34,6 +34,7 @@ class ChainResolver:
 
     Attributes:
         limbs: its joints.
+        finder: of its links that overlap.
         reach: for each node, an upper bound of the distance from its joint to a point of the chain, metres.
         translated: joints that keep the orientation of links that were moved out by translation.
     """
@@ -52,16 +53,13 @@ class ChainResolver:
         self.translated: set[int] = set()
         self.limbs = Limbs(scene.model, joints)
         self._base = int(scene.model.parents[joints[0]])
-        self._finder = LinkFinder(workspace, self.limbs, foreign, exact)
+        self.finder = LinkFinder(workspace, self.limbs, foreign, exact)
         self._guards = guards(scene.figure, self.limbs, kept)
         self._cones = cone_guards(scene.figure, self.limbs, kept)
         self._tip = three(scene.model.frames[tip].placement.translation)
-        self._bearing = self._links_with_pieces(workspace)
-        self.reach = self._reaches(workspace)
-
-    def _links_with_pieces(self, workspace: Workspace) -> list[int]:
         carriers = {self.limbs.carrier(int(joint)) for joint in workspace.table.joint}
-        return sorted(node for node in carriers if node >= 0)
+        self._bearing = sorted(node for node in carriers if node >= 0)  # links with pieces
+        self.reach = self._reaches(workspace)
 
     def _reaches(self, workspace: Workspace) -> list[float]:
         """Lengths of the bones from each joint outwards, and the size of the last link's pieces."""
@@ -93,14 +91,6 @@ class ChainResolver:
         """Bring limbs that have left their reach cones, or joints their ranges of motion, back into them."""
         for guard in self._guards:
             guard.keep()
-
-    def nearest_root(self, overlaps: Sequence[Overlap]) -> Link | None:
-        """The overlapping link nearest to the root; see `LinkFinder.nearest_root`."""
-        return self._finder.nearest_root(overlaps)
-
-    def deepest(self, overlaps: Sequence[Overlap]) -> Link | None:
-        """The link that is deepest inside; see `LinkFinder.deepest`."""
-        return self._finder.deepest(overlaps)
 
     def push(self, link: Link, margin: float = MARGIN, tracked: Tracked | None = None) -> tuple[int, ...]:
         """Move the link out of the obstacle by `margin` metres; the nodes that moved. Call `read` first."""
@@ -138,7 +128,7 @@ class ChainResolver:
     def _kept(self, link: Link, push: Vector, tracked: Tracked | None) -> Array | None:
         """(3, 3) axes, one a row, that a translated link keeps; None for a link that rotates."""
         # A link is translated if parallel to the surface, or near its tracked direction and parallel there or held.
-        there, bone = _columns(self.limbs.frames[link.node]).copy(), self._bone(link)
+        there, bone = self.limbs.frames[link.node, :9].reshape(3, 3).T.copy(), self._bone(link)
         if tracked is not None:
             wanted = np.ascontiguousarray(tracked.placed[self.limbs.joints[link.node]].rotation.T)
             turned = float(np.abs(wanted - there).max())
@@ -213,8 +203,3 @@ def _parallel(bone: Array, push: Vector, most: float) -> bool:
     """Whether a bone (3,) is at less than an angle, by its sine, to the surface that pushes it out."""
     length = float(np.linalg.norm(bone))
     return length > SHORT and abs(float(bone @ push)) < most * length * float(np.linalg.norm(push))
-
-
-def _columns(frame: Array) -> Array:
-    """(3, 3) axes of a row of `Limbs.frames`, one a row."""
-    return np.asarray(frame[:9].reshape(3, 3).T)

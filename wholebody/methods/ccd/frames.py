@@ -16,7 +16,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
-from wholebody.base.errors import InputError
+from wholebody.base.checks import posture
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import first_passed, last_free
 from wholebody.methods.ccd.chain import MARGIN, Tracked
@@ -51,7 +51,8 @@ def resolve_overlap(
     It goes from `q_free` (nq,), the posture shown before, or out of things moved there, by `largest_motion` (nv,) at
     most, and is within limits and reach cones, as `q_wanted` (nq,) is made. `rng` orders the chains.
     """
-    checked = [_posture(scene, q, what) for q, what in ((q_free, "q_free"), (q_wanted, "q_wanted"))]
+    given = (posture(q, scene.model.nq, what) for q, what in ((q_free, "q_free"), (q_wanted, "q_wanted")))
+    checked = [np.asarray(pin.normalize(scene.model, q)) for q in given]
     with scene.built.pool(FrameResolver, lambda: FrameResolver(scene)).borrow() as frames:
         return frames.remove(checked[0], checked[1], rng, largest_motion)
 
@@ -134,8 +135,8 @@ class Attraction:
             tracked = self._resolver.tracked
             if chain.translated and tracked is not None:
                 link, turns = max(chain.translated), []
-                for posture in (q, trial):
-                    pin.forwardKinematics(self._model, self._data, posture)
+                for at in (q, trial):
+                    pin.forwardKinematics(self._model, self._data, at)
                     wanted = tracked.placed[link].rotation
                     turns.append(np.abs(self._data.oMi[link].rotation - wanted).max())
                 found[k] = turns[1] < turns[0] - 1e-3  # rad
@@ -181,8 +182,8 @@ class FrameResolver:
         resolver = self._resolver
         resolver.counts, resolver.margin = Counts(), MARGIN
         wanted = resolver.into_cones(self._figure.clamp(q_wanted))
-        for data, posture in zip(self._data, (wanted, q_free), strict=True):
-            pin.forwardKinematics(self._model, data, posture)
+        for data, q in zip(self._data, (wanted, q_free), strict=True):
+            pin.forwardKinematics(self._model, data, q)
         for chain in resolver.chains.values():
             chain.translated.clear()
         resolver.tracked = self._tracked
@@ -272,13 +273,10 @@ class FrameResolver:
         for share in (shares, least) if least < 1.0 else (1.0,):
             q = self._figure.clamp(np.asarray(pin.integrate(self._model, q0, share * way)))
             q = self._resolver.into_cones(q)
-            if not self._resolver.query(q) and self._clear(q0, q):
+            overlaps, sweep = self._resolver.query(q), self._workspace.sweep
+            if not overlaps and sweep.first_contact(q0, q, None, 2.0 * ALLOWED_DEPTH) is None:
                 return q
         return None
-
-    def _clear(self, q0: Array, q1: Array) -> bool:
-        """Whether the direct motion between two shown postures is free."""
-        return self._workspace.sweep.first_contact(q0, q1, None, 2.0 * ALLOWED_DEPTH) is None
 
     def _perturbed(self, q: Array, size: float, rng: np.random.Generator) -> Array:
         """Copy of a posture q (nq,) with random changes of its joints, so that a straight arm can bend."""
@@ -312,10 +310,3 @@ class FrameResolver:
             deepest=self._resolver.deepest,
             swept=self._swept,
         )
-
-
-def _posture(scene: Scene, q: Array, what: str) -> Array:
-    posture = np.asarray(q, dtype=float)
-    if posture.shape != (scene.model.nq,) or not np.isfinite(posture).all():
-        raise InputError(f"{what} is ({scene.model.nq},) finite numbers; got shape {posture.shape}")
-    return np.asarray(pin.normalize(scene.model, posture))

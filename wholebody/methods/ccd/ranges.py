@@ -159,14 +159,6 @@ RangeGuard = CoupledGuard | EllipticGuard | TwistGuard
 
 def range_guards(figure: Figure, limbs: Limbs, names: Sequence[str]) -> list[RangeGuard]:
     """The named ranges that these limbs can leave."""
-    made = [_guard(figure, limbs, name) for name in names]
+    kinds: dict[type, Any] = {CoupledRange: CoupledGuard, EllipticRange: EllipticGuard, TwistRange: TwistGuard}
+    made = [kinds[type(figure.ranges[name])](figure, limbs, figure.ranges[name]) for name in names]
     return [guard for guard in made if guard.nodes]
-
-
-def _guard(figure: Figure, limbs: Limbs, name: str) -> RangeGuard:
-    part = figure.ranges[name]
-    if isinstance(part, CoupledRange):
-        return CoupledGuard(figure, limbs, part)
-    if isinstance(part, EllipticRange):
-        return EllipticGuard(figure, limbs, part)
-    return TwistGuard(figure, limbs, part)

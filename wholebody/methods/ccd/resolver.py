@@ -16,12 +16,12 @@ from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.methods.ccd.chain import MARGIN, ChainResolver, Tracked
 from wholebody.methods.ccd.guards import NOTHING_FIXED, Kept
 from wholebody.methods.ccd.limbs import movable
-from wholebody.methods.ccd.links import Link, Overlap
+from wholebody.methods.ccd.links import Link, LinkFinder, Overlap
 from wholebody.methods.control import Control
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace
 
-Find = Callable[[ChainResolver, Sequence[Overlap]], "Link | None"]
+Find = Callable[[LinkFinder, Sequence[Overlap]], "Link | None"]
 """What chooses the link to be moved."""
 
 TOLERANCE = 1e-4  # m: largest overlap that is ignored; coal's own accuracy is a hundredth of it
@@ -121,7 +121,7 @@ class OverlapResolver:
         q = q.copy()
         overlaps = self.query(q)
         names = list(self.chains)
-        find = ChainResolver.nearest_root
+        find = LinkFinder.nearest_root
         for _ in range(4):
             if not overlaps:
                 break
@@ -131,16 +131,16 @@ class OverlapResolver:
                     break
                 overlaps = self._leave(self.chains[names[k]], q, overlaps, find)
             if overlaps and self.deepest > 0.98 * before:  # the pass gained too little
-                if find is ChainResolver.deepest or not self.exact:
+                if find is LinkFinder.deepest or not self.exact:
                     break
-                find = ChainResolver.deepest  # a forearm that cannot leave keeps the hand from its turn
+                find = LinkFinder.deepest  # a forearm that cannot leave keeps the hand from its turn
         return q, overlaps
 
     def _leave(self, chain: ChainResolver, q: Array, overlaps: list[Overlap], find: Find) -> list[Overlap]:
         """Move one chain out of its overlaps, with a new goal every time; q is changed in place."""
         worst, node = np.inf, -1
         for _ in range(8):
-            link = find(chain, overlaps)
+            link = find(chain.finder, overlaps)
             if link is None or (link.node == node and link.depth > 0.8 * worst):
                 break
             worst, node = link.depth, link.node

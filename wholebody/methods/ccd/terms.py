@@ -10,14 +10,12 @@ import numpy as np
 from wholebody.figures.description import followers_of
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State, joint_support
-from wholebody.geometry.placement import placement
 from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.ccd.guards import Kept
-from wholebody.methods.ccd.limbs import Vector, movable
+from wholebody.methods.ccd.limbs import Vector, movable, three
 from wholebody.problem import Problem
 from wholebody.tasks.bounds import Freeze, StepLimit
 from wholebody.tasks.frame import Frame, Hold, Orientation
-from wholebody.tasks.inputs import target_rotation
 from wholebody.tasks.point import Point
 from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
 
@@ -60,9 +58,8 @@ class _Reader:
         self._problem, self._figure, self._state = problem, problem.scene.figure, state
         self.refused: list[str] = []
         self.joints: set[int] = set()
-        self.fixed = {
-            joint for bound in problem.bounds if isinstance(bound, Freeze) for joint in _frozen(self._figure, bound)
-        }
+        names = (bound.joints for bound in problem.bounds if isinstance(bound, Freeze))
+        self.fixed = {self._figure.joint_id(name) for joints in names for name in self._figure.joint_names(joints)}
 
     def goals(self) -> tuple[GoalPlace, ...]:
         """The goals; their joints are among `joints` then."""
@@ -75,7 +72,7 @@ class _Reader:
             path = [joint for joint in reaching(self._figure, goal.frame) if joint not in self.fixed]
             if not path:
                 self.refused.append(f"{where}({goal.frame!r}), which no joint moves that may turn (the root stays)")
-            found.append(_goal_place(self._figure, goal))
+            found.append(_goal_place(goal))
             self.joints.update(path)
         return tuple(found)
 
@@ -99,16 +96,14 @@ class _Reader:
 
     def _hold(self, term: Hold, where: str) -> None:
         """Keep the joints that would move a frame, if it is where it is held and no goal needs them."""
-        model = self._problem.scene.model
-        support = joint_support(model)
-        carried = support[_joint(self._figure, term.frame)]
-        if term.relative_to is not None:
-            carried = carried - support[_joint(self._figure, term.relative_to)]
-        if carried[_dofs(self._figure, self.joints)].any():
+        model, support = self._problem.scene.model, joint_support(self._problem.scene.model)
+        carried = support[term.residual.place.joint] - support[term.residual.base.joint]  # of the world: none
+        if carried[[model.joints[joint].idx_v for joint in sorted(self.joints)]].any():
             self.refused.append(f"{where}, which the joints that reach move too")
         elif np.abs(term.value(self._state.update(self._problem.start))).max() > 1e-6:  # m, rad
             self.refused.append(f"{where}, which is elsewhere at the start")
-        self.fixed |= {int(joint) for joint in range(1, model.njoints) if _moves(self._figure, joint, carried)}
+        freedoms = enumerate(zip(model.idx_vs, model.nvs, strict=True))
+        self.fixed |= {joint for joint, (first, count) in freedoms if joint and carried[first : first + count].any()}
 
     def others(self) -> None:
         """Refuse bounds, measures and joints without a counterpart in cyclic coordinate descent."""
@@ -124,7 +119,7 @@ class _Reader:
 
 def reaching(figure: Figure, frame: str) -> tuple[int, ...]:
     """The joints of the frame's chain up to it; without a chain, all between the frame and the root."""
-    carrier = _joint(figure, frame)
+    carrier = int(figure.model.frames[figure.frame_id(frame)].parentJoint)
     for chain in figure.chains.values():
         joints = [figure.joint_id(name) for name in chain.joints]
         if carrier in joints:
@@ -133,29 +128,11 @@ def reaching(figure: Figure, frame: str) -> tuple[int, ...]:
     return tuple(joint for joint in path if joint > 0 and movable(figure.model, joint))
 
 
-def _joint(figure: Figure, frame: str) -> int:
-    return int(figure.model.frames[figure.frame_id(frame)].parentJoint)
-
-
-def _moves(figure: Figure, joint: int, carried: Any) -> bool:
-    made = figure.model.joints[joint]
-    return bool(carried[made.idx_v : made.idx_v + made.nv].any())
-
-
-def _dofs(figure: Figure, joints: set[int]) -> list[int]:
-    return [figure.model.joints[joint].idx_v for joint in sorted(joints)]
-
-
-def _frozen(figure: Figure, bound: Freeze) -> list[int]:
-    return [figure.joint_id(name) for name in figure.joint_names(bound.joints)]
-
-
-def _goal_place(figure: Figure, goal: Point | Frame | Orientation) -> GoalPlace:
-    frame = figure.frame_id(goal.frame)
+def _goal_place(goal: Point | Frame | Orientation) -> GoalPlace:
     if isinstance(goal, Point):
-        offset, place = np.asarray(goal.offset, dtype=float), np.asarray(goal.target, dtype=float)
-        return GoalPlace(frame, tuple(offset.tolist()), tuple(place.tolist()), None, goal.weight)
-    if isinstance(goal, Frame):
-        target = placement(goal.target)
-        return GoalPlace(frame, (0.0, 0.0, 0.0), tuple(target.translation.tolist()), target.rotation, goal.weight)
-    return GoalPlace(frame, (0.0, 0.0, 0.0), None, target_rotation(goal.target, "target").rotation, goal.weight)
+        offset, place = three(goal.resolved_offset), three(goal.resolved_target)
+        return GoalPlace(goal.place.frame, offset, place, None, goal.weight)
+    asked = goal.residual
+    place = three(asked.target) if asked.position else None
+    rotation = asked.placement.rotation if asked.orientation else None
+    return GoalPlace(asked.place.frame, (0.0, 0.0, 0.0), place, rotation, goal.weight)

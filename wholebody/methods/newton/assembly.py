@@ -26,7 +26,8 @@ from wholebody.methods.newton.assembly_solution import (
     explained,
     to_target,
 )
-from wholebody.methods.newton.assembly_system import AssemblyObjective, AssemblySystem, checked
+from wholebody.methods.newton.assembly_solution import Kind as GoalKind
+from wholebody.methods.newton.assembly_system import AssemblySystem, checked, objective_of
 from wholebody.methods.newton.batches import Batch, EquationSet, Unit
 from wholebody.methods.newton.feasibility import satisfy
 from wholebody.methods.newton.inequalities import KINDS, Kind
@@ -109,25 +110,21 @@ class Assembly(AssemblyJoints):
 
     def point_goal(self, body: str, target: ArrayLike, *, place: ArrayLike = (0.0, 0.0, 0.0)) -> Self:
         """Move a point of a body, (3,) in its frame, to a position in the world (3,), if possible; metres."""
-        what = f"the goal of {shown(body)}"
-        index, local = self._moved(body, what)
-        offset = local * pin.SE3(np.eye(3), point(place, f"{what}: place"))
-        self._goals.append(AssemblyGoal(what, index, offset, to_target(target, "point", what), "point"))
-        return self
+        return self._goal(body, target, "point", place)
 
     def frame_goal(self, body: str, target: PlacementLike) -> Self:
         """Move a body to a placement in the world, if possible."""
-        what = f"the goal of {shown(body)}"
-        index, local = self._moved(body, what)
-        self._goals.append(AssemblyGoal(what, index, local, to_target(target, "frame", what), "frame"))
-        return self
+        return self._goal(body, target, "frame")
 
     def orientation_goal(self, body: str, target: ArrayLike) -> Self:
         """Turn a body to an orientation, a quaternion (x, y, z, w) or a matrix (3, 3), if possible; it may move."""
+        return self._goal(body, target, "orientation")
+
+    def _goal(self, body: str, target: Any, kind: GoalKind, place: ArrayLike = (0.0, 0.0, 0.0)) -> Self:
         what = f"the goal of {shown(body)}"
         index, local = self._moved(body, what)
-        goal = AssemblyGoal(what, index, local, to_target(target, "orientation", what), "orientation")
-        self._goals.append(goal)
+        offset = local * pin.SE3(np.eye(3), point(place, f"{what}: place"))
+        self._goals.append(AssemblyGoal(what, index, offset, to_target(target, kind, what), kind))
         return self
 
     @property
@@ -332,7 +329,7 @@ class Assembly(AssemblyJoints):
             self._analysed, objective = self.structures, None
             if self._measures:
                 loose = [self._names[name] for name in self._parts if name not in self._figures]
-                objective = AssemblyObjective(self._measures, self.scene, self.q, loose, figures)
+                objective = objective_of(self._measures, self.scene, self.q, loose, figures)
             found = AssemblySystem(
                 self._held(), self._weight(), name, figures, self._to_scene, self.revision, objective
             )

@@ -7,21 +7,19 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array
 from wholebody.base.checks import instance
 from wholebody.base.errors import InputError
 from wholebody.geometry.memory_views import placement_view
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.assembly_geometry import AssemblyFigure
-from wholebody.methods.newton.batches import OBJECTIVE, Angle, Batch
+from wholebody.methods.newton.batches import Batch
 from wholebody.methods.newton.feasibility import Projection, kkt_algebra, project
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.linear_algebra import QuasiDefinite
-from wholebody.methods.newton.measures import refine
-from wholebody.methods.newton.own_rows import quadratic_model
+from wholebody.methods.newton.measures import Objective, refine
 from wholebody.methods.newton.settings import REFINEMENT
 from wholebody.methods.newton.system import ActiveSystem, System, unit
-from wholebody.methods.newton.task_batches import RootMotion
 from wholebody.scene.scene import Scene
 from wholebody.tasks.answers import is_own
 from wholebody.tasks.base import Measure
@@ -39,7 +37,7 @@ class AssemblySystem(ActiveSystem):
         figures: Sequence[AssemblyFigure],
         to_scene: Callable[[Array], Array],
         revision: int,
-        objective: AssemblyObjective | None = None,
+        objective: Objective | None = None,
     ) -> None:
         """Take constraints and weights (7 n,); `to_scene` gives the scene's posture (nq,) at variables (7 n,)."""
         super().__init__([*held, *(() if objective is None else objective.batches())], weight, algebra, figures)
@@ -103,65 +101,19 @@ class AssemblySystem(ActiveSystem):
             joints[1:, axis] = quat.rotate(bodies[:, 3:], np.broadcast_to(unit_vector, (len(bodies), 3)))
 
 
-class AssemblyObjective:
-    """Rows whose squares model some measures: one for each degree of freedom of bodies and revolute joints.
+def objective_of(
+    measures: Iterable[Measure], scene: Scene, q: Array, bodies: Iterable[int], figures: Iterable[FigureBodies]
+) -> Objective:
+    """Rows of measures, resolved on an assembly's scene at its posture q (nq,); `bodies` are those without figure."""
 
-    A measure f with gradient g and diagonal second derivative h is, to second order, a sum of squares of displacements
-    from -g / h with the factors h / 2, as in `wholebody.methods.newton.measures`.
-    """
+    def placed(body: int) -> tuple[int, int]:
+        joint = scene.model.joints[body + 1]
+        return int(joint.idx_q), int(joint.idx_v)
 
-    def __init__(
-        self,
-        measures: Iterable[Measure],
-        scene: Scene,
-        q: Array,
-        bodies: Iterable[int],
-        figures: Iterable[FigureBodies],
-    ) -> None:
-        """Resolve the measures on the assembly's scene at its posture q (nq,); `bodies` are those without figure."""
-        self._state = scene.state(q)
-        self._measures = [measure.resolve(scene, q) for measure in measures]
-        joints = scene.model.joints
-        free = [(body, int(joints[body + 1].idx_q), int(joints[body + 1].idx_v)) for body in bodies]
-        self._angles: list[tuple[FigureBodies, slice, Angle, Indices]] = []
-        for figure in figures:
-            first = joints[figure.first + 1]
-            rows, tangent = figure.distance(q[first.idx_q : first.idx_q + figure.model.nq])
-            part = slice(int(first.idx_q), int(first.idx_q) + figure.model.nq)
-            self._angles.append((figure, part, rows, int(first.idx_v) + tangent))
-            free += [(figure.first + body, part.start + at, int(first.idx_v) + v) for body, at, v in figure.roots]
-        self._free = [(RootMotion(body, "the measures"), at, v) for body, at, v in free]
-        self._tangent = np.concatenate([*(np.arange(v, v + 6) for _, _, v in free), *(row[3] for row in self._angles)])
-        self._stiffness = np.zeros(len(self._tangent))
-
-    def batches(self) -> list[Batch]:
-        """All rows, in the order of their factors."""
-        found: list[Batch] = [*(motion for motion, _, _ in self._free), *(rows for _, _, rows, _ in self._angles)]
-        for batch in found:
-            batch.role = OBJECTIVE
-        return found
-
-    def value(self, q: Array) -> float:
-        """The measures, with their weights, at a posture (nq,) of the assembly's scene."""
-        state = self._state.update(q)
-        return float(sum(term.weight * term.value(state) for term in self._measures))
-
-    def renew(self, q: Array) -> None:
-        """Model the measures at a posture (nq,) of the assembly's scene."""
-        state = self._state.update(q)
-        gradient, curvature = quadratic_model(self._measures, state)
-        half = np.maximum(0.5 * curvature, REFINEMENT.least_stiffness)
-        way = -0.5 * gradient / half
-        for motion, at, v in self._free:
-            motion.anchor(q[at : at + 7], way[v : v + 6])
-        for figure, part, rows, tangent in self._angles:
-            rows.bound = figure.angles_at(q[part]) + way[tangent]
-        self._stiffness = REFINEMENT.stiffness * half[self._tangent]
-
-    def enter(self, system: System) -> None:
-        """Write the present factors into a system, whose residual is of the model before."""
-        system.stiffness[system.objective] = self._stiffness
-        system.renew(system.batches)
+    parts = [(figure, *placed(figure.first)) for figure in figures]
+    free = [(body, *placed(body)) for body in bodies]
+    free += [(figure.first + k, at + own_at, v + own_v) for figure, at, v in parts for k, own_at, own_v in figure.roots]
+    return Objective(scene.state(q), q, parts, free, [measure.resolve(scene, q) for measure in measures])
 
 
 def checked(measure: Measure, scene: Scene, q: Array) -> Measure:

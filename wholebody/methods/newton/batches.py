@@ -65,10 +65,20 @@ class Batch(ABC):
     def __init__(self, bodies: Indices, labels: list[str]) -> None:
         self.bodies = np.asarray(bodies, dtype=np.intp)
         self.labels = labels
-        self._seen: tuple[Array, ...] | None = None
+        self._seen: tuple[Array, tuple[Array, ...]] = np.zeros(0), ()
 
     def __len__(self) -> int:
         return len(self.bodies)
+
+    def _shared(self, x: Array) -> tuple[Array, ...]:
+        """The `_work` at the bodies x (N + 1, 7), done once."""
+        if self._seen[0] is not x:
+            self._seen = x, self._work(x)
+        return self._seen[1]
+
+    def _work(self, x: Array) -> tuple[Array, ...]:
+        """What residual and Jacobian share."""
+        return ()
 
     @property
     def signature(self) -> Hashable:
@@ -125,7 +135,7 @@ class Coincide(Batch):
     ) -> None:
         """Take points (k, 3) in each body, directions (k, size, 3) in the world and heights (k, size)."""
         super().__init__(bodies, labels)
-        self.size, self.directions, self.height = directions.shape[1], directions, height
+        self.size, self.height = directions.shape[1], height
         self.pattern = np.ones((self.size, 14), dtype=bool)
         if self.size == 3 and bool((directions == np.eye(3)).all()):
             self.pattern[:, PLACE] = self.pattern[:, OTHER_PLACE] = np.eye(3, dtype=bool)
@@ -136,15 +146,13 @@ class Coincide(Batch):
             self._forms[:, :, side] = sign * forms.reshape(-1, self.size, 4, 4)
         self._sides = np.concatenate([directions, -directions], axis=2).reshape(-1, self.size, 2, 3)
 
-    def _slopes(self, x: Array) -> tuple[Array, Array]:
+    def _work(self, x: Array) -> tuple[Array, ...]:
         """The two bodies (k, 2, 7), and the derivatives (k, size, 2, 4) by their quaternions."""
-        if self._seen is None or self._seen[0] is not x:
-            pair = x[self.bodies]
-            self._seen = (x, pair, np.einsum("kisab,ksb->kisa", self._forms, pair[:, :, 3:]))
-        return self._seen[1], self._seen[2]
+        pair = x[self.bodies]
+        return pair, np.einsum("kisab,ksb->kisa", self._forms, pair[:, :, 3:])
 
     def residual(self, x: Array) -> Array:  # noqa: D102
-        pair, slopes = self._slopes(x)
+        pair, slopes = self._shared(x)
         result: Array = np.einsum("kisa,ksa->ki", self._sides, pair[:, :, :3])
         result += 0.5 * np.einsum("kisa,ksa->ki", slopes, pair[:, :, 3:])
         result -= self.height
@@ -153,7 +161,7 @@ class Coincide(Batch):
     def jacobian(self, x: Array) -> Array:  # noqa: D102
         result = np.empty((len(self), self.size, 2, 7))
         result[..., :3] = self._sides
-        result[..., 3:] = self._slopes(x)[1]
+        result[..., 3:] = self._shared(x)[1]
         return result.reshape(len(self), self.size, 14)
 
     def curvature(self, x: Array, force: Array) -> Array:  # noqa: D102
@@ -181,20 +189,17 @@ class Turn(Batch):
         self.pattern = np.zeros((self.size, 14), dtype=bool)
         self.pattern[:, TURN] = self.pattern[:, OTHER_TURN] = True
 
-    def _right(self, x: Array) -> Array:
+    def _work(self, x: Array) -> tuple[Array, ...]:
         """Derivative (k, size, 4) by the first quaternion."""
-        if self._seen is None or self._seen[0] is not x:
-            right = np.einsum("kiab,kb->kia", self.forms, x[self.bodies[:, 1], 3:])
-            self._seen = (x, right, right)
-        return self._seen[1]
+        return (np.einsum("kiab,kb->kia", self.forms, x[self.bodies[:, 1], 3:]),)
 
     def residual(self, x: Array) -> Array:  # noqa: D102
-        result: Array = np.einsum("kia,ka->ki", self._right(x), x[self.bodies[:, 0], 3:])
+        result: Array = np.einsum("kia,ka->ki", self._shared(x)[0], x[self.bodies[:, 0], 3:])
         return result
 
     def jacobian(self, x: Array) -> Array:  # noqa: D102
         result = np.zeros((len(self), self.size, 14))
-        result[:, :, TURN] = self._right(x)
+        result[:, :, TURN] = self._shared(x)[0]
         result[:, :, OTHER_TURN] = np.einsum("ka,kiab->kib", x[self.bodies[:, 0], 3:], self.forms)
         return result
 
@@ -276,18 +281,15 @@ class Angle(Batch):
         super().__init__(bodies, labels)
         self.forms, self.center, self.bound, self.sign = forms, center, bound, sign
 
-    def _components(self, x: Array) -> tuple[Array, Array, Array]:
+    def _work(self, x: Array) -> tuple[Array, ...]:
         """Components (k, 2) z and w, and their derivatives by either quaternion, (k, 2, 4)."""
-        if self._seen is None or self._seen[0] is not x:
-            first, second = x[self.bodies[:, 0], 3:], x[self.bodies[:, 1], 3:]
-            right = np.einsum("kiab,kb->kia", self.forms, second)
-            left = np.einsum("ka,kiab->kib", first, self.forms)
-            self._seen = (x, np.einsum("kia,ka->ki", right, first), right, left)
-        return self._seen[1], self._seen[2], self._seen[3]
+        first, second = x[self.bodies[:, 0], 3:], x[self.bodies[:, 1], 3:]
+        right, left = np.einsum("kiab,kb->kia", self.forms, second), np.einsum("ka,kiab->kib", first, self.forms)
+        return np.einsum("kia,ka->ki", right, first), right, left
 
     def angle(self, x: Array) -> Array:
         """(k,) the angles [rad]."""
-        part = self._components(x)[0]
+        part = self._shared(x)[0]
         angle = 2.0 * np.arctan2(part[:, 0], part[:, 1])
         result: Array = angle - 2.0 * np.pi * np.round((angle - self.center) / (2.0 * np.pi))
         return result
@@ -297,7 +299,7 @@ class Angle(Batch):
         return result
 
     def _gradients(self, x: Array) -> tuple[Array, Array, Array]:
-        part, right, left = self._components(x)
+        part, right, left = self._shared(x)
         gradient = np.zeros((len(self), 2, 14))
         gradient[:, :, TURN], gradient[:, :, OTHER_TURN] = right, left
         square = np.maximum((part * part).sum(axis=1), 1e-12)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -66,7 +67,6 @@ class FigureBodies:
         self._tangent: Indices = np.array([self.model.joints[row[0]].idx_v for row in self._turning], dtype=np.intp)
         self._step: tuple[Array, Array, Array] | None = None
         self.q = self._start = pin.neutral(self.model) if start is None else start
-        self._state: State | None = None
         self._state_of: Array | None = None
         self._rows_of: tuple[Array, Array] = (np.zeros(0), np.zeros(0))
         self._lay_chart()
@@ -86,12 +86,10 @@ class FigureBodies:
         """The state that `state_at` and `state_of` move, at the start."""
         return self.state_of(self._start)
 
-    @property
+    @cached_property
     def _present(self) -> State:
         """The state that `state_at` and `state_of` move."""
-        if self._state is None:
-            self._state = State(self.model)
-        return self._state
+        return State(self.model)
 
     def state_at(self, x: Array) -> State:
         """The kinematic state at the bodies x (count + 1, 7)."""

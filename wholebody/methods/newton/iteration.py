@@ -131,7 +131,8 @@ class Iteration:
             over = active.control.over or active.control.spent > most
             # a frame gets on if it can: its budget ends it after a step, or three that failed, or at twice as much
             late = over and (self.x is not begun or tried >= 3 or (tried and active.control.spent > 2.0 * most))
-            if self._holds(goals) or active.control.reason or late:
+            holds = (self.met if goals else self.hard <= self.tolerance) and self.state.finished()
+            if holds or active.control.reason or late:
                 return
             active.control.tell(TraceEntry(self.goal, self.hard, 0.0, 0.0))
             before = self._norms(self.residual)
@@ -164,10 +165,6 @@ class Iteration:
             if stagnant >= patience:
                 self.stationary = not early_exit
                 return
-
-    def _holds(self, goals: bool) -> bool:
-        """Whether the constraints hold, and the goals where they are pursued."""
-        return (self.met if goals else self.hard <= self.tolerance) and self.state.finished()
 
     def _trusted_step(
         self, trust: _Trust, violation: float, restore: bool, goals: bool, measures: Measures

@@ -37,12 +37,6 @@ class Pattern(NamedTuple):
     height: int
     width: int
 
-    def dense(self, values: Array) -> Array:
-        """The Jacobian as an array (height, width)."""
-        result = np.zeros((self.height, self.width))
-        np.add.at(result, (self.rows, self.columns), values)
-        return result
-
     def times(self, values: Array, vector: Array) -> Array:
         """J vector, (height,)."""
         result = np.bincount(self.rows, values * vector[self.columns], self.height)
@@ -292,10 +286,9 @@ class QuasiDefinite:
         wanted = np.concatenate([-system.gradient, system.residual])
         found = self._factor.solve(wanted)
         slack = np.maximum(least - system.damping, 0.0)
-        for _ in range(
-            2
-        ):  # iterative refinement: residual of the matrix without the least damping: differs by -slack y
-            error = wanted - self._times(found)
+        lower = self._matrix
+        for _ in range(2):  # iterative refinement by the matrix without the least damping, which differs by -slack y
+            error = wanted - (lower @ found + lower.T @ found - lower.diagonal() * found)
             error[n:] -= slack * found[n:]
             found = found + self._factor.solve(error)
         if not np.isfinite(found).all():
@@ -306,11 +299,6 @@ class QuasiDefinite:
         """Whether the last matrix is positive definite on the null space of J: its inertia is (n, m, 0)."""
         pivots = self._factor.vectorD()
         return int((pivots < 0.0).sum()) == self.pattern.height
-
-    def _times(self, x: Array) -> Array:
-        lower = self._matrix
-        result: Array = lower @ x + lower.T @ x - lower.diagonal() * x
-        return result
 
 
 LinearAlgebra = NormalEquations | QuasiDefinite

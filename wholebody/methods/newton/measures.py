@@ -15,7 +15,7 @@ a round whose accelerated step does not lower the measures is repeated with the 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from wholebody.base.errors import UndefinedTermError
 from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State
 from wholebody.methods.acceleration import Anderson
-from wholebody.methods.newton.batches import OBJECTIVE, Batch
+from wholebody.methods.newton.batches import OBJECTIVE, Angle, Batch
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.iteration import Iteration
 from wholebody.methods.newton.linear_algebra import SingularSystemError
@@ -42,27 +42,71 @@ MINIMISED = (Effort, RotationEffort, Displacement, Discomfort, Rhythm)
 
 
 class Objective:
-    """Rows for the measures of a problem.
+    """Rows whose squares model measures: one for each revolute joint, and six for each root or body that counts."""
 
-    Attributes:
-        rows: the joints' angles, each relative to its minimiser.
-        roots: the motion of each free root that counts relative to its minimiser, and its place in the posture.
-        squares: the rows of measures that are sums of squares.
-        minimised: the measures that are minimised.
-        reported: names of the others.
-    """
+    def __init__(
+        self,
+        state: State,
+        q: Array,
+        figures: Iterable[tuple[FigureBodies, int, int]],
+        free: Sequence[tuple[int, int, int]],
+        measures: Iterable[Measure] = (),
+    ) -> None:
+        """Take resolved measures; figures and free bodies come with their first places in q (nq,) and the tangent."""
+        self._state, self.minimised = state, list(measures)
+        self._curved = self.minimised  # those that have no rows of their own
+        self.squares: list[TangentRows] = []
+        self._angles: list[tuple[FigureBodies, slice, Angle, Indices]] = []
+        for bodies, at, v in figures:
+            part = slice(at, at + bodies.model.nq)
+            rows, tangent = bodies.distance(q[part])
+            self._angles.append((bodies, part, rows, v + tangent))
+        self._free = [(RootMotion(body, "the measures"), at, v) for body, at, v in free]
+        self._tangent = np.concatenate([*(each[3] for each in self._angles), *(np.arange(v, v + 6) for *_, v in free)])
+        self.stiffness = np.full(len(self._tangent), REFINEMENT.stiffness * REFINEMENT.least_stiffness)
+
+    def batches(self) -> list[Batch]:
+        """All rows, in the order of their factors."""
+        found: list[Batch] = [*(rows for _, _, rows, _ in self._angles), *(motion for motion, _, _ in self._free)]
+        for batch in (*found, *self.squares):
+            batch.role = OBJECTIVE
+        return [*found, *self.squares]
+
+    def value(self, q: Array) -> float:
+        """The minimised measures, with their weights, at the posture q (nq,)."""
+        state = self._state.update(q)
+        return float(sum(term.weight * term.value(state) for term in self.minimised))
+
+    def renew(self, q: Array) -> None:
+        """Model the measures at the posture q (nq,)."""
+        state = self._state.update(q)
+        gradient, curvature = quadratic_model(self._curved, state)
+        half = np.maximum(0.5 * curvature, REFINEMENT.least_stiffness)
+        self._aim(q, -0.5 * gradient / half)
+        self.stiffness = REFINEMENT.stiffness * half[self._tangent]
+
+    def enter(self, system: System) -> None:
+        """Write the present factors into a system, whose residual is of the model before."""
+        squares = np.full(sum(rows.size for rows in self.squares), REFINEMENT.stiffness)
+        system.stiffness[system.objective] = np.concatenate([self.stiffness, squares])
+        system.renew(system.batches)
+
+    def _aim(self, q: Array, way: Array) -> None:
+        """Count from the posture q (nq,), towards displacements (nv,)."""
+        for bodies, part, rows, tangent in self._angles:
+            rows.bound = bodies.angles_at(q[part]) + way[tangent]
+        for motion, at, v in self._free:
+            motion.anchor(q[at : at + 7], way[v : v + 6])
+
+
+class FigureObjective(Objective):
+    """The rows of a problem: measures that are minimised, among them sums of squares; `reported` names the others."""
 
     def __init__(self, problem: Problem, bodies: FigureBodies, state: State) -> None:
         """Prepare the rows for the figure's revolute joints."""
-        self._state, self._bodies = state, bodies
-        self.rows, tangent = bodies.distance(problem.start)
         counted = [root for root in bodies.roots if _counts_root(problem, state, root[2])]
-        self.roots = [(RootMotion(body, "the root"), q) for body, q, _ in counted]
-        self._tangent = np.concatenate([tangent, *(np.arange(v, v + 6) for _, _, v in counted)])
-        self.minimised: list[Measure] = []
-        self.reported: list[str] = []
-        self.squares: list[TangentRows] = []
-        self._curved: list[Measure] = []  # those without squares
+        super().__init__(state, problem.start, [(bodies, 0, 0)], counted)
+        self._curved, self.reported, self._follows = list[Measure](), list[str](), True
         for term in problem.measures:
             if isinstance(term, MINIMISED) or _depends_on(term, self._tangent, problem.start, state):
                 self.minimised.append(term)
@@ -71,25 +115,11 @@ class Objective:
                 self.squares += [] if rows is None else [rows]
             else:
                 self.reported.append(type(term).__name__)
-        self._follows = True
-        self.stiffness = np.full(len(self._tangent), REFINEMENT.stiffness * REFINEMENT.least_stiffness)
-
-    def batches(self) -> list[Batch]:
-        """All rows, in the order of their factors."""
-        found: list[Batch] = [self.rows, *(motion for motion, _ in self.roots), *self.squares]
-        for batch in found:
-            batch.role = OBJECTIVE
-        return found
-
-    def value(self, x: Array) -> float:
-        """The minimised measures at the bodies x (7 n,)."""
-        state = self._state.update(self._bodies.posture(x))
-        return sum(term.weight * term.value(state) for term in self.minimised)
 
     def anchor(self, q: Array) -> None:
         """Use displacements from q (nq,), the last state of a drag, with the measures' second derivatives."""
-        self._model_at(q)
-        self._aim(q, np.zeros(len(self._tangent)))
+        super().renew(q)
+        self._aim(q, np.zeros(len(q)))
         for rows in self.squares:
             rows.count_from(q)
         self._follows = False
@@ -103,26 +133,7 @@ class Objective:
     def renew(self, q: Array) -> None:
         """Model the measures at the posture q (nq,), unless an anchor is set."""
         if self._follows:
-            self._model_at(q)
-
-    def enter(self, system: System) -> None:
-        """Write the present factors into a system."""
-        squares = np.full(sum(rows.size for rows in self.squares), REFINEMENT.stiffness)
-        system.stiffness[system.objective] = np.concatenate([self.stiffness, squares])
-
-    def _model_at(self, q: Array) -> None:
-        state = self._state.update(q)
-        gradient, curvature = quadratic_model(self._curved, state)
-        half = np.maximum(0.5 * curvature[self._tangent], REFINEMENT.least_stiffness)
-        self._aim(q, -0.5 * gradient[self._tangent] / half)
-        self.stiffness = REFINEMENT.stiffness * half
-
-    def _aim(self, q: Array, way: Array) -> None:
-        """Count from the posture q (nq,), towards displacements (k,) of the revolute joints and the root."""
-        joints = len(self.rows)
-        self.rows.bound = self._bodies.angles_at(q) + way[:joints]
-        for number, (motion, place) in enumerate(self.roots):
-            motion.anchor(q[place : place + 7], way[joints + 6 * number : joints + 6 * number + 6])
+            super().renew(q)
 
 
 def _counts_root(problem: Problem, state: State, first: int) -> bool:

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 
 from wholebody.methods.base import UnsupportedTermError
-from wholebody.methods.control import Control, Progress
+from wholebody.methods.conclusion import Ending
+from wholebody.methods.control import Control
+from wholebody.methods.descents import Descends
 from wholebody.methods.inputs import check_problem
 from wholebody.methods.newton.multistart import Search, Settings
 from wholebody.methods.newton.settings import STARTS
 from wholebody.methods.newton.terms import FigureSystem, state_equations
 from wholebody.methods.newton.tracking import NewtonTracker
 from wholebody.problem import Problem
-from wholebody.solution import Solution
+from wholebody.scene.workspace import Workspace
 
 
 @dataclass(frozen=True)
-class Newton(Settings):
+class Newton(Settings, Descends):
     """Newton's method in full coordinates (Choi and Cremer 1999), for trees and closed loops alike.
 
     Every body has seven variables, every joint is an equation, and each step is the least motion that satisfies all of
@@ -46,6 +47,8 @@ class Newton(Settings):
         'solved'
     """
 
+    longest = STARTS.longest
+
     @property
     def name(self) -> str:
         """Name for tables."""
@@ -61,24 +64,12 @@ class Newton(Settings):
                 return str(error)
         return None
 
-    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
-        """Find a posture. Goals out of reach and starts in penetration are answers, not errors.
-
-        Args:
-            problem: to be solved.
-            progress: see `wholebody.methods.control.Progress`.
-
-        Raises:
-            InputError: the problem has a term that this method has no equations for.
-        """
-        check_problem(problem, "Newton.solve: problem")
-        began = time.perf_counter()
-        with problem.borrow() as workspace, Control(self.time_limit, progress, STARTS.longest) as control:
-            active_system = FigureSystem(problem, workspace, self.algebra)
-            active_system.control = control
-            search = Search(active_system, self)
-            found = search.everywhere(problem.scene.figure.clamp(problem.start))
-            return search.solution(found, began)
+    def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
+        """See `Descends._descend`."""
+        active_system = FigureSystem(problem, workspace, self.algebra)
+        active_system.control = control
+        search = Search(active_system, self)
+        return search.ending(search.everywhere(problem.scene.figure.clamp(problem.start)))
 
     def tracker(self, problem: Problem, dt: float | None = None) -> NewtonTracker:
         """A tracker of goals that move from call to call; it analyses its equations once.
@@ -91,4 +82,4 @@ class Newton(Settings):
             InputError: the problem has a term that this method has no equations for, dt is not a positive finite
                 number, or the scene changed after the problem was made.
         """
-        return NewtonTracker(problem, self, dt, self.solve)
+        return NewtonTracker(self, self, problem, dt)

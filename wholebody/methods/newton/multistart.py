@@ -12,7 +12,7 @@ from wholebody.assessment.posture import Assessment, assess
 from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import known
 from wholebody.base.fields import Checked
-from wholebody.methods.conclusion import Ending, assessed_tolerance, concluded, meets
+from wholebody.methods.conclusion import Ending, assessed_tolerance, meets
 from wholebody.methods.contradictions import Contradiction, contradictions, least_left
 from wholebody.methods.inputs import Iterations, Restarts, Seed, TimeLimit, Tolerance
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
@@ -22,7 +22,7 @@ from wholebody.methods.newton.measures import refine
 from wholebody.methods.newton.settings import STARTS
 from wholebody.methods.newton.terms import FigureSystem
 from wholebody.methods.starts import Minima, off_limits, restarts
-from wholebody.solution import Solution, TraceEntry
+from wholebody.solution import TraceEntry
 
 
 @dataclass(frozen=True)
@@ -104,10 +104,10 @@ class Search:
                 break
         return best
 
-    def solution(self, found: SearchResult, began: float) -> Solution:
-        """The solution of a result; the search began at `began` by `time.perf_counter`."""
+    def ending(self, found: SearchResult) -> Ending:
+        """A result as the end of the search."""
         reported = ", ".join(self.active_system.objective.reported)
-        ending = Ending(
+        return Ending(
             found.q,
             found.reached.stationary,
             self.iterations,
@@ -116,14 +116,7 @@ class Search:
             remark=f"; {reported} is reported, not minimised" if reported else "",
             contradictions=self.contradictions,
             judgement=found.judgement,
-        )
-        return concluded(
-            self.active_system.problem,
-            ending,
             method=f"newton/{self.active_system.algebra.name}",
-            tolerance=self.settings.tolerance,
-            control=self.active_system.control,
-            began=began,
         )
 
     def _starts(self, q: Array) -> Iterator[tuple[Array, str]]:
@@ -153,7 +146,11 @@ class Search:
     def _refined(self, found: SearchResult) -> SearchResult:
         """The same with lower measures, if possible."""
         active_system, tolerance = self.active_system, self.settings.tolerance
-        x, spent = refine(active_system, found.reached.x, active_system.objective.value, tolerance=tolerance)
+
+        def value(x: Array) -> float:
+            return active_system.objective.value(active_system.bodies.posture(x))
+
+        x, spent = refine(active_system, found.reached.x, value, tolerance=tolerance)
         self.iterations += spent
         lower = self._judged(with_values(found.reached, x=x), found.how, active_system)
         return lower if self._solves(lower) and self._better(lower, found) else found

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Hashable, Sequence
 from typing import Any
 
@@ -191,7 +190,7 @@ class ActiveSystem:
         self._laid: Hashable = None
         self._goals_laid: Hashable = None
         self._here = np.zeros(0)
-        self.structures, self.laying = 0, 0.0
+        self.structures = 0
 
     def begin(self, x: Array, goals: Sequence[Batch]) -> Array:
         """Begin a solve at x (7 n,) with these goals, and with the things where they are now; returns the start."""
@@ -262,9 +261,7 @@ class ActiveSystem:
         if laid not in self._known:
             if len(self._known) >= 32:  # more would take more memory
                 self._known.clear()
-            began = time.process_time()
             system = System(batches, self._weight)
             self._known[laid] = (system, linear_algebra(system.pattern, self.algebra_name))
             self.structures += 1
-            self.laying += time.process_time() - began
         return self._known[laid]

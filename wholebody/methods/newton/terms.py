@@ -13,7 +13,7 @@ from wholebody.figures.state import State
 from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.newton.batches import HARD, ONE_SIDED, EquationSet, Role, Unit
 from wholebody.methods.newton.figure_bodies import FigureBodies
-from wholebody.methods.newton.measures import Objective
+from wholebody.methods.newton.measures import FigureObjective
 from wholebody.methods.newton.own_rows import constraint_rows, goal_rows
 from wholebody.methods.newton.quaternions import axes_along
 from wholebody.methods.newton.system import ActiveSystem
@@ -141,7 +141,7 @@ class FigureSystem(ActiveSystem):
         held += bound_equations(problem, bodies, workspace.state).batches()
         if not yielding:
             held += constraint_equations(problem, bodies).batches()
-        self.objective = Objective(problem, bodies, workspace.state)
+        self.objective = FigureObjective(problem, bodies, workspace.state)
         super().__init__([*held, *self.objective.batches()], bodies.weight, algebra, [bodies])
         self._find_contacts(problem.clearances, workspace, bodies.data)
         self._own = tuple(filter(is_own, problem.measures))

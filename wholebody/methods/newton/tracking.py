@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.base.arrays import Array, with_values
-from wholebody.base.checks import posture, time_step
+from wholebody.base.arrays import Array
+from wholebody.base.checks import posture
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT
-from wholebody.methods.base import begun, judged, nearest_to
+from wholebody.methods.base import Method, SolvingTracker
+from wholebody.methods.conclusion import concluded
 from wholebody.methods.control import BUDGET
-from wholebody.methods.inputs import TOLERANCE, check_problem
+from wholebody.methods.inputs import TOLERANCE
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.multistart import Search, Settings
 from wholebody.methods.newton.settings import FRAMES, STARTS
 from wholebody.methods.newton.terms import FigureSystem
 from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import Collision
-from wholebody.scene.workspace import NotCopyable
 from wholebody.solution import Solution
 from wholebody.tasks import StepLimit
 
@@ -36,16 +35,13 @@ class NewtonStep(NamedTuple):
     collisions: tuple[Collision, ...] = ()
 
 
-class NewtonTracker(NotCopyable):
+class NewtonTracker(SolvingTracker):
     """Follows the goals of one problem, frame by frame.
 
     Goals, other terms and clearances of the problem may be replaced between calls, and things may be moved. A tracker
     remembers the previous frame, so it serves one motion and one thread at a time.
 
     Attributes:
-        problem: to be solved whose goals it follows.
-        dt: seconds a frame; None for frames without a time step.
-        workspace: its own workspace; between calls others may move it.
         unswept: radians and metres: shorter motions need no sweep, because every iteration of a frame was tested.
         leaves_overlap: True.
     """
@@ -53,25 +49,12 @@ class NewtonTracker(NotCopyable):
     unswept = SHORT
     leaves_overlap = True
 
-    def __init__(
-        self, problem: Problem, settings: Settings, dt: float | None, solve: Callable[[Problem], Solution]
-    ) -> None:
-        """Build the equations; `settings` are those of whole solves, and `solve` is the method."""
-        self.problem = check_problem(problem, "tracker: problem")
-        self.dt = None if dt is None else time_step(dt, "dt")
-        self._settings, self._solve = settings, solve
-        self.workspace = problem.workspace()
+    def __init__(self, method: Method, settings: Settings, problem: Problem, dt: float | None) -> None:
+        """Build the equations; `settings` are those of the method. Where dt is None, speeds are not bounded."""
+        super().__init__(method, problem, 1.0 if dt is None else dt)
+        self._settings, self._bounded = settings, dt is not None
         self._alone = OneAtATime("tracker")
         self._lay_out()
-
-    def step(self, q: Array, tolerance: float = FRAMES.tolerance) -> NewtonStep:
-        """The same as `frame`; what things that moved meanwhile met is named."""
-        q = begun(self.problem, q)
-        self.workspace.refresh()
-        motion, step = self.workspace.next_frame(q), self.frame(q, tolerance)
-        if motion is None:
-            return step
-        return with_values(step, collisions=judged(self.workspace, motion, q, step.q))
 
     def frame(self, q: Array, tolerance: float | None = None) -> NewtonStep:
         """One frame of a drag: from the posture q (nq,) the least motion that meets the problem's present goals.
@@ -88,7 +71,7 @@ class NewtonTracker(NotCopyable):
         with self._alone:
             active_system = self._renewed()
             active_system.objective.anchor(q)
-            if self.dt is not None and any(isinstance(bound, StepLimit) for bound in self.problem.bounds):
+            if self._bounded and any(isinstance(bound, StepLimit) for bound in self.problem.bounds):
                 state = self.workspace.state.update(q)
                 ranges = np.array([bound.bounds(state, self.dt) for bound in self.problem.bounds])
                 active_system.bodies.bound_step(q, ranges[:, 0].max(axis=0), ranges[:, 1].min(axis=0))
@@ -133,27 +116,17 @@ class NewtonTracker(NotCopyable):
         even, weighted = (np.linalg.norm(by * errors[1]) / np.linalg.norm(by * errors[0]) for by in (1.0, weights))
         return bool(1.0 - weighted <= 0.5 * (1.0 - even) + 1e-6)
 
-    def nearest(self, q: Array) -> Solution:
-        """The method's answer from q (nq,), with measures relative to q."""
-        return self._solve(nearest_to(self.problem, q))
-
-    def overlap_resolutions(self, q: Array) -> Sequence[Array]:
-        """No postures: the steps lead out."""
-        posture(q, self.workspace.model.nq)
-        return ()
-
     def solve(self, q: Array) -> Solution:
         """Solve for the problem's present goals from the posture q (nq,), without other starts."""
         began = time.perf_counter()
         q = posture(q, self.workspace.model.nq)
         with self._alone:
             search = Search(self._renewed(), self._settings)
-            return search.solution(search.from_here(q), began)
-
-    @property
-    def laid_out(self) -> tuple[int, float]:
-        """Number of patterns, and the processor's time of their analysis [s]."""
-        return self._active_system.structures, self._active_system.laying
+            ending, control = search.ending(search.from_here(q)), self._active_system.control
+        tolerance = self._settings.tolerance
+        return concluded(
+            self.problem, ending, method=self._method.name, tolerance=tolerance, control=control, began=began
+        )
 
     def _lay_out(self) -> None:
         problem = self.problem

@@ -84,11 +84,7 @@ def primal_dual_active_set(
             return False
         for c in range(k):
             reached[c] = dot(elastic[places[c]], x)
-        if attempt < limits.at_once:
-            wrong = _correct_all(program, places, active, own, limits.tolerance, x)
-        else:
-            wrong = _correct_worst(program, places, active, own, limits.tolerance, x)
-        if not wrong:
+        if not _correct(program, places, active, own, limits.tolerance, x, attempt < limits.at_once):
             for i in range(n):
                 x[i] = min(max(x[i], lower[i]), upper[i])
             return True
@@ -110,67 +106,51 @@ def minimise_with(program: QuadraticProgram, active: ActiveSet, tolerance: float
 
 
 @compiled(inner=True, error_model="numpy", forceinline=True)
-def _correct_all(
-    program: QuadraticProgram, places: Indices, active: ActiveSet, own: Face, tolerance: float, x: Array
+def _correct(
+    program: QuadraticProgram, places: Indices, active: ActiveSet, own: Face, tolerance: float, x: Array, every: bool
 ) -> bool:
-    """Put right everything that is wrong in an active set with the minimiser x (n,); whether anything was."""
-    target, least, lower, upper = program.target, program.least, program.lower, program.upper
-    at_lower, at_upper, pushing = active.lower, active.upper, active.elastic
-    multiplier, gradient, reached = own.multiplier, own.gradient, own.reached
-    wrong = False
-    for i in range(len(x)):
-        low = gradient[i] >= 0.0 if at_lower[i] else x[i] < lower[i] - tolerance
-        high = gradient[i] <= 0.0 if at_upper[i] else x[i] > upper[i] + tolerance
-        wrong = wrong or low != at_lower[i] or high != at_upper[i]
-        at_lower[i], at_upper[i] = low, high
-    following = len(target)
-    for c in range(len(places)):
-        j = places[c]
-        push = reached[c] < least[j] - tolerance
-        if pushing[j]:
-            push = multiplier[following] <= 0.0
-            following += 1
-        wrong = wrong or push != pushing[j]
-        pushing[j] = push
-    return wrong
-
-
-@compiled(inner=True, error_model="numpy", forceinline=True)
-def _correct_worst(
-    program: QuadraticProgram, places: Indices, active: ActiveSet, own: Face, tolerance: float, x: Array
-) -> bool:
-    """Put right the entry that is most wrong, in units of x; whether any was."""
+    """Put right every wrong entry of an active set, or the one that is most wrong in units of x; whether any was."""
     diagonal, target, elastic = program.diagonal, program.target, program.elastic
     least, lower, upper = program.least, program.lower, program.upper
     at_lower, at_upper, pushing = active.lower, active.upper, active.elastic
     multiplier, gradient, reached = own.multiplier, own.gradient, own.reached
     worst, mask, place, found = -np.inf, at_lower, 0, False
     for i in range(len(x)):
+        low = gradient[i] >= 0.0 if at_lower[i] else x[i] < lower[i] - tolerance
+        high = gradient[i] <= 0.0 if at_upper[i] else x[i] > upper[i] + tolerance
+        if low == at_lower[i] and high == at_upper[i]:
+            continue
+        found = True
+        if every:
+            at_lower[i], at_upper[i] = low, high
+            continue
         pull = abs(gradient[i]) / diagonal[i]
-        next_lower = gradient[i] >= 0.0 if at_lower[i] else x[i] < lower[i] - tolerance
-        next_upper = gradient[i] <= 0.0 if at_upper[i] else x[i] > upper[i] + tolerance
-        found = found or next_lower != at_lower[i] or next_upper != at_upper[i]
         wrong = pull if at_lower[i] else lower[i] - x[i]
-        if next_lower != at_lower[i] and wrong > worst:
+        if low != at_lower[i] and wrong > worst:
             worst, mask, place = wrong, at_lower, i
         wrong = pull if at_upper[i] else x[i] - upper[i]
-        if next_upper != at_upper[i] and wrong > worst:
+        if high != at_upper[i] and wrong > worst:
             worst, mask, place = wrong, at_upper, i
     following = len(target)
     for c in range(len(places)):
         j = places[c]
-        wrong = least[j] - reached[c]
-        flips = wrong > tolerance
+        push, wrong = reached[c] < least[j] - tolerance, least[j] - reached[c]
         if pushing[j]:
-            flips = not multiplier[following] <= 0.0
+            push, wrong = multiplier[following] <= 0.0, multiplier[following]
+            following += 1
+        if push == pushing[j]:
+            continue
+        found = True
+        if every:
+            pushing[j] = push
+            continue
+        if pushing[j]:
             norm = 0.0
             for i in range(len(x)):
                 norm += elastic[j, i] * elastic[j, i] / diagonal[i]
-            wrong = multiplier[following] * norm
-            following += 1
-        found = found or flips
-        if flips and wrong > worst:
+            wrong *= norm
+        if wrong > worst:
             worst, mask, place = wrong, pushing, j
-    if found:
+    if found and not every:
         mask[place] = not mask[place]
     return found

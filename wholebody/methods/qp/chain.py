@@ -17,17 +17,16 @@ import pinocchio as pin
 from wholebody import tasks
 from wholebody.base.arrays import Array, with_values
 from wholebody.base.pool import Pool
-from wholebody.figures.figure import Figure
 from wholebody.methods.control import Control
 from wholebody.methods.qp.chain_kernel import Goals
 from wholebody.methods.qp.closed_form import Branches
 from wholebody.methods.qp.plain_chain import FIRST, NEARBY, Chains, PlainChain
-from wholebody.methods.qp.settings import SEEDS, Budget
+from wholebody.methods.qp.settings import SEEDS, Settings
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
 from wholebody.tasks.distance import SquaredDistance
-from wholebody.terms.entries import RESIDUAL, Entry, entries_of, placement_floats
+from wholebody.terms.entries import RESIDUAL, Entry, entries_of
 
 
 class Met(NamedTuple):
@@ -52,21 +51,6 @@ def chains_of(problem: Problem) -> Pool[Chains]:
     return built.pool(Chains, lambda: Chains(built.model, limits))
 
 
-def branches(figure: Figure, frame: str, placement: pin.SE3, at: Array) -> Array:
-    """Postures (k, nq) with a frame at a placement, by the closed form of its arm, the nearest to `at` (nq,) first."""
-    # All with six joints, samples with seven, some off by what limits take away. None where it has no closed form.
-    model = figure.model
-    known = model.frames[figure.frame_id(frame)]
-    chain = Chains(model, figure.limits).of(frozenset((known.parentJoint,)))
-    if chain is None or chain.arm is None:
-        return np.zeros((0, model.nq))
-    floats = [placement_floats(known.placement), np.zeros(12), placement.translation, placement.rotation.ravel()]
-    goals = Goals(np.concatenate(floats)[None], np.zeros((1, 6), dtype=np.int64))
-    near = chain.angles(at)
-    found = chain.branches(goals, np.array([near, np.zeros_like(near)]))
-    return np.array([chain.posture(values, at) for values in found.cheaper(np.inf)]).reshape(-1, model.nq)
-
-
 def goal_entries(problem: Problem) -> list[Entry] | None:
     """Entries of the goals, where they are places and rotations and nothing else must hold; None otherwise."""
     if problem.constraints or problem.bounds or not problem.goals:
@@ -80,7 +64,7 @@ def goal_entries(problem: Problem) -> list[Entry] | None:
     return found
 
 
-def from_seeds(problem: Problem, workspace: Workspace, budget: Budget, control: Control) -> Met | None:
+def from_seeds(problem: Problem, workspace: Workspace, settings: Settings, control: Control) -> Met | None:
     """A posture that meets the goals with everything held, the best of the first few; None for other terms."""
     entries = goal_entries(problem)
     if entries is None:
@@ -90,13 +74,13 @@ def from_seeds(problem: Problem, workspace: Workspace, budget: Budget, control: 
         if chain is None:
             return None
         at = problem.scene.figure.clamp(problem.start)
-        distance = distance_of(problem, chain) if budget.measures else None
+        distance = distance_of(problem, chain) if settings.measures else None
         nearest = np.array([chain.angles(at if distance is None else distance.reference), np.zeros(len(chain.idx_v))])
         if distance is not None:
             nearest[1] = distance.weights[chain.idx_v]
         asked = Asked(chain.goals(entries), at, nearest, problem.clearances)
-        rule = Rule.of(chain, asked.goals, budget, distance is not None)
-        return Descents(asked, chain, rule, workspace, budget, control).run()
+        rule = Rule.of(chain, asked.goals, settings, distance is not None)
+        return Descents(asked, chain, rule, workspace, settings, control).run()
 
 
 class Asked(NamedTuple):
@@ -112,10 +96,10 @@ class Descents:
     """Descents of one problem from one batch of seeds after the other."""
 
     def __init__(
-        self, asked: Asked, chain: PlainChain, rule: Rule, workspace: Workspace, budget: Budget, control: Control
+        self, asked: Asked, chain: PlainChain, rule: Rule, workspace: Workspace, settings: Settings, control: Control
     ) -> None:  # fmt: skip
         """Set up; `run` does it all."""
-        self.asked, self.chain, self.workspace, self.budget, self.control = asked, chain, workspace, budget, control
+        self.asked, self.chain, self.workspace, self.settings, self.control = asked, chain, workspace, settings, control
         self.start, self.rule, self.measured = chain.angles(asked.at), rule, rule.measured
         self.trace: list[TraceEntry] = []
         self.least = np.inf  # effort of an end that does not keep its clearances
@@ -123,7 +107,7 @@ class Descents:
 
     def run(self, first: tuple[Array, Array] | None = None) -> Met | None:
         """The answer of the batches in turn: the closed form's ends, its samples, random seeds; `first`: ends known."""
-        if not self.budget.restarts:
+        if not self.settings.restarts:
             return self._ended(self.start[None].copy(), 1)
         exact, finite, enough = self.rule[:3]
         if exact:
@@ -147,7 +131,7 @@ class Descents:
             if met is not None:
                 return with_values(met, blocked=None)
             first = None
-        for seeds in self.chain.seeds(self.start, self.budget.seed, self.rule.together):
+        for seeds in self.chain.seeds(self.start, self.settings.seed, self.rule.together):
             if first is None:
                 met = self._along(self._ended(seeds, enough))
             else:
@@ -166,9 +150,9 @@ class Descents:
     def _is_out_of_reach(self) -> bool:
         """Whether all postures of six joints at the goal and at those nearby are beyond limits or far inside things."""
         chain, (goals, at, _, clearances) = self.chain, self.asked
-        if self.budget.tolerance > NEARBY:
+        if self.settings.tolerance > NEARBY:
             return False  # postures farther from the goal would do
-        found = chain.loosely_met(goals, self.budget.seed)
+        found = chain.loosely_met(goals, self.settings.seed)
         if len(found) and self.workspace.model.nv > len(self.start):
             return False  # others may make room
         deep = clearances - SEEDS.deep
@@ -176,9 +160,9 @@ class Descents:
 
     def _nearest(self) -> Met:
         """Where descents from the first seeds come nearest to the goals with everything held: a few, which differ."""
-        seeds = next(self.chain.seeds(self.start, self.budget.seed, SEEDS.together))
+        seeds = next(self.chain.seeds(self.start, self.settings.seed, SEEDS.together))
         # All of them, although some may meet the goals inside of things.
-        found, _ = self._descended(seeds, how_far(self.budget, len(seeds), others=True))
+        found, _ = self._descended(seeds, how_far(self.settings, len(seeds), others=True))
         values, near = list[Array](), list[Array]()
         for k in found[:, 0].argsort():
             differs = all(np.abs(seeds[k] - each).max() > SEEDS.differing for each in values)
@@ -199,7 +183,7 @@ class Descents:
     def _first_ended(self) -> tuple[Array, Array]:
         """Ends (k, n) of the closed form's branches, and what was found there (k, 4); empty for more than `FIRST`."""
         goals, _, nearest, _ = self.asked
-        ends, asked = np.empty((1, FIRST, len(self.start))), how_far(self.budget, self.rule.enough)
+        ends, asked = np.empty((1, FIRST, len(self.start))), how_far(self.settings, self.rule.enough)
         found, counts = self.chain.descents(goals.tables[None], goals, nearest[None], asked, ends)
         count = max(int(counts[0]), 0)
         return ends[0, :count], found[0, :count]
@@ -207,7 +191,7 @@ class Descents:
     def _ended(self, seeds: Array, enough: int, others: bool = False) -> Met | None:
         """The end of least effort that is free, of the first that meet the goals; None where none is."""
         while len(seeds):
-            found, taken = self._descended(seeds, how_far(self.budget, enough, others))
+            found, taken = self._descended(seeds, how_far(self.settings, enough, others))
             met = self._chosen(seeds[:taken], found)
             if met is not None or self.control.over:
                 return met
@@ -225,7 +209,7 @@ class Descents:
         for effort, k in sorted((end[1], k) for k, end in enumerate(ends) if end[1] < np.inf):
             q = chain.posture(seeds[k], self.asked.at)
             if self._is_free(q):
-                known = bool(ends[k][2]) and (self.measured or not self.budget.measures)
+                known = bool(ends[k][2]) and (self.measured or not self.settings.measures)
                 # Ends of a chain with as many joints as rows are isolated: no descent leads out of what blocks it.
                 free = len(self.start) > self.rule.rows and self.least < SEEDS.worth * effort
                 return Met(q, tuple(self.trace), known, self.blocked if free else None)
@@ -249,7 +233,7 @@ class Descents:
         chain, (goals, at, nearest, _), trace = self.chain, self.asked, tuple(self.trace)
         blocked = chain.along(goals, nearest, values) if self.measured else None
         if blocked is None:
-            return Met(chain.posture(values, at), trace, not self.budget.measures)
+            return Met(chain.posture(values, at), trace, not self.settings.measures)
         if self._is_free(q := chain.posture(blocked, at)):
             return Met(q, trace, True)
         end = float(blocked[chain.held])
@@ -270,10 +254,10 @@ class Descents:
         return is_free(self.workspace, q, self.asked.clearances)
 
 
-def how_far(budget: Budget, enough: int, others: bool = False) -> Array:
+def how_far(settings: Settings, enough: int, others: bool = False) -> Array:
     """Numbers (5,) of `chain_kernel.reach`; `others`: those too that will take more effort than what is found."""
-    steps = min(budget.iterations, SEEDS.steps)
-    return np.array([budget.tolerance, SEEDS.damping**2, steps, enough, 0.0 if others else 1.0])
+    steps = min(settings.iterations, SEEDS.steps)
+    return np.array([settings.tolerance, SEEDS.damping**2, steps, enough, 0.0 if others else 1.0])
 
 
 class Rule(NamedTuple):
@@ -287,9 +271,9 @@ class Rule(NamedTuple):
     measured: bool  # whether ends are compared by a measure
 
     @classmethod
-    def of(cls, chain: PlainChain, goals: Goals, budget: Budget, measured: bool) -> Rule:
+    def of(cls, chain: PlainChain, goals: Goals, settings: Settings, measured: bool) -> Rule:
         """The rule for problems with such goals."""
-        exact, more = chain.is_exact(goals), 1 + budget.restarts_for_measure
+        exact, more = chain.is_exact(goals), 1 + settings.restarts_for_measure
         finite = exact and chain.held < 0
         enough = 1 if finite or not measured else SEEDS.compared * more
         rows = sum(3 * int(each[3] + each[4]) for each in goals.entries)

@@ -18,7 +18,7 @@ from wholebody.methods.control import Control
 from wholebody.methods.qp.chain import Asked, Descents, Rule, chains_of, distance_of, goal_entries, how_far
 from wholebody.methods.qp.chain_kernel import Goals
 from wholebody.methods.qp.plain_chain import FIRST, PlainChain
-from wholebody.methods.qp.settings import SEEDS, Budget
+from wholebody.methods.qp.settings import SEEDS, Settings
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.distance import Displacement, Effort
@@ -45,7 +45,7 @@ class Batch(NamedTuple):
     starts: Array  # (k, nq)
     tables: Array  # (k, e, 36) floats of the goals' entries
     numbers: Numbers
-    budget: Budget
+    settings: Settings
 
     def run(self) -> Answers:
         """Solve what descents of the chain lead to an answer of."""
@@ -76,15 +76,15 @@ class Batch(NamedTuple):
                     q[k], iterations[k], ended[k] = met.q, len(met.trace), True
             if len(left):
                 judgement.put(left, judged(problem, self.numbers.of_some(left), q[left]))
-        solved = ended & judgement.meets(assessed_tolerance(self.budget.tolerance))
+        solved = ended & judgement.meets(assessed_tolerance(self.settings.tolerance))
         return Answers(solved, q, iterations, judgement, time.perf_counter() - began)
 
 
-def batches(problems: Sequence[Problem], budget: Budget, largest: int) -> list[Batch]:
+def batches(problems: Sequence[Problem], settings: Settings, largest: int) -> list[Batch]:
     """The problems that may be solved at once, in batches of at most so many."""
     groups: dict[Hashable, list[int]] = {}
     known: dict[Hashable, PlainChain | None] = {}
-    for place, problem in enumerate(problems if budget.restarts else ()):
+    for place, problem in enumerate(problems if settings.restarts else ()):
         form = _form(problem, known)
         if form is not None:
             groups.setdefault(form, []).append(place)
@@ -94,7 +94,7 @@ def batches(problems: Sequence[Problem], budget: Budget, largest: int) -> list[B
             places = group[first : first + largest]
             some = [problems[place] for place in places]
             starts, numbers = np.array([problem.start for problem in some]), Numbers.of(some)
-            made.append(Batch(places, some[0], starts, _tables(some[0], numbers), numbers, budget))
+            made.append(Batch(places, some[0], starts, _tables(some[0], numbers), numbers, settings))
     return made
 
 
@@ -164,21 +164,21 @@ class _First:
     @classmethod
     def of(cls, batch: Batch, chain: PlainChain, entries: list[Entry]) -> _First:
         """Descend from the first seeds of each problem."""
-        problem, budget = batch.problem, batch.budget
+        problem, settings = batch.problem, batch.settings
         limits = problem.scene.figure.limits
         at = batch.starts.copy()
         at[:, limits.idx_q] = np.clip(at[:, limits.idx_q], limits.lower, limits.upper)
         nearest = np.zeros((len(at), 2, len(chain.idx_v)))
-        nearest[:, 0] = chain.angles(batch.numbers.references if budget.measures else at)
-        if budget.measures:
+        nearest[:, 0] = chain.angles(batch.numbers.references if settings.measures else at)
+        if settings.measures:
             nearest[:, 1] = distance_of(problem, chain).weights[chain.idx_v]  # type: ignore[union-attr]
         goals = chain.goals(entries)
-        rule = Rule.of(chain, goals, budget, budget.measures)
+        rule = Rule.of(chain, goals, settings, settings.measures)
         together = 0 if rule.exact else rule.together
         ends = np.empty((len(at), together or FIRST, nearest.shape[2]))
         for k in range(len(at) if together else 0):
-            ends[k] = next(chain.seeds(chain.angles(at[k]), budget.seed, together))
-        found, counts = chain.descents(batch.tables, goals, nearest, how_far(budget, rule.enough), ends, together)
+            ends[k] = next(chain.seeds(chain.angles(at[k]), settings.seed, together))
+        found, counts = chain.descents(batch.tables, goals, nearest, how_far(settings, rule.enough), ends, together)
         return cls(batch, chain, goals, rule, at, nearest, ends, found, np.maximum(counts, 0))
 
     @cached_property
@@ -225,4 +225,4 @@ class _First:
         goals = Goals(batch.tables[k], self.goals.entries)
         asked = Asked(goals, self.at[k], self.nearest[k], batch.numbers.clearances[k])
         workspace.begin()
-        return Descents(asked, self.chain, self.rule, workspace, batch.budget, Control(np.inf))
+        return Descents(asked, self.chain, self.rule, workspace, batch.settings, Control(np.inf))

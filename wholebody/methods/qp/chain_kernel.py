@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
+from wholebody.methods.qp.closed_form_kernel import BRANCHES, FULL, Arm, foreseen, sampled
 from wholebody.methods.qp.dense_kernel import copy, solve
 from wholebody.terms.entries import Integers
 from wholebody.terms.residual_kernel import residuals
 
-TURN = 2.0 * np.pi
 CLEARLY, NEAR = 1.25, 0.3
 """An end of less than this many radians or metres away is left where it will take this many times another's effort."""
 HARDLY = 1.6
@@ -294,10 +294,10 @@ def _unwind(chain: Chain, q: Array, nearest: Array) -> None:
     """Turn joints by whole turns to where they are nearest to a posture."""
     for i in range(len(q)):
         if chain.turns[i, 0] != 0.0 or chain.turns[i, 1] != 0.0 or chain.turns[i, 2] != 0.0:
-            while q[i] - nearest[i] > np.pi and q[i] - TURN >= chain.lower[i]:
-                q[i] -= TURN
-            while nearest[i] - q[i] > np.pi and q[i] + TURN <= chain.upper[i]:
-                q[i] += TURN
+            while q[i] - nearest[i] > np.pi and q[i] - FULL >= chain.lower[i]:
+                q[i] -= FULL
+            while nearest[i] - q[i] > np.pi and q[i] + FULL <= chain.upper[i]:
+                q[i] += FULL
 
 
 @compiled(inner=True)
@@ -354,3 +354,47 @@ def rows_of(chain: Chain, goals: Goals, room: Room) -> None:
                 if moved != 0:
                     for i in range(6):
                         room.jacobian[r, k] += moved * room.wrench[r, i] * room.columns[k, i]
+
+
+@compiled(error_model="numpy", nogil=True)
+def reach_all(
+    bodies: tuple[Chain, Arm, Room], asked: Array, goals: tuple[Array, NDArray[np.int64]], samples: tuple[int, int],
+    nearest: Array, ends: Array, found: Array, counts: Indices,
+) -> None:  # fmt: skip
+    """Do for each of k problems what `reach` does, from the branches of its closed form or given seeds.
+
+    Args:
+        bodies: the joints; the arm that they are, without joints where it has no closed form; room, written.
+        asked: (5,) as in `reach`.
+        goals: floats (k, e, 36) and integers (e, 6) of the goals.
+        samples: how many of the joint that the closed form holds, and how many where none of these is within limits.
+        nearest: (k, 2, n) as in `reach`.
+        ends: (k, m, n) seeds of arms without a closed form; written: where descents end.
+        found: (k, m, 4) written, as in `reach`.
+        counts: (k,) of seeds; written: of those that were taken, -1 for more than there is room for.
+    """
+    chain, arm, room = bodies
+    tables, integers = goals
+    size, most, limits = len(chain.lower), ends.shape[1], (chain.lower, chain.upper)
+    branch, effort = np.empty((samples[1], BRANCHES, size)), np.empty((samples[1], BRANCHES))
+    order, seeds = np.empty(samples[1] * BRANCHES, dtype=np.intp), np.empty((samples[1] * BRANCHES, size))
+    met, expected = np.empty((samples[1] * BRANCHES, 4)), np.zeros(max(most, samples[1] * BRANCHES))
+    for p in range(len(tables)):
+        one = Goals(tables[p], integers)
+        if not len(arm.joints):
+            given = ends[p, : counts[p]]
+            counts[p] = reach(chain, one, room, given, nearest[p], asked, expected, found[p])
+            continue
+        number = 0
+        for v in samples:
+            if number == 0:
+                number = sampled(arm, tables[p, 0], limits, nearest[p], branch[:v], effort[:v], order)
+                for k in range(number):
+                    at, b = order[k] // BRANCHES, order[k] % BRANCHES
+                    copy(branch[at, b], seeds[k])
+                    expected[k] = foreseen(effort[:v], at, b)
+        taken = reach(chain, one, room, seeds[:number], nearest[p], asked, expected, met)
+        counts[p] = taken if taken <= most else -1
+        for k in range(min(taken, most)):
+            copy(seeds[k], ends[p, k])
+            copy(met[k], found[p, k])

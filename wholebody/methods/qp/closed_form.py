@@ -107,7 +107,7 @@ def _crossing(axes: Array, points: Array) -> Array:
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back."""
-    from wholebody.methods.qp import branch_kernel, closed_form_kernel
+    from wholebody.methods.qp import closed_form_kernel
 
     rows, one, near = np.zeros((1, 3)), np.zeros(1), np.zeros((2, 1))
     arm = Arm(rows, rows, np.zeros(1, dtype=np.intp), 0, CROSSING, 0, np.zeros((4, 3)), SLACK)
@@ -115,6 +115,6 @@ def compiled_kernel() -> Any:
     closed_form_kernel.branches(arm, goal, np.zeros(0), found)
     order = np.zeros(0, dtype=np.intp)
     closed_form_kernel.sampled(arm, goal, limits, near, found, np.zeros((0, BRANCHES)), order)
-    branch_kernel.along(arm, goal, limits, near, 0.0, one.copy())
-    branch_kernel.beside(arm, goal, limits, near, 0.0, one, one.copy())
+    closed_form_kernel.along(arm, goal, limits, near, 0.0, one.copy())
+    closed_form_kernel.beside(arm, goal, limits, near, 0.0, one, one.copy())
     return closed_form_kernel

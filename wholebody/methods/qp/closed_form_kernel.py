@@ -301,7 +301,21 @@ def sampled(
         for v in range(len(values)):
             values[v] = low + (high - low) * v / (len(values) - 1)
     branches(arm, goal, values, found)
-    return _least(found, lower, upper, near, effort, order)
+    count, number = 0, len(found)
+    for b in range(BRANCHES):
+        for v in range(number):
+            effort[v, b] = within(found[v, b], lower, upper, near, BETWEEN if number > 1 else SLACK)
+        for v in range(number):
+            own = effort[v, b]
+            if own == np.inf or (v > 0 and effort[v - 1, b] <= own) or (v + 1 < number and effort[v + 1, b] < own):
+                continue
+            place = count
+            while place > 0 and effort[order[place - 1] // BRANCHES, order[place - 1] % BRANCHES] > own:
+                order[place] = order[place - 1]
+                place -= 1
+            order[place] = BRANCHES * v + b
+            count += 1
+    return count
 
 
 @compiled(inner=True, error_model="numpy")
@@ -314,26 +328,6 @@ def foreseen(effort: Array, v: int, b: int) -> float:
     if not 0.0 < bent < np.inf:
         return 0.0
     return float(own - 0.125 * (after - before) ** 2 / bent)
-
-
-@compiled(inner=True, error_model="numpy")
-def _least(found: Array, lower: Array, upper: Array, nearest: Array, effort: Array, order: Indices) -> int:
-    """See `sampled`."""
-    count, number = 0, len(found)
-    for b in range(BRANCHES):
-        for v in range(number):
-            effort[v, b] = within(found[v, b], lower, upper, nearest, BETWEEN if number > 1 else SLACK)
-        for v in range(number):
-            own = effort[v, b]
-            if own == np.inf or (v > 0 and effort[v - 1, b] <= own) or (v + 1 < number and effort[v + 1, b] < own):
-                continue
-            place = count
-            while place > 0 and effort[order[place - 1] // BRANCHES, order[place - 1] % BRANCHES] > own:
-                order[place] = order[place - 1]
-                place -= 1
-            order[place] = BRANCHES * v + b
-            count += 1
-    return count
 
 
 @compiled(inner=True, error_model="numpy")
@@ -351,3 +345,56 @@ def within(q: Array, lower: Array, upper: Array, nearest: Array, slack: float) -
         q[i] = min(max(angle, lower[i]), upper[i])
         effort += nearest[1, i] * (q[i] - nearest[0, i]) ** 2
     return effort
+
+
+@compiled(error_model="numpy")
+def along(
+    arm: Arm, goal: Array, limits: tuple[Array, Array], nearest: Array, spacing: float, q: Array
+) -> float:  # fmt: skip
+    """Go along a branch of an arm with a held joint to the least effort, by golden sections over that joint.
+
+    `goal` and `nearest` as in `branches` and `sampled`; `limits` (n,) each; q (n,) a posture of the branch, written:
+    that of the least effort. The effort; inf, with q as it was, where there is none.
+    """
+    joint, golden = arm.joints[arm.held], 0.5 * (np.sqrt(5.0) - 1.0)
+    low, high, best, end = q[joint] - spacing, q[joint] + spacing, np.inf, q.copy()
+    at, effort, posture = np.empty(2), np.empty(2), np.empty((2, len(q)))
+    at[0], at[1] = high - golden * (high - low), low + golden * (high - low)
+    for side in range(2):
+        effort[side] = beside(arm, goal, limits, nearest, at[side], q, posture[side])
+    while high - low > 1e-6:
+        new = 0 if effort[0] <= effort[1] else 1
+        if new == 0:
+            high, at[1], effort[1] = at[1], at[0], effort[0]
+            copy(posture[0], posture[1])
+            at[0] = high - golden * (high - low)
+        else:
+            low, at[0], effort[0] = at[0], at[1], effort[1]
+            copy(posture[1], posture[0])
+            at[1] = low + golden * (high - low)
+        effort[new] = beside(arm, goal, limits, nearest, at[new], q, posture[new])
+    for side in range(2):
+        if effort[side] < best:
+            best = effort[side]
+            copy(posture[side], end)
+    copy(end, q)
+    return best
+
+
+@compiled(error_model="numpy")
+def beside(
+    arm: Arm, goal: Array, limits: tuple[Array, Array], nearest: Array, value: float, q: Array, posture: Array
+) -> float:  # fmt: skip
+    """Effort of the branch nearest to q (n,), written, for a value of the held joint; inf if over 1 rad away."""
+    found, best, chosen = np.empty((1, BRANCHES, len(q))), np.inf, -1
+    branches(arm, goal, np.array([value]), found)
+    for b in range(BRANCHES):
+        effort, away = within(found[0, b], limits[0], limits[1], nearest, SLACK), 0.0
+        for i in range(len(q)):
+            away = max(away, abs(found[0, b, i] - q[i]))
+        if effort < np.inf and away < min(best, 1.0):
+            best, chosen, most = away, b, effort
+    if chosen < 0:
+        return np.inf
+    copy(found[0, chosen], posture)
+    return most

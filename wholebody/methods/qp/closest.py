@@ -104,7 +104,7 @@ class Closest(Stage):
             if ratio > WORTH and not blocked:
                 push = rows.soft_weight * (rows.soft @ x + rows.soft_error)
                 here, bent = there, None
-        return LocalSolution(here.at.q, here.violation, here.at.measure, converged, used)
+        return self.ended(here, converged, used)
 
     def _curvature(self, rows: Rows, push: Array) -> tuple[Array, Array]:
         """Soft rows (k, nv) and weights (k,) of the positive curvature of what `push` (soft rows,) pulls and holds."""

@@ -46,7 +46,7 @@ class Feasibility(Stage):
                 way = self._turned_on(here, program, step, wrapped)
                 there = None if way is None else self.moved(here, way)
                 if there is None:
-                    return _end(here, True, count)
+                    return self.ended(here, True, count)
                 here, history, box = there, [], FEASIBILITY.step
                 last = np.zeros_like(step)
                 working_set.reset()
@@ -61,13 +61,13 @@ class Feasibility(Stage):
             there = self.moved(here, step)
             if there is None:
                 if box < FEASIBILITY.least_step:
-                    return _end(here, False, count)
+                    return self.ended(here, False, count)
                 # after a step to where a term of one's own is not finite
                 box, last = 0.3 * min(box, float(np.abs(step).max())), np.zeros_like(step)
                 continue
             here = there
             self.record(here, "goal")
-        return _end(here, here.violation.worst <= self.tolerance, count)
+        return self.ended(here, here.violation.worst <= self.tolerance, count)
 
     def _program(self, here: Iterate, box: float) -> QuadraticProgram:
         size = StepSize(box / PROGRAM.box, 0.0, FEASIBILITY.damping, False)
@@ -96,10 +96,6 @@ class Feasibility(Stage):
     def look(self, q: Array, longest: float = np.inf) -> Iterate:
         """See `Stage.look`."""
         return self.iterate_at(q, FEASIBILITY.within, longest)
-
-
-def _end(here: Iterate, converged: bool, count: int) -> LocalSolution:
-    return LocalSolution(here.at.q, here.violation, here.at.measure, converged, count)
 
 
 def stalls(history: list[float], tolerance: float) -> bool:

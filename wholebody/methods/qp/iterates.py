@@ -108,6 +108,10 @@ class Stage:
         """A posture (nq,) that a way with this longest entry led to, with its rows; UndefinedTermError."""
         raise NotImplementedError
 
+    def ended(self, here: Iterate, converged: bool, count: int) -> LocalSolution:
+        """A posture as the end, after so many programs."""
+        return LocalSolution(here.at.q, here.violation, here.at.measure, converged, count)
+
     def jumps(self, here: Iterate, there: Iterate) -> bool:
         """Whether the motion between two postures passes through something."""
         return passes_through(self.shared.lineariser.workspace, here.placed, there.placed, here.at.q, there.at.q)

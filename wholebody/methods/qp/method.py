@@ -5,32 +5,35 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated
 
 from wholebody.assessment.posture import assess
 from wholebody.base.arrays import Array
 from wholebody.base.checks import posture, shown
 from wholebody.base.errors import InputError
-from wholebody.base.fields import Checked
 from wholebody.methods.conclusion import Ending, concluded, meets
-from wholebody.methods.control import Control, Progress
-from wholebody.methods.inputs import BUDGET, Iterations, Restarts, Seed, TimeLimit, Tolerance, check_problem
+from wholebody.methods.control import Control
+from wholebody.methods.descents import Descends
+from wholebody.methods.inputs import check_problem
 from wholebody.methods.qp.chain import from_seeds
 from wholebody.methods.qp.chain_batch import Batch, batches
 from wholebody.methods.qp.multistart import Multistart
-from wholebody.methods.qp.settings import Budget
+from wholebody.methods.qp.settings import Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.registry import make_solver
 from wholebody.methods.qp.tracking import QPTracker
 from wholebody.problem import Problem
+from wholebody.scene.workspace import Workspace
 from wholebody.solution import Solution
-
-LONGEST = 10.0  # s of processor time: twice what a search within its numbers of programs takes for a person in a cabin
 
 
 @dataclass(frozen=True)
-class QP(Checked):
+class QP(Settings, Descends):
     """Quadratic programs, solved by a QP solver of your choice.
+
+    A solve is the best of a descent, of another that seeks feasibility first, and of seeded starts, which are tried
+    only where the earlier ones did not reach the goals, and within the budget. A robot of plain joints on a fixed base
+    that is asked for places and rotations alone first goes to its goals as if nothing were in its way. Where nothing
+    is, the descent begins there, or ends there without measures.
 
     These are settings alone: one object serves any number of problems and threads at the same time.
 
@@ -63,16 +66,7 @@ class QP(Checked):
         'solved'
     """
 
-    solver: str = "osqp"
-    hot_start: bool = True
-    tolerance: Tolerance = 1e-5
-    iterations: Iterations = 150
-    budget: Annotated[int, BUDGET] = 1000
-    restarts: Restarts = 40
-    restarts_for_measure: Restarts = 0
-    seed: Seed = 0
-    measures: bool = True
-    time_limit: TimeLimit = None
+    longest = 10.0  # s: twice what a search within its numbers of programs takes for a person in a cabin
 
     def __post_init__(self) -> None:
         """Check the settings.
@@ -99,38 +93,19 @@ class QP(Checked):
         check_problem(problem, "QP.accepts: problem")
         return None
 
-    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
-        """Find a posture; the best of a descent, of another that seeks feasibility first, and of seeded starts.
-
-        A robot of plain joints on a fixed base that is asked for places and rotations alone first goes to its goals as
-        if nothing were in its way. Where nothing is, the descent begins there, or ends there without measures.
-
-        The later ones are tried only when the earlier ones did not reach the goals, and within the budget. Never
-        raises for a goal out of reach or a start in penetration: the status says so.
-
-        Args:
-            problem: to be solved.
-            progress: see `wholebody.methods.control.Progress`.
-
-        Raises:
-            InputError: the scene changed after the problem was stated.
-        """
-        check_problem(problem, "QP.solve: problem")
-        began, budget = time.perf_counter(), self._budget
-        with problem.borrow() as workspace, Control(self.time_limit, progress, LONGEST) as control:
-            met = from_seeds(problem, workspace, budget, control)
-            judgement = assess(problem, met.q) if met is not None and met.complete else None
-            if met is not None and judgement is not None and meets(judgement, self.tolerance):
-                ending = Ending(met.q, True, len(met.trace), met.trace, "directly", judgement=judgement)
-            else:
-                search = Multistart(problem, workspace, self._qp_solver(), budget, control)
-                begin, before = (None, ()) if met is None else (met.q if judgement is None else None, met.trace)
-                best = search.run(begin, None if met is None else met.blocked, () if met is None else met.near)
-                ending = Ending(
-                    best.q, best.converged, len(before) + search.spent, (*before, *search.trace), search.how,
-                    contradictions=search.contradictions, programs=search.solver.counted(),
-                )  # fmt: skip
-        return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
+    def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
+        """See `Descends._descend`."""
+        met = from_seeds(problem, workspace, self, control)
+        judgement = assess(problem, met.q) if met is not None and met.complete else None
+        if met is not None and judgement is not None and meets(judgement, self.tolerance):
+            return Ending(met.q, True, len(met.trace), met.trace, "directly", judgement=judgement)
+        search = Multistart(problem, workspace, self._qp_solver(), self, control)
+        begin, before = (None, ()) if met is None else (met.q if judgement is None else None, met.trace)
+        best = search.run(begin, None if met is None else met.blocked, () if met is None else met.near)
+        return Ending(
+            best.q, best.converged, len(before) + search.spent, (*before, *search.trace), search.how,
+            contradictions=search.contradictions, programs=search.solver.counted(),
+        )  # fmt: skip
 
     def batches(self, problems: Sequence[Problem], largest: int) -> list[Batch]:
         """Those of many problems that may be solved at once, in batches of at most so many: see `chain_batch`.
@@ -138,14 +113,7 @@ class QP(Checked):
         Empty where a time limit, or the `solve` of a class derived from this one, has a say in each.
         """
         alone = self.time_limit is not None or type(self).solve is not QP.solve
-        return [] if alone else batches(problems, self._budget, largest)
-
-    @property
-    def _budget(self) -> Budget:
-        return Budget(
-            self.tolerance, self.iterations, self.budget, self.restarts, self.seed, self.measures,
-            self.restarts_for_measure,
-        )  # fmt: skip
+        return [] if alone else batches(problems, self, largest)
 
     def minima(self, problem: Problem, starts: Iterable[Array]) -> Iterator[Solution]:
         """For each start (nq,) the minimum of the measures that one descent from it leads to, without other starts.
@@ -158,12 +126,12 @@ class QP(Checked):
             begins = iter(starts)
         except TypeError:
             raise InputError(f"QP.minima: starts is {shown(starts)}; give postures, such as [problem.start]") from None
-        budget = Budget(self.tolerance, self.iterations, self.budget, 0, self.seed, self.measures)
+        alone = replace(self, restarts=0, restarts_for_measure=0)
         for given in begins:
             start = posture(given, problem.scene.model.nq, "QP.minima: a start")
             began = time.perf_counter()
-            with problem.borrow() as workspace, Control(self.time_limit, None, LONGEST) as control:
-                search = Multistart(problem, workspace, self._qp_solver(), budget, control)
+            with problem.borrow() as workspace, Control(self.time_limit, None, self.longest) as control:
+                search = Multistart(problem, workspace, self._qp_solver(), alone, control)
                 end = search.feasibility_first(start)
             ending = Ending(
                 end.q, end.converged, search.spent, tuple(search.trace), search.how,

@@ -18,7 +18,7 @@ from wholebody.methods.qp.cancelling import posture_apart
 from wholebody.methods.qp.closest import ENDLESS, Closest
 from wholebody.methods.qp.feasibility import Feasibility
 from wholebody.methods.qp.iterates import LocalSolution, Run, better, held
-from wholebody.methods.qp.settings import SEARCH, Budget
+from wholebody.methods.qp.settings import SEARCH, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP
 from wholebody.methods.qp.subproblem import Subproblem
@@ -42,10 +42,10 @@ class Multistart:
     """The search for one problem; it keeps the best posture."""
 
     def __init__(
-        self, problem: Problem, workspace: Workspace, solver: QPSolver, budget: Budget, control: Control
+        self, problem: Problem, workspace: Workspace, solver: QPSolver, settings: Settings, control: Control
     ) -> None:
         """Set up for a problem; `run` does it all."""
-        self.problem, self.solver, self.budget, self.control = problem, solver, budget, control
+        self.problem, self.solver, self.settings, self.control = problem, solver, settings, control
         self.subproblem = Subproblem(problem, workspace.state)
         self.lineariser = problem.lineariser(workspace)
         self.trace: list[TraceEntry] = []
@@ -67,7 +67,7 @@ class Multistart:
     @property
     def _left(self) -> int:
         """Programs that attempts after the first may still solve."""
-        return self.budget.programs - (0 if self._first is None else len(self.trace) - self._first)
+        return self.settings.budget - (0 if self._first is None else len(self.trace) - self._first)
 
     @property
     def best(self) -> LocalSolution:
@@ -88,8 +88,8 @@ class Multistart:
             self._accept(self._directly(other), "directly")
         self._find_closest()
         poor = self._descend_again()
-        self._restart_for_measure(max(self.budget.restarts_for_measure, SEARCH.poor if poor else 0))
-        if self.best.violation.worst <= self.budget.tolerance:
+        self._restart_for_measure(max(self.settings.restarts_for_measure, SEARCH.poor if poor else 0))
+        if self.best.violation.worst <= self.settings.tolerance:
             self.contradictions = ()  # by less than the tolerance
         if self._out_of_reach:  # although a closer posture may be near
             self._best = with_values(self.best, converged=True)
@@ -128,12 +128,12 @@ class Multistart:
         self._least = least
         if self._proven():
             return
-        if not held(self.best, self.budget.tolerance):
+        if not held(self.best, self.settings.tolerance):
             apart = posture_apart(self.problem, self.lineariser.workspace, self.best.q)
             starts = self.lineariser.defined([] if apart is None else [apart])
             yield Attempt(starts, lambda q: self._probe(q, 0.0), "from where contacts that cancel are left")
-        rng = np.random.default_rng(self.budget.seed)
-        count = min(self.budget.restarts, SEARCH.inside_probes) if least else self.budget.restarts
+        rng = np.random.default_rng(self.settings.seed)
+        count = min(self.settings.restarts, SEARCH.inside_probes) if least else self.settings.restarts
         if few := self._moving() < SEARCH.few:
             self._minima, self._relaxed_minima = Minima(SEARCH.fewest_descents), Minima(SEARCH.fewest_descents)
         others = (throughout if few else restarts)(self.problem, state, start, rng, count)
@@ -152,18 +152,18 @@ class Multistart:
     def _before_contact(self, grips: bool = False) -> Iterator[Array]:
         """Postures where surfaces are in front of the faces that they are to meet, or bars in front of palms."""
         most = len(self.trace) + self._left
-        for local in before_contact(self.problem, self._shared, self.budget.seed, most, grips=grips):
+        for local in before_contact(self.problem, self._shared, self.settings.seed, most, grips=grips):
             self.spent += local.iterations
             yield local.q
 
     def _directly(self, start: Array) -> LocalSolution:
         """A descent; without measures by whole steps as long as these gain much."""
-        return self._ran(self._descent(self.budget.iterations, None, "", full_step=not self.budget.measures), start)
+        return self._ran(self._descent(self.settings.iterations, None, "", full_step=not self.settings.measures), start)
 
     def feasibility_first(self, start: Array) -> LocalSolution:
         """Find a feasible posture without measures, and descend with measures from there."""
-        local = self._ran(self._feasibility(self.lineariser, self.budget.iterations, "feasibility"), start)
-        if local.violation.worst > self.budget.tolerance or not self.budget.measures:
+        local = self._ran(self._feasibility(self.lineariser, self.settings.iterations, "feasibility"), start)
+        if local.violation.worst > self.settings.tolerance or not self.settings.measures:
             return local
         self._accept(local, "by feasibility first")
         return self._descend(local.q)
@@ -178,7 +178,7 @@ class Multistart:
 
     def _relaxed(self, start: Array) -> LocalSolution | None:
         """A relaxed probe through things, and a descent from where it reaches the goals; None where out of reach."""
-        tolerance = self.budget.tolerance
+        tolerance = self.settings.tolerance
         relaxed = self._probe(start, SEARCH.relaxation_depth)
         self._nearest_through = min(self._nearest_through, relaxed.violation.total)
         nearer = relaxed.violation.left < (1.0 - SEARCH.nearer) * self.best.violation.left
@@ -199,8 +199,8 @@ class Multistart:
         there = at_its_place(self.problem, self.lineariser.state.update(self.best.q))
         if there is None or self.control.over:
             return False
-        tolerance, workspace, before = self.budget.tolerance, self.lineariser.workspace, self.best.measure
-        search = Multistart(there, workspace, self.solver, self.budget, self.control)
+        tolerance, workspace, before = self.settings.tolerance, self.lineariser.workspace, self.best.measure
+        search = Multistart(there, workspace, self.solver, self.settings, self.control)
         local = search._directly(self._start)
         if local.violation.worst > tolerance:
             local = search.feasibility_first(self._start)
@@ -213,9 +213,9 @@ class Multistart:
     def _descend_again(self) -> bool:
         """If contacts are met, descend at their place, then from beside a kink; whether the end is not a minimum."""
         # At a kink two points touch at once; the point that counts as the contact should leave.
-        problem, tolerance = self.problem, self.budget.tolerance
+        problem, tolerance = self.problem, self.settings.tolerance
         touches = any(hasattr(term, "touches") for term in (*problem.goals, *problem.constraints))
-        if not (touches and self.budget.measures and self.best.violation.worst <= tolerance):
+        if not (touches and self.settings.measures and self.best.violation.worst <= tolerance):
             return False
         while self._to_the_place():
             pass
@@ -225,7 +225,7 @@ class Multistart:
                 return False
             way = -share * judged.first_order.residual
             start = problem.scene.figure.clamp(np.asarray(pin.integrate(problem.scene.model, self.best.q, way)))
-            local = self._ran(self._descent(self.budget.iterations, None, "", tolerance=0.1 * tolerance), start)
+            local = self._ran(self._descent(self.settings.iterations, None, "", tolerance=0.1 * tolerance), start)
             alike = local.violation.worst <= tolerance and local.measure <= 1.005 * self.best.measure
             if alike and assess(problem, local.q).optimality < judged.optimality:
                 self._best = local  # what it costs more was bought with the tolerance
@@ -235,10 +235,10 @@ class Multistart:
 
     def _restart_for_measure(self, count: int) -> None:
         """Where all is met, seek a lower minimum from the best of some feasible postures, of few programs each."""
-        tolerance = self.budget.tolerance
-        if not (count and self.budget.measures and self.best.violation.worst <= tolerance):
+        tolerance = self.settings.tolerance
+        if not (count and self.settings.measures and self.best.violation.worst <= tolerance):
             return
-        rng, screened = np.random.default_rng([self.budget.seed, count]), SEARCH.screened * count
+        rng, screened = np.random.default_rng([self.settings.seed, count]), SEARCH.screened * count
         others = restarts(self.problem, self.lineariser.state, self._start, rng, screened - 1)
         found = list[LocalSolution]()
         for q in chain([self._start], others):
@@ -265,11 +265,11 @@ class Multistart:
 
     def _feasibility(self, lineariser: Lineariser, most: int, note: str) -> Feasibility:
         shared = with_values(self._shared, lineariser=lineariser)
-        return Feasibility(shared, self.budget.tolerance, most, note, figure=self.problem.scene.figure)
+        return Feasibility(shared, self.settings.tolerance, most, note, figure=self.problem.scene.figure)
 
     def _find_closest(self) -> None:
         """Where the goals are not reached, find the closest posture, then improve the measures from there."""
-        tolerance = self.budget.tolerance
+        tolerance = self.settings.tolerance
         if self.control.over:
             return
         if self._out_of_reach:
@@ -280,7 +280,7 @@ class Multistart:
             self._closest_from_best()
         if self.best.violation.left <= tolerance:
             return
-        if self.problem.measures and self.budget.measures:
+        if self.problem.measures and self.settings.measures:
             local = self._stay(self.best)
             if held(local, tolerance) and local.violation.left <= self.best.violation.left + tolerance:
                 self._best = local
@@ -288,15 +288,15 @@ class Multistart:
     def _proven(self) -> bool:
         """Whether the best posture is known to be the closest to the goals."""
         near = self.best.violation.left <= NEAREST * self._least
-        return near and bool(self._least) and held(self.best, self.budget.tolerance)
+        return near and bool(self._least) and held(self.best, self.settings.tolerance)
 
     def _known_out_of_reach(self, q: Array) -> bool:
         """Whether the goals are out of reach of q (nq,): descents through everything all rest at the same distance."""
         # It is then the least that limits and constraints allow, if no relaxed probe came nearer. Local minima differ.
         if not (self.problem.goals and self.problem.scene.model.nv):
             return False
-        tolerance, ends = self.budget.tolerance, list[LocalSolution]()
-        given = (self.problem, self.lineariser.state, self._start, np.random.default_rng(self.budget.seed))
+        tolerance, ends = self.settings.tolerance, list[LocalSolution]()
+        given = (self.problem, self.lineariser.state, self._start, np.random.default_rng(self.settings.seed))
         agreeing = SEARCH.agreeing_few if (few := self._moving() < SEARCH.few) else SEARCH.agreeing
         starts = throughout(*given, SEARCH.reach_trials_few - 1) if few else None
         others = starts or restarts(*given, SEARCH.reach_trials - 1, SEARCH.far)
@@ -336,7 +336,7 @@ class Multistart:
 
     def _approach(self, begin: Array) -> None:
         """Find the closest posture from one (nq,); where constraints do not hold then, restore them."""
-        tolerance = self.budget.tolerance
+        tolerance = self.settings.tolerance
         local = self._ran(self._closest(self._at_most(SEARCH.coming_near)), begin)
         if not held(local, tolerance) and local.violation.total < self.best.violation.total:
             local = self._descend(local.q, note="nearest", measures=False, most=SEARCH.coming_near)
@@ -344,15 +344,15 @@ class Multistart:
 
     def _at_most(self, programs: int) -> int:
         """The smaller of this number of programs and that of one descent."""
-        return min(programs, self.budget.iterations)
+        return min(programs, self.settings.iterations)
 
     def _closest(self, most: int) -> Closest:
-        return Closest(self._shared, self.budget.tolerance, most, problem=self.problem)
+        return Closest(self._shared, self.settings.tolerance, most, problem=self.problem)
 
     def _stay(self, local: LocalSolution) -> LocalSolution:
         """Descend with the goals' errors to stay as they are: constraints are restored, then the measures improve."""
         nearest = self._goal_errors(local.q)
-        most = self._at_most(SEARCH.staying) if held(local, self.budget.tolerance) else self.budget.iterations
+        most = self._at_most(SEARCH.staying) if held(local, self.settings.tolerance) else self.settings.iterations
         stayed = self._ran(self._descent(most, nearest, "nearest"), local.q)
         left = float(np.linalg.norm(self._goal_errors(stayed.q)))
         violation = with_values(stayed.violation, goal=left, left=left)
@@ -366,22 +366,22 @@ class Multistart:
         self, start: Array, note: str = "", *, measures: bool = True, most: int | None = None, full_step: bool = False
     ) -> LocalSolution:
         """Descend from a start; restore constraints that are violated at its end."""
-        iterations = self.budget.iterations if most is None else min(most, self.budget.iterations)
+        iterations = self.settings.iterations if most is None else min(most, self.settings.iterations)
         local = self._ran(self._descent(iterations, None, note, measures=measures, full_step=full_step), start)
-        if (most is None or local.iterations < most) and not held(local, self.budget.tolerance):
+        if (most is None or local.iterations < most) and not held(local, self.settings.tolerance):
             stayed = self._stay(local)
-            local = stayed if better(stayed, local, self.budget.tolerance) else local
+            local = stayed if better(stayed, local, self.settings.tolerance) else local
         return local
 
     def _descent(
         self, iterations: int, offset: Array | None, note: str, *, measures: bool = True, full_step: bool = False,
         tolerance: float | None = None,
     ) -> SQP:  # fmt: skip
-        tolerance, measures = tolerance or self.budget.tolerance, measures and self.budget.measures
+        tolerance, measures = tolerance or self.settings.tolerance, measures and self.settings.measures
         return SQP(self._shared, tolerance, iterations, note, offset, measures, full_step)
 
     def _accept(self, local: LocalSolution, how: str) -> bool:
         """Keep the better one; whether the problem is solved now."""
-        if self._best is None or better(local, self._best, self.budget.tolerance):
+        if self._best is None or better(local, self._best, self.settings.tolerance):
             self._best, self.how = local, how
-        return self.best.violation.worst <= self.budget.tolerance
+        return self.best.violation.worst <= self.settings.tolerance

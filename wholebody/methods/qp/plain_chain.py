@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.figures.description import Limits
-from wholebody.methods.qp import branch_kernel
+from wholebody.methods.qp import chain_kernel
 from wholebody.methods.qp.chain_kernel import Chain, Goals, Room
 from wholebody.methods.qp.closed_form import Branches, closed_form
 from wholebody.methods.qp.closed_form import compiled_kernel as closed_form_kernel
@@ -123,14 +123,14 @@ class PlainChain:
         found, near, held = values.copy(), nearest[0, self.held], self.held
         turn = min(self.chain.upper[held], near + np.pi) - max(self.chain.lower[held], near - np.pi)
         spacing, limits = turn / (SEEDS.samples - 1), (self.chain.lower, self.chain.upper)
-        effort = branch_kernel.along(self.arm, goals.tables[0], limits, nearest, spacing, found)
+        effort = closed_form_kernel().along(self.arm, goals.tables[0], limits, nearest, spacing, found)
         return found if effort < np.inf else None
 
     def beside(self, goals: Goals, nearest: Array, value: float, values: Array) -> Array | None:
         """The branch (n,) nearest to values (n,) where the joint that is held has a value; None where there is none."""
         assert self.arm is not None
         found, limits = np.empty_like(values), (self.chain.lower, self.chain.upper)
-        effort = branch_kernel.beside(self.arm, goals.tables[0], limits, nearest, value, values, found)
+        effort = closed_form_kernel().beside(self.arm, goals.tables[0], limits, nearest, value, values, found)
         return found if effort < np.inf else None
 
     def loosely_met(self, goals: Goals, seed: int) -> Array:
@@ -168,13 +168,6 @@ class PlainChain:
             (self.chain, arm, room), asked, (tables, goals.entries), self.samples, nearest, ends, found, counts
         )
         return found, counts
-
-    def angles_of(self, goal: Array, held: Array | None = None) -> Array:
-        """Values (8 v, n) of all branches for a goal (36,), NaN for none, with (v,) values of a joint that is held."""
-        values = _ONE if held is None else held
-        found = np.empty((len(values), BRANCHES, len(self.idx_v)))
-        closed_form_kernel().branches(self.arm, goal, values, found)
-        return found.reshape(-1, len(self.idx_v))
 
     def seeds(self, start: Array, seed: int, count: int) -> Iterator[Array]:
         """Batches (count, n) of values all over the limits, but not farther from a start (n,) than half a turn."""
@@ -228,24 +221,17 @@ def _is_plain(joint: pin.JointModel) -> bool:
     return bool(joint.nv == 1) and str(joint.shortname()).startswith(("JointModelR", "JointModelP"))
 
 
-def _small_chain() -> tuple[Chain, Room]:
-    """A chain of one joint with room for goals without rows, for which loops are compiled."""
+@lru_cache(maxsize=1)
+def compiled_kernel() -> Any:
+    """The module of the compiled loop, compiled or read back: not in the middle of a solve."""
+    closed_form_kernel()
     joint, one, axis = np.zeros(1, dtype=np.intp), np.zeros(1), np.zeros((1, 3))
     room = Room(
         np.zeros((2, 4, 3)), np.zeros((1, 6)), np.zeros((0, 6)), np.zeros(0), np.zeros((0, 1)), np.zeros(1, np.bool_)
     )
-    return Chain(joint, np.zeros((1, 4, 3)), axis, axis, np.zeros((2, 1), dtype=np.int8), one, one), room
-
-
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
-    """The module of the compiled loop, compiled or read back: not in the middle of a solve."""
-    from wholebody.methods.qp import chain_batch_kernel
-
-    closed_form_kernel()
-    chain, room = _small_chain()
-    chain_batch_kernel.reach_all(
+    chain = Chain(joint, np.zeros((1, 4, 3)), axis, axis, np.zeros((2, 1), dtype=np.int8), one, one)
+    chain_kernel.reach_all(
         (chain, _NO_ARM, room), np.zeros(5), (np.zeros((0, 0, 36)), np.zeros((0, 6), dtype=np.int64)),
         (1, 1), np.zeros((0, 2, 1)), np.zeros((0, 1, 1)), np.zeros((0, 1, 4)), np.zeros(0, dtype=np.intp),
     )  # fmt: skip
-    return chain_batch_kernel
+    return chain_kernel

@@ -14,7 +14,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices, Mask
 
@@ -67,17 +66,6 @@ class QuadraticProgram(NamedTuple):
         """Number of variables n."""
         return len(self.diagonal)
 
-    def value(self, x: Array) -> float:
-        """Objective at x, shape (n,)."""
-        residual = self.rows @ x - self.target
-        violated = np.maximum(self.least - self.elastic @ x, 0.0)
-        return float(
-            0.5 * (self.diagonal * x) @ x
-            + self.linear @ x
-            + 0.5 * (self.weight * residual) @ residual
-            + 0.5 * (self.elastic_weight * violated) @ violated
-        )
-
     def gradient(self, x: Array) -> Array:
         """Derivative of the objective at x, shape (n,); it is continuous."""
         residual = self.rows @ x - self.target
@@ -104,14 +92,6 @@ class ActiveSet(NamedTuple):
     lower: Mask
     upper: Mask
     elastic: Mask
-
-    def same(self, other: ActiveSet) -> bool:
-        """Whether both are the same set."""
-        return (
-            np.array_equal(self.elastic, other.elastic)
-            and np.array_equal(self.lower, other.lower)
-            and np.array_equal(self.upper, other.upper)
-        )
 
 
 class Room(NamedTuple):
@@ -158,15 +138,3 @@ class SplitForm(NamedTuple):
     matrix: Array  # (m + k, n + m + k) rows [T -I 0; C 0 I]
     least: Array  # (m + k,) what the first m rows are, and the others are at least
     box: Array  # (2, n) bounds of x; r and s have none
-
-
-class SparseForm(NamedTuple):
-    """The same over a fixed pattern of A = [I 0 0; T -I 0; C 0 I], column by column, with the box among its rows."""
-
-    hessian: Array  # (n + m + slots,) diagonal of P, and q
-    gradient: Array
-    values: Array  # entries of A
-    lower: Array  # (n + m + slots,) bounds of its rows
-    upper: Array
-    starts: NDArray[np.int64]  # (n + 1,) where each column begins in `places`
-    places: NDArray[np.int64]  # rows of the pattern of T

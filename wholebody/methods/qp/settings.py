@@ -1,20 +1,28 @@
-"""Constants of the QP method, as frozen records; each name states its trade-off."""
+"""The settings of the QP method, and its constants as frozen records; each name states its trade-off."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple
+
+from wholebody.base.fields import Checked
+from wholebody.methods.inputs import BUDGET, Iterations, Restarts, Seed, TimeLimit, Tolerance
 
 
-class Budget(NamedTuple):
-    """What a search is bounded by; see `QP`."""
+@dataclass(frozen=True)
+class Settings(Checked):
+    """What `QP` is set by."""
 
-    tolerance: float
-    iterations: int
-    programs: int
-    restarts: int
-    seed: int
-    measures: bool
-    restarts_for_measure: int = 0
+    solver: str = "osqp"
+    hot_start: bool = True
+    tolerance: Tolerance = 1e-5
+    iterations: Iterations = 150
+    budget: Annotated[int, BUDGET] = 1000
+    restarts: Restarts = 40
+    restarts_for_measure: Restarts = 0
+    seed: Seed = 0
+    measures: bool = True
+    time_limit: TimeLimit = None
 
 
 class Weights(NamedTuple):

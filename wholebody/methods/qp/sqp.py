@@ -85,7 +85,7 @@ class SQP(Stage):
         here = here if self._watched is None else self._watched
         if self._kept is not None and not self._better_than_kept(here):
             here = self._kept
-        return LocalSolution(here.at.q, here.violation, here.at.measure, converged, count)
+        return self.ended(here, converged, count)
 
     def _feasible_before(self, here: Iterate) -> Iterate | None:
         """The best feasible posture, if the descent later ended at an infeasible one and may return."""

@@ -9,13 +9,13 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, with_values
-from wholebody.base.checks import flag, posture, time_step
+from wholebody.base.checks import flag, posture
 from wholebody.base.errors import TermError
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
-from wholebody.methods.base import Method, begun, goal_error, nearest_to
+from wholebody.methods.base import Method, SolvingTracker, begun, goal_error, nearest_to
 from wholebody.methods.control import BUDGET, budget_for_sweep
-from wholebody.methods.inputs import TOLERANCE, check_problem
+from wholebody.methods.inputs import TOLERANCE
 from wholebody.methods.qp.escaping import ProjectionRows, free_end, projection_rows
 from wholebody.methods.qp.escaping import compiled_kernel as compiled_escape
 from wholebody.methods.qp.settings import ESCAPE, TRACKING
@@ -25,13 +25,12 @@ from wholebody.methods.qp.turning import least_unseen, predicted_distances, unse
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import MOST_SHARES, FrameMotion
-from wholebody.scene.workspace import NotCopyable
 from wholebody.solution import Solution
 from wholebody.tasks.bounds import StepLimit, allowed, at_speeds, clipped
 from wholebody.terms.linearisation import PackedLinearisation
 
 
-class QPTracker(NotCopyable):
+class QPTracker(SolvingTracker):
     """Follows the goals of one problem, step by step.
 
     No step moves any piece farther than half the distance within which pairs were looked at, so nothing is jumped over,
@@ -41,9 +40,6 @@ class QPTracker(NotCopyable):
     A tracker remembers the step before, so it is for one figure and one thread at a time.
 
     Attributes:
-        problem: whose goals are followed.
-        dt: seconds a step.
-        workspace: its own; between steps it may be moved.
         unswept: infinite: no step passes through anything, and a frame of several is swept where it is long.
         leaves_overlap: True.
     """
@@ -66,16 +62,15 @@ class QPTracker(NotCopyable):
         Raises:
             InputError: dt is not a positive finite number.
         """
-        self.problem = check_problem(problem, "tracker: problem")
-        self.dt, self._method, self._minimising = time_step(dt, "dt"), method, minimising
+        super().__init__(method, problem, dt)
+        self._minimising = minimising
         solver.load()  # not in the middle of a drag
         compiled_escape()
         self._working_set, self._query_distance = WorkingSet(solver), TRACKING.least_within
         self._alone = OneAtATime("tracker")
-        self.workspace = problem.workspace()
         self._distance = np.full(len(self.workspace.table.pairs), np.inf)  # room of `_nearer`
         self._left: Array | None = None
-        self._begun, self._revision = False, problem.scene.revision
+        self._checked, self._revision = False, problem.scene.revision
         self._set_up()
 
     def step(self, q: Array, measures: bool = True) -> QPStep:
@@ -96,8 +91,8 @@ class QPTracker(NotCopyable):
         with self._alone:
             if self.problem.scene.revision != self._revision:
                 self.problem.check_fresh()
-            if not self._begun or type(q) is not np.ndarray:  # a step takes as long as ten such checks
-                q, self._begun = begun(self.problem, q), True
+            if not self._checked or type(q) is not np.ndarray:  # a step takes as long as ten such checks
+                q, self._checked = begun(self.problem, q), True
             self.workspace.refresh()
             self._renew()
             motion = self.workspace.next_frame(q)
@@ -145,11 +140,6 @@ class QPTracker(NotCopyable):
         """The same with measures that count from q, and are minimised: they say what is near."""
         return self._minimising().solve(nearest_to(self.problem, q))
 
-    def overlap_resolutions(self, q: Array) -> Sequence[Array]:
-        """None: the steps lead out."""
-        posture(q, self.workspace.model.nq)
-        return ()
-
     def _among_moving(self, q: Array, measures: bool, motion: FrameMotion) -> QPStep:
         """A step with things that move or are still in the figure: they advance by shares, and the figure yields."""
         # If the frame's budget ends first, things move the rest of their way while the figure stays.
@@ -164,7 +154,7 @@ class QPTracker(NotCopyable):
                 following = motion.next_share(share, workspace.near(here, self._query_distance), self._query_distance)
                 workspace.place(motion.placements(following))
             else:
-                following, depth = share, self._overlap(here)
+                following, depth = share, -float(workspace.near(here, 0.0).distance.min(initial=0.0))
                 if depth <= TRACKING.out or depth > TRACKING.worth * before or len(steps) > MOST_SHARES:
                     break
                 before = depth
@@ -185,10 +175,6 @@ class QPTracker(NotCopyable):
         collisions = motion.collisions(path)
         workspace.keep(motion, collisions)
         return with_values(_together(model, path, steps, self.dt), collisions=collisions)
-
-    def _overlap(self, q: Array) -> float:
-        """Greatest depth of any pair at a posture (nq,), metres."""
-        return -float(self.workspace.near(q, 0.0).distance.min(initial=0.0))
 
     def _projection_rows(self, q: Array) -> ProjectionRows:
         """What stands around a posture (nq,), with all things where they are."""

@@ -161,7 +161,8 @@ def simplify(problem: Problem) -> Simplified:
     problem.check_fresh()
     whole, still = problem.scene, set(still_dofs(problem))
     model, table = whole.model, whole.pair_table
-    frozen = [j for j in range(1, model.njoints) if still.issuperset(_dofs(model, j))]
+    freedoms = [range(first, first + count) for first, count in zip(model.idx_vs, model.nvs, strict=True)]
+    frozen = [j for j in range(1, model.njoints) if still.issuperset(freedoms[j])]
     body = np.arange(model.njoints)
     for joint in frozen:
         body[joint] = body[model.parents[joint]]
@@ -184,10 +185,6 @@ def simplify(problem: Problem) -> Simplified:
         tuple(model.names[j] for j in frozen), int(moves.sum()) - len(numbers), int((~moves).sum()), things, counts
     )
     return Simplified(small, problem, left_out, part)
-
-
-def _dofs(model: pin.Model, joint: int) -> range:
-    return range(model.idx_vs[joint], model.idx_vs[joint] + model.nvs[joint])
 
 
 def _without(problem: Problem, frozen: list[int], numbers: Indices) -> tuple[Problem, _Part] | None:

@@ -13,7 +13,6 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
-from wholebody.figures.description import Limits as JointLimits
 
 
 class Chart:
@@ -39,13 +38,6 @@ class Chart:
         """(n - 1, nv) from each original posture to the next."""
         pairs = zip(self.original[:-1], self.original[1:], strict=True)
         return np.array([pin.difference(self.model, *pair) for pair in pairs]).reshape(-1, self.model.nv)
-
-    def bounds(self, limits: JointLimits) -> tuple[Array, Array]:
-        """(n, nv) least and greatest deviations that joint limits allow; infinite where a joint has none."""
-        lower, upper = np.full((len(self), self.model.nv), -np.inf), np.full((len(self), self.model.nv), np.inf)
-        lower[:, limits.idx_v] = limits.lower - self.original[:, limits.idx_q]
-        upper[:, limits.idx_v] = limits.upper - self.original[:, limits.idx_q]
-        return lower, upper
 
     def posture(self, frame: int, x: Array) -> Array:
         """(nq,) the posture of a frame with the deviation x (nv,)."""

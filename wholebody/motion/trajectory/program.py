@@ -47,8 +47,10 @@ class Limits(NamedTuple):
         `seams` say whether the clip goes on before and after them, `rate` is the factor of speed limits, None for none.
         """
         count, nv = len(chart), chart.model.nv
-        lower, upper = chart.bounds(terms.scene.figure.limits)
-        slowest, fastest = np.full((count - 1, nv), -np.inf), np.full((count - 1, nv), np.inf)
+        lower, upper = np.full((count, nv), -np.inf), np.full((count, nv), np.inf)
+        slowest, fastest = lower[1:].copy(), upper[1:].copy()
+        at_q, at_v, least, most = terms.scene.figure.limits
+        lower[:, at_v], upper[:, at_v] = least - chart.original[:, at_q], most - chart.original[:, at_q]
         for place in range(count):
             bounds = terms.bounds(first + place)
             away = pin.difference(chart.model, terms.q[first + place], chart.original[place])

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array, with_values
+from wholebody.base.arrays import Array, Mask, with_values
 from wholebody.methods.qp.active_set import last_resort, solve_from, violated_set
-from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram, SparseForm
+from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.settings import CORRECTIONS
 from wholebody.methods.qp.solvers.base import ACTIVE_SET, QPSolver
-from wholebody.methods.qp.solvers.split_form import SCALING, compiled_kernel, read_active
+from wholebody.methods.qp.solvers.split_form import SCALING, read_active, scaled_split
 
 ROUNDS = (25, 50, 100, 200, 400)  # iterations, until an active set read off the multipliers settles
 SLOTS = 8  # elastic rows come in multiples of this, so that sizes seldom change; more slots = slower iterations
@@ -39,9 +39,8 @@ class OSQPSolver(QPSolver):
         self._workspace: Workspace | None = None
 
     def load(self) -> None:
-        """Import OSQP and make its loops ready."""
+        """Import OSQP."""
         extension()
-        compiled_kernel()
 
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """Minimise; see `QPSolver.solve_cold`."""
@@ -53,7 +52,7 @@ class OSQPSolver(QPSolver):
             near = self.uncorrected = workspace.x()
             solution = solve_from(program, workspace.active(), CORRECTIONS.of_guess)
             if solution is not None:
-                return with_values(solution, iterations=iterations, by=self.name)
+                return with_values(solution, iterations=iterations, by=OSQPSolver.name)
         return last_resort(program, near, iterations)
 
     def workspace(self, program: QuadraticProgram) -> Workspace:
@@ -64,24 +63,15 @@ class OSQPSolver(QPSolver):
         return self._workspace
 
 
-class ActiveSetSolver(QPSolver):
+class ActiveSetSolver(OSQPSolver):
     """The primal-dual active set method throughout; OSQP where the sets do not settle."""
 
     name = "active_set"
 
-    def __init__(self, hot_start: bool = True) -> None:
-        """Begin without a workspace."""
-        super().__init__(hot_start)
-        self._osqp = OSQPSolver()
-
-    def load(self) -> None:
-        """Import OSQP."""
-        self._osqp.load()
-
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """Minimise from no bounds and the rows that x = 0 does not meet; see `QPSolver.solve_cold`."""
         solution = solve_from(program, violated_set(program), CORRECTIONS.most)
-        return self._osqp.solve_cold(program) if solution is None else with_values(solution, by=ACTIVE_SET)
+        return super().solve_cold(program) if solution is None else with_values(solution, by=ACTIVE_SET)
 
 
 class Workspace:
@@ -101,16 +91,10 @@ class Workspace:
             self.pattern = self.pattern | before.pattern
             self.slots = max(self.slots, before.slots)
         size = n + m + self.slots
-        objective, matrix, self._starts, self._places = _structure(n, m, self.slots, self.pattern.tobytes())
-        self._pattern = matrix
-        self.hessian, self.gradient = np.ones(size), np.zeros(size)
-        self._values, self.low, self.high = (
-            np.ones(matrix.nnz),
-            np.full(size, SCALING.inactive),
-            np.full(size, SCALING.infinite),
-        )
+        objective, matrix, self._entries = _structure(n, m, self.slots, self.pattern.tobytes())
+        self.hessian, self.gradient, self.values = np.ones(size), np.zeros(size), np.ones(matrix.nnz)
+        self.low, self.high = np.full(size, SCALING.inactive), np.full(size, SCALING.infinite)
         self.low[n : n + m] = self.high[n : n + m] = 0.0  # OSQP factorises anew where other rows become equalities
-        self._kernel = compiled_kernel()
         osqp = extension()
         settings = self._settings = osqp.OSQPSettings()
         osqp.osqp_set_default_settings(settings)
@@ -128,16 +112,27 @@ class Workspace:
             program.size == self.n
             and len(program.target) == self.m
             and len(program.least) <= self.slots
-            and bool(self._kernel.within(np.ascontiguousarray(program.rows), self.pattern))
+            and not program.rows[~self.pattern].any()
         )
 
     def load(self, program: QuadraticProgram) -> None:
         """Put the program's numbers in."""
-        self.k = len(program.least)
-        form = SparseForm(self.hessian, self.gradient, self._values, self.low, self.high, self._starts, self._places)
-        self._kernel.fill_sparse(program.packed(), SCALING, form)
+        n, m, self.k = self.n, self.m, len(program.least)
+        spare = self.slots - self.k
+        form = scaled_split(
+            with_values(
+                program,
+                elastic=np.vstack([program.elastic, np.zeros((spare, n))]),
+                least=np.append(program.least, np.full(spare, SCALING.inactive)),
+                elastic_weight=np.append(program.elastic_weight, np.ones(spare)),
+            )
+        )
+        self.hessian, self.gradient = form.diagonal, form.linear
+        self.values = np.vstack([np.eye(n, len(form.linear)), form.matrix]).T[self._entries]
+        self.low = np.concatenate([form.box[0], form.least])
+        self.high = np.concatenate([form.box[1], form.least[:m], np.full(self.slots, SCALING.infinite)])
         self._solver.update_data_vec(q=self.gradient, l=self.low, u=self.high)
-        self._solver.update_data_mat(P_x=self.hessian, P_i=None, A_x=self._values, A_i=None)
+        self._solver.update_data_mat(P_x=self.hessian, P_i=None, A_x=self.values, A_i=None)
 
     def run(self, limit: int) -> int:
         """Iterate on from where the last run ended; how many iterations."""
@@ -146,12 +141,6 @@ class Workspace:
             self._solver.update_settings(self._settings)
         self._solver.solve()
         return int(self._solver.info.iter)
-
-    def matrix(self) -> Any:
-        """A as it is now, a matrix of scipy."""
-        matrix = self._pattern.copy()
-        matrix.data[:] = self._values
-        return matrix
 
     def x(self) -> Array:
         """(n,) where OSQP is."""
@@ -165,8 +154,8 @@ class Workspace:
 
 
 @lru_cache(maxsize=64)
-def _structure(n: int, m: int, slots: int, pattern: bytes) -> tuple[Any, Any, NDArray[np.int64], NDArray[np.int64]]:
-    """P and A with ones for entries, where the soft rows' pattern (m, n) begins in each column, and its rows."""
+def _structure(n: int, m: int, slots: int, pattern: bytes) -> tuple[Any, Any, Mask]:
+    """P and A with ones for entries, for a pattern (m, n) of the soft rows, and where A' has entries."""
     from scipy import sparse
 
     soft = np.frombuffer(pattern, dtype=bool).reshape(m, n)
@@ -179,8 +168,7 @@ def _structure(n: int, m: int, slots: int, pattern: bytes) -> tuple[Any, Any, ND
     indptr = np.concatenate([[0], np.cumsum(block.sum(axis=0))])
     matrix = sparse.csc_matrix((np.ones(len(row)), row, indptr), shape=(size, size))
     objective = sparse.csc_matrix((np.ones(size), np.arange(size), np.arange(size + 1)), shape=(size, size))
-    starts = np.concatenate([[0], np.cumsum(soft.sum(axis=0))]).astype(np.int64)
-    return objective, matrix, starts, np.nonzero(soft.T)[1].astype(np.int64)
+    return objective, matrix, block.T
 
 
 @lru_cache(maxsize=1)

@@ -51,8 +51,6 @@ def make_solver(name: str, hot_start: bool = True) -> QPSolver:
         raise MissingPackageError(f"the QP solver {name} is not installed; install it with: pip install {package}")
     if name not in solver_names():
         raise UnknownNameError("QP solver", name, solver_names())
-    from wholebody.methods.qp.solvers.registry import QpsolversSolver
-
     return QpsolversSolver(name, hot_start)
 
 

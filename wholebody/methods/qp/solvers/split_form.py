@@ -7,14 +7,10 @@ are nearly hard, since their residuals hardly count in them.
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import Any
-
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.methods.qp.active_set import smallest
-from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram, Scaling, SparseForm, SplitForm
+from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram, Scaling, SplitForm
 
 SCALING = Scaling()
 
@@ -39,17 +35,3 @@ def scaled_split(program: QuadraticProgram) -> SplitForm:
 def read_active(box: Array, push: Array) -> ActiveSet:
     """The active set of multipliers `box` (n,), positive at an upper bound, and `push` (k,) of the elastic rows."""
     return ActiveSet(box < -1e-9, box > 1e-9, push > 1e-9)
-
-
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
-    """The module of compiled loops, compiled or read back: not in the middle of a solve."""
-    from wholebody.methods.qp.solvers import split_kernel
-
-    program, _ = smallest()
-    split_kernel.within(program.rows, np.zeros((0, 1), dtype=bool))
-    two, places = np.ones(2), np.zeros(0, np.int64)
-    split_kernel.fill_sparse(
-        program, SCALING, SparseForm(two, two, np.ones(3), two, two, np.zeros(2, np.int64), places)
-    )
-    return split_kernel
