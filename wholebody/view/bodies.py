@@ -321,9 +321,8 @@ class Bodies:
 
 def _own_color(piece: Any) -> Color:
     """The colour that a robot's file gives the link of a piece, and otherwise that of figures."""
-    if not piece.overrideMaterial and piece.meshColor[3] > 0.0:
-        return LOOK.figure
-    red, green, blue, alpha = (float(part) for part in piece.meshColor)
+    own = piece.overrideMaterial or not piece.meshColor[3] > 0.0
+    red, green, blue, alpha = (float(part) for part in (piece.meshColor if own else LOOK.figure))
     return red, green, blue, alpha
 
 

@@ -58,7 +58,8 @@ def _color(assembly: Assembly, owner: str) -> Color | None:
         return assembly.scene.objects[owner].color
     figure = owner.split("/")[0]
     if owner not in assembly.bodies and figure in assembly.figures:
-        return assembly.colors.get(figure, LOOK.figure)
+        usual: Color = LOOK.figure
+        return assembly.colors.get(figure, usual)
     return assembly.colors.get(owner)
 
 
