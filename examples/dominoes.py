@@ -8,7 +8,7 @@ import numpy as np
 from presenting import LIGHT, OAK, STEEL, command_line
 
 import wholebody as wb
-from wholebody.view.filmstrip import write_filmstrip
+from wholebody.view.side_by_side import write_filmstrip
 from wholebody.view.viewed_scene import ViewedWorld
 
 COUNT = 12

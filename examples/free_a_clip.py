@@ -15,7 +15,7 @@ from matplotlib.figure import Figure as Chart
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.motion.judging import Avoided
-from wholebody.view.filmstrip import write_filmstrip
+from wholebody.view.side_by_side import write_filmstrip
 
 RECORDING = "mocap/cmu_35_01.bvh"
 FRAMES = 6  # postures in a film strip

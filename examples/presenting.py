@@ -9,7 +9,7 @@ from typing import Any
 
 import wholebody as wb
 from wholebody.tracking import Recording, judge
-from wholebody.view.filmstrip import write_filmstrip
+from wholebody.view.side_by_side import write_filmstrip
 
 Place = tuple[float, float, float]
 Color = tuple[float, float, float, float]

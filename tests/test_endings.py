@@ -15,7 +15,7 @@ from wholebody.cli.main import main
 from wholebody.figures.anthropometry import make_person
 from wholebody.figures.packaged_urdf import write_human
 from wholebody.studies.records import Records
-from wholebody.view.filmstrip import write_filmstrip
+from wholebody.view.side_by_side import write_filmstrip
 
 TASK = Path(__file__).parent.parent / "examples" / "tasks" / "shelf.toml"
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from wholebody.bench.attack.case import Case
+from wholebody.bench.attack.judging import Case
 from wholebody.bench.attack.running import run
 
 

@@ -29,7 +29,7 @@ from wholebody.motion import measures
 from wholebody.motion.sphere_filling import Spheres, fill_with_spheres
 from wholebody.planning.distinct_solutions import Solutions
 from wholebody.view import Viewer
-from wholebody.view.timeline import timeline
+from wholebody.view.motion_curves import timeline
 
 ROOT = Path(__file__).resolve().parent.parent
 CIRCLE: list[Any] = []

@@ -13,7 +13,7 @@ from tests.audits.human_postures import PostureRow
 from tests.audits.human_sizes import DimensionRow, RangeRow
 from tests.audits.human_tasks import TaskRow
 from tests.audits.templates import TEMPLATES
-from wholebody.bench.report import render
+from wholebody.bench.tables import render
 
 QUICK = 3
 """Number of tasks of a short run."""

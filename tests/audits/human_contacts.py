@@ -13,7 +13,7 @@ import pinocchio as pin
 from tests.audits.human_tasks import add_seat, draw
 from wholebody.base.arrays import Array
 from wholebody.bench.suite.problem_sets.things import coal_distance
-from wholebody.figures.human.capsules import SPREAD
+from wholebody.figures.human.details import SPREAD
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tests.audits.templates import TEMPLATES
 from wholebody.bench.measure.motion import recorded, synthetic
-from wholebody.bench.report import render
+from wholebody.bench.tables import render
 from wholebody.figures import load
 from wholebody.motion.avoidance import avoid
 from wholebody.motion.checking import ClipCheck

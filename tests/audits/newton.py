@@ -28,7 +28,7 @@ from tests.audits.newton_shapes import (
 from tests.audits.templates import TEMPLATES
 from wholebody.base.arrays import Array
 from wholebody.base.errors import WholebodyError
-from wholebody.bench.report import render
+from wholebody.bench.tables import render
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.linear_algebra import LinearSystem, Pattern, linear_algebra

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from wholebody.base.files import write
-from wholebody.figures import hulls
+from wholebody.figures import body_spec
 from wholebody.figures.body_spec import urdf_text
 from wholebody.figures.hand import MESH, hand_figure, hand_spec
 from wholebody.figures.human.figure import avatar_figure, avatar_spec, human_figure
@@ -27,7 +27,7 @@ def packaged_files() -> dict[str, str]:
 
 def ellipsoid_obj() -> str:
     """Return the unit polyhedron of the hand's parts as an OBJ; of STL files MuJoCo reads binary ones only."""
-    vertices = hulls.unit_sphere()
+    vertices = body_spec.unit_sphere()
     triangles = ConvexHull(vertices).simplices
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0.0

@@ -8,7 +8,7 @@ import numpy as np
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.bench.measure.throws import DT
+from wholebody.bench.measure.world import DT
 from wholebody.bench.rows import Figure, Row, measured_ms
 from wholebody.dynamics.rigid_bodies import RigidBodies
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def examine(path: str, reaches: int) -> dict[str, Figure]:
     """Load a description, and make some reaches (0 loads only); "refused" alone where it is refused."""
     import wholebody as wb
-    from wholebody.figures.rest_posture import UNPARTED
+    from wholebody.figures.self_pairs import UNPARTED
     from wholebody.geometry import convex, meshes
 
     _ = convex, meshes

@@ -9,14 +9,13 @@ from pathlib import Path
 import jinja2
 import pytest
 
-from wholebody.bench import report
-from wholebody.bench.report import TEMPLATES, render, strong, upfirst, words
-from wholebody.bench.tables import formatted
+from wholebody.bench import tables
+from wholebody.bench.tables import TEMPLATES, formatted, render, strong, upfirst, words
 
 
 @pytest.mark.parametrize("path", sorted(TEMPLATES.iterdir()), ids=lambda path: path.name)
 def test_every_template_can_be_read(path: Path) -> None:
-    assert report._environment(TEMPLATES).get_template(path.name).name == path.name
+    assert tables._environment(TEMPLATES).get_template(path.name).name == path.name
 
 
 @pytest.mark.parametrize("path", sorted(TEMPLATES.glob("*.md.jinja")), ids=lambda path: path.name)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from wholebody.bench import statistics
-from wholebody.bench.report import spanned
 from wholebody.bench.statistics import NOTHING, Interval
+from wholebody.bench.tables import spanned
 
 
 @pytest.mark.parametrize(("count", "of"), [(0, 7), (199, 200), (200, 200), (3, 20), (1, 1)])

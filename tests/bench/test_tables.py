@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from types import SimpleNamespace
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -15,7 +13,7 @@ from hypothesis import strategies as st
 from wholebody.base.errors import FileFormatError
 from wholebody.bench.rows import Row, read_rows
 from wholebody.bench.statistics import Interval
-from wholebody.bench.tables import filled, machine, of, replace_section, sentence, write_rows
+from wholebody.bench.tables import machine, replace_section, sentence, write_rows
 
 PAGE = "# Results\n\nbefore\n\n<!-- bench:step -->\nold\n<!-- /bench:step -->\n\nafter\n"
 
@@ -32,20 +30,6 @@ def test_rows_come_back_exactly(tmp_path_factory: pytest.TempPathFactory, rows: 
     assert facts == {"processor": "a: b", "cores": "2"}
     assert back == rows
     assert list(path.parent.iterdir()) == [path], "nothing else is left beside it"
-
-
-@dataclass(frozen=True)
-class Computed:
-    name: str
-    count: int = field(metadata=of(lambda values, run: len(values)))
-    mean: float = field(metadata=of(lambda values, run: np.mean(values)))
-    value: float
-
-
-def test_a_row_is_filled_by_name_by_what_computes_a_field_and_by_what_a_source_has() -> None:
-    row = filled(Computed, [1.0, 4.0], SimpleNamespace(name="source", count=7, value=0.5), name="given")
-    assert row == Computed("given", 2, 2.5, 0.5)
-    assert type(row.mean) is float, "numpy's numbers are written otherwise"
 
 
 @pytest.mark.parametrize(

@@ -114,7 +114,7 @@ def test_a_strip_has_the_ghost_of_each_of_its_frames(
         drawn.update(postures=postures, ghosts=ghosts)
         return out
 
-    monkeypatch.setattr("wholebody.view.filmstrip.write_filmstrip", strip)
+    monkeypatch.setattr("wholebody.view.side_by_side.write_filmstrip", strip)
     clip = wb.read_clip(walk, wb.load("human"))
     before = clip.with_q(clip.q[::-1]).write(tmp_path / "before.npz")
     given = ["clip", "play", str(walk), "--out", str(tmp_path / "strip.png"), "--pictures", "3"]
@@ -130,7 +130,7 @@ def test_a_ghost_in_a_strip_is_seen(tmp_path: Path) -> None:
     from PIL import Image
 
     from wholebody.view.browser import find_chromium
-    from wholebody.view.filmstrip import write_filmstrip
+    from wholebody.view.side_by_side import write_filmstrip
 
     if find_chromium() is None:
         pytest.skip("there is no Chromium")

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench.measure.drops import ENGINES, Judge, drops
+from wholebody.bench.measure.world import ENGINES, Judge, drops
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.dynamics.step_program import SKIN
 

@@ -9,7 +9,7 @@ import pytest
 import wholebody as wb
 from wholebody.dynamics.coupling import contact_impulse
 from wholebody.dynamics.rigid_bodies import RigidBodies
-from wholebody.scene.matter.materials import Surface
+from wholebody.scene.matter.body import Surface
 from wholebody.tracking.overlaps import overlaps
 
 DT = 1.0 / 60.0

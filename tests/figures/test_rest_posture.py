@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.figures.rest_posture import UNPARTED
+from wholebody.figures.self_pairs import UNPARTED
 
 
 def least_distance(figure: wb.Figure, q: np.ndarray) -> float:

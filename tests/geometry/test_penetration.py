@@ -15,8 +15,7 @@ from scipy.spatial.transform import Rotation
 from wholebody import InputError
 from wholebody.base.arrays import Array
 from wholebody.geometry.minkowski import Placed
-from wholebody.geometry.penetration import global_depth, object_penetration, object_penetrations
-from wholebody.geometry.separation import least_separation
+from wholebody.geometry.penetration import global_depth, least_separation, object_penetration, object_penetrations
 from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Shape, Sphere
 
 seeds = st.integers(0, 2**32 - 1)

@@ -10,7 +10,7 @@ import trimesh
 import wholebody as wb
 from wholebody.geometry.continuous.sweep import Sweep
 from wholebody.geometry.proximity import PairTable, Proximity
-from wholebody.scene.moving_scene import PER_THING, MovingScene
+from wholebody.scene.moving_obstacles import PER_THING, MovingScene
 
 
 def hull_points() -> np.ndarray:

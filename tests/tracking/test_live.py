@@ -12,7 +12,7 @@ import pytest
 import wholebody as wb
 from wholebody.geometry.continuous.sweep import Sweep
 from wholebody.methods.ccd.chain import ChainResolver
-from wholebody.scene.moving_scene import MovingScene
+from wholebody.scene.moving_obstacles import MovingScene
 from wholebody.tracking.live import LiveDrag
 
 SETTLING = 400

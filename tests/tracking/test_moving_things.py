@@ -16,7 +16,7 @@ import pytest
 import wholebody as wb
 from wholebody import tracking
 from wholebody.base.batches import fingerprint
-from wholebody.bench.measure.throws import DT, SHAPES, Throw, throws
+from wholebody.bench.measure.world import DT, SHAPES, Throw, throws
 from wholebody.methods.solve import as_method
 from wholebody.tracking.loop import FrameLoop
 from wholebody.tracking.overlaps import make_room

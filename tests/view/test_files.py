@@ -18,7 +18,7 @@ import wholebody as wb
 from wholebody.base.errors import InputError, MissingPackageError, UnknownNameError
 from wholebody.view import Viewer
 from wholebody.view.browser import Browser, BrowserError, find_chromium
-from wholebody.view.movie import movie
+from wholebody.view.screenshot import movie
 from wholebody.view.style import LOOK
 
 browser_needed = pytest.mark.browser

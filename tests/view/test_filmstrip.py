@@ -11,7 +11,7 @@ from PIL import Image
 
 import wholebody as wb
 from wholebody.view.browser import Browser
-from wholebody.view.filmstrip import GAP, write_filmstrip
+from wholebody.view.side_by_side import GAP, write_filmstrip
 from wholebody.view.viewed_scene import ViewedAssembly
 
 RED = (0.9, 0.1, 0.1, 1.0)

@@ -18,7 +18,7 @@ import wholebody as wb
 from wholebody.cli import main
 from wholebody.figures.surface import surface_of
 from wholebody.figures.surface.making import halfway
-from wholebody.geometry.gltf_document import GltfDocument
+from wholebody.geometry.gltf import GltfDocument
 from wholebody.motion.files.gltf import triangles
 from wholebody.motion.files.gltf_reading import Animated
 

@@ -13,7 +13,7 @@ import pytest
 import trimesh
 
 import wholebody as wb
-from wholebody.figures.link_visuals import FINE, MANY, mesh_parts
+from wholebody.figures.link_pieces import FINE, MANY, mesh_parts
 from wholebody.geometry.meshes import read_mesh, read_parts
 from wholebody.view import style
 from wholebody.view.bodies import Bodies, LinkVisuals

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.view.timeline import timeline
+from wholebody.view.motion_curves import timeline
 
 INSIDE = "document.querySelector('iframe').contentWindow"
 
@@ -55,7 +55,7 @@ def test_a_free_clip_and_one_frame(found: wb.motion.ClipCheck) -> None:
 
 def test_long_clips_are_shown_in_part(found: wb.motion.ClipCheck, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = timeline(found)
-    monkeypatch.setattr("wholebody.view.timeline.MOST_POSTURES", 2)
+    monkeypatch.setattr("wholebody.view.motion_curves.MOST_POSTURES", 2)
     assert len(timeline(found)) < len(whole)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import fcntl
+import math
 import os
 import re
 import shutil
@@ -15,7 +16,7 @@ import stat
 import sys
 import tempfile
 import time
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cache
 from os import PathLike
@@ -118,6 +119,21 @@ def parsed_toml(text: str, name: str) -> dict[str, Any]:
     except ValueError:  # Python reads no whole number of more than 4300 digits
         line = next((n for n, said in enumerate(text.splitlines(), 1) if _LONG_NUMBER.search(said)), 1)
         raise FileFormatError(f"{name}:{line}: a number has thousands of digits; write fewer") from None
+
+
+@cache
+def packaged_toml(path: Path) -> dict[str, Any]:
+    """What a TOML file of the package says; whoever reads it changes nothing."""
+    return parsed_toml(path.read_text("utf-8"), path.name)
+
+
+def finite(value: Any) -> Any:
+    """Content of a JSON file, in which numbers that are not finite become null, and tuples lists."""
+    if isinstance(value, Mapping):
+        return {key: finite(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [finite(entry) for entry in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def check_file(path: str | PathLike[str], kind: str) -> None:

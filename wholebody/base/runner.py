@@ -174,7 +174,6 @@ class Child:
         self._process = self._output = self._connection = self._job = None
 
     def _fork(self, job: Job) -> None:
-        """Fork a process for the job."""
         context = multiprocessing.get_context("fork")
         self._connection, theirs = context.Pipe()
         self._process = context.Process(target=_serve_one, args=(theirs, job, self._environment), daemon=True)
@@ -302,7 +301,6 @@ def serve(descriptor: int, parent: int) -> None:
 
 
 def _serve_one(parent: Connection, job: Job, environment: Mapping[str, str]) -> None:
-    """Do one job in a forked process."""
     global _parent
     _parent = parent
     os.environ.update(environment)
@@ -318,7 +316,6 @@ def _end_at_alarms() -> None:
 
 
 def _wait_for(process: subprocess.Popen[bytes] | BaseProcess) -> int:
-    """Wait until a process has ended; return its exit code."""
     if isinstance(process, subprocess.Popen):
         return process.wait()
     process.join()

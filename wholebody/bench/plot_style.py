@@ -8,7 +8,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from wholebody.base.files import parsed_toml
+from wholebody.base.files import packaged_toml
 from wholebody.bench.statistics import Interval
 
 MOST = 6  # methods in a chart
@@ -21,12 +21,7 @@ class Style(NamedTuple):
     marker: str
 
 
-def _read() -> dict[str, Any]:
-    file = Path(__file__).with_name("plot_style.toml")
-    return parsed_toml(file.read_text("utf-8"), file.name)
-
-
-STYLE = _read()
+STYLE = packaged_toml(Path(__file__).with_name("plot_style.toml"))
 """Matplotlib's settings, the colours and markers of methods, and further colours."""
 
 

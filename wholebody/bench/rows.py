@@ -10,7 +10,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
 from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -18,7 +17,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from wholebody.base.errors import FileFormatError
-from wholebody.base.files import parsed_toml, read_text
+from wholebody.base.files import packaged_toml, read_text
 from wholebody.bench import plot_style
 from wholebody.bench.statistics import Interval
 from wholebody.bench.tables import formatted, sentence
@@ -81,6 +80,11 @@ def table(rows: Sequence[Row]) -> str:
     return "\n".join(lines)
 
 
+def told(row: Row) -> str:
+    """A row in one line."""
+    return f"{row.case}, {row.tool}: {', '.join(f'{name} {value}' for name, value in row.figures.items())}"
+
+
 def read_rows(path: Path) -> tuple[dict[str, str], list[Row]]:
     """The facts and the rows that `write_rows` wrote, without empty figures; FileFormatError for another file."""
     facts: dict[str, str] = {}
@@ -138,11 +142,9 @@ def shown(figure: Figure) -> str:
     return str(figure)
 
 
-@cache
 def texts() -> dict[str, Any]:
     """What `texts.toml` holds by name: what reports say above their tables, and figures that others published."""
-    file = Path(__file__).with_name("texts.toml")
-    return parsed_toml(file.read_text("utf-8"), file.name)
+    return packaged_toml(Path(__file__).with_name("texts.toml"))
 
 
 def report(about: str, tables: Mapping[str, Sequence[Row]], facts: Mapping[str, str], notes: Sequence[str] = ()) -> str:

@@ -1,4 +1,4 @@
-"""Results as files: CSV with the machine at its head, texts of its cells, sections of pages between two markers."""
+"""Results as files: CSV with the machine at its head, reports from templates, sections of pages between two markers."""
 
 from __future__ import annotations
 
@@ -9,18 +9,20 @@ import os
 import platform
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import date
-from functools import cache
 from importlib import metadata
 from math import isfinite
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import TYPE_CHECKING, Any
 
 from wholebody.base.errors import FileFormatError
-from wholebody.base.files import make_folder, write
+from wholebody.base.files import make_folder, templates, write
 from wholebody.bench.statistics import Interval
 from wholebody.version import __version__
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 
 def machine() -> dict[str, str]:
@@ -76,9 +78,6 @@ def _version(name: str) -> str:
         return ""
 
 
-_R = TypeVar("_R")
-
-
 def write_text(path: Path, text: str) -> None:
     """Write a file whole or not at all."""
     make_folder(path.parent)
@@ -109,29 +108,6 @@ def flat(row: Any) -> dict[str, Any]:
             if isinstance(each, Interval):
                 cells |= {name: each.value, f"{name}_low": each.low, f"{name}_high": each.high}
     return cells
-
-
-def of(compute: Callable[..., Any]) -> dict[str, Callable[..., Any]]:
-    """What computes a field of a row from the sources of the row, as `metadata` of the field; see `filled`."""
-    return {"of": compute}
-
-
-def filled(kind: type[_R], *sources: Any, **values: Any) -> _R:
-    """A row of a kind: fields by name, or as `of` computes them, or from the first source with such an attribute."""
-    for name, as_type, compute in _columns(kind):  # type: ignore[arg-type]
-        if name not in values and compute is not None:
-            found = compute(*sources)
-            values[name] = found if as_type is Interval else as_type(found)
-        elif name not in values:
-            values[name] = next(getattr(source, name) for source in sources if hasattr(source, name))
-    return kind(**values)
-
-
-@cache
-def _columns(kind: Any) -> list[tuple[str, Any, Callable[..., Any] | None]]:
-    """Name and type of each field of a kind of rows, and what computes it."""
-    types = get_type_hints(kind)
-    return [(field.name, types[field.name], field.metadata.get("of")) for field in dataclasses.fields(kind)]
 
 
 def programs_text(programs: Mapping[str, int]) -> str:
@@ -181,3 +157,81 @@ def _line(cells: Iterable[str]) -> str:
     line = io.StringIO(newline="")
     csv.writer(line, lineterminator="\r\n").writerow(cells)  # it quotes only what its own lines end with
     return line.getvalue().removesuffix("\r\n") + "\n"
+
+
+TEMPLATES = Path(__file__).parent / "templates"
+
+
+def render(name: str, folder: Path = TEMPLATES, /, **values: Any) -> str:
+    """Fill in a template of a folder, named without its last suffix; empty lines beside each other become one."""
+    lines: list[str] = []
+    for line in _environment(folder).get_template(f"{name}.jinja").render(values).strip().split("\n"):
+        if line.strip() or (lines and lines[-1]):
+            lines.append(line.rstrip())
+    return "\n".join(lines)
+
+
+def page(title: str, text: str, charts: Mapping[str, Path], subtitle: str = "") -> str:
+    """Markdown as one HTML page that needs no network; images of the SVG charts, by their names, are put within."""
+    from markdown_it import MarkdownIt
+
+    body = str(MarkdownIt("commonmark", {"html": False}).enable("table").render(text))
+    body = re.sub(r"<td[^>]*>([^<]{35,})</td>", r'<td class="text">\1</td>', body)  # texts break into lines
+    picture = r'<p><img src="[^"]*?([^"/]+)\.svg" alt="([^"]*)" ?/?></p>'
+    body = re.sub(picture, lambda found: _within(charts[found[1]], found[2]), body)
+    sections = [(_anchor(name), name) for name in re.findall(r"<h2>(.*?)</h2>", body)]
+    body = re.sub(r"<h2>(.*?)</h2>", lambda found: f'<h2 id="{_anchor(found[1])}">{found[1]}</h2>', body)
+    return render("page.html", title=title, subtitle=subtitle, sections=sections, body=body)
+
+
+def _anchor(title: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
+
+
+def _within(svg: Path, caption: str) -> str:
+    """A chart within a page. Names in it are of one file, and there are many files in the page."""
+    drawn = svg.read_text(encoding="utf-8")
+    drawn = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{svg.stem}-", drawn[drawn.index("<svg") :])
+    return f"<figure>{drawn}<figcaption>{caption}</figcaption></figure>"
+
+
+def _environment(folder: Path) -> Environment:
+    made = templates(folder)
+    made.filters |= {
+        "f": formatted,
+        "measured": sentence,
+        "span": spanned,
+        "strong": strong,
+        "tex": tex,
+        "upfirst": upfirst,
+        "words": words,
+    }
+    return made
+
+
+def spanned(found: Interval, spec: str, scale: float = 1.0, unit: str = "", ends: str = "") -> str:
+    """A figure times `scale` and its interval, such as "98.5 % [93, 99]"; nothing for NaN. `ends`: their format."""
+    if found.value != found.value:
+        return ""
+    low, high = (formatted(scale * each, ends or spec, none="∞") for each in (found.low, found.high))
+    return f"{formatted(scale * found.value, spec, unit, none='∞')} [{low}, {high}]"
+
+
+def strong(count: int) -> str:
+    """A count in bold print, unless it is zero."""
+    return f"**{count}**" if count else "0"
+
+
+def tex(text: str) -> str:
+    """A text in which LaTeX reads no command."""
+    return re.sub(r"([&%$#_{}])", r"\\\1", text)
+
+
+def upfirst(text: str) -> str:
+    """A text that begins with a capital letter."""
+    return text[:1].upper() + text[1:]
+
+
+def words(name: str) -> str:
+    """A name as one reads it."""
+    return name.replace("_", " ")

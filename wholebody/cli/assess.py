@@ -85,7 +85,6 @@ def _check_options(arguments: argparse.Namespace) -> None:
 
 
 def _show(judged: Any, scores: Any) -> None:
-    """Print tables."""
     import math
 
     from rich.markup import escape

@@ -175,7 +175,7 @@ def _corners(problem: Problem, goal: int, arguments: argparse.Namespace) -> Any:
 
 
 def _animation(task: Task, dragged: Dragged, path: Path) -> None:
-    from wholebody.cli.picture import viewer_of
+    from wholebody.cli.show import viewer_of
 
     with viewer_of(task.problem, task.view, task.title) as viewer:
         viewer.play(dragged, repeat=float("inf"))

@@ -34,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
     """List the scenes, or run one or all."""
     from wholebody.base.checks import known
     from wholebody.base.files import check_writable, make_folder
-    from wholebody.bench.measure.frames import is_held, loop_report
+    from wholebody.bench.measure.frames import is_held, paper_report
     from wholebody.bench.tables import machine, write_text
     from wholebody.cli.tables import print_rows
     from wholebody.tracking import SCENES, build_scene
@@ -51,7 +51,9 @@ def run(arguments: argparse.Namespace) -> int:
     for name in names:
         scene = build_scene(name, frames=arguments.frames, seed=arguments.seed)
         rows += [_run_one(scene, overlap, arguments.seed, arguments.out, facts) for overlap in chosen]
-    write_text(arguments.out / f"{arguments.scene}-{arguments.overlap}.md", loop_report(rows, facts) + "\n")
+    write_text(
+        arguments.out / f"{arguments.scene}-{arguments.overlap}.md", paper_report("interact", rows, facts) + "\n"
+    )
     print_rows(rows)
     print(f"wrote {arguments.out}")
     return 0 if all(map(is_held, rows)) else 1

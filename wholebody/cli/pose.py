@@ -56,7 +56,7 @@ def pose(path: Path, method: str | None, out: Path, *, as_json: bool = False, dr
 
 def _pose(path: Path, method: str | None, out: Path, as_json: bool, screenshots: Screenshots | None) -> int:
     from wholebody.base import files
-    from wholebody.cli import picture
+    from wholebody.cli.show import draw as draw_scene
     from wholebody.methods.solve import method_named, solve
     from wholebody.taskfile import read_task, result
 
@@ -76,7 +76,7 @@ def _pose(path: Path, method: str | None, out: Path, as_json: bool, screenshots:
 
         tables.show_solution(task, solution)
     with Console(stderr=as_json).status("drawing"):
-        written, note = picture.draw(task.problem, solution.q, task.view, out, task.title, screenshots)
+        written, note = draw_scene(task.problem, solution.q, task.view, out, task.title, screenshots)
     told = [f"wrote {file}" for file in (out / "result.json", *written)]
     print(*told, *filter(None, [note]), sep="\n", file=sys.stderr if as_json else sys.stdout)
     return 0 if solution.solved else 1

@@ -1,4 +1,4 @@
-"""`wholebody show`: show a figure, the start of a task, or a result."""
+"""`wholebody show`: show a figure, the start of a task, or a result; viewers and pictures for other commands too."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from wholebody.base.errors import MissingPackageError
 from wholebody.cli.arguments import add_person, person_options
 from wholebody.cli.command import command, flag, option
 
@@ -15,8 +16,38 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from wholebody.base.arrays import Array
     from wholebody.problem import Problem
     from wholebody.taskfile.task import View
+    from wholebody.view import Viewer
+    from wholebody.view.screenshot import Screenshots
+
+
+def viewer_of(problem: Problem, view: View, title: str, **settings: Any) -> Viewer:
+    """A viewer of the problem's scene with the task's camera; the settings are others of the viewer."""
+    from wholebody.view import Viewer
+
+    viewer = Viewer(problem.scene, see_through=view.see_through, title=title, **settings)
+    if view.eye is not None:
+        viewer.look(view.eye, view.target)
+    return viewer
+
+
+def draw(
+    problem: Problem, q: Array, view: View, folder: Path, title: str, screenshots: Screenshots | None
+) -> tuple[list[Path], str]:
+    """Write scene.html and, by a browser if any, scene.png: the files, and a sentence if there is no picture."""
+    with viewer_of(problem, view, title, screenshots=screenshots) as viewer:
+        viewer.show(q, problem=problem)
+        written = [viewer.save(folder / "scene.html")]
+        if screenshots is None:
+            return written, ""
+        try:
+            written.append(viewer.picture(folder / "scene.png"))
+        except MissingPackageError as error:
+            return written, f"no picture: {error}"
+    return written, ""
+
 
 LOCAL = "127.0.0.1"
 
@@ -55,7 +86,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Show, and wait until the first tab is opened and the last one is closed."""
     from wholebody.base.errors import InputError
     from wholebody.base.files import checked_target
-    from wholebody.cli.picture import viewer_of
+    from wholebody.cli.show import viewer_of
     from wholebody.view.screenshot import Screenshots
     from wholebody.view.viewer import SAVED
 

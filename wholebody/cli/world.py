@@ -55,7 +55,7 @@ exit code: 1 if pieces were deeper in each other than 0.1 mm after a frame, or a
 def run(arguments: argparse.Namespace) -> int:
     """List the scenes, or run one or all."""
     from wholebody.base.files import check_writable, make_folder
-    from wholebody.bench.measure.frames import world_report
+    from wholebody.bench.measure.frames import paper_report
     from wholebody.bench.tables import machine, write_text
     from wholebody.cli.tables import print_rows
     from wholebody.dynamics.world import WORLD_SCENES
@@ -79,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
     facts = machine()
     rows = [_run_one(_scene(name, arguments), arguments, facts) for name in names]
     print_rows(rows)
-    write_text(arguments.out / "world.md", world_report(rows, facts) + "\n")
+    write_text(arguments.out / "world.md", paper_report("world_frames", rows, facts) + "\n")
     print(f"wrote {arguments.out}")
     return 0 if all(row["deepest mm"] <= 0.1 and not row["not avoided"] for row in rows) else 1  # mm
 
@@ -161,7 +161,7 @@ def _animation(
 
     from wholebody.bench.measure.frames import moments
     from wholebody.view import Viewer
-    from wholebody.view.filmstrip import write_filmstrip
+    from wholebody.view.side_by_side import write_filmstrip
     from wholebody.view.viewed_scene import ViewedWorld
 
     viewed = ViewedWorld(scene.scene, frames[-1].placements)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import os
 import re
 import sys
@@ -10,48 +11,13 @@ from importlib import metadata
 from pathlib import Path
 from typing import NamedTuple
 
-MODULES = {
-    "pin": "pinocchio",
-    "coal": "coal",
-    "numba": "numba",
-    "numpy": "numpy",
-    "scipy": "scipy",
-    "qpsolvers": "qpsolvers",
-    "osqp": "osqp",
-    "daqp": "daqp",
-    "meshcat": "meshcat",
-    "matplotlib": "matplotlib",
-    "joblib": "joblib",
-    "cloudpickle": "cloudpickle",
-    "pillow": "PIL",
-    "trimesh": "trimesh",
-    "coacd": "coacd",
-    "pycollada": "collada",
-    "platformdirs": "platformdirs",
-    "rich": "rich",
-    "jinja2": "jinja2",
-    "markdown-it-py": "markdown_it",
-}
+with Path(__file__).with_name("packages.csv").open(encoding="utf-8", newline="") as _file:
+    _ROWS = list(csv.DictReader(_file))
+
+MODULES = {row["name"]: row["module"] for row in _ROWS if row["module"]}
 """Required packages: distribution -> its module."""
 
-EXTRAS = {
-    "placo": "placo",
-    "quadprog": "solvers",
-    "proxsuite": "solvers",
-    "piqp": "solvers",
-    "distributed": "cluster",
-    "viser": "drag",
-    "shtab": "completion",
-    "mujoco-core": "mjcf",
-    "pin-pink": "compare",
-    "mink": "compare",
-    "mujoco": "compare",
-    "rapier3d": "compare",
-    "drake": "drake",
-    "optik-py": "optik",
-    "pytracik": "tracik",
-    "eaik": "eaik",
-}
+EXTRAS = {row["name"]: row["extra"] for row in _ROWS if row["extra"]}
 """Optional packages: distribution -> the extra that installs it."""
 
 OLDEST, NEWEST = (3, 10), (3, 14)

@@ -30,7 +30,7 @@ from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.proximity import Contacts, PairTable
-from wholebody.scene.matter.materials import Surface
+from wholebody.scene.matter.body import Surface
 
 Gains = float | Mapping[str, float] | None
 RATE = 2500.0  # 1/s^2: stiffness over inertia of Schmidl and Lin's spring, 1000 N/m at 0.4 kg

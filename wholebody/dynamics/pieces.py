@@ -15,8 +15,7 @@ from wholebody.dynamics import motion_kernel
 from wholebody.geometry.contact_rows import ContactRowBuilder, compiled_kernel
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.proximity import Contacts, PairTable, Proximity
-from wholebody.scene.matter.body import MassProperties, mass_properties
-from wholebody.scene.matter.materials import MATERIALS, Material, Surface, surface
+from wholebody.scene.matter.body import MATERIALS, MassProperties, Material, Surface, mass_properties, surface
 from wholebody.scene.scene import Scene
 
 HUMAN = MATERIALS["human"]  # of every figure

@@ -15,7 +15,7 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array, brief
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.figures.joined import one_figure
+from wholebody.figures.loading import one_figure
 
 SIDES = ("left", "right")
 NAMES = {"pelvis", "thorax", "neck", "head"}.union(

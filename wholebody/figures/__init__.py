@@ -5,8 +5,7 @@ from wholebody.figures.denavit_hartenberg import DenavitHartenberg, denavit_hart
 from wholebody.figures.description import Chain, JointCone, Limits
 from wholebody.figures.figure import Figure
 from wholebody.figures.human.fingers import finger_angles
-from wholebody.figures.joined import join
-from wholebody.figures.loading import load
+from wholebody.figures.loading import join, load
 from wholebody.figures.packaged_urdf import urdf_path
 from wholebody.figures.reach_cones import ReachCone
 

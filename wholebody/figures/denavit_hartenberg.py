@@ -95,15 +95,13 @@ def denavit_hartenberg(figure: Figure, branch: str) -> DenavitHartenberg:
             raise InputError(f"joint {model.names[joint]!r} is not revolute; a table is made of revolute joints here")
     data = model.createData()
     tip_id = figure.frame_id(chain.tip)
-    pin.framesForwardKinematics(model, data, pin.neutral(model))
+    pin.computeJointJacobians(model, data, pin.neutral(model))
+    pin.updateFramePlacements(model, data)
     parent = model.parents[ids[0]]
     reference = _link_frame(figure, parent)
     inverse = (data.oMf[reference[1]] if reference[1] >= 0 else pin.SE3.Identity()).inverse()
-    axes = []
-    for joint in ids:
-        placement = inverse * data.oMi[joint]
-        axis = _axis(model, joint)
-        axes.append((np.array(placement.translation), placement.rotation @ (axis / np.linalg.norm(axis))))
+    directions = data.J[3:, [model.joints[joint].idx_v for joint in ids]].T @ inverse.rotation.T
+    axes = [(inverse.act(data.oMi[joint].translation), axis) for joint, axis in zip(ids, directions, strict=True)]
     tip = inverse * data.oMf[tip_id]
     frames = _frames(axes)
     links = [frames[k].inverse() * frames[k + 1] for k in range(len(ids))]
@@ -117,14 +115,6 @@ def _link_frame(figure: Figure, joint: int) -> tuple[str, int]:
     """Name and index of the first segment frame on a joint; the world if there is none."""
     frames = ((name, figure.frame_id(name)) for name in figure.segments)
     return next((each for each in frames if figure.model.frames[each[1]].parentJoint == joint), ("world", -1))
-
-
-def _axis(model: pin.Model, joint: int) -> Array:
-    """Axis of a revolute joint in its own frame: its motion subspace."""
-    data = model.createData()
-    pin.computeJointJacobians(model, data, pin.neutral(model))
-    column = pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.LOCAL)[:, model.joints[joint].idx_v]
-    return np.array(column[3:])
 
 
 def _frames(axes: list[tuple[Array, Array]]) -> list[pin.SE3]:

@@ -15,11 +15,9 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
-from wholebody.figures import hulls
-from wholebody.figures.anthropometry import Person, describe, make_person
-from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, geometry_of, model_of, place
+from wholebody.figures.anthropometry import FINGER_BASES, Dimensions, Person, describe, keyed_hand, make_person
+from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, ellipsoid, geometry_of, model_of, place
 from wholebody.figures.description import Articulated, Chain, Description, chosen_pairs
-from wholebody.figures.dimensions import FINGER_BASES, Dimensions, keyed_hand
 from wholebody.figures.figure import Figure
 from wholebody.figures.postures import lowest
 from wholebody.figures.tables import keyed, named_angles
@@ -123,7 +121,7 @@ def part_radius(size: Dimensions, part: str) -> float:
 
 def _polyhedron(size: Dimensions, part: str) -> tuple[object, pin.SE3]:
     radii = part_radii(size, part)
-    shape, center = hulls.ellipsoid(radii, part)
+    shape, center = ellipsoid(radii, part)
     return shape, place(z=-radii[2]) * center
 
 

@@ -1,11 +1,14 @@
-"""The convex collision pieces of a robot's links: exact shapes, and meshes as hulls or decomposed."""
+"""A robot's links: the convex pieces that contacts are measured with, and what its file wants drawn."""
 
 from __future__ import annotations
 
+import hashlib
+import io
 import logging
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import coal
 import numpy as np
@@ -14,13 +17,15 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import known, shown
-from wholebody.base.errors import InputError
+from wholebody.base.errors import InputError, WholebodyError
 from wholebody.base.fields import Range
+from wholebody.figures.figure import Figure
 from wholebody.geometry.convex import HULL_VERTICES, coacd_version, convex_pieces, mesh_hull
 from wholebody.geometry.hull import hull_piece
-from wholebody.geometry.mesh_cache import ConvexPieces, cached
-from wholebody.geometry.meshes import EmptyMeshError, read_mesh
+from wholebody.geometry.mesh_cache import ConvexPieces, cached, cached_entry
+from wholebody.geometry.meshes import EmptyMeshError, read_mesh, read_parts
 from wholebody.geometry.pieces import LARGEST, SMALLEST
+from wholebody.geometry.polygonal import around
 
 CYLINDER_SIDES = 32
 """A cylinder becomes a prism around it with this many sides; its corners protrude by 0.5 % of the radius."""
@@ -153,7 +158,105 @@ def _pieces(vertices: Array, faces: NDArray[np.int64], share: float | None, what
 
 def _prism(radius: float, length: float) -> Array:
     """Corners of the prism around a cylinder along z, shape (2 sides, 3)."""
-    turn = 2.0 * np.pi * np.arange(CYLINDER_SIDES) / CYLINDER_SIDES
-    outside = radius / np.cos(np.pi / CYLINDER_SIDES)
-    ring = np.column_stack([outside * np.cos(turn), outside * np.sin(turn)])
+    ring = around(radius, CYLINDER_SIDES)
     return np.vstack([np.column_stack([ring, np.full(CYLINDER_SIDES, z)]) for z in (-0.5 * length, 0.5 * length)])
+
+
+MANY = 4000
+"""Triangles of one mesh from which what is finer than `FINE` is left out: robots' meshes have up to a million."""
+
+FINE = 0.002  # m
+
+
+Color: TypeAlias = tuple[float, float, float, float]
+"""Red, green, blue, alpha."""
+
+
+class Drawn(NamedTuple):
+    """One object of a link: (4, 4) relative to a joint, coal's shape or vertices (n, 3) and faces (m, 3)."""
+
+    link: str
+    joint: str
+    placement: Array
+    shape: Any
+    color: Color
+
+
+def drawn_of(figure: Figure) -> list[Drawn]:
+    """What is drawn of a figure's links; nothing of a link with a mesh that cannot be read: its pieces are drawn."""
+    names, frames = figure.model.names, figure.model.frames
+    made: list[Drawn] = []
+    broken = set()
+    for visual in figure.visual.geometryObjects if figure.visual is not figure.geometry else ():
+        link, joint = str(frames[visual.parentFrame].name), str(names[visual.parentJoint])
+        red, green, blue, alpha = visual.meshColor.tolist()
+        given: Color = (red, green, blue, alpha)
+        place = np.array(visual.placement.homogeneous)
+        if not visual.meshPath:
+            solid = visual.geometry
+            drawn = triangles_of(solid) if isinstance(solid, coal.BVHModelBase) else solid
+            made.append(Drawn(link, joint, place, drawn, given))
+            continue
+        try:
+            parts = mesh_parts(visual.meshPath, tuple(visual.meshScale.tolist()))
+        except WholebodyError as error:
+            _log.info("link %s: its pieces are drawn, as %s", link, error)
+            broken.add(link)
+            continue
+        for vertices, faces, own in parts:
+            color = given if own is None or visual.overrideMaterial else own
+            made.append(Drawn(link, joint, place, (vertices, faces), color))
+    return [one for one in made if one.link not in broken]
+
+
+MeshParts = tuple[tuple[Array, NDArray[np.int64], Color | None], ...]
+
+
+@lru_cache(maxsize=256)
+def mesh_parts(path: str, scale: tuple[float, ...]) -> MeshParts:
+    """The parts of a mesh file by colour: vertices (n, 3), faces (m, 3), and red, green, blue, alpha if it has any."""
+    place = Path(path)
+
+    def make() -> MeshParts:
+        turn = slice(None, None, -1 if np.prod(scale) < 0.0 else 1)  # a mirrored face keeps its outer side
+        parts = [(vertices * scale, faces[:, turn], color) for vertices, faces, color in read_parts(place)]
+        fine = sum(len(faces) for _, faces, _ in parts) <= MANY
+        return tuple(part if fine else (*thinned(part[0], part[1]), part[2]) for part in parts)
+
+    try:
+        content = place.read_bytes()
+    except OSError:
+        return make()
+    # The 2 is another one whenever what is kept changes.
+    key = hashlib.sha256(f"visual 2 {MANY} {FINE} {scale!r} {place.suffix}".encode() + content).hexdigest()
+    return cached_entry(key, make, _packed, _unpacked)
+
+
+def thinned(vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
+    """Vertices (k, 3) and faces (l, 3) of a mesh without what is finer than `FINE`."""
+    from wholebody.figures.surface.nets import clustered  # who draws nothing does not load how surfaces are made
+
+    kept = clustered(vertices, faces, np.floor(vertices / FINE).astype(np.int64))
+    used, local = np.unique(kept, return_inverse=True)
+    return vertices[used], local.reshape(-1, 3)
+
+
+def _packed(parts: MeshParts) -> bytes:
+    arrays: dict[str, Any] = {}
+    for number, (vertices, faces, color) in enumerate(parts):
+        arrays[f"vertices{number}"], arrays[f"faces{number}"] = vertices.astype(np.float32), faces.astype(np.uint32)
+        arrays[f"color{number}"] = np.array(() if color is None else color)
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **arrays)
+    return buffer.getvalue()
+
+
+def _unpacked(data: bytes) -> MeshParts:
+    with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+        found = []
+        for number in range(len(arrays.files) // 3):
+            color = [float(part) for part in arrays[f"color{number}"]]
+            paint = (color[0], color[1], color[2], color[3]) if color else None
+            vertices, faces = arrays[f"vertices{number}"].astype(float), arrays[f"faces{number}"].astype(np.int64)
+            found.append((vertices, faces, paint))
+        return tuple(found)

@@ -15,8 +15,8 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.figures.dimensions import RELAXED
-from wholebody.figures.human.capsules import SPREAD
+from wholebody.figures.anthropometry import RELAXED
+from wholebody.figures.human.details import SPREAD
 from wholebody.figures.postures import support
 from wholebody.figures.sizes import MIDDLE_TIP
 

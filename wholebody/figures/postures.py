@@ -59,10 +59,10 @@ def _moves(abduction: str, segment: str) -> bool:
 
 def _close_segments(figure: Articulated, q: Array, pairs: Indices, within: Array) -> set[str]:
     """Segments with pieces nearer to others than `GAP`, of pairs (k, 2) whose origins are `within` (k,) then."""
-    pieces, placed = figure.geometry.geometryObjects, _placed(figure, q)
-    centers = np.array([place.translation for place in placed])
+    pieces, places = zip(*placed(figure, q), strict=True)
+    centers = np.array([place.translation for place in places])
     apart = np.linalg.norm(centers[pairs[:, 0]] - centers[pairs[:, 1]], axis=1)
-    at = [coal.Transform3s(place.rotation, place.translation) for place in placed]
+    at = [coal.Transform3s(place.rotation, place.translation) for place in places]
     close: set[str] = set()
     for a, b in pairs[apart < within].tolist():
         shapes, result = (pieces[a].geometry, pieces[b].geometry), coal.DistanceResult()
@@ -71,19 +71,17 @@ def _close_segments(figure: Articulated, q: Array, pairs: Indices, within: Array
     return close
 
 
-def _placed(figure: Articulated, q: Array) -> list[pin.SE3]:
-    """Placements of the pieces in the world."""
+def placed(figure: Articulated, q: Array) -> list[tuple[pin.GeometryObject, pin.SE3]]:
+    """The pieces of a figure, and where each is in a posture (nq,)."""
     data = figure.model.createData()
     pin.forwardKinematics(figure.model, data, q)
-    return [data.oMi[piece.parentJoint] * piece.placement for piece in figure.geometry.geometryObjects]
+    return [(piece, data.oMi[piece.parentJoint] * piece.placement) for piece in figure.geometry.geometryObjects]
 
 
 def lowest(figure: Articulated, q: Array) -> float:
     """Height of the lowest point of all pieces, metres."""
-    return min(
-        -support(piece.geometry, placement, np.array([0.0, 0.0, -1.0]))
-        for piece, placement in zip(figure.geometry.geometryObjects, _placed(figure, q), strict=True)
-    )
+    down = np.array([0.0, 0.0, -1.0])
+    return min(-support(piece.geometry, place, down) for piece, place in placed(figure, q))
 
 
 def support(shape: Any, placement: pin.SE3, direction: Array) -> float:

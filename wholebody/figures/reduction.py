@@ -34,7 +34,11 @@ def reduced_parts(
     old = figure.describe()
     frames = {frame.name: frame for frame in small.frames}
     description = Description(
-        groups=_filtered(old.groups, names),
+        groups={
+            name: left
+            for name, members in old.groups.items()
+            if (left := tuple(joint for joint in members if joint in names))
+        },
         chains={
             name: Chain(tuple(joint for joint in chain.joints if joint in names), chain.tip)
             for name, chain in old.chains.items()
@@ -99,11 +103,6 @@ def drop_rigid_pairs(geometry: pin.GeometryModel) -> list[ExcludedPair]:
         if pieces[pair.first].parentJoint == pieces[pair.second].parentJoint
     ]
     return drop_pairs(geometry, together, "locked together")
-
-
-def _filtered(groups: Mapping[str, tuple[str, ...]], names: set[str]) -> dict[str, tuple[str, ...]]:
-    kept = {name: tuple(joint for joint in members if joint in names) for name, members in groups.items()}
-    return {name: members for name, members in kept.items() if members}
 
 
 def _restricted(whole: Articulated, name: str, part: Articulated) -> Array:

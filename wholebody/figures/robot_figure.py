@@ -19,8 +19,7 @@ from wholebody.base.errors import FileFormatError, InputError, WholebodyError
 from wholebody.figures.description import ROOT_JOINT, Chain, Description, JointCone, copied
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, LinkShape, link_pieces
-from wholebody.figures.rest_posture import RestPosture, rest_posture
-from wholebody.figures.self_pairs import choose_pairs, drop_pairs
+from wholebody.figures.self_pairs import RestPosture, choose_pairs, drop_pairs, rest_posture
 from wholebody.figures.urdf.file import LinkVisual
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.pieces import SMALLEST

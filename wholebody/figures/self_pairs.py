@@ -1,14 +1,22 @@
-"""Choice of the pairs of pieces that can touch, by adjacency and random postures, if a file does not give them."""
+"""The pairs of a robot's pieces that can touch, if its file does not give them, and its default posture.
+
+The default posture is near zero, within limits, and free of self-contact. Many descriptions overlap at zero: hands and
+thighs, fingers, or wrists and forearms whose hulls are larger than the parts. The joints move as little as possible to
+separate the pairs; the few pairs that still overlap are not tested.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices
-from wholebody.figures.description import ExcludedPair
+from wholebody.base.arrays import Array, Indices, cross
+from wholebody.figures.description import ExcludedPair, limits_of
+from wholebody.figures.state import State, root_freedoms
+from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 
 SELDOM = 0.02
 """Share of the sampled postures: pairs that are free in at most this share are left out, as nested shells."""
@@ -108,3 +116,133 @@ def _seldom_free(model: pin.Model, geometry: pin.GeometryModel, postures: Array)
         if not free:
             break
     return free
+
+
+APART = 1e-3
+"""Least distance of two pieces in the posture, metres."""
+
+LONGEST_STEP = 0.25
+"""Largest change of a joint in one correction, radians or metres."""
+
+DAMPING = 1e-4
+"""Square metres added to the diagonal of the normal equations; larger = shorter steps along singular directions."""
+
+UNPARTED = "overlap at zero, and no posture was found that parts them"
+
+
+class RestPosture(NamedTuple):
+    """The default posture of a robot."""
+
+    q: Array  # (nq,) posture within the limits without self-contact
+    zero: Array  # (nq,) all joints at zero, or at the nearest value within the limits
+    excluded: tuple[ExcludedPair, ...]  # pairs that could not be separated; they are removed from the geometry
+    parted: tuple[tuple[str, str], ...]  # pairs of pieces that overlap at `zero` and not at `q`, by name
+
+
+def rest_posture(model: pin.Model, geometry: pin.GeometryModel) -> RestPosture:
+    """Find a posture near zero that is free of self-contact; pairs that cannot be separated are removed."""
+    limits = limits_of(model)
+    zero = pin.neutral(model)
+    zero[limits.idx_q] = np.clip(zero[limits.idx_q], limits.lower, limits.upper)
+    if not len(geometry.collisionPairs) or model.nv == 0:
+        return RestPosture(zero, zero.copy(), (), ())
+    search = _Parting(model, geometry, zero)
+    begun = search.contacts(zero, 0.0)
+    if not len(begun.number) and not len(search.contacts(zero, APART).number):
+        return RestPosture(zero, zero.copy(), (), ())
+    best = search.away_from(zero)
+    # Random starts, half-way from zero, if zero itself does not lead to a free posture.
+    for other in random_postures(model, 8, seed=1):
+        if not len(best.left):
+            break
+        best = min(best, search.away_from(pin.interpolate(model, zero, other, 0.5)), key=_badness)
+    left = best.left
+    q = search.pulled_back(best.q, frozenset(left))
+    names = [piece.name for piece in geometry.geometryObjects]
+    at_zero = set(begun.number.tolist()) - set(left)
+    pairs = search.proximity.table.pairs
+    parted = tuple((names[pairs[k, 0]], names[pairs[k, 1]]) for k in sorted(at_zero))
+    return RestPosture(q, zero, tuple(drop_pairs(geometry, left, UNPARTED)), parted)
+
+
+class _Try(NamedTuple):
+    """Result from one start: the posture, the pairs that still overlap, and the sum of their distances."""
+
+    q: Array
+    left: tuple[int, ...]
+    depth: float
+
+
+def _badness(found: _Try) -> tuple[int, float]:
+    return len(found.left), -found.depth
+
+
+class _Parting:
+    """Moves a posture out of its own overlaps by damped least squares over the joints that are not at a limit."""
+
+    def __init__(self, model: pin.Model, geometry: pin.GeometryModel, zero: Array) -> None:
+        self.model, self.zero = model, zero
+        self.proximity, self.state = Proximity(PairTable(model, geometry)), State(model)
+        self.limits = limits_of(model)
+        self.movable = ~root_freedoms(model)
+
+    def contacts(self, q: Array, within: float) -> Contacts:
+        return self.proximity.query(self.state.update(q).data, within)
+
+    def away_from(self, q: Array) -> _Try:
+        """Correct until nothing is nearer than `APART`; otherwise return the posture with the fewest overlaps."""
+        best: _Try | None = None
+        since = 0
+        # corrections from one start; ordinary overlaps take three to ten.
+        for _ in range(60):
+            near = self.contacts(q, APART)
+            left = tuple(np.sort(near.number[near.distance <= 0.0]).tolist())
+            found = _Try(q, left, float(np.minimum(near.distance, 0.0).sum()))
+            if best is None or _badness(found) < _badness(best) or not len(near.number):
+                best, since = found, 0
+            since += 1
+            # Corrections without fewer overlaps or less depth after which the attempt from a start ends.
+            if not len(near.number) or since > 12:
+                break
+            q = self._corrected(q, near)
+        assert best is not None
+        return best
+
+    def pulled_back(self, q: Array, left: frozenset[int]) -> Array:
+        """Move every joint back towards zero while the posture stays free, ignoring the pairs that are left out."""
+        way = np.asarray(pin.difference(self.model, self.zero, q))
+        for place in np.argsort(-np.abs(way), kind="stable").tolist():
+            for share in (1.0, 0.5, 0.25):
+                trial = way.copy()
+                trial[place] *= 1.0 - share
+                if abs(way[place]) > 1e-9 and self._free(np.asarray(pin.integrate(self.model, self.zero, trial)), left):
+                    way = trial
+                    break
+        return np.asarray(pin.integrate(self.model, self.zero, way))
+
+    def _free(self, q: Array, left: frozenset[int]) -> bool:
+        return left.issuperset(self.contacts(q, 0.5 * APART).number.tolist())
+
+    def _corrected(self, q: Array, near: Contacts) -> Array:
+        joint = self.proximity.table.joint
+        lever = cross(near.point_a, near.normal)
+        rows = self.state.rows(np.hstack([near.normal, lever]), joint[near.pair[:, 1]], joint[near.pair[:, 0]])
+        wanted = 1.5 * APART - near.distance
+        free = self.movable.copy()
+        lower, upper = np.full(self.model.nv, -np.inf), np.full(self.model.nv, np.inf)
+        lower[self.limits.idx_v] = self.limits.lower - q[self.limits.idx_q]
+        upper[self.limits.idx_v] = self.limits.upper - q[self.limits.idx_q]
+        step = np.zeros(self.model.nv)
+        for _ in range(self.model.nv):
+            part = rows[:, free]
+            short = wanted - rows[:, ~free] @ step[~free]
+            step[free] = part.T @ np.linalg.solve(part @ part.T + DAMPING * np.eye(len(part)), short)
+            beyond = free & ((step < lower - 1e-12) | (step > upper + 1e-12))
+            if not beyond.any():
+                break
+            step[beyond] = np.clip(step[beyond], lower[beyond], upper[beyond])
+            free &= ~beyond
+        longest = float(np.abs(step).max(initial=0.0))
+        if longest > LONGEST_STEP:
+            step *= LONGEST_STEP / longest
+        return np.asarray(pin.integrate(self.model, q, step))

@@ -137,15 +137,12 @@ def is_convex(vertices: Array, faces: NDArray[np.int64]) -> bool:
         return False
     # triangles, which show of almost all meshes that they are not convex
     for some in (middle[:: max(1, len(middle) // 64)], middle):
-        if not (_below(hull.equations, some) <= FLAT * size).all():
+        # how far they are below the surface of the hull, metres
+        below = -(some @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=1)
+        if not (below <= FLAT * size).all():
             return False
     # share of the hull's area that rounding may leave uncovered
     return _covered(corners, area) >= (1.0 - 1e-3) * float(hull.area)
-
-
-def _below(equations: Array, points: Array) -> Array:
-    """How far points (k, 3) are below the surface of a hull of faces (f, 4), metres."""
-    return -np.asarray((points @ equations[:, :3].T + equations[:, 3]).max(axis=1))
 
 
 def _covered(corners: Array, area: Array) -> float:

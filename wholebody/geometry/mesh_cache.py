@@ -15,17 +15,16 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from wholebody.base.arrays import with_values
 from wholebody.base.errors import InputError
 from wholebody.base.files import write
 from wholebody.geometry.hull import coal_convex
-from wholebody.geometry.pieces import Piece
+from wholebody.geometry.pieces import Piece, hull_triangles
 from wholebody.version import __version__
 
 T = TypeVar("T")
@@ -162,7 +161,7 @@ def _entries(folder: Path) -> list[tuple[float, int, Path]]:
 
 def _packed(found: ConvexPieces) -> bytes:
     corners = [np.array(piece.geometry.points()) for piece in found.pieces]
-    faces = [_triangles(piece.geometry) for piece in found.pieces]
+    faces = [hull_triangles(piece.geometry) for piece in found.pieces]
     told = json.dumps([found.added_volume, found.notes]).encode()
     buffer = io.BytesIO()
     np.savez(
@@ -190,8 +189,3 @@ def _unpacked(data: bytes) -> ConvexPieces:
         )
         added, notes = json.loads(arrays["told"].tobytes())
     return ConvexPieces(pieces, float(added), tuple(notes))
-
-
-def _triangles(hull: Any) -> NDArray[np.int64]:
-    polygons = (hull.polygons(k) for k in range(hull.num_polygons))
-    return np.array([[face[0], face[1], face[2]] for face in polygons], dtype=np.int64).reshape(-1, 3)

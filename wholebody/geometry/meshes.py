@@ -82,7 +82,7 @@ def _bent(path: Path) -> list[tuple[Array, NDArray[np.int64], tuple[float, float
     """The parts of a glTF file whose meshes bones bend, which trimesh leaves as they were bound; None of others."""
     if path.suffix.lower() not in (".gltf", ".glb"):
         return None
-    from wholebody.geometry.gltf_document import GltfDocument
+    from wholebody.geometry.gltf import GltfDocument
 
     check_file(path, "mesh")
     check_content(path)

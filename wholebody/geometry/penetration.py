@@ -1,8 +1,17 @@
-"""Penetration of two objects: the global penetration depth of unions of convex pieces, and the least separation."""
+"""Penetration of two objects: the global penetration depth of unions of convex pieces, and the least separation.
+
+The least separation is the point nearest to the origin outside the union of the Minkowski differences of all pairs (see
+`wholebody.geometry.minkowski`). The problem is not convex, because each pair may separate on any side. It is solved by
+branch and bound. A node fixes the side of separation of some pairs, n . t >= h(n), and its bound is the QP  min |t|^2
+under these rows. If another pair overlaps at the QP's answer, the node branches over the sides of that pair. Nodes are
+processed in the order of their bounds, so the first one without overlap is the least.
+"""
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Sequence
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +21,7 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.geometry.large_models import pairs_of
-from wholebody.geometry.minkowski import ObjectPair, Placed
-from wholebody.geometry.separation import least_separation
+from wholebody.geometry.minkowski import OVERLAP, ObjectPair, Placed, Sides
 
 
 class ObjectPenetration(NamedTuple):
@@ -117,3 +125,186 @@ def object_penetrations(
         )
         found.append(object_penetration(a, b, pieces_a, pieces_b, mask))
     return sorted(filter(None, found), key=lambda one: -float(np.linalg.norm(one.separation)))
+
+
+TOUCHING = 1e-7
+"""Overlap that counts as none in the search, metres; the answer is verified to `OVERLAP`."""
+
+
+MOST_DESCENTS, MOST_ROWS = 30, 40
+"""Most rounds of a local search, and rows of its QP; both are far fewer unless rounding causes cycles."""
+
+
+SHORTEST = 2e-4
+"""Least step of a march along a ray, metres; narrower free gaps may be missed."""
+
+
+class Separation(NamedTuple):
+    """A translation of A."""
+
+    translation: Array  # (3,) metres
+    separated: bool  # whether coal finds no overlap after it
+    # whether no shorter one exists, proven. With several overlapping pairs of round pieces, whose sides are sampled and
+    # then refined, there is seldom a proof: then the translation is the best of many local searches.
+    least: bool
+
+
+class _Node(NamedTuple):
+    translation: Array
+    normals: Array
+    offsets: Array
+
+
+def least_separation(
+    pieces_a: Sequence[Placed], pieces_b: Sequence[Placed], allowed: NDArray[np.bool_] | None = None
+) -> Separation:
+    """Least translation of A after which no piece of it overlaps B; see `object_penetration` for the arguments."""
+    # Zero where nothing overlaps, and with ``separated=False`` where nothing separates (between two half-spaces).
+    pairs = ObjectPair(pieces_a, pieces_b, allowed)
+    escapes = pairs.escapes()
+    ways = [*escapes, *([] if (found := _depth_first(pairs, _ROOT)) is None else [found])]
+    best = min(ways, key=lambda way: float(way @ way), default=None)
+    least = False
+    if not pairs.sampled:
+        best, least = _search(pairs, best)
+    if best is not None and not least:
+        best = _descents(pairs, best, escapes)
+    if best is None:
+        return Separation(np.zeros(3), False, False)
+    # No translation can be shorter than the depth of the deepest pair alone.
+    depths = pairs.overlapping(np.zeros(3), TOUCHING)[1]
+    least = least or bool(np.linalg.norm(best) <= depths.max(initial=0.0) + OVERLAP)
+    return Separation(best, not pairs.overlapping(best, OVERLAP)[0], least)
+
+
+_ROOT = _Node(np.zeros(3), np.zeros((0, 3)), np.zeros(0))
+
+
+def _search(pairs: ObjectPair, best: Array | None) -> tuple[Array | None, bool]:
+    """Branch and bound: the best translation without overlap, and whether it is proven to be the least."""
+    limit = np.inf if best is None else float(best @ best)
+    queue: list[tuple[float, int, _Node]] = [(0.0, 0, _ROOT)]
+    made = 0
+    # Nodes branched before the best known translation is returned: time, about a millisecond a node, against proof.
+    for _ in range(400):
+        if not queue:
+            return best, best is not None
+        _, _, node = heapq.heappop(queue)
+        found, depths, normals = pairs.overlapping(node.translation, TOUCHING)
+        if not found:
+            return node.translation, True
+        for child in _children(pairs, node, found, depths, normals):
+            value = float(child.translation @ child.translation)
+            if value < limit:
+                made += 1
+                heapq.heappush(queue, (value, made, child))
+    return best, False
+
+
+def _depth_first(pairs: ObjectPair, node: _Node) -> Array | None:
+    """Follow the nearest child down to a translation without overlap."""
+    for _ in range(10 * (len(pairs.a) + len(pairs.b))):
+        found, depths, normals = pairs.overlapping(node.translation, TOUCHING)
+        if not found:
+            return node.translation
+        children = _children(pairs, node, found, depths, normals)
+        if not children:
+            return None
+        node = min(children, key=lambda child: float(child.translation @ child.translation))
+    return None
+
+
+def _children(
+    pairs: ObjectPair, node: _Node, found: list[tuple[int, int]], depths: Array, normals: Array
+) -> list[_Node]:
+    """One node for each side of the deepest pair that can be reached with the sides already chosen."""
+    deepest = int(np.argmax(depths))
+    i, j = found[deepest]
+    sides = pairs.sides(i, j)
+    if pairs.a[i].round or pairs.b[j].round:
+        here = pairs.rows(i, j, normals[deepest : deepest + 1])
+        sides = Sides(np.vstack([sides.normals, here.normals]), np.concatenate([sides.offsets, here.offsets]))
+    answers = _nearest_on_rows(sides, node.normals, node.offsets)
+    return [
+        _Node(answer, np.vstack([node.normals, normal]), np.append(node.offsets, offset))
+        for answer, normal, offset in zip(answers, sides.normals, sides.offsets, strict=True)
+        if np.isfinite(answer[0])
+    ]
+
+
+def _nearest_on_rows(new: Sides, normals: Array, offsets: Array) -> Array:
+    """Least t subject to the old rows and one new row that the old answer violates: (k, 3), NaN if infeasible."""
+    # The new row is then active, with at most two old rows; all such sets are tried at once.
+    count = len(new.offsets)
+    best, answers = np.full(count, np.inf), np.full((count, 3), np.nan)
+    for size in (0, 1, 2):
+        for chosen in combinations(range(len(offsets)), size):
+            old = list(chosen)
+            rows = np.concatenate([new.normals[:, None], np.broadcast_to(normals[old], (count, size, 3))], axis=1)
+            values = np.concatenate([new.offsets[:, None], np.broadcast_to(offsets[old], (count, size))], axis=1)
+            gram = rows @ rows.transpose(0, 2, 1)
+            solid = np.linalg.det(gram) > 1e-10
+            gram[~solid] = np.eye(size + 1)
+            weights = np.linalg.solve(gram, values[:, :, None])
+            trial = (rows * weights).sum(axis=1)
+            length = (trial**2).sum(axis=1)
+            kept = solid & (length < best) & (trial @ normals.T >= offsets - 1e-10).all(axis=1)
+            best[kept], answers[kept] = length[kept], trial[kept]
+    return answers
+
+
+def _descents(pairs: ObjectPair, best: Array, escapes: Array) -> Array:
+    """Local searches from the first free position along many directions, for problems that `_search` cannot finish."""
+    best = _descent(pairs, best)
+    lengths = np.linalg.norm(escapes, axis=1)
+    for escape, length in zip(escapes, lengths, strict=True):
+        if length > 0.0:
+            # Largest length of a start of a local search, relative to the best known: the search shortens it.
+            reach = min(float(length), 1.5 * float(np.linalg.norm(best)))
+            free = _first_free(pairs, escape / length, reach)
+            if free is not None:
+                best = min(best, _descent(pairs, free), key=lambda t: float(t @ t))
+    return best
+
+
+def _first_free(pairs: ObjectPair, direction: Array, reach: float) -> Array | None:
+    """March along a ray to the first position without overlap; a pair overlaps at least for its depth."""
+    length = 0.0
+    while length <= reach:
+        found, depths, _ = pairs.overlapping(length * direction, TOUCHING)
+        if not found:
+            return length * direction
+        length += max(float(depths.max()), SHORTEST)
+    return None
+
+
+def _descent(pairs: ObjectPair, translation: Array) -> Array:
+    """Shorten a translation that separates, keeping every pair on its sides of the plane that now separates it."""
+    # Each plane is a sufficient condition: the QP with all is feasible, and its answer separates and is no longer.
+    for _ in range(MOST_DESCENTS):
+        sides = pairs.between(translation)
+        if sides is None:
+            return translation
+        shorter = _least_under(sides)
+        if shorter is None or np.linalg.norm(shorter) > np.linalg.norm(translation) - SHORTEST * 1e-4:
+            return translation
+        if pairs.overlapping(shorter, OVERLAP)[0]:
+            return translation
+        translation = shorter
+    return translation
+
+
+def _least_under(sides: Sides) -> Array | None:
+    """The QP  min |t|^2,  normals t >= offsets: the most violated row is added until none is violated."""
+    answer, normals, offsets = np.zeros(3), np.zeros((0, 3)), np.zeros(0)
+    for _ in range(MOST_ROWS):
+        slack = sides.normals @ answer - sides.offsets
+        worst = int(np.argmin(slack))
+        if slack[worst] >= -1e-10:
+            return answer
+        row = Sides(sides.normals[worst : worst + 1], sides.offsets[worst : worst + 1])
+        answer = _nearest_on_rows(row, normals, offsets)[0]
+        if not np.isfinite(answer[0]):
+            return None
+        normals, offsets = np.vstack([normals, row.normals]), np.append(offsets, row.offsets)
+    return None

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import coal
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, cross
 from wholebody.base.errors import InputError
@@ -110,9 +111,15 @@ def normal_across(axis_a: Array, axis_b: Array) -> Array:
     return np.asarray(normal / np.linalg.norm(normal))
 
 
+def hull_triangles(hull: Any) -> NDArray[np.int64]:
+    """Triangles (m, 3) of a coal.Convex, indices of its points."""
+    found = [(face[0], face[1], face[2]) for face in map(hull.polygons, range(hull.num_polygons))]
+    return np.array(found, dtype=np.int64).reshape(-1, 3)
+
+
 def _convex_faces(geometry: Any, points: Array) -> Array:
     """Outward planes of a coal.Convex, coplanar triangles merged."""
-    triangles = np.array([[t[0], t[1], t[2]] for t in (geometry.polygons(i) for i in range(geometry.num_polygons))])
+    triangles = hull_triangles(geometry)
     a, b, c = points[triangles[:, 0]], points[triangles[:, 1]], points[triangles[:, 2]]
     normals = cross(b - a, c - a)
     length = np.linalg.norm(normals, axis=1)

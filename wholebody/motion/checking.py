@@ -19,7 +19,7 @@ from wholebody.geometry.proximity import PairTable
 from wholebody.motion.clip import Clip, same_joints
 from wholebody.motion.clip_contacts import Contact, ContactTable, contact_as_dict
 from wholebody.motion.stance import Sliding, sliding
-from wholebody.scene.moving_scene import MovingScene
+from wholebody.scene.moving_obstacles import MovingScene
 from wholebody.scene.scene import Scene
 
 DEPTH = 1e-4

@@ -12,7 +12,7 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array, Mask, cross
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.figures.joined import one_figure
+from wholebody.figures.loading import one_figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.inverse_dynamics import ROOT, InverseDynamics, foot_wrenches
 from wholebody.motion.stance import FEET, standing_feet

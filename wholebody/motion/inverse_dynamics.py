@@ -16,7 +16,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.figures.joined import one_figure
+from wholebody.figures.loading import one_figure
 from wholebody.motion.stance import pieces_on
 from wholebody.tasks.balance import DOWN, convex_polygon, edges
 from wholebody.tasks.surfaces import outermost

@@ -10,7 +10,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.figures.joined import one_figure
+from wholebody.figures.loading import one_figure
 
 MIRROR = np.diag([1.0, -1.0, 1.0])
 """Reflection at the plane y = 0."""

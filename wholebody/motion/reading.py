@@ -11,7 +11,7 @@ from wholebody.base.checks import choice, flag
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, InputError, one_line
 from wholebody.figures.figure import Figure
-from wholebody.figures.joined import one_figure
+from wholebody.figures.loading import one_figure
 from wholebody.motion.clip import Clip, check_figure
 from wholebody.motion.files import FBX, SKELETONS, bvh, columns, gltf_reading, read_frames
 from wholebody.motion.files.base import Frames

@@ -11,7 +11,7 @@ from wholebody.base.arrays import Array, cross
 from wholebody.base.checks import function, instance, known, warn
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.figures.joined import one_figure
+from wholebody.figures.loading import one_figure
 from wholebody.geometry.placement import PlacementLike
 from wholebody.geometry.shapes import HalfSpace
 from wholebody.motion.clip import Clip

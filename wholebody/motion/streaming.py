@@ -11,7 +11,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import instance
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.figures.joined import one_figure
+from wholebody.figures.loading import one_figure
 from wholebody.geometry.shapes import HalfSpace
 from wholebody.motion.footholds import LiveRests
 from wholebody.motion.held_points import Holds, held_points

@@ -14,14 +14,13 @@ import pinocchio as pin
 from wholebody.base import checks
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.figures.joined import join, welded
+from wholebody.figures.loading import join, welded
 from wholebody.geometry.placement import placement as to_placement
 from wholebody.geometry.proximity import PairTable
 from wholebody.geometry.shapes import Box, Capsule, Cylinder, Ellipsoid, Hull, Mesh, Shape, Sphere
 from wholebody.scene.geometry_model import Motion, SceneGeometry, SceneObject, assemble
-from wholebody.scene.matter.body import Body, mass_properties
-from wholebody.scene.matter.materials import DEFAULT, Material
-from wholebody.scene.matter.materials import material as to_material
+from wholebody.scene.matter.body import DEFAULT, Body, Material, mass_properties
+from wholebody.scene.matter.body import material as to_material
 
 if TYPE_CHECKING:
     from typing_extensions import Self

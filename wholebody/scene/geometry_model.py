@@ -17,7 +17,7 @@ from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.continuous.moved_pairs import compiled_kernel
 from wholebody.geometry.large_models import geometry_model, pairs_of
 from wholebody.geometry.proximity import PairTable, Proximity
-from wholebody.scene.matter.materials import DEFAULT, Material
+from wholebody.scene.matter.body import DEFAULT, Material
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure

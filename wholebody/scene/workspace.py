@@ -121,8 +121,7 @@ class Workspace(NotCopyable):
 
     def frame(self, moved: Mapping[str, tuple[pin.SE3, pin.SE3]]) -> FrameMotion:
         """A frame in which these things move, from one placement to another in the frame of their joint."""
-        from wholebody.scene.moving_obstacles import BothSides, FrameMotion
-        from wholebody.scene.moving_scene import MovingScene
+        from wholebody.scene.moving_obstacles import BothSides, FrameMotion, MovingScene
 
         both = self._moving.get(tuple(moved))
         if both is None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,7 +14,7 @@ from wholebody.base.arrays import Array, as_dict, brief
 from wholebody.base.checks import instance, posture
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, one_line
-from wholebody.base.files import checked_target, read_text, write
+from wholebody.base.files import checked_target, finite, read_text, write
 from wholebody.figures.state import State
 from wholebody.geometry.placement import FARTHEST
 from wholebody.solution import Solution
@@ -82,7 +81,7 @@ def _values(measures: Sequence[Measure], state: State) -> dict[str, float]:
 
 def as_json(description: dict[str, Any]) -> str:
     """Return JSON; numbers that are not finite (the least distance without pairs) become null."""
-    return json.dumps(_finite(description), indent=2, allow_nan=False) + "\n"
+    return json.dumps(finite(description), indent=2, allow_nan=False) + "\n"
 
 
 class Result(NamedTuple):
@@ -165,11 +164,3 @@ def write_result(task: Task, solution: Solution, path: str | os.PathLike[str]) -
     instance(solution, Solution, "write_result: solution", "give one of wb.solve")
     posture(solution.q, task.problem.scene.model.nq, "write_result: the solution's posture")
     return write(file, as_json(describe(task, solution, file.parent)))
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(entry) for key, entry in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(entry) for entry in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -17,7 +17,7 @@ from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import UnknownNameError
 from wholebody.base.files import is_file, is_folder, title_of
 from wholebody.figures import Figure, join, load
-from wholebody.figures.joined import member
+from wholebody.figures.loading import member
 from wholebody.geometry.placement import placement
 from wholebody.geometry.shapes import Mesh, Shape
 from wholebody.methods.base import Method

@@ -21,7 +21,7 @@ from wholebody.base.checks import known, number, whole
 from wholebody.base.files import parsed_toml
 from wholebody.figures import load
 from wholebody.figures.figure import Figure
-from wholebody.figures.joined import one_figure
+from wholebody.figures.loading import one_figure
 from wholebody.geometry import shapes
 from wholebody.methods.inputs import SEED
 from wholebody.motion.clip import MOST_FRAMES, Clip

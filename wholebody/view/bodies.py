@@ -11,7 +11,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.joining import joint_in
-from wholebody.figures.link_visuals import drawn_of
+from wholebody.figures.link_pieces import drawn_of
 from wholebody.figures.surface import surface_of
 from wholebody.geometry.pieces import box_corners
 from wholebody.view import drawing, style
@@ -133,8 +133,10 @@ class Bodies:
         )
         self._patches: list[tuple[str, Skinned]] = []
         shown = [index for index, body in enumerate(self.all) if body.thing is not None and not self.hidden(index)]
-        self._things, standing = shown, [index for index in shown if self._stands(index)]
         colors = [body.color for body in self.all]
+        # of a crowd are opaque things that the world carries
+        standing = [k for k in shown if self.all[k].joint == 0 and not self.all[k].plate and colors[k][3] == 1.0]
+        self._things = shown
         self._crowds = crowds(LOOK.object_node, standing, list(scene.geometry.geometryObjects), colors)
         self._among = {
             index: (crowd.path, k) for crowd in self._crowds for k, index in enumerate(crowd.members.tolist())
@@ -215,11 +217,6 @@ class Bodies:
         """Whether a piece is not drawn: the surface of its body is, or it is an outer piece, which has no opacity."""
         body = self.all[index]
         return self.scene.piece_owner[index] in self._owned or (body.thing is None and body.color[3] == 0.0)
-
-    def _stands(self, index: int) -> bool:
-        """Whether a thing's piece is opaque and the world carries it."""
-        body = self.all[index]
-        return body.joint == 0 and not body.plate and body.color[3] == 1.0
 
     def paint(self, keyframe: Keyframe, index: int, state: Color) -> None:
         """Give a piece the colour of a state, or the patches of the surface on its segment."""
@@ -324,9 +321,8 @@ class Bodies:
 
 def _own_color(piece: Any) -> Color:
     """The colour that a robot's file gives the link of a piece, and otherwise that of figures."""
-    if not piece.overrideMaterial and piece.meshColor[3] > 0.0:
-        return LOOK.figure
-    red, green, blue, alpha = (float(part) for part in piece.meshColor)
+    own = piece.overrideMaterial or not piece.meshColor[3] > 0.0
+    red, green, blue, alpha = (float(part) for part in (piece.meshColor if own else LOOK.figure))
     return red, green, blue, alpha
 
 

@@ -210,7 +210,6 @@ class Browser:
         return self._ask(method, self._session, **params)
 
     def _ask(self, method: str, session: str | None, **params: Any) -> dict[str, Any]:
-        """The answer of a page, or of the browser."""
         self._number += 1
         message: dict[str, Any] = {"id": self._number, "method": method, "params": params}
         if session is not None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
+from wholebody.geometry.pieces import hull_triangles
 from wholebody.view.commands import floats, integers
 from wholebody.view.style import LOOK, Color
 
@@ -165,8 +166,7 @@ def revolved(profile: Array, normals: Array, around: int = _AROUND) -> tuple[Arr
 def convex_faces(convex: Any) -> NDArray[np.uint32]:
     """Triangles (m, 3) of a coal Convex, wound outwards."""
     points = np.asarray(convex.points())
-    corners = [convex.polygons(i) for i in range(convex.num_polygons)]
-    faces = np.array([[corner[0], corner[1], corner[2]] for corner in corners], dtype=np.uint32)
+    faces = hull_triangles(convex).astype(np.uint32)
     a, b, c = points[faces[:, 0]], points[faces[:, 1]], points[faces[:, 2]]
     inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a - points.mean(axis=0)) < 0
     faces[inward] = faces[inward][:, ::-1]

@@ -65,7 +65,10 @@ class LivePage:
         self.url = f"http://127.0.0.1:{self.server.get_port()}"
         self.server.scene.set_up_direction("+z")
         self.server.scene.configure_default_lights(cast_shadow=False)  # shadows cost most of a frame without a GPU
-        self._look()
+        middle = np.mean([drag.place(name) for name in drag.handles], axis=0)
+        # m: of the camera, from the middle of the handles, which it looks at from the front right
+        self.server.initial_camera.position = middle + np.array((2.2, -1.6, 0.6))
+        self.server.initial_camera.look_at = middle
         self._pieces = self._draw()
         self._handles = {name: self._handle(name) for name in (*drag.handles, *drag.things)}
         self._panel()
@@ -96,13 +99,6 @@ class LivePage:
             pass
         finally:
             self.stop()
-
-    def _look(self) -> None:
-        """Look at the middle of the handles from the front right."""
-        middle = np.mean([self.drag.place(name) for name in self.drag.handles], axis=0)
-        # m: of the camera, from the middle of the handles
-        self.server.initial_camera.position = middle + np.array((2.2, -1.6, 0.6))
-        self.server.initial_camera.look_at = middle
 
     def _draw(self) -> list[Any]:
         scene = self.drag.scene

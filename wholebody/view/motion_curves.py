@@ -1,7 +1,8 @@
-"""Curves of a retargeted or freed motion over time, and a film beside its recording: one HTML page."""
+"""A motion over time as one HTML page: curves beside its recording, and the timeline of a checked clip."""
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -10,9 +11,12 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from wholebody.base.arrays import Array
+from wholebody.base.checks import instance
+from wholebody.base.errors import InputError
 from wholebody.base.files import Scratch, templates
-from wholebody.motion.checking import check
+from wholebody.motion.checking import ClipCheck, check
 from wholebody.motion.clip import Clip
+from wholebody.motion.clip_contacts import Contact
 from wholebody.motion.footholds import speeds
 from wholebody.motion.retargeting import bone_errors
 from wholebody.motion.roles import skeleton_roles
@@ -21,6 +25,7 @@ from wholebody.motion.stance import paths, standing_points
 from wholebody.motion.standing_ground import ground
 from wholebody.scene.scene import Scene
 from wholebody.view.side_by_side import beside
+from wholebody.view.viewer import Viewer
 
 Names: TypeAlias = str | os.PathLike[str] | Mapping[str, Mapping[str, str]]
 """Which joint and frame are which part of a body, as `wb.retarget` takes it."""
@@ -116,3 +121,50 @@ def _bones(motion: SkeletonMotion | None, clips: Mapping[str, Clip], names: Name
         errors = np.degrees(np.array(list(bone_errors(motion, clip, names).values())))
         lines += [("median", name, np.median(errors, axis=0)), ("greatest", name, errors.max(axis=0))]
     return [_chart("angle of bones to the recording's", "degrees", lines)]
+
+
+MOST_POSTURES = 1200
+"""Postures of the animation: of a longer clip each k-th frame is shown. More make the page larger, 3 kB each."""
+
+
+def timeline(found: ClipCheck, scene: Scene | None = None) -> str:
+    """HTML of a checked clip, which makes no network requests.
+
+    Args:
+        found: what `wholebody.check` found.
+        scene: the scene that the clip was checked in; the figure alone by default.
+
+    Raises:
+        InputError: no check, or a scene of another figure.
+    """
+    instance(found, ClipCheck, "timeline: found", "give the answer of wb.check(clip)")
+    clip = found.clip
+    scene = Scene(clip.figure) if scene is None else instance(scene, Scene, "timeline: scene", "give a scene")
+    if scene.model.nq != clip.q.shape[1]:
+        raise InputError("timeline: the scene is of another figure than the clip; give the one that was checked")
+    every = math.ceil(len(clip) / MOST_POSTURES)
+    with Viewer(scene, title=clip.name) as viewer, Scratch() as folder:
+        viewer.play(clip.q[::every], clip.dt * every)
+        page = viewer.save(folder / "clip.html").read_text("utf-8")
+    page_of = templates(Path(__file__).parent).get_template("timeline.html.jinja")
+    return page_of.render(check=found, clip=clip, contacts=found.contacts, data=_data(found), page=page)
+
+
+def _data(found: ClipCheck) -> dict[str, Any]:
+    """What the page draws: depths in millimetres, those that are not zero, frames and gaps in the order of time."""
+    return {
+        "frames": len(found.clip),
+        "dt": found.clip.dt,
+        "tolerance": 1e3 * found.tolerance,
+        "rows": [
+            {"name": contact.names, "kind": contact.kind, **_cells(contact)} for contact in found.contacts
+        ],
+    }  # fmt: skip
+
+
+def _cells(contact: Contact) -> dict[str, Any]:
+    times = np.zeros(2 * len(contact.depth) - 1)
+    times[::2], times[1::2] = contact.depth, contact.between
+    at = np.flatnonzero(times)
+    # digits of depths in the page, after the point of millimetres
+    return {"at": at.tolist(), "depth": np.round(1e3 * times[at], 4).tolist()}

@@ -100,7 +100,6 @@ def _data(name: str, content: bytes | None = None) -> str:
 
 @cache
 def _file(name: str) -> str:
-    """The text of a file of this folder."""
     return Path(__file__).with_name(name).read_text(encoding="utf-8")
 
 

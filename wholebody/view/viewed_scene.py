@@ -15,7 +15,7 @@ from wholebody.base.checks import a
 from wholebody.base.errors import InputError
 from wholebody.geometry.proximity import Contacts
 from wholebody.scene.geometry_model import SceneGeometry
-from wholebody.scene.moving_scene import MovingScene
+from wholebody.scene.moving_obstacles import MovingScene
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace
 from wholebody.view.style import LOOK, Color
@@ -58,7 +58,8 @@ def _color(assembly: Assembly, owner: str) -> Color | None:
         return assembly.scene.objects[owner].color
     figure = owner.split("/")[0]
     if owner not in assembly.bodies and figure in assembly.figures:
-        return assembly.colors.get(figure, LOOK.figure)
+        usual: Color = LOOK.figure
+        return assembly.colors.get(figure, usual)
     return assembly.colors.get(owner)
 
 

@@ -24,10 +24,9 @@ from wholebody.view import commands
 from wholebody.view.bodies import scene_glb
 from wholebody.view.composition import Composition, panel
 from wholebody.view.contact_markers import checked_overlaps
-from wholebody.view.movie import check_movie, counted, frame_times, movie
 from wholebody.view.page import live_page, notebook_frame, static_page
 from wholebody.view.scene_graph import SceneGraph
-from wholebody.view.screenshot import Screenshots
+from wholebody.view.screenshot import Screenshots, check_movie, counted, frame_times, movie
 from wholebody.view.sender import Sender, seconds
 from wholebody.view.server import Command, Op
 from wholebody.view.style import LOOK, Color
@@ -236,7 +235,6 @@ class Viewer:
         self._show_again()
 
     def _show_again(self) -> None:
-        """Show the posture that is shown as it was asked for."""
         if self._shown is not None:
             q, problem, overlaps = self._shown
             self.show(q, problem=problem, pieces=self._composition.pieces, overlaps=overlaps)

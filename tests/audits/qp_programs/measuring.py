@@ -5,17 +5,16 @@ from __future__ import annotations
 import gc
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from itertools import groupby
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from tests.audits.qp_programs.recording import Recorded
 from tests.audits.templates import TEMPLATES
-from wholebody.bench.report import render
 from wholebody.bench.statistics import Interval, quantile, share
-from wholebody.bench.tables import filled, of
+from wholebody.bench.tables import render
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import ACTIVE_SET, QPSolver
 from wholebody.methods.qp.solvers.osqp_solver import ActiveSetSolver
@@ -67,6 +66,11 @@ class QPRow:
     primal: float
     dual: float
     gap: float
+
+
+def of(compute: Callable[[Sequence[QPRow]], Any]) -> dict[str, Any]:
+    """What computes a field of `QPSummary` from its rows, as metadata."""
+    return {"of": compute}
 
 
 @dataclass(frozen=True)
@@ -186,7 +190,12 @@ def residuals(program: QuadraticProgram, answer: QPSolution) -> Residuals:
 
 def summaries(rows: Sequence[QPRow], solvers: Sequence[str]) -> list[QPSummary]:
     """One row a solver."""
-    return [filled(QPSummary, [row for row in rows if row.solver == name], solver=name) for name in solvers]
+    found = []
+    for name in solvers:
+        mine = [row for row in rows if row.solver == name]
+        figures = {each.name: each.metadata["of"](mine) for each in fields(QPSummary) if each.metadata}
+        found.append(QPSummary(name, **figures))
+    return found
 
 
 def qp_report(rows: Sequence[QPRow], totals: Sequence[QPSummary], facts: Mapping[str, str]) -> str:

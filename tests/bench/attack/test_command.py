@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
-from wholebody.bench.attack.case import Case, Verdict
+from wholebody.bench.attack.judging import Case, Verdict
 from wholebody.bench.rows import read_rows
 from wholebody.cli.bench import run as group
 

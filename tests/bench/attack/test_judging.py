@@ -11,8 +11,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench.attack.case import Verdict
-from wholebody.bench.attack.judging import Pairs, judge
+from wholebody.bench.attack.judging import Pairs, Verdict, judge
 from wholebody.bench.attack.solves import verdict
 from wholebody.bench.suite.stability.bodies import Builder, planar_arm, sliding_tool
 

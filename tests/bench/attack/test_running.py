@@ -18,8 +18,8 @@ import wholebody as wb
 from wholebody.base.errors import UnknownNameError
 from wholebody.base.runner import Child
 from wholebody.bench.attack import running
-from wholebody.bench.attack.case import KINDS, PATTERN, Case, Verdict, kind_of
 from wholebody.bench.attack.inputs import mutated
+from wholebody.bench.attack.judging import KINDS, PATTERN, Case, Verdict, kind_of
 from wholebody.bench.attack.running import attack, keep, report, row
 
 FACTS = {"wholebody": "0"}

@@ -10,7 +10,7 @@ import pytest
 import wholebody as wb
 from tests.motion.test_retargeting import person
 from wholebody.base.errors import InputError
-from wholebody.bench.measure.retargeting import compare, judged, totals
+from wholebody.bench.measure.files import compare, judged, totals
 from wholebody.bench.rows import Row
 from wholebody.motion.roles import matched
 

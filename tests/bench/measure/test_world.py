@@ -7,8 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wholebody.bench.measure.drops import DENSITY, ENGINES, GRAVITY, Judge, ball, installed, measure, pile, stack
-from wholebody.bench.measure.throws import throws
+from wholebody.bench.measure.world import (
+    DENSITY,
+    ENGINES,
+    GRAVITY,
+    Judge,
+    ball,
+    installed,
+    measure,
+    pile,
+    stack,
+    throws,
+)
 from wholebody.cli.main import main
 
 

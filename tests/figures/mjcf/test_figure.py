@@ -11,7 +11,7 @@ import pytest
 import wholebody as wb
 from tests.figures.mjcf.random_files import mjcf
 from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
-from wholebody.figures.link_visuals import drawn_of
+from wholebody.figures.link_pieces import drawn_of
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo, which reads MJCF files, is not installed")
 

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 import wholebody as wb
 from wholebody.base.errors import FileFormatError
-from wholebody.geometry.gltf_builder import GltfBuilder
+from wholebody.geometry.gltf import GltfBuilder
 from wholebody.motion import read_skeleton
 
 SIDES = (("Left", 1.0), ("Right", -1.0))

@@ -10,8 +10,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.base.errors import InputError, UnknownNameError
-from wholebody.scene.matter.body import mass_properties
-from wholebody.scene.matter.materials import MATERIALS, surface
+from wholebody.scene.matter.body import MATERIALS, mass_properties, surface
 
 TABLE = {
     ("wood", "wood"): (0.3, 0.3),

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.bench.attack.case import CORPUS, Verdict, chosen
+from wholebody.bench.attack.judging import CORPUS, Verdict, chosen
 from wholebody.figures.packaged_urdf import task_paths, urdf_path
 from wholebody.taskfile import read_result, read_task
 
@@ -269,14 +269,11 @@ def called(name: str, given: dict[str, str], folder: Path) -> Verdict:
 
 
 def _use(made: Any, problem: wb.Problem) -> None:
-    """Use what a call has made, by itself."""
     scene, qp = problem.scene, wb.QP(budget=5)
-    if isinstance(made, wb.Goal):
-        wb.solve(wb.Problem(scene, goals=[made]), method=qp)
-    elif isinstance(made, wb.Constraint):
-        wb.solve(wb.Problem(scene, constraints=[made]), method=qp)
-    elif isinstance(made, wb.Measure):
-        wb.solve(wb.Problem(scene, measures=[made]), method=qp)
+    roles: dict[str, type] = {"goals": wb.Goal, "constraints": wb.Constraint, "measures": wb.Measure}
+    role: Any = {name: [made] for name, kind in roles.items() if isinstance(made, kind)}
+    if role:
+        wb.solve(wb.Problem(scene, **role), method=qp)
     elif isinstance(made, wb.Shape):
         scene.add(made, name="made", at=(3, 0, 0)).contacts(scene.figure.neutral)
     elif isinstance(made, wb.Problem):

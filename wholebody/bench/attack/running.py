@@ -19,20 +19,19 @@ import numpy as np
 from wholebody.base.errors import UnknownNameError, WholebodyError
 from wholebody.base.files import Scratch
 from wholebody.base.runner import ONE_THREAD, Child, Job, allow_processor, run_jobs
-from wholebody.bench.attack import frames, inputs, solves, terms, ways
-from wholebody.bench.attack.case import KINDS, Case, Verdict
-from wholebody.bench.report import render
+from wholebody.bench.attack import frames, inputs, solves, terms
+from wholebody.bench.attack.judging import KINDS, Case, Verdict
 from wholebody.bench.rows import Row, texts, times
 from wholebody.bench.rows import report as tables_of
 from wholebody.bench.statistics import wilson
-from wholebody.bench.tables import write_text
+from wholebody.bench.tables import render, write_text
 
 CASES = {
     "argument": inputs.argument,
     "file": inputs.file,
     "solve": solves.case,
-    "stream": ways.stream,
-    "sweep": ways.sweep,
+    "stream": frames.stream,
+    "sweep": frames.sweep,
     "contact": terms.contact,
     "own-term": terms.own_term,
     "pairs": frames.pairs,

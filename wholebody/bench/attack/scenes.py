@@ -10,9 +10,9 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.bench.attack.case import chosen
-from wholebody.bench.attack.judging import Pairs
-from wholebody.bench.suite.problem_sets.things import Occupied
+from wholebody.bench.attack.judging import CORPUS, Pairs, chosen
+from wholebody.bench.suite.problem_sets.things import Occupied, turned
+from wholebody.bench.tables import render
 from wholebody.figures.packaged_urdf import task_paths, urdf_path
 from wholebody.figures.urdf.writing import exact
 
@@ -87,22 +87,18 @@ def _robot(rng: np.random.Generator, path: Path) -> Body:
 def _urdf(rng: np.random.Generator, scale: float) -> str:
     """Return a robot whose links are about 0.3 times the scale long, metres."""
     count = 1 if rng.random() < 0.3 else int(rng.integers(2, 9))
-    parts = [_link("link0", rng, scale, 0.0)]
-    lengths = [0.0]
+    links, joints, lengths = [_link("link0", rng, scale, 0.0)], list[dict[str, str]](), [0.0]
     for number in range(1, count + 1):
         parent = int(rng.integers(0, number)) if rng.random() < 0.2 else number - 1
-        length = float(scale * rng.uniform(0.1, 0.5))
-        parts.append(_joint(number, parent, lengths[parent], rng, scale))
-        parts.append(_link(f"link{number}", rng, scale, length))
-        lengths.append(length)
-    parts.append(
-        f'  <link name="tip"/>\n  <joint name="fixed_tip" type="fixed"><parent link="link{count}"/><child link="tip"/>'
-        f'<origin xyz="0 0 {lengths[-1]!r}"/></joint>'
-    )
-    return "\n".join(['<?xml version="1.0"?>', '<robot name="attacked">', *parts, "</robot>\n"])
+        lengths.append(float(scale * rng.uniform(0.1, 0.5)))
+        joints.append(_joint(number, parent, lengths[parent], rng, scale))
+        links.append(_link(f"link{number}", rng, scale, lengths[number]))
+    links.append({"name": "tip"})
+    tip = {"name": "fixed_tip", "kind": "fixed", "parent": f"link{count}", "child": "tip", "at": f"0 0 {lengths[-1]!r}"}
+    return render("robot.urdf", name="attacked", links=links, joints=[*joints, tip])
 
 
-def _joint(number: int, parent: int, length: float, rng: np.random.Generator, scale: float) -> str:
+def _joint(number: int, parent: int, length: float, rng: np.random.Generator, scale: float) -> dict[str, str]:
     kind = chosen(rng, ("revolute", "revolute", "revolute", "prismatic", "continuous"))
     axis = np.eye(3)[int(rng.integers(3))] if rng.random() < 0.7 else rng.normal(size=3)
     axis = axis / np.linalg.norm(axis)
@@ -112,35 +108,26 @@ def _joint(number: int, parent: int, length: float, rng: np.random.Generator, sc
     if rng.random() < 0.1:
         low = high * 0.5  # zero is out of the limits
     ends = "" if kind == "continuous" else f'lower="{low!r}" upper="{high!r}" '
-    return (
-        f'  <joint name="joint{number}" type="{kind}"><parent link="link{parent}"/><child link="link{number}"/>'
-        f'<origin xyz="0 0 {length!r}" rpy="{exact(turn)}"/><axis xyz="{exact(axis)}"/>'
-        f'<limit {ends}effort="10" velocity="3"/></joint>'
-    )
+    joint = {"name": f"joint{number}", "kind": kind, "parent": f"link{parent}", "child": f"link{number}"}
+    joint |= {"at": f"0 0 {length!r}", "rpy": exact(turn), "axis": exact(axis)}
+    return joint | {"limit": f'{ends}effort="10" velocity="3"'}
 
 
-def _link(name: str, rng: np.random.Generator, scale: float, length: float) -> str:
+def _link(name: str, rng: np.random.Generator, scale: float, length: float) -> dict[str, str]:
     mass = float(min(scale**3 * 100.0 + 1e-6, 1e5))
-    inertia = float(mass * scale**2 / 100.0 + 1e-12)
-    inertial = (
-        f'<inertial><origin xyz="0 0 {length / 2!r}"/><mass value="{mass!r}"/>'
-        f'<inertia ixx="{inertia!r}" iyy="{inertia!r}" izz="{inertia!r}" ixy="0" ixz="0" iyz="0"/></inertial>'
-    )
+    link = {"name": name, "middle": f"0 0 {length / 2!r}", "mass": repr(mass)}
+    link["spin"] = repr(float(mass * scale**2 / 100.0 + 1e-12))
     if rng.random() < 0.1:
-        return f'  <link name="{name}">{inertial}</link>'
+        return link
     width = float(scale * rng.uniform(0.02, 0.06))
     long = max(length, 2.0 * width)
-    shapes = {
-        "box": f'<box size="{width!r} {1.5 * width!r} {0.9 * long!r}"/>',
-        "sphere": f'<sphere radius="{width!r}"/>',
-        "cylinder": f'<cylinder radius="{width!r}" length="{0.9 * long!r}"/>',
-        "capsule": f'<capsule radius="{0.7 * width!r}" length="{0.7 * long!r}"/>',
-    }
-    shape = chosen(rng, list(shapes.values()))
-    return (
-        f'  <link name="{name}">{inertial}<collision><origin xyz="0 0 {length / 2!r}"/>'
-        f"<geometry>{shape}</geometry></collision></link>"
+    shapes = (
+        f'<box size="{width!r} {1.5 * width!r} {0.9 * long!r}"/>',
+        f'<sphere radius="{width!r}"/>',
+        f'<cylinder radius="{width!r}" length="{0.9 * long!r}"/>',
+        f'<capsule radius="{0.7 * width!r}" length="{0.7 * long!r}"/>',
     )
+    return link | {"shape": chosen(rng, shapes)}
 
 
 @dataclass(frozen=True)
@@ -181,26 +168,14 @@ def shape(rng: np.random.Generator, size: float) -> wb.Shape:
         return wb.HalfSpace((float(normal[0]), float(normal[1]), float(normal[2])))
     if kind == "hull":
         return wb.Hull(rng.normal(size=(int(rng.integers(8, 40)), 3)) * [length(0.2, 0.5) for _ in range(3)])
-    return _corner(length(0.4, 1.0))
-
-
-def _corner(size: float) -> wb.Shape:
-    """A mesh that is not convex: an angle of two walls."""
-    outline = [(0.0, 0.0), (1.0, 0.0), (1.0, 0.2), (0.2, 0.2), (0.2, 1.0), (0.0, 1.0)]
-    vertices = [(size * x, size * y, size * z) for z in (0.0, 0.5) for x, y in outline]
-    caps = [(0, 2, 1), (0, 3, 2), (0, 4, 3), (0, 5, 4)]
-    faces = caps + [(6 + a, 6 + c, 6 + b) for a, b, c in caps]
-    for k in range(6):
-        following = (k + 1) % 6
-        faces += [(k, following, 6 + following), (k, 6 + following, 6 + k)]
-    return wb.Mesh((np.array(vertices), np.array(faces)))
+    return wb.Mesh(CORPUS / "corner.obj", scale=length(0.4, 1.0))  # an angle of two walls: it is not convex
 
 
 def somewhere(rng: np.random.Generator, placed: Occupied, size: float) -> pin.SE3:
     """A place about a figure."""
     middle, spread = _extent(placed)
     reach = 1.3 * spread + 0.5 * size
-    return pin.SE3(pin.Quaternion(_turn(rng)).matrix(), middle + rng.uniform(-reach, reach, 3))
+    return pin.SE3(pin.Quaternion(turned(rng)).matrix(), middle + rng.uniform(-reach, reach, 3))
 
 
 def _extent(placed: Occupied) -> tuple[Array, float]:
@@ -227,7 +202,7 @@ def inside(rng: np.random.Generator, placed: Occupied, size: float, depth: float
     start = placed.places[int(rng.integers(placed.count))]
     direction = rng.normal(size=3)
     direction /= np.linalg.norm(direction)
-    turn = pin.Quaternion(_turn(rng)).matrix()
+    turn = pin.Quaternion(turned(rng)).matrix()
     near, far = 0.0, 4.0 * (_extent(placed)[1] + size)
 
     def at(way: float) -> pin.SE3:
@@ -250,8 +225,3 @@ def inside(rng: np.random.Generator, placed: Occupied, size: float, depth: float
 def xyzquat(at: pin.SE3) -> tuple[float, ...]:
     """Return a placement as seven numbers."""
     return tuple(float(x) for x in pin.SE3ToXYZQUAT(at))
-
-
-def _turn(rng: np.random.Generator) -> Array:
-    turn = rng.normal(size=4)
-    return np.asarray(turn / np.linalg.norm(turn))

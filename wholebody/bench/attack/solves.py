@@ -14,8 +14,7 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.bench.attack.case import Verdict, chosen
-from wholebody.bench.attack.judging import Judged, Pairs, judge
+from wholebody.bench.attack.judging import Judged, Pairs, Verdict, chosen, judge
 from wholebody.bench.attack.scenes import Body, Thing, body, clear, inside, xyzquat
 from wholebody.bench.suite.problem_sets.things import Occupied
 from wholebody.methods import installed_methods
@@ -39,7 +38,8 @@ def case(rng: np.random.Generator, folder: Path) -> Verdict:
     """Solve a problem."""
     figure = body(rng, folder)
     clearance = float(chosen(rng, (0.0, 0.0, 0.001, 0.005, 0.005, 0.05, 0.3))) * min(1.0, figure.size)
-    start = _start_posture(figure, rng)
+    start = figure.figure.clamp(figure.figure.posture(chosen(rng, figure.figure.postures)))
+    start = start if rng.random() < 0.5 else figure.near(start, float(rng.choice([0.05, 0.3, 1.0])), rng)
     witness = figure.clear(start, float(rng.choice([0.1, 0.4, 1.0])), rng, clearance + 1e-4 * figure.size)
     things = _around(figure, start, witness, clearance, rng)
     terms = _random_terms(figure, start, witness, rng)
@@ -74,13 +74,6 @@ def scene_of(figure: Body, things: Sequence[Thing]) -> wb.Scene:
     for number, thing in enumerate(things):
         scene.add(thing.shape, name=f"thing {number}", at=thing.at)
     return scene
-
-
-def _start_posture(figure: Body, rng: np.random.Generator) -> Array:
-    """A posture (nq,) to start from: a named one, or one at random."""
-    names = figure.figure.postures
-    q = figure.figure.clamp(figure.figure.posture(names[int(rng.integers(len(names)))]))
-    return q if rng.random() < 0.5 else figure.near(q, float(rng.choice([0.05, 0.3, 1.0])), rng)
 
 
 def _around(

@@ -16,7 +16,8 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.bench.attack.case import Verdict, chosen
+from wholebody.bench.attack.judging import Verdict, chosen
+from wholebody.bench.suite.problem_sets.things import turned
 from wholebody.figures.state import State, Wrench
 from wholebody.problem import Problem
 from wholebody.solution import Solution
@@ -42,9 +43,8 @@ def contact(rng: np.random.Generator, folder: Path) -> Verdict:
 
 def _in_reach(rng: np.random.Generator) -> Array:
     """A placement before a standing person, turned at random."""
-    turn = rng.normal(size=4)
-    low, high = (0.25, -0.6, 0.6), (0.8, 0.3, 1.5)
-    return np.concatenate([rng.uniform(low, high), turn / np.linalg.norm(turn)])
+    turn = turned(rng)
+    return np.concatenate([rng.uniform((0.25, -0.6, 0.6), (0.8, 0.3, 1.5)), turn])
 
 
 def _rod(rng: np.random.Generator) -> tuple[wb.Shape, Any]:
@@ -52,7 +52,6 @@ def _rod(rng: np.random.Generator) -> tuple[wb.Shape, Any]:
 
 
 def _hit(rng: np.random.Generator) -> tuple[wb.Shape, Any]:
-    """A box, a table or a rod."""
     which = int(rng.integers(3))
     if which == 0:
         x, y, z = rng.uniform(0.05, 0.5, 3)

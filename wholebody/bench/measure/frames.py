@@ -23,7 +23,6 @@ def _run(case: str, tool: str, figures: Mapping[str, Figure], columns: Mapping[s
 
 
 def _spent(milliseconds: Array, name: str = "") -> dict[str, Figure]:
-    """Mean, p95, p99 and longest of frames."""
     front = f"{name} " if name else ""
     return {
         f"{front}mean ms": float(milliseconds.mean()),
@@ -121,13 +120,10 @@ def is_held(run: Row) -> bool:
     return bool(run["deepest mm"] <= 1.0 and not run["frames that pass"] and beyond < 1e-6)
 
 
-def _paper() -> list[Row]:
-    return [Row(scene, "paper", figures) for scene, figures in texts()["paper"].items()]
-
-
-def loop_report(rows: Sequence[Row], facts: Mapping[str, str]) -> str:
-    """The table beside the paper's."""
-    return report(texts()["interact"], {"": [*rows, *_paper()]}, facts)
+def paper_report(about: str, rows: Sequence[Row], facts: Mapping[str, str]) -> str:
+    """The table beside the paper's; `about` names a text of `texts.toml`."""
+    paper = [Row(scene, "paper", figures) for scene, figures in texts()["paper"].items()]
+    return report(texts()[about], {"": [*rows, *paper]}, facts)
 
 
 def world_rows(
@@ -172,11 +168,6 @@ def world_rows(
         "last": columns["energy J"][-1],
     }
     return _run(scene, overlap, figures, columns)
-
-
-def world_report(rows: Sequence[Row], facts: Mapping[str, str]) -> str:
-    """The table beside the paper's."""
-    return report(texts()["world_frames"], {"": [*rows, *_paper()]}, facts)
 
 
 def frame_panels(rows: Sequence[Row], *groups: Sequence[str]) -> list[Panel]:

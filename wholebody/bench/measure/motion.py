@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
-from wholebody.base.files import parsed_toml
+from wholebody.base.files import packaged_toml
 from wholebody.bench.rows import Figure as Value
 from wholebody.bench.rows import Panel, Row, report, shares, texts
 from wholebody.figures.figure import Figure
@@ -24,30 +24,18 @@ from wholebody.motion.worn_equipment import NOTHING, READY
 RATE = 30.0  # Hz: of all clips
 
 
-def _read() -> dict[str, list[tuple[float, str, dict[str, float]]]]:
-    """Seconds from the key before, a posture, and joints that are otherwise, of each clip."""
-    file = Path(__file__).with_name("clips.toml")
-    return {
-        name: [
-            (
-                seconds,
-                posture,
-                {joint.replace("both", side): value for joint, value in joints.items() for side in ("left", "right")},
-            )
-            for seconds, posture, joints in keys
-        ]
-        for name, keys in parsed_toml(file.read_text("utf-8"), file.name).items()
-    }
+SYNTHETIC = packaged_toml(Path(__file__).with_name("clips.toml"))
+"""Clips that need no recordings: seconds from the key before, a posture, and joints that are otherwise, of each key.
 
-
-SYNTHETIC = _read()
-"""Clips that need no recordings: the way between two postures has no velocity and no acceleration at its ends."""
+The way between two postures has no velocity and no acceleration at its ends.
+"""
 
 
 def synthetic(name: str, figure: Figure) -> Clip:
     """A clip that needs no recording: one of `SYNTHETIC`, of a person."""
     postures, q = [(0.0, figure.posture(SYNTHETIC[name][0][1]))], list[Array]()
-    for seconds, posture, angles in SYNTHETIC[name][1:]:
+    for seconds, posture, joints in SYNTHETIC[name][1:]:
+        angles = {joint.replace("both", side): value for joint, value in joints.items() for side in ("left", "right")}
         postures.append((seconds, figure.clamp(figure.with_joints(figure.posture(posture), angles))))
     for (_, before), (seconds, after) in pairwise(postures):
         for k in range(round(seconds * RATE)):

@@ -12,7 +12,7 @@ from wholebody.cli.bench.command import folders, listed, quick, seed
 from wholebody.cli.command import command, count, flag, option
 
 if TYPE_CHECKING:
-    from wholebody.bench.suite.compare.settings import Settings
+    from wholebody.bench.suite.compare.run import Settings
 
 
 @command(
@@ -53,8 +53,8 @@ def compare(arguments: argparse.Namespace) -> int:
     from wholebody.base.batches import threads
     from wholebody.bench.suite.adapters.registry import missing
     from wholebody.bench.suite.compare import run as comparison
-    from wholebody.bench.suite.compare.advice import advice
     from wholebody.bench.suite.compare.report import PAGE, publish, to_docs
+    from wholebody.bench.suite.compare.summary import advice
     from wholebody.cli.tables import bar
 
     jobs = arguments.jobs or (threads(arguments.cluster) if arguments.cluster else 1)
@@ -83,7 +83,7 @@ def _facts(beside: str) -> dict[str, str]:
 
 def _settings(arguments: argparse.Namespace) -> Settings:
     from wholebody.bench.suite.adapters.registry import adapters
-    from wholebody.bench.suite.compare.settings import QUICK, Settings
+    from wholebody.bench.suite.compare.run import QUICK, Settings
     from wholebody.bench.suite.problem_sets.registry import CASES, SETS, beside, problem_set
 
     if arguments.held_out:
@@ -112,7 +112,6 @@ OF_SETS = ("quick", "sets", "cases", "minutes", "jobs", "cluster", "update_docs"
 
 
 def _compare_on_task(arguments: argparse.Namespace) -> int:
-    """Compare methods on one's own task."""
     from rich.console import Console
 
     from wholebody.bench.rows import chart
@@ -137,7 +136,6 @@ def _compare_on_task(arguments: argparse.Namespace) -> int:
 
 
 def _again(arguments: argparse.Namespace) -> int:
-    """Run a published comparison again, and compare the two."""
     _alone(arguments, "again", OF_A_LOCK)
     from wholebody.bench.suite.adapters.registry import missing
     from wholebody.bench.suite.compare import run as comparison

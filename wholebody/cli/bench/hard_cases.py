@@ -16,7 +16,7 @@ from wholebody.cli.command import command, count, option
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from wholebody.bench.attack.case import Case
+    from wholebody.bench.attack.judging import Case
     from wholebody.bench.suite.adapters.base import Adapter
     from wholebody.bench.suite.stability.asking import Cell
     from wholebody.bench.suite.stability.catalogue import HardCase
@@ -116,7 +116,7 @@ def attack(arguments: argparse.Namespace) -> int:
 
 
 def _check(arguments: argparse.Namespace) -> None:
-    from wholebody.bench.attack.case import KINDS
+    from wholebody.bench.attack.judging import KINDS
 
     if not 0.0 < arguments.seconds < 1e9:
         raise InputError(f"--seconds is {arguments.seconds:g}; give a positive number of seconds")
@@ -128,7 +128,7 @@ def _check(arguments: argparse.Namespace) -> None:
 
 
 def _cases(arguments: argparse.Namespace) -> Iterator[Case]:
-    from wholebody.bench.attack.case import Case, kind_of
+    from wholebody.bench.attack.judging import Case, kind_of
 
     kept = (k for k in numbers(arguments.first) if arguments.kinds is None or kind_of(k) in arguments.kinds)
     for done, number in enumerate(kept):

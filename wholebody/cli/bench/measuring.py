@@ -11,7 +11,7 @@ from pathlib import Path
 from wholebody.base import checks
 from wholebody.base.errors import InputError
 from wholebody.base.files import make_folder
-from wholebody.bench.rows import Panel, Row, across, chart, only, report, texts
+from wholebody.bench.rows import Panel, Row, across, chart, only, report, texts, told
 from wholebody.bench.tables import machine, write_rows
 from wholebody.cli.bench.command import Chart, listed, measuring, publish
 from wholebody.cli.command import count, flag, option
@@ -132,9 +132,9 @@ def motion(arguments: argparse.Namespace) -> None:
     from wholebody.motion.avoidance import METHODS
     from wholebody.motion.batch import BatchProgress, avoid_many
 
-    def tell(told: BatchProgress) -> None:
-        if told.case is not None:
-            print(f"{told.case.clip}, {told.case.equipment}, {told.case.method}: {told.case.outcome}", flush=True)
+    def tell(now: BatchProgress) -> None:
+        if now.case is not None:
+            print(f"{now.case.clip}, {now.case.equipment}, {now.case.method}: {now.case.outcome}", flush=True)
 
     few, figure = 2 if arguments.quick else None, load("human")
     recordings = clips(arguments, few)
@@ -163,7 +163,7 @@ WORLD = {"throws": "Thrown at a person", "drops": "The same drops in three engin
 )
 def world(arguments: argparse.Namespace) -> int:
     """Measure; --quick takes three drops for half a second, and one throw of each kind."""
-    from wholebody.bench.measure.throws import throw_summary
+    from wholebody.bench.measure.world import throw_summary
 
     found: dict[str, list[Row]] = {part: [] for part in chosen(arguments.parts, WORLD, "--parts")}
     given = _world(arguments)
@@ -172,7 +172,7 @@ def world(arguments: argparse.Namespace) -> int:
     for part, rows in found.items():
         for row in given[part]:
             rows.append(row)
-            print(f"{row.case}, {row.tool}: {', '.join(f'{name} {value}' for name, value in row.figures.items())}")
+            print(told(row))
             write_rows(arguments.out / f"world-{part}.csv", facts, rows)
     shown = dict(found)
     if "throws" in found:
@@ -185,16 +185,16 @@ def world(arguments: argparse.Namespace) -> int:
 
 def _world(arguments: argparse.Namespace) -> dict[str, Iterable[Row]]:
     """What measures each part; names are checked before anything is measured."""
-    from wholebody.bench.measure import drops, throws
+    from wholebody.bench.measure.world import ENGINES, all_throws, drops, installed, measure
 
     quick = arguments.quick
-    known = {drop.name: drop for drop in drops.drops()}
+    known = {drop.name: drop for drop in drops()}
     names = chosen(arguments.only, known, "--only")[: 3 if quick else None]
-    tools = drops.installed(chosen(arguments.engines, drops.ENGINES, "--engines"))
+    tools = installed(chosen(arguments.engines, ENGINES, "--engines"))
     frames = 30 if quick else None
     return {
-        "throws": throws.all_throws(1 if quick else 3, quick),
-        "drops": (drops.measure(known[name], tool, frames) for name, tool in product(names, tools)),
+        "throws": all_throws(1 if quick else 3, quick),
+        "drops": (measure(known[name], tool, frames) for name, tool in product(names, tools)),
     }
 
 
@@ -232,7 +232,7 @@ def files(arguments: argparse.Namespace) -> int:
 
 def _compared(arguments: argparse.Namespace) -> int:
     """Follow recordings by both tools; figures of files may go about freely."""
-    from wholebody.bench.measure.retargeting import compare, totals
+    from wholebody.bench.measure.files import compare, totals
     from wholebody.figures import load
 
     names = arguments.figure or ["human"]
@@ -240,9 +240,7 @@ def _compared(arguments: argparse.Namespace) -> int:
     rows = []
     for row in compare(arguments.folder, figures, 20 if arguments.quick else arguments.frames):
         rows.append(row)
-        print(
-            f"{row.case}, {row.tool}: {', '.join(f'{name} {value}' for name, value in row.figures.items())}", flush=True
-        )
+        print(told(row), flush=True)
     facts = machine() | {"frames": str(arguments.frames)}
     tables = {"All clips": totals(rows), "Each": rows}
     text = report(texts()["clips"], tables, facts)

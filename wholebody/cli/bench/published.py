@@ -57,7 +57,7 @@ def answer(arguments: argparse.Namespace) -> None:
     """Answer."""
     from wholebody.base.files import checked_target
     from wholebody.bench.suite.adapters.registry import adapters
-    from wholebody.bench.suite.published.answering import Answering, chosen_problems
+    from wholebody.bench.suite.published.problems import Answering, chosen_problems
     from wholebody.bench.suite.published.rebuilt import dumped, files_of
     from wholebody.cli.tables import bar
 

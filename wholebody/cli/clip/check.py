@@ -68,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         show(found)
     if arguments.html is not None:
-        from wholebody.view.timeline import timeline
+        from wholebody.view.motion_curves import timeline
 
         with Console(stderr=True).status("drawing"):
             page = timeline(found, scene)

@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.motion.reading import read_clip
     from wholebody.motion.worn_equipment import dressed
     from wholebody.view import Viewer
-    from wholebody.view.filmstrip import write_filmstrip
+    from wholebody.view.side_by_side import write_filmstrip
 
     out: Path | None = arguments.out
     whole(arguments.pictures, "--pictures", 1, 100)

@@ -1,45 +1,209 @@
-"""The person in convex polyhedra, which is closest to a body, and in the 39 spheres that whole motions are tested with.
-
-The spheres are in five groups (Degenhardt's thesis, section 3.3.1). Places and radii leave the least volume of the
-median man's and woman's capsules and boxes uncovered, and put the least outside of them; for other builds the radius
-grows with the square root of mass per stature. The detail is coarse: the hulls of hands come up to 5 cm out of it, of
-feet 6 cm, of forearms and shanks 3.5 cm, so things in the world meet the hulls instead (`Figure.outer`). To hold the
-hulls to 5 mm, 39 spheres would have to come 4 to 10 cm out of them.
-"""
+"""The person's pieces: capsules and boxes, whose distances are exact and fast; polyhedra; spheres."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import coal
+import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import with_values
-from wholebody.figures import hulls
-from wholebody.figures.body_spec import Solid, place
-from wholebody.figures.dimensions import Dimensions
-from wholebody.figures.human import capsules
+from wholebody.base.arrays import Array, cross, with_values
+from wholebody.figures.anthropometry import RELAXED, Dimensions
+from wholebody.figures.body_spec import Solid, box, ellipsoid, place, tapered
+from wholebody.figures.sizes import TRUNK
 from wholebody.figures.tables import table
+
+# Turn a capsule's own axis z into y, and into x.
+_ACROSS = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+_AHEAD = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+
+
+SPREAD = 3
+"""Number of the piece of the thigh that is the flesh that spreads on a seat."""
+
+
+def solids(size: Dimensions) -> tuple[Solid, ...]:
+    """Return the pieces of a person: spheres, capsules and boxes."""
+    return (*_trunk(size), *_limbs(size))
+
+
+def _trunk(size: Dimensions) -> Iterator[Solid]:
+    for part in trunk_slices(size):
+        radius, other = sorted((part.half_depth, part.half_breadth))
+        axis = _ACROSS if part.half_breadth > part.half_depth else _AHEAD
+        capsule = coal.Capsule(radius, max(2.0 * (other - radius), 2e-3))
+        yield Solid(part.segment, part.segment, capsule, place(part.x, 0.0, part.z, axis))
+    neck = size.body.radius("neck")
+    length = size.body.length("neck")
+    yield _between("neck", "neck", neck, (0.0, 0.0, 0.1 * length), (0.0, 0.0, 0.9 * length))
+    # Radius of the face and jaw in half breadths of the head (estimate).
+    skull, face = size.head_half_breadth, 0.75 * size.head_half_breadth
+    half = size.head_half_length - skull
+    top = size.head_top - skull
+    yield _between("head:0", "head", skull, (size.head_x - half, 0.0, top), (size.head_x + half, 0.0, top))
+    front = size.eye_x - face
+    yield _between("head:1", "head", face, (front, 0.0, size.eye_z), (front, 0.0, size.head_bottom + face))
+
+
+def _limbs(size: Dimensions) -> Iterator[Solid]:
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        yield clavicle(size, side)
+        yield from _arm(size, side, sign)
+        yield from hand(size, side)
+        yield from _leg(size, side, sign)
+        yield from foot(size, side)
+
+
+def _arm(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
+    """Deltoid and upper arm, elbow, forearm, wrist."""
+    person, radius = size.body, size.body.radius
+    upper, fore = person.length("left_upper_arm"), person.length("left_forearm")
+    arm, elbow = RELAXED * radius("upper_arm"), person.size("elbow_back")
+    out, top = sign * (person.size("deltoid") - arm), person.size("shoulder_top") - arm
+    name = f"{side}_upper_arm"
+    yield _between(f"{name}:0", name, arm, (0.0, out, min(top, 0.0)), (0.0, 0.3 * out, -0.45 * upper))
+    low, below = 0.88 * arm, person.size("elbow_below")
+    yield _between(f"{name}:1", name, low, (0.0, 0.0, -0.55 * upper), (low - elbow, 0.0, low - below - upper))
+    thick, wrist = RELAXED * radius("forearm"), radius("wrist")
+    # The underside of the bent forearm is level with the elbow's.
+    up, name = thick - below, f"{side}_forearm"
+    yield _between(f"{name}:0", name, thick, (up, 0.0, elbow - thick), (up, 0.0, -0.40 * fore))
+    yield _down(f"{side}_forearm:1", f"{side}_forearm", wrist, 0.45 * fore, fore - wrist)
+
+
+def _leg(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
+    """Thigh with its hip, knee, calf, ankle. On a seat the underside of the thigh is level with the pelvis'."""
+    person, radius = size.body, size.body.radius
+    thigh, shank = person.length("left_thigh"), person.length("left_shank")
+    high, hip = 0.5 * person.size("thigh_clearance"), size.joint("left_hip_flexion")[1]
+    front, out = high - person.size("seat"), sign * (0.5 * person.size("hip_breadth") - hip - high)
+    name = f"{side}_thigh"
+
+    def inwards(beside: float) -> float:
+        """Place of the lower end: nearer to the thigh's axis where the hip is wider than the thigh."""
+        return 0.3 * beside if sign * beside > 0.0 else beside
+
+    yield _between(f"{name}:0", name, high, (front, out, -0.12 * thigh), (front, inwards(out), -0.42 * thigh))
+    # Flesh that spreads on a seat. It meets things only, so that arms hang and passages are as wide as for who stands.
+    # It is thinner than the thigh by 2 mm, so that not both lie on the seat.
+    flesh = high - 0.002
+    wide = sign * (0.5 * person.size("hip_breadth_sitting") - hip - flesh)
+    yield _between(f"{name}:{SPREAD}", name, flesh, (front, wide, -0.12 * thigh), (front, inwards(wide), -0.42 * thigh))
+    # Share of the thigh's radius by which flesh gives way where the thigh presses on the belly or the other thigh: 29
+    # to 41 mm from the small woman to the large man (estimate). These are tested against the core that is left.
+    core = (1.0 - 0.4) * high
+    yield _between(f"{name}:2", name, core, (front, inwards(out), -0.3 * thigh), (front, inwards(out), -0.42 * thigh))
+    knee = person.size("knee")
+    # Where the knee is thicker than the thigh below its axis, it is that in front of the seat.
+    over = max(knee - person.size("seat"), 0.0)
+    yield _between(f"{name}:1", name, knee, (over, 0.0, -0.6 * thigh), (0.0, 0.0, -thigh))
+    calf, ankle = radius("calf"), radius("ankle")
+    name, shin = f"{side}_shank", 0.95 * knee - calf  # the shin is not before the knee
+    top, low = (min(back * calf, shin) for back in (-0.15, -0.25))
+    yield _between(f"{name}:0", name, calf, (top, 0.0, -0.1 * shank), (low, 0.0, -0.42 * shank))
+    yield _down(f"{name}:1", name, ankle, 0.55 * shank, 0.94 * shank)
+
+
+def clavicle(size: Dimensions, side: str) -> Solid:
+    """Shoulder girdle: a level capsule from beside the breastbone to the shoulder joint, as high as the acromion."""
+    x, y, z = size.joint(f"{side}_shoulder_flexion")
+    radius = 0.017 * size.stature  # Radius of the shoulder girdle as a fraction of stature (estimate).
+    height = z + size.body.size("shoulder_top") - radius
+    return _between(
+        f"{side}_clavicle", f"{side}_clavicle", radius, (0.25 * x, 0.25 * y, height), (0.9 * x, 0.9 * y, height)
+    )
+
+
+def hand(size: Dimensions, side: str) -> Iterator[Solid]:
+    """Palm, index finger, thumb, and the three others slightly shortened: they curl, and the index finger leads."""
+    segment, thick, breadth = f"{side}_hand", size.palm_half_thickness, size.hand_breadth
+    palm, index = size.palm_length, size.index
+    box = coal.Box(breadth, 2.0 * thick, palm)
+    yield Solid(f"{segment}:0", segment, box, place(0.0, 0.0, -0.5 * palm))
+    start, end = 0.85 * palm, 0.88 * size.hand_length
+    width = 0.45 * breadth
+    fingers = coal.Box(width, 1.8 * index.radius, end - start)
+    yield Solid(f"{segment}:1", segment, fingers, place(0.08 * breadth - 0.5 * width, 0.0, -0.5 * (start + end)))
+    radius = index.radius
+    yield _between(
+        f"{segment}:2", segment, radius, (index.x, 0.0, -index.knuckle), (index.x, 0.0, -(index.tip - radius))
+    )
+    thumb = size.thumb
+    root = (0.36 * breadth, 0.0, -thumb.knuckle)
+    yield _between(f"{segment}:3", segment, thumb.radius, root, (thumb.x, 0.0, -(thumb.tip - thumb.radius)))
+
+
+def foot(size: Dimensions, side: str) -> Iterator[Solid]:
+    """Boxes for the foot and the toes, flush on the sole."""
+    height, length = -1.0 * size.sole, size.toe_joint_x - size.heel_x
+    box = coal.Box(length, 2.0 * size.foot_half_width, height)
+    yield Solid(
+        f"{side}_foot", f"{side}_foot", box, place(0.5 * (size.toe_joint_x + size.heel_x), 0.0, 0.5 * size.sole)
+    )
+    toes = coal.Box(size.toe_length, 2.0 * size.foot_half_width, 2.0 * size.toe_half_height)
+    yield Solid(f"{side}_toes", f"{side}_toes", toes, place(0.5 * size.toe_length, 0.0, 0.0))
+
+
+class Slice(NamedTuple):
+    """A slice of the trunk, in its segment's frame; the centre is at (x, 0, z)."""
+
+    segment: str
+    x: float
+    z: float
+    half_depth: float
+    half_breadth: float
+    half_height: float
+
+
+def trunk_slices(size: Dimensions) -> Iterator[Slice]:
+    """Return positions and half sizes of the slices from the pelvis to the thorax."""
+    person = size.body
+    rear, seat, wide = 0.5 * person.size("buttock_depth"), person.size("seat"), 0.5 * person.size("hip_breadth")
+    yield Slice("pelvis", rear - person.size("buttock"), rear - seat, rear, wide, rear)
+    for part, (z, high) in zip(TRUNK, ((0.5, 1.3), (0.5, 1.1), (0.5, 1.2), (0.42, 0.75)), strict=True):
+        half, length = 0.5 * part.share * person.size(part.depth), person.length(part.segment)
+        ahead = half - part.back(person.built[0])
+        yield Slice(part.segment, ahead, z * length, half, 0.5 * person.size(part.breadth), high * length)
+
+
+def _down(name: str, segment: str, radius: float, start: float, end: float) -> Solid:
+    return _between(name, segment, radius, (0.0, 0.0, -start), (0.0, 0.0, -end))
+
+
+def _between(
+    name: str, segment: str, radius: float, start: Array | tuple[float, ...], end: Array | tuple[float, ...]
+) -> Solid:
+    """Capsule whose caps are centred on two points."""
+    start, end = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
+    span = end - start
+    length = float(np.linalg.norm(span))
+    z = span / length
+    side = cross(z, np.array((1.0, 0.0, 0.0) if abs(z[0]) < 0.9 else (0.0, 1.0, 0.0)))
+    side /= np.linalg.norm(side)
+    rotation = np.column_stack([cross(side, z), side, z])
+    center = 0.5 * (start + end)
+    return Solid(name, segment, coal.Capsule(radius, length), pin.SE3(rotation, center))
 
 
 def polyhedra(size: Dimensions) -> tuple[Solid, ...]:
     """Return the pieces of a person, all of them convex polyhedra."""
     rest = [
         solid
-        for solid in capsules.solids(size)
+        for solid in solids(size)
         if solid.name not in ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "neck")
     ]
-    return (*_trunk(size), *(hull_of(solid) for solid in rest))
+    return (*_trunk_hulls(size), *(hull_of(solid) for solid in rest))
 
 
-def _trunk(size: Dimensions) -> Iterator[Solid]:
-    for part in capsules.trunk_slices(size):
+def _trunk_hulls(size: Dimensions) -> Iterator[Solid]:
+    for part in trunk_slices(size):
         radii = (part.half_depth, part.half_breadth, part.half_height)
-        yield _solid(part.segment, hulls.ellipsoid(radii, part.segment), part.x, part.z)
+        yield _solid(part.segment, ellipsoid(radii, part.segment), part.x, part.z)
     neck, length = size.body.radius("neck"), size.body.length("neck")
-    yield _solid("neck", hulls.tapered(neck, neck, 0.8 * length, "neck"), 0.0, 0.9 * length)
+    yield _solid("neck", tapered(neck, neck, 0.8 * length, "neck"), 0.0, 0.9 * length)
 
 
 def _solid(name: str, hull: tuple[Any, pin.SE3], x: float, z: float) -> Solid:
@@ -51,10 +215,10 @@ def hull_of(solid: Solid) -> Solid:
     """Return the polyhedron of a box or a capsule, at the same place."""
     if type(solid.geometry).__name__ == "Box":
         x, y, z = (2.0 * float(half) for half in solid.geometry.halfSide)
-        shape, center = hulls.box((x, y, z), solid.name)
+        shape, center = box((x, y, z), solid.name)
     else:
         radius, half = solid.geometry.radius, solid.geometry.halfLength
-        shape, center = hulls.tapered(radius, radius, 2.0 * half, solid.name)
+        shape, center = tapered(radius, radius, 2.0 * half, solid.name)
         center = place(z=half) * center
     return with_values(solid, geometry=shape, placement=solid.placement * center)
 

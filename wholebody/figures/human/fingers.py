@@ -15,8 +15,8 @@ import coal
 import pinocchio as pin
 
 from wholebody.base.checks import choice, known
+from wholebody.figures.anthropometry import FINGER_BASES, Dimensions, keyed_hand
 from wholebody.figures.body_spec import BodySpec, Landmark, Link, Solid, place
-from wholebody.figures.dimensions import FINGER_BASES, Dimensions, keyed_hand
 from wholebody.figures.hand import (
     FINGERS,
     PARTS,

@@ -12,17 +12,16 @@ from collections.abc import Callable, Mapping
 
 from wholebody.base.checks import known
 from wholebody.base.errors import InputError
-from wholebody.figures.anthropometry import Person, describe, make_person
+from wholebody.figures.anthropometry import Dimensions, Person, describe, make_person
 from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, place
-from wholebody.figures.dimensions import Dimensions
 from wholebody.figures.hand import palm_axes
-from wholebody.figures.human import capsules, details, fingers
+from wholebody.figures.human import details, fingers
 from wholebody.figures.sizes import MIDDLE_TIP
 from wholebody.figures.tables import keyed, table
 
 DETAILS: dict[str, Callable[[Dimensions], tuple[Solid, ...]]] = {
     "spheres": details.spheres,
-    "capsules": capsules.solids,
+    "capsules": details.solids,
     "hulls": details.polyhedra,
 }
 

@@ -11,8 +11,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import FileFormatError
-from wholebody.figures.link_pieces import LinkShape
-from wholebody.figures.link_visuals import MANY, thinned
+from wholebody.figures.link_pieces import MANY, LinkShape, thinned
 from wholebody.figures.mjcf.compiled import Compiled, placement
 from wholebody.figures.mjcf.model import RobotModel
 from wholebody.figures.robot_figure import COLOR
@@ -65,14 +64,8 @@ def height_field(compiled: Compiled, geom: int) -> list[Array]:
             run = list(cells)
             (a, b), (c, d) = grid[row : row + 2, [run[0], run[-1] + 1]]
             tops = [(a, d, c), (a, b, d)] if plane[0] == "bent" else [(a, b, c, d)]
-            found += [_prism(np.array(top), below) for top in tops]
+            found += [np.concatenate([top, [(x, y, -below) for x, y, _ in top]]) for top in tops]
     return found
-
-
-def _prism(top: Array, below: float) -> Array:
-    bottom = np.array(top)
-    bottom[:, 2] = -below
-    return np.concatenate([top, bottom])
 
 
 def visual_of(compiled: Compiled, robot: RobotModel) -> pin.GeometryModel | None:

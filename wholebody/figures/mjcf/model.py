@@ -265,7 +265,6 @@ class _Builder:
 
 
 def _inertia(theirs: Any, body: int) -> pin.Inertia:
-    """Inertia of a body in its own frame."""
     turn = placement(np.zeros(3), theirs.body_iquat[body]).rotation
     about = turn @ np.diag(theirs.body_inertia[body]) @ turn.T
     return pin.Inertia(float(theirs.body_mass[body]), np.array(theirs.body_ipos[body]), about)

@@ -8,8 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.figures.anthropometry import Person
-from wholebody.figures.dimensions import FINGER_BASES, Dimensions, keyed_hand
+from wholebody.figures.anthropometry import FINGER_BASES, Dimensions, Person, keyed_hand
 from wholebody.figures.figure import Figure
 from wholebody.figures.hand import FINGERS, PARTS, hand_figure_of, part_radius
 from wholebody.figures.surface.fields import Field, ellipsoid, placed, round_cone, union
@@ -29,7 +28,10 @@ class HandShape(NamedTuple):
 def hand_shape(person: Person, side: str) -> HandShape:
     """Return the hand of a person."""
     size, figure = Dimensions(person), hand_figure_of(person, side)
-    bind, rest = _placements(figure, side, _spread(side)), _placements(figure, side, _resting(side))
+    # Degrees of abduction in the binding posture: fingers side by side would melt into one.
+    apart = {"index": 14.0, "ring": 14.0, "little": 18.0}
+    spread = {f"{side}_{finger}_mcp_abduction": angle for finger, angle in apart.items()}
+    bind, rest = _placements(figure, side, spread), _placements(figure, side, _resting(side))
     _bring_thumb(rest, side, np.array([size.thumb.x, 0.0, -size.thumb.tip]))
     sign = 1.0 if side == "left" else -1.0
     palm = _palm(size, sign)
@@ -74,13 +76,6 @@ def _bring_thumb(rest: dict[str, Array], side: str, target: Array) -> None:
     turn[:3, 3] = origin - turn[:3, :3] @ origin
     for segment in (first, last):
         rest[segment] = turn @ rest[segment]
-
-
-def _spread(side: str) -> dict[str, float]:
-    """Degrees of abduction in the binding posture: fingers side by side would melt into one."""
-    return {
-        f"{side}_{finger}_mcp_abduction": angle for finger, angle in (("index", 14.0), ("ring", 14.0), ("little", 18.0))
-    }
 
 
 def _resting(side: str) -> dict[str, float]:

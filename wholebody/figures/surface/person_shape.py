@@ -9,10 +9,9 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.figures.anthropometry import Person
+from wholebody.figures.anthropometry import Dimensions, Person
 from wholebody.figures.body_spec import Solid
-from wholebody.figures.dimensions import Dimensions
-from wholebody.figures.human.capsules import SPREAD
+from wholebody.figures.human.details import SPREAD
 from wholebody.figures.human.figure import figure_of
 from wholebody.figures.human.spec import human_spec
 from wholebody.figures.surface.fields import (
@@ -210,7 +209,6 @@ class PersonShape:
         return Garment("trousers", COLORS.trousers, body, low, high, 0.024, self._claims(segments), cuts)
 
     def _calf(self, side: str, sign: float) -> Field:
-        """The muscle behind the shank."""
         length, radius = self.person.length("left_shank"), self.person.radius("calf")
         shape = ellipsoid(
             (-0.20 * radius, sign * 0.02 * radius, -0.27 * length), (0.90 * radius, 0.90 * radius, 0.24 * length)

@@ -1,20 +1,209 @@
-"""A figure from any URDF: its own collision geometry as convex pieces, and the pairs that can touch."""
+"""A figure from any URDF: Pinocchio's model, its collision geometry as convex pieces, and the pairs that can touch.
+
+Pinocchio requires that a joint that follows another (mimic) comes after the followed joint in its own order. So the
+first of several joints that move together, in that order, carries the coordinate, and the others follow it, whichever
+of them the file calls the leader.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
+from typing import NamedTuple
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+import pinocchio as pin
 
 from wholebody.base.arrays import with_values
-from wholebody.base.errors import InputError
+from wholebody.base.checks import shown
+from wholebody.base.errors import FileFormatError, InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, check_concavity
 from wholebody.figures.robot_figure import Robot, check_size, geometry_of_links, robot_figure, visual_of_links
 from wholebody.figures.urdf.extension import extended_figure
-from wholebody.figures.urdf.file import read_urdf
-from wholebody.figures.urdf.model import urdf_model
+from wholebody.figures.urdf.file import UrdfFile, read_urdf
+from wholebody.figures.urdf.joints import Mimic, UrdfJoint
 from wholebody.figures.urdf.srdf import read_srdf
+from wholebody.figures.urdf.writing import ANY_LIMIT, add_joint
+
+
+class _Law(NamedTuple):
+    """A joint's value as ``slope * leader + offset``."""
+
+    leader: str
+    slope: float
+    offset: float
+
+
+def urdf_model(urdf: UrdfFile, root: str) -> tuple[pin.Model, tuple[str, ...]]:
+    """Return Pinocchio's model, its root "fixed" or "free", and one sentence for each joint that was changed."""
+    joints, notes = _with_constant_followers(urdf.joints)
+    model = _build(urdf, joints, root, mimic=False)
+    if any(joint.mimic for joint in joints):
+        joints, remarks = _within_followers(joints)
+        notes += remarks
+        joints = _led_by_the_first(joints, {name: place for place, name in enumerate(model.names)})
+        model = _build(urdf, joints, root, mimic=True)
+    for joint in joints:
+        if joint.kind == "planar":
+            _lay_in_plane(model, joint)
+    _set_limits(model, joints)
+    return model, notes
+
+
+def _lay_in_plane(model: pin.Model, joint: UrdfJoint) -> None:
+    """Let a planar joint move in the plane normal to its axis: Pinocchio's moves in x and y of its frame."""
+    z = joint.axis
+    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
+    x /= np.linalg.norm(x)
+    turned = pin.SE3(np.column_stack((x, np.cross(z, x), z)), np.zeros(3))
+    if z[2] == 1.0:
+        return
+    back, index = turned.inverse(), model.getJointId(joint.name)
+    model.jointPlacements[index] = model.jointPlacements[index] * turned
+    model.inertias[index] = back.act(model.inertias[index])
+    for child in range(index + 1, model.njoints):
+        if model.parents[child] == index:
+            model.jointPlacements[child] = back * model.jointPlacements[child]
+    for frame in model.frames:
+        if frame.parentJoint == index:
+            frame.placement = back * frame.placement
+
+
+def _within_followers(joints: tuple[UrdfJoint, ...]) -> tuple[tuple[UrdfJoint, ...], tuple[str, ...]]:
+    """Cut the limits of leaders so that every follower stays within its own."""
+    laws, by_name = _laws(joints), {joint.name: joint for joint in joints}
+    ends = {name: (joint.lower, joint.upper) for name, joint in by_name.items()}
+    notes = []
+    for name, law in laws.items():
+        own = by_name[name]
+        low, high = sorted((end - law.offset) / law.slope for end in (own.lower, own.upper))
+        kept = max(low, ends[law.leader][0]), min(high, ends[law.leader][1])
+        if kept[0] > kept[1]:
+            told = f"its limits exclude those of {shown(law.leader)}, so they are left out"
+            notes.append(f"joint {shown(name)}: {told}")
+            continue
+        ends[law.leader] = kept
+    made = [with_values(joint, lower=ends[joint.name][0], upper=ends[joint.name][1]) for joint in joints]
+    return tuple(made), tuple(notes)
+
+
+def _laws(joints: tuple[UrdfJoint, ...]) -> dict[str, _Law]:
+    """The law of every joint that follows another, directly or through others."""
+    by_name = {joint.name: joint for joint in joints}
+    laws: dict[str, _Law] = {}
+    for joint in joints:
+        slope, offset, at = 1.0, 0.0, joint
+        while at.mimic is not None:
+            slope, offset = slope * at.mimic.multiplier, offset + slope * at.mimic.offset
+            at = by_name[at.mimic.joint]
+        if at is not joint:
+            laws[joint.name] = _Law(at.name, slope, offset)
+    return laws
+
+
+def _with_constant_followers(joints: tuple[UrdfJoint, ...]) -> tuple[tuple[UrdfJoint, ...], tuple[str, ...]]:
+    """Fix the joints that follow a fixed joint, or another one by a multiplier of zero."""
+    laws = _laws(joints)
+    fixed = {joint.name for joint in joints if joint.kind == "fixed"}
+    made, notes = [], []
+    for joint in joints:
+        law = laws.get(joint.name)
+        if law is None or (law.leader not in fixed and law.slope != 0.0):
+            made.append(joint)
+            continue
+        notes.append(
+            f"joint {shown(joint.name)}: it mimics {shown(law.leader)}, which does not move it, so it is fixed"
+        )
+        if joint.kind == "prismatic":
+            moved = pin.SE3(np.eye(3), law.offset * joint.axis)
+        else:
+            moved = pin.SE3(pin.exp3(law.offset * joint.axis), np.zeros(3))
+        made.append(with_values(joint, kind="fixed", origin=joint.origin * moved, mimic=None))
+    return tuple(made), tuple(notes)
+
+
+def _led_by_the_first(joints: tuple[UrdfJoint, ...], order: dict[str, int]) -> tuple[UrdfJoint, ...]:
+    """Make the first of joints that move together the leader; its limits are those of the file's leader."""
+    laws, by_name = _laws(joints), {joint.name: joint for joint in joints}
+    first: dict[str, str] = {}
+    for name in sorted({*laws, *(law.leader for law in laws.values())}, key=order.__getitem__):
+        first.setdefault(laws[name].leader if name in laws else name, name)
+    made = []
+    for joint in joints:
+        law = laws.get(joint.name, _Law(joint.name, 1.0, 0.0))
+        if law.leader not in first:
+            made.append(joint)
+            continue
+        # a revolute joint without limits would be a point on a circle, which no joint can follow
+        kind = "prismatic" if joint.kind == "prismatic" else "revolute"
+        head = first[law.leader]
+        if joint.name != head:
+            base = laws.get(head, _Law(head, 1.0, 0.0))
+            slope = law.slope / base.slope
+            made.append(with_values(joint, kind=kind, mimic=Mimic(head, slope, law.offset - slope * base.offset)))
+            continue
+        leader = by_name[law.leader]
+        ends = sorted(law.slope * end + law.offset for end in (leader.lower, leader.upper))
+        made.append(
+            with_values(
+                joint, kind=kind, mimic=None, lower=ends[0], upper=ends[1], velocity=abs(law.slope) * leader.velocity
+            )
+        )
+    return tuple(made)
+
+
+def _build(urdf: UrdfFile, joints: tuple[UrdfJoint, ...], root: str, mimic: bool) -> pin.Model:
+    base = [pin.JointModelFreeFlyer()] if root == "free" else []
+    try:
+        return pin.buildModelFromXML(_text(urdf, joints), *base, mimic=mimic)
+    except Exception as error:  # the file passed our checks but fails in urdfdom
+        reason = " ".join(str(error).split())
+        raise FileFormatError(f"{urdf.path}: Pinocchio cannot read it ({reason}); correct the file") from error
+
+
+def _text(urdf: UrdfFile, joints: tuple[UrdfJoint, ...]) -> str:
+    """The links and joints as a URDF without shapes, with exact numbers."""
+    robot = Element("robot", name=urdf.name)
+    for name in urdf.links:
+        link = SubElement(robot, "link", name=name)
+        if name in urdf.inertials:
+            link.append(urdf.inertials[name])
+    for joint in joints:
+        made = add_joint(
+            robot,
+            joint.name,
+            joint.kind,
+            joint.parent,
+            joint.child,
+            origin=joint.origin,
+            axis=None if joint.kind in ("fixed", "floating") else joint.axis,
+            limit=ANY_LIMIT if joint.kind in ("revolute", "prismatic") else None,
+        )
+        if joint.mimic is not None:
+            multiplier, offset = (repr(float(value)) for value in joint.mimic[1:])
+            SubElement(made, "mimic", joint=joint.mimic.joint, multiplier=multiplier, offset=offset)
+    return ElementTree.tostring(robot, encoding="unicode")
+
+
+def _set_limits(model: pin.Model, joints: tuple[UrdfJoint, ...]) -> None:
+    lower, upper = np.array(model.lowerPositionLimit), np.array(model.upperPositionLimit)
+    velocity, effort = np.array(model.velocityLimit), np.array(model.effortLimit)
+    for joint in joints:
+        if not model.existJointName(joint.name) or joint.mimic is not None:
+            continue
+        made = model.joints[model.getJointId(joint.name)]
+        if made.nv == 1:
+            velocity[made.idx_v], effort[made.idx_v] = joint.velocity, joint.effort
+            if made.nq == 1:
+                lower[made.idx_q], upper[made.idx_q] = joint.lower, joint.upper
+    # adding 0.0 makes -0.0 to 0.0: numpy draws no random number between 0.0 and -0.0
+    model.lowerPositionLimit, model.upperPositionLimit = lower + 0.0, upper + 0.0
+    model.velocityLimit, model.effortLimit = velocity, effort
+
 
 SAMPLES = 400
 """Number of random postures for finding pairs that always overlap."""

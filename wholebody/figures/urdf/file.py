@@ -149,7 +149,6 @@ def _shapes(link: Element, path: Path, package_dirs: tuple[Path, ...]) -> Iterat
 
 
 def _shape(element: Element, link: str, path: Path, package_dirs: tuple[Path, ...]) -> LinkShape:
-    """The shape of a ``<collision>`` or ``<visual>``."""
     place = f"{path}: {element.tag} of link {shown(link)}"
     shapes = element.findall("geometry/*")
     if len(shapes) != 1:

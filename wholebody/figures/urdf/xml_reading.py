@@ -59,7 +59,7 @@ def numbers(element: Element, name: str, place: str, count: int, default: str | 
         found = ()
     if len(found) != count or not all(math.isfinite(number) for number in found):
         wanted = "a finite number" if count == 1 else f"{count} finite numbers"
-        raise FileFormatError(f"{place}: <{element.tag}> has {name}={_short(text)}; give {wanted}")
+        raise FileFormatError(f"{place}: <{element.tag}> has {name}={one_line(repr(text), 60)}; give {wanted}")
     if name in element.attrib:
         element.set(name, " ".join(words))
     return found
@@ -71,9 +71,8 @@ def bounded(
     """Return the numbers of an attribute as `numbers` does, none of them larger than `most`."""
     found = numbers(element, name, place, count, default)
     if max(abs(number) for number in found) > most:
-        raise FileFormatError(
-            f"{place}: <{element.tag}> has {name}={_short(element.get(name))}; give SI units, at most {most:g}"
-        )
+        said = one_line(repr(element.get(name)), 60)
+        raise FileFormatError(f"{place}: <{element.tag}> has {name}={said}; give SI units, at most {most:g}")
     return found
 
 
@@ -86,8 +85,3 @@ def placement(element: Element, place: str, most: float) -> pin.SE3:
     for name, angle in (("roll", roll), ("pitch", pitch), ("yaw", yaw)):
         warn_of_degrees(angle, f"{place}: the {name} of <origin>", 2.0 * math.pi)
     return pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), np.array(bounded(origin, "xyz", place, 3, "0 0 0", most)))
-
-
-def _short(text: object) -> str:
-    shown = repr(text)
-    return shown if len(shown) <= 60 else f"{shown[:57]}..."

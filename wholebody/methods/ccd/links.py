@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.geometry.separation import least_separation
+from wholebody.geometry.penetration import least_separation
 from wholebody.methods.ccd.limbs import Limbs, Vector
 from wholebody.scene.workspace import Workspace
 

@@ -13,7 +13,7 @@ from wholebody.base.checks import color as checked_color
 from wholebody.base.checks import instance, known, numbers, shown, text
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.figures.joined import one_figure
+from wholebody.figures.loading import one_figure
 from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.geometry.shapes import LENGTH, Shape

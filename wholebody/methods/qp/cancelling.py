@@ -2,7 +2,7 @@
 
 Two pieces of one segment that overlap one thing from opposite sides push it in opposite directions. Their rows add up
 to nothing, and no descent leaves, although a translation does: the least that separates all pieces of the two
-(`wholebody.geometry.separation`; figure 4b of Schmidl and Lin, "Real-time physically-based interaction between avatars
+(`wholebody.geometry.penetration`; figure 4b of Schmidl and Lin, "Real-time physically-based interaction between avatars
 and virtual environments"). Damped least squares over the joints realises it.
 """
 
@@ -14,9 +14,8 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, cross
-from wholebody.geometry.penetration import global_depth
+from wholebody.geometry.penetration import global_depth, least_separation
 from wholebody.geometry.proximity import Contacts
-from wholebody.geometry.separation import least_separation
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 

@@ -10,7 +10,7 @@ from wholebody.base.checks import flag, warn
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, InputError, one_line
 from wholebody.figures.figure import Figure
-from wholebody.figures.joined import one_figure
+from wholebody.figures.loading import one_figure
 from wholebody.motion.files import amass, archive, bvh, columns, gltf, gltf_reading, joint_profile
 from wholebody.motion.files.base import Frames, Motion
 from wholebody.motion.skeleton import SkeletonMotion

@@ -16,10 +16,9 @@ from wholebody.base.errors import InputError
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
 from wholebody.figures.joining import joint_in
-from wholebody.figures.link_pieces import triangles_of
-from wholebody.figures.link_visuals import Color, Drawn, drawn_of
+from wholebody.figures.link_pieces import Color, Drawn, drawn_of, triangles_of
 from wholebody.figures.surface import Surface, surface_of
-from wholebody.geometry.gltf_builder import VERTICES, GltfBuilder
+from wholebody.geometry.gltf import VERTICES, GltfBuilder
 from wholebody.motion.files.base import Motion
 from wholebody.motion.skeleton import UP
 from wholebody.motion.thing_tracks import steady

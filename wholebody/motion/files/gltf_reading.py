@@ -14,7 +14,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import FileFormatError
 from wholebody.base.files import title_of
 from wholebody.figures.figure import Figure
-from wholebody.geometry.gltf_document import GltfDocument
+from wholebody.geometry.gltf import GltfDocument
 from wholebody.motion.files.base import Frames
 from wholebody.motion.files.gltf import JOINT
 from wholebody.motion.files.node_motion import NodeMotion, steps_of

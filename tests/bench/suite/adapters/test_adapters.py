@@ -13,7 +13,7 @@ import wholebody as wb
 from wholebody.base.errors import InputError, MissingPackageError, UnknownNameError
 from wholebody.bench.suite.adapters.base import FEASIBILITY_ONLY, Adapter
 from wholebody.bench.suite.adapters.registry import adapters, missing, names
-from wholebody.bench.suite.compare.settings import Settings
+from wholebody.bench.suite.compare.run import Settings
 from wholebody.bench.suite.problem_sets.registry import SETS
 
 INSTALLED = adapters(["all"])

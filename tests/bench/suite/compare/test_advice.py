@@ -7,10 +7,9 @@ from math import inf
 import numpy as np
 import pytest
 
-from wholebody.bench.suite.compare.advice import OURS, advice, best, choices, standings
 from wholebody.bench.suite.compare.report import curve, groups
 from wholebody.bench.suite.compare.results import ANSWERED, EFFORT, FLOOR, OVERTIME, REFUSED, WORST, Record, Results
-from wholebody.bench.suite.compare.summary import summaries
+from wholebody.bench.suite.compare.summary import OURS, advice, best, choices, standings, summaries
 
 CASES = range(5)
 

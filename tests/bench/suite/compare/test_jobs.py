@@ -8,8 +8,8 @@ from types import ModuleType
 import pytest
 
 from wholebody.base.batches import close_own_child
-from wholebody.bench.suite.compare.jobs import Task, work
 from wholebody.bench.suite.compare.results import Chunk
+from wholebody.bench.suite.compare.solving import Task, work
 
 FROM_SCRATCH = True
 WAITS = 0.5  # s: of each solve of the method that sleeps

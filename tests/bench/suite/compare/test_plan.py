@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wholebody.bench.suite.compare.results import Chunk
-from wholebody.bench.suite.compare.run import FIRST, Plan, share_out
-from wholebody.bench.suite.compare.settings import Settings
+from wholebody.bench.suite.compare.run import FIRST, Plan, Settings, share_out
 
 COSTS = st.lists(st.tuples(st.floats(1e-3, 5.0), st.floats(1e-3, 30.0)), min_size=1, max_size=8)
 

@@ -14,7 +14,7 @@ from wholebody.base.errors import InputError
 from wholebody.bench import plot_style
 from wholebody.bench.suite.compare import report as publishing
 from wholebody.bench.suite.compare.results import ANSWERED, OVERTIME, REFUSED, Chunk, Record, Store
-from wholebody.bench.suite.compare.settings import Settings
+from wholebody.bench.suite.compare.run import Settings
 
 FACTS = {"wholebody": "0", "processor": "a fast one", "date": "2030-01-02"}
 REFUSAL = "it cannot take <goals[0]>, Point"

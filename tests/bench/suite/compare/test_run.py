@@ -14,8 +14,7 @@ import pytest
 
 from wholebody.base.errors import InputError, WholebodyError
 from wholebody.bench.suite.compare.results import FAILED, NAME, OVERTIME, REFUSED, Record, Store
-from wholebody.bench.suite.compare.run import run
-from wholebody.bench.suite.compare.settings import Settings
+from wholebody.bench.suite.compare.run import Settings, run
 
 TIMES = ("seconds", "cpu_seconds", "setup_seconds", "frame_p95")
 CAP = 1.0  # s of the processor: much more than a solve takes

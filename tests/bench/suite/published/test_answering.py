@@ -10,9 +10,9 @@ import pytest
 
 from wholebody.base.errors import FileFormatError, UnknownNameError
 from wholebody.bench.suite.adapters.registry import adapters
-from wholebody.bench.suite.published.answering import Answering, chosen_problems
 from wholebody.bench.suite.published.answers import read_answers
 from wholebody.bench.suite.published.judging import judge
+from wholebody.bench.suite.published.problems import Answering, chosen_problems
 from wholebody.cli import main
 
 

@@ -28,25 +28,19 @@ LADDER: tuple[Budget, ...] = tuple((tol, None) for tol in (1e-1, 3e-2, 1e-2, 3e-
 """Tolerances from cheap to exact; each adapter begins and ends where it makes sense for it."""
 
 
-def _nothing(method: Any, problem: Problem) -> None:
-    pass
-
-
 @dataclass(frozen=True)
 class Adapter:
     """A method as it takes part in comparisons.
 
     `make`: a fresh method from a tolerance and the most iterations; `loose`: budgets from cheap to exact, those of
     feasibility only before the others; `prepare`: builds what a solve needs, untimed, or raises InputError where the
-    method cannot express a problem; `hindered`: a method whose quadratic programs are never finished, None where `make`
-    with one iteration stands for it; `setup` and `differences`: sentences for reports.
+    method cannot express a problem; `setup` and `differences`: sentences for reports.
     """
 
     name: str
     make: Callable[[float, int | None], Method]
     loose: tuple[Budget, ...]
-    prepare: Callable[[Any, Problem], None] = _nothing
-    hindered: Callable[..., Method] | None = None
+    prepare: Callable[[Any, Problem], None] = lambda method, problem: None
     setup: str = ""
     differences: tuple[str, ...] = ()
 

@@ -9,8 +9,16 @@ import numpy as np
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.bench.measure.track import SETTING, Track
-from wholebody.bench.suite.adapters.loop import Loop, Stepper, kept_apart, longest_moves, placements, size
-from wholebody.bench.suite.adapters.tasks import TaskStepper, TaskTool
+from wholebody.bench.suite.adapters.loop import (
+    Loop,
+    Stepper,
+    TaskStepper,
+    TaskTool,
+    kept_apart,
+    longest_moves,
+    placements,
+    size,
+)
 from wholebody.bench.suite.adapters.urdf import Frames, mjcf, own_frame
 from wholebody.figures.figure import Figure
 from wholebody.problem import Problem

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -21,37 +21,38 @@ from wholebody.methods.differential import TOOL
 from wholebody.problem import Problem
 
 
-class Chain(ABC):
-    """The chain of a frame in a solver.
+class Chain:
+    """The chain of a frame.
 
     Attributes:
+        model: Pinocchio's.
         joints: in the model, from the base on.
         places: (n,) of their values in a posture.
         end: placement of the frame in the last joint.
+        solver: what a tool made of it; None before.
     """
+
+    solver: Any = None
 
     def __init__(self, model: pin.Model, frame: int) -> None:
         """Look the joints up."""
+        self.model = model
         self.joints = list(model.supports[model.frames[frame].parentJoint])[1:]
         self.places = np.array([model.joints[joint].idx_q for joint in self.joints])
         self.end = model.frames[frame].placement
 
     @contextmanager
-    def written(self, model: pin.Model) -> Iterator[tuple[Path, str, str]]:
+    def written(self) -> Iterator[tuple[Path, str, str]]:
         """The chain as a URDF file, and its first and its last link."""
         root = ElementTree.Element("robot", name="chain")
         ElementTree.SubElement(root, "link", name="link 0")
         for number, joint in enumerate(self.joints, 1):
             ElementTree.SubElement(root, "link", name=f"link {number}")
-            add_model_joint(root, model, joint, f"link {number - 1}", f"link {number}")
+            add_model_joint(root, self.model, joint, f"link {number - 1}", f"link {number}")
         with Scratch() as folder:
             path = folder / "chain.urdf"
             path.write_bytes(ElementTree.tostring(root))
             yield path, "link 0", f"link {len(self.joints)}"
-
-    @abstractmethod
-    def values(self, start: Array, target: pin.SE3, tolerance: float) -> Any:
-        """Values (n,) of the joints that bring the last one to where the frame is at its target; None for none."""
 
 
 class OneChain(OneCall[Chain], ABC):
@@ -59,7 +60,10 @@ class OneChain(OneCall[Chain], ABC):
 
     loose = tuple((tolerance, None) for tolerance in (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8))
     kinds = (wb.Displacement, wb.Effort, wb.Frame)
-    chain: ClassVar[type[Chain]]
+
+    @abstractmethod
+    def values(self, chain: Chain, start: Array, target: pin.SE3) -> Any:
+        """Values (n,) of the joints that bring the last one to where the frame is at its target; None for none."""
 
     def depends_on(self, problem: Problem) -> tuple[Any, ...]:
         """The model, and the frame at the end of the chain."""
@@ -67,15 +71,13 @@ class OneChain(OneCall[Chain], ABC):
 
     def build(self, problem: Problem) -> Chain:
         """Make the chain."""
-        return self.chain(problem.scene.model, _goal(problem).residual.place.frame)
+        return Chain(problem.scene.model, _goal(problem).residual.place.frame)
 
     def found(self, built: Chain, problem: Problem) -> tuple[Array | None, bool]:
         """The solver's posture."""
         start = problem.scene.figure.clamp(problem.start)
         with TOOL:
-            answer = built.values(
-                start[built.places], _goal(problem).resolved_target * built.end.inverse(), self.tolerance
-            )
+            answer = self.values(built, start[built.places], _goal(problem).resolved_target * built.end.inverse())
         if answer is None:
             return None, False
         q: Array = start.copy()
@@ -106,91 +108,83 @@ def _joints(problem: Problem) -> list[Any]:
     return [model.joints[joint] for joint in list(model.supports[_goal(problem).residual.place.joint])[1:]]
 
 
-class _OptikChain(Chain):
-    def __init__(self, model: pin.Model, frame: int) -> None:
-        import optik
-
-        super().__init__(model, frame)
-        with self.written(model) as (path, first, last):
-            self._robot = optik.Robot.from_urdf_file(str(path), first, last)
-        self._robot.set_parallelism(1)
-
-    def values(self, start: Array, target: pin.SE3, tolerance: float) -> Any:
-        import optik
-
-        # optik bounds the squared error, here of the frame itself; its restarts end after 1 s.
-        settings = optik.SolverConfig(solution_mode="speed", max_time=1.0, tol_f=(0.5 * tolerance) ** 2)
-        answer: Any = self._robot.ik(settings, (target * self.end).homogeneous, start, self.end.homogeneous)
-        return None if answer is None else answer[0]
-
-
 class Optik(OneChain):
     """optik: random restarts of a bounded quasi-Newton method (SLSQP) on the error of the frame."""
 
     name = "optik"
-    chain = _OptikChain
     way = "by its restarts"
     failure = "optik found no posture in its time"
 
+    def build(self, problem: Problem) -> Chain:
+        """Make the chain and the robot."""
+        import optik
 
-class _TracikChain(Chain):
-    def __init__(self, model: pin.Model, frame: int) -> None:
-        super().__init__(model, frame)
-        self._solver: Any = None
-        self._asked, self._model = 0.0, model
+        chain = super().build(problem)
+        with chain.written() as (path, first, last):
+            chain.solver = optik.Robot.from_urdf_file(str(path), first, last)
+        chain.solver.set_parallelism(1)
+        return chain
 
-    def values(self, start: Array, target: pin.SE3, tolerance: float) -> Any:
-        if tolerance != self._asked:  # which it takes when it is made
-            from trac_ik import TracIK
+    def values(self, chain: Chain, start: Array, target: pin.SE3) -> Any:
+        """As `OneChain` says."""
+        import optik
 
-            with self.written(self._model) as (path, first, last):
-                self._solver = TracIK(first, last, str(path), timeout=0.05, epsilon=0.3 * tolerance)
-            self._asked = tolerance
-        return self._solver.ik(target.translation, target.rotation, start)
+        # optik bounds the squared error, here of the frame itself; its restarts end after 1 s.
+        settings = optik.SolverConfig(solution_mode="speed", max_time=1.0, tol_f=(0.5 * self.tolerance) ** 2)
+        answer: Any = chain.solver.ik(settings, (target * chain.end).homogeneous, start, chain.end.homogeneous)
+        return None if answer is None else answer[0]
 
 
 class Tracik(OneChain):
     """TRAC-IK: Newton's method with restarts and a quadratic program on the frame's error, beside each other."""
 
     name = "tracik"
-    chain = _TracikChain
     way = "by its restarts"
     failure = "TRAC-IK found no posture in its time"
 
+    def values(self, chain: Chain, start: Array, target: pin.SE3) -> Any:
+        """As `OneChain` says."""
+        if chain.solver is None:
+            from trac_ik import TracIK
 
-class _EaikChain(Chain):
-    def __init__(self, model: pin.Model, frame: int) -> None:
-        from eaik.IK_HP import HPRobot
-
-        super().__init__(model, frame)
-        data = model.createData()
-        pin.computeJointJacobians(model, data, pin.neutral(model))
-        places = [data.oMi[joint] for joint in self.joints]
-        axes = np.array([data.J[3:, model.joints[joint].idx_v] for joint in self.joints])
-        points = np.array([np.zeros(3), *(place.translation for place in places), places[-1].translation])
-        self._robot, self._turned = HPRobot(axes, np.diff(points, axis=0)), places[-1].rotation
-        self._lower, self._upper = (
-            limit[self.places] for limit in (model.lowerPositionLimit, model.upperPositionLimit)
-        )
-
-    def values(self, start: Array, target: pin.SE3, tolerance: float) -> Any:
-        found = self._robot.IK(pin.SE3(target.rotation @ self._turned.T, target.translation).homogeneous)
-        turn = 2.0 * np.pi
-        exact = np.atleast_2d(found.Q)[~np.asarray(found.is_LS, dtype=bool)]
-        near = exact + turn * np.round((start - exact) / turn)
-        near -= turn * np.ceil((near - self._upper) / turn).clip(0.0)
-        near += turn * np.ceil((self._lower - near) / turn).clip(0.0)
-        near = near[(near <= self._upper).all(axis=1)]
-        return near[((near - start) ** 2).sum(axis=1).argmin()] if len(near) else None
+            with chain.written() as (path, first, last):
+                chain.solver = TracIK(first, last, str(path), timeout=0.05, epsilon=0.3 * self.tolerance)
+        return chain.solver.ik(target.translation, target.rotation, start)
 
 
 class Eaik(OneChain):
     """EAIK: all branches of arms of six turning joints in closed form, of which the nearest within limits is taken."""
 
     name = "eaik"
-    chain = _EaikChain
     way = "in closed form"
     failure = "EAIK found no branch within limits"
+
+    def build(self, problem: Problem) -> Chain:
+        """Make the chain, and its axes where it is at zero."""
+        from eaik.IK_HP import HPRobot
+
+        chain = super().build(problem)
+        model, data = chain.model, chain.model.createData()
+        pin.computeJointJacobians(model, data, pin.neutral(model))
+        places = [data.oMi[joint] for joint in chain.joints]
+        axes = np.array([data.J[3:, model.joints[joint].idx_v] for joint in chain.joints])
+        points = np.array([np.zeros(3), *(place.translation for place in places), places[-1].translation])
+        chain.solver = HPRobot(axes, np.diff(points, axis=0)), places[-1].rotation
+        return chain
+
+    def values(self, chain: Chain, start: Array, target: pin.SE3) -> Any:
+        """As `OneChain` says."""
+        robot, turned = chain.solver
+        found, turn = robot.IK(pin.SE3(target.rotation @ turned.T, target.translation).homogeneous), 2.0 * np.pi
+        lower, upper = (
+            limit[chain.places] for limit in (chain.model.lowerPositionLimit, chain.model.upperPositionLimit)
+        )
+        exact = np.atleast_2d(found.Q)[~np.asarray(found.is_LS, dtype=bool)]
+        near = exact + turn * np.round((start - exact) / turn)
+        near -= turn * np.ceil((near - upper) / turn).clip(0.0)
+        near += turn * np.ceil((lower - near) / turn).clip(0.0)
+        near = near[(near <= upper).all(axis=1)]
+        return near[((near - start) ** 2).sum(axis=1).argmin()] if len(near) else None
 
     def unsupported(self, problem: Problem) -> list[str]:
         """Names of what EAIK cannot express."""

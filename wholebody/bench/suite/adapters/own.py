@@ -16,11 +16,7 @@ from wholebody.bench.measure.track import SETTING, Track
 from wholebody.bench.suite.adapters.base import FEASIBILITY_ONLY, LADDER, Adapter, Tool, few, made
 from wholebody.figures.state import State, Wrench
 from wholebody.methods.base import Method
-from wholebody.methods.qp.active_set import guess_active_set
 from wholebody.methods.qp.method import QP
-from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
-from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver
 from wholebody.methods.qp.step_program import QPStep
 from wholebody.tasks.base import Goal, Surroundings, filled
 from wholebody.tasks.residuals import point_rows
@@ -47,7 +43,6 @@ def qp_adapter(solver: str) -> Adapter:
     return Adapter(
         name=f"qp/{solver}" if solver else "qp",
         make=partial(_qp, settings),
-        hindered=partial(UnfinishedQP, **settings),
         loose=(*((tolerance, FEASIBILITY_ONLY) for tolerance in exact), *LADDER[1:]),
     )
 
@@ -64,16 +59,13 @@ def one_start(family: str) -> Adapter:
         adapter,
         name=f"{family}/one_start",
         make=partial(made, kind, {}),
-        hindered=partial(kind, iterations=1),
         loose=tuple(level for level in adapter.loose if level[1] != FEASIBILITY_ONLY),
     )
 
 
 def ccd_adapter() -> Adapter:
     """Cyclic coordinate descent."""
-    kind = wb.methods.CCD
-    make, hindered = partial(made, kind, {"restarts": 0}), partial(kind, iterations=1)
-    return Adapter("ccd", make, (*few(2, 5, 20), *LADDER[:8]), hindered=hindered)
+    return Adapter("ccd", partial(made, wb.methods.CCD, {"restarts": 0}), (*few(2, 5, 20), *LADDER[:8]))
 
 
 def dls_adapter() -> Adapter:
@@ -83,40 +75,14 @@ def dls_adapter() -> Adapter:
 
 def newton_adapter(way: str) -> Adapter:
     """Sparse Newton in full coordinates, in one of the ways of `NEWTONS`."""
-    kind = partial(wb.Newton, **NEWTONS[way])
-    make, hindered = partial(made, kind, {"restarts": 0}), partial(kind, iterations=1)
-    return Adapter(f"newton/{way}", make, (*few(3, 6, 12, 25), *LADDER[1:]), hindered=hindered)
+    make = partial(made, partial(wb.Newton, **NEWTONS[way]), {"restarts": 0})
+    return Adapter(f"newton/{way}", make, (*few(3, 6, 12, 25), *LADDER[1:]))
 
 
 def _qp(settings: dict[str, Any], tolerance: float, iterations: int | None) -> Method:
     if iterations is None or iterations == FEASIBILITY_ONLY:
         return QP(**settings, tolerance=tolerance, measures=iterations is None)
     return QP(**settings, tolerance=tolerance, iterations=iterations, budget=0, restarts=0)
-
-
-class Unfinished(OSQPSolver):
-    """OSQP that is stopped early, without the active sets and the fallback that make its answers exact."""
-
-    name = "osqp, unfinished"
-
-    def solve(self, program: QuadraticProgram) -> QPSolution:
-        """Minimise, not quite."""
-        return self.solve_cold(program)
-
-    def solve_cold(self, program: QuadraticProgram) -> QPSolution:
-        """What some iterations lead to, inside the box of the program."""
-        workspace = self.workspace(program)
-        used = workspace.run(5)  # OSQP takes 25 to some hundreds for programs of a reach
-        x = workspace.x().clip(program.lower, program.upper)
-        return QPSolution(x, guess_active_set(program, x, 1e-4), False, used, self.name)
-
-
-class UnfinishedQP(QP):
-    """The QP method with such a solver."""
-
-    def _qp_solver(self) -> QPSolver:
-        """One that never finishes."""
-        return Unfinished()
 
 
 class MovingPoint(Goal):

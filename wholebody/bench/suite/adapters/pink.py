@@ -12,8 +12,7 @@ import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.bench.measure.track import SETTING, Track
 from wholebody.bench.suite.adapters.base import FEASIBILITY_ONLY
-from wholebody.bench.suite.adapters.loop import Loop, Stepper, kept_apart, longest_moves, size
-from wholebody.bench.suite.adapters.tasks import TaskStepper, TaskTool
+from wholebody.bench.suite.adapters.loop import Loop, Stepper, TaskStepper, TaskTool, kept_apart, longest_moves, size
 from wholebody.problem import Problem
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.residuals import PlacementResidual

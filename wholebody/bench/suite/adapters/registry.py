@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from wholebody.base.arrays import with_values
 from wholebody.base.errors import MissingPackageError, UnknownNameError
-from wholebody.base.files import parsed_toml
+from wholebody.base.files import packaged_toml
 from wholebody.bench.measure.track import Track
 from wholebody.bench.suite.adapters.base import LADDER, Adapter, Outside, Tool, made
 from wholebody.bench.suite.adapters.own import NEWTONS, ccd_adapter, dls_adapter, newton_adapter, one_start, qp_adapter
@@ -89,7 +89,6 @@ def missing() -> Mapping[str, str]:
 
 
 def _rows() -> dict[str, _Row]:
-    """All methods, in the order of reports."""
     rows = {f"qp/{solver}".removesuffix("/"): _Row(partial(qp_adapter, solver))
             for solver in ("", "active_set", "osqp", "daqp")}  # fmt: skip
     for solver, need in _texts()["solvers"].items():
@@ -104,7 +103,7 @@ def _rows() -> dict[str, _Row]:
     rows = {name: with_values(row, build=partial(_described, name, row.build)) for name, row in rows.items()}
     for family in ("qp", "newton", "ccd", "dls", "placo", "mink", "pink", "drake"):
         row = rows[f"{family}/{ONE}" if f"{family}/{ONE}" in rows else family]
-        rows[f"{family}/{STARTS}"] = with_values(row, build=partial(_restarted, row.build))
+        rows[f"{family}/{STARTS}"] = with_values(row, build=lambda build=row.build: restarted(build()))
     return rows
 
 
@@ -141,14 +140,8 @@ def _described(name: str, build: Callable[[], Adapter]) -> Adapter:
     return replace(build(), setup=setup, differences=tuple(said.get("differences", ())))
 
 
-def _restarted(build: Callable[[], Adapter]) -> Adapter:
-    return restarted(build())
-
-
-@cache
 def _texts() -> dict[str, Any]:
-    file = Path(__file__).with_name("adapters.toml")
-    return parsed_toml(file.read_text("utf-8"), file.name)
+    return packaged_toml(Path(__file__).with_name("adapters.toml"))
 
 
 @cache

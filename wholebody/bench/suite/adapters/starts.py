@@ -9,7 +9,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
 from itertools import count
 from typing import Any
 
@@ -88,7 +87,7 @@ def restarted(adapter: Adapter) -> Adapter:
     return replace(
         adapter,
         name=f"{family}/{STARTS}",
-        make=partial(_make, adapter),
+        make=lambda tolerance, iterations: Restarted(adapter.make(tolerance, iterations), adapter.prepare),
         loose=(),
         prepare=Restarted.prepare,
         setup=adapter.setup.replace("; one start,", "; from each start").removesuffix(".")
@@ -96,10 +95,6 @@ def restarted(adapter: Adapter) -> Adapter:
         + "Further starts within 1.5 s of processor time where there is no answer: joints moved at random "
         "within their limits, the root and what holds it excepted, free of overlap.",
     )
-
-
-def _make(adapter: Adapter, tolerance: float, iterations: int | None) -> Restarted:
-    return Restarted(adapter.make(tolerance, iterations), adapter.prepare)
 
 
 def starts(problem: Problem) -> Iterator[Array]:

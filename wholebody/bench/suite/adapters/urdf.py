@@ -126,20 +126,15 @@ def _geom(piece: Any, body: ElementTree.Element, assets: ElementTree.Element) ->
         ElementTree.SubElement(assets, "mesh", name=piece.name, vertex=exact(points.ravel()))
         attributes |= {"type": "mesh", "mesh": piece.name}
     elif kind == "half-space":
-        attributes |= {"type": "plane", "size": "0 0 1"} | _place(piece.placement * _surface(shape))
+        normal = np.array(shape.n)  # of the surface n . x = d
+        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal).matrix()
+        attributes |= {"type": "plane", "size": "0 0 1"} | _place(piece.placement * pin.SE3(turn, shape.d * normal))
     else:
         raise InputError(
             f"{piece.name!r} is a {type(shape).__name__}; MJCF is written for spheres, capsules, boxes, hulls and "
             "half-spaces"
         )
     ElementTree.SubElement(body, "geom", attributes)
-
-
-def _surface(shape: Any) -> Any:
-    """Placement of the surface of a half-space n . x <= d: z along n, the origin at d n."""
-    normal = np.array(shape.n)
-    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal)
-    return pin.SE3(turn.matrix(), shape.d * normal)
 
 
 def _place(placement: Any) -> dict[str, str]:

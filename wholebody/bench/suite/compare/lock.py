@@ -15,13 +15,12 @@ from typing import Any, NamedTuple
 
 from wholebody.base.errors import FileFormatError, InputError
 from wholebody.base.files import read_text
-from wholebody.bench.report import spanned, words
 from wholebody.bench.statistics import LEAST, Interval, median
 from wholebody.bench.suite.adapters.registry import adapters
-from wholebody.bench.suite.compare.settings import Settings
+from wholebody.bench.suite.compare.run import Settings
 from wholebody.bench.suite.compare.summary import Material, kernel_of
 from wholebody.bench.suite.problem_sets.registry import problem_set
-from wholebody.bench.tables import write_text
+from wholebody.bench.tables import spanned, words, write_text
 
 NAME = "lock.json"
 HEAD = {"format": "wholebody comparison", "version": "1.0"}

@@ -11,15 +11,27 @@ import numpy as np
 
 from wholebody.bench import plot_style
 from wholebody.bench.plot_style import MOST, method_style
-from wholebody.bench.report import page, render
 from wholebody.bench.rows import Panel, chart
-from wholebody.bench.suite.compare.advice import OURS, Standing, advice, choices, named, reference, standings
 from wholebody.bench.suite.compare.lock import NAME as LOCK
 from wholebody.bench.suite.compare.lock import locked, write_lock
 from wholebody.bench.suite.compare.results import COARSE, DEFAULT, FLOOR, Quantity, Results, Store, middle
-from wholebody.bench.suite.compare.settings import Settings
-from wholebody.bench.suite.compare.summary import GOOD, Material, Summary, kernel_of, left_out, material
-from wholebody.bench.tables import publish_text, write_rows, write_text
+from wholebody.bench.suite.compare.run import Settings
+from wholebody.bench.suite.compare.summary import (
+    GOOD,
+    OURS,
+    Material,
+    Standing,
+    Summary,
+    advice,
+    choices,
+    kernel_of,
+    left_out,
+    material,
+    named,
+    reference,
+    standings,
+)
+from wholebody.bench.tables import page, publish_text, render, write_rows, write_text
 
 
 def curve(results: Results, family: str, adapter: str, quantity: Quantity) -> tuple[list[float], list[float]]:

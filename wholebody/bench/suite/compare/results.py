@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.base.errors import FileFormatError, InputError
+from wholebody.base.errors import FileFormatError, InputError, one_line
 from wholebody.bench.suite.adapters.base import Budget
 
 DEFAULT: Budget = (1e-4, None)
@@ -262,26 +262,18 @@ class Store:
             raise FileFormatError(f"{self.path}: it was cut off before its first line; remove it and run again")
         try:
             found, *chunks = [json.loads(line) for line in lines]
-            self.chunks = [_chunk(value) for value in chunks]
+            for value in chunks:
+                records = tuple(Record(**each) for each in value.pop("records"))
+                self.chunks.append(Chunk(records=records, **value))
         except (ValueError, TypeError, KeyError) as error:
             raise FileFormatError(f"{self.path}: not a file of this command ({error}); give another --out") from None
         if found != wanted:
             name = next(key for key in {**wanted, **found} if found.get(key) != wanted.get(key))
             raise InputError(
-                f"{self.path.parent} holds a run with {name} = {_short(found.get(name))}, "
-                f"and {_short(wanted.get(name))} is asked for; give another --out, or the settings "
+                f"{self.path.parent} holds a run with {name} = {one_line(str(found.get(name)), 80)}, "
+                f"and {one_line(str(wanted.get(name)), 80)} is asked for; give another --out, or the settings "
                 "of that run to go on with it"
             )
         if len(whole) < len(data):
             with self.path.open("r+b") as file:
                 file.truncate(len(whole))
-
-
-def _chunk(value: dict[str, Any]) -> Chunk:
-    records = tuple(Record(**inner) for inner in value.pop("records"))
-    return Chunk(records=records, **value)
-
-
-def _short(value: Any) -> str:
-    text = str(value)
-    return text if len(text) <= 80 else text[:77] + "..."

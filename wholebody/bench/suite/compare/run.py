@@ -1,4 +1,4 @@
-"""The whole comparison: which case next, by whom, what is kept, and how long it will take.
+"""What a comparison is asked to do, and its course: which case next, by whom, what is kept, and how long it will take.
 
 Every method has the same share of the time in every set. What a fast one leaves over goes to the others: min(cost,
 share) summed over all is the time there is. Of its share a method spends half at the default budget and half on the
@@ -9,18 +9,98 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.base.batches import spread
-from wholebody.base.errors import WholebodyError
-from wholebody.bench.suite.adapters.base import Adapter
-from wholebody.bench.suite.compare.jobs import Task, work
-from wholebody.bench.suite.compare.results import Chunk, Store
-from wholebody.bench.suite.compare.settings import Settings, seed_of
+from wholebody.base.errors import InputError, WholebodyError
+from wholebody.base.fields import Checked, Range
+from wholebody.bench.suite.adapters.base import FEASIBILITY_ONLY, Adapter, Budget
+from wholebody.bench.suite.compare.results import DEFAULT, Chunk, Store
+from wholebody.bench.suite.compare.solving import Task, work
+from wholebody.bench.suite.problem_sets.case import ProblemSet
+from wholebody.version import __version__
+
+SEEDS = 3  # from which the cases of a set are made in turn
+MOST = 1 << 31
+
+
+@dataclass(frozen=True)
+class Settings(Checked):
+    """What is compared, and how much of it.
+
+    `cases` of every set at the default budget, of which the first `sweep` at `levels` others too; problems are made
+    from `SEEDS` seeds in turn, from `seed` on; a solve is ended after `cap` seconds of the processor; all solving takes
+    `minutes`.
+    """
+
+    sets: tuple[ProblemSet, ...]
+    adapters: tuple[Adapter, ...]
+    cases: Annotated[int, Range(1, MOST, whole=True)] = 200
+    sweep: Annotated[int, Range(0, MOST, whole=True)] = 40
+    levels: Annotated[int, Range(1, MOST, whole=True)] = 6
+    seed: Annotated[int, Range(0, MOST, whole=True)] = 0
+    cap: Annotated[float, Range(1e-3, 1e6, "s")] = 20.0
+    minutes: Annotated[float, Range(1e-3, 1e6)] = 25.0
+
+    def __post_init__(self) -> None:
+        """Check the numbers; InputError for one that makes no sense, and for no set or method."""
+        super().__post_init__()
+        if not self.sets or not self.adapters:
+            raise InputError("a comparison needs a problem set and a method; name at least one of each")
+
+    def described(self) -> dict[str, Any]:
+        """What a folder's run must agree in to be gone on with."""
+        return {
+            "wholebody": __version__,
+            "sets": [family.name for family in self.sets],
+            "methods": [adapter.name for adapter in self.adapters],
+            "cases": self.cases,
+            "sweep": self.sweep,
+            "levels": {adapter.name: [list(level) for level in self.ladder(adapter)] for adapter in self.adapters},
+            "seeds": [seed_of(self.seed, number) for number in range(SEEDS)],
+            "cap": self.cap,
+            "minutes": self.minutes,
+        }
+
+    def asked(self, family: ProblemSet) -> tuple[int, int]:
+        """Cases of a set at the default budget, and at all budgets: fewer of these where goals move."""
+        # A case whose goals move is hundreds of solves at every budget.
+        return self.cases, self.sweep // 4 if family.moving else self.sweep
+
+    def ladder(self, adapter: Adapter, moving: bool = False) -> list[Budget]:
+        """Budgets beside the default one, from cheap to exact, evenly chosen where there are more than `levels`."""
+        unused = FEASIBILITY_ONLY if moving else 0
+        listed = [level for level in adapter.loose if level != DEFAULT and level[1] != unused]
+        # A case whose goals move is hundreds of solves.
+        most = min(self.levels, 3) if moving else self.levels
+        if len(listed) <= most:
+            return listed
+        first = [level for level in listed if level[1] == FEASIBILITY_ONLY]
+        others = [level for level in listed if level[1] != FEASIBILITY_ONLY]
+        share = round(most * len(first) / len(listed))
+        return [*_evenly(first, share), *_evenly(others, most - share)]
+
+
+def _evenly(listed: list[Budget], most: int) -> list[Budget]:
+    """So many of them, the first and the last among them; the first where it is one."""
+    if len(listed) <= most:
+        return listed
+    return [listed[round(place * (len(listed) - 1) / max(most - 1, 1))] for place in range(most)]
+
+
+def seed_of(seed: int, number: int) -> int:
+    """Seed of a case: every set is made from `SEEDS` seeds in turn, so that what depends on one of them shows."""
+    return seed + number % SEEDS
+
+
+QUICK: dict[str, Any] = {"cases": 20, "sweep": 6, "levels": 5, "cap": 5.0, "minutes": 2.0}
+"""A short comparison, within three minutes on two cores."""
+
 
 FIRST = 4  # cases after which it is known what building one takes
 
@@ -36,30 +116,23 @@ class Plan:
     """Keeps count of what things cost, and says who may go on."""
 
     def __init__(self, settings: Settings, jobs: int) -> None:
-        self._settings = settings
         self._total = 60.0 * settings.minutes * jobs
-        self._keys = [(family.name, adapter.name) for family in settings.sets for adapter in settings.adapters]
-        self._place = {key: place for place, key in enumerate(self._keys)}
-        count = len(self._keys)
-        self._spent, self._cases = np.zeros(count), np.zeros(count)
-        self._swept, self._sweeps = np.zeros(count), np.zeros(count)
-        self._levels = np.array(
-            [len(settings.ladder(adapter, family.moving)) for family in settings.sets for adapter in settings.adapters]
-        )
+        self._levels = {
+            (family.name, adapter.name): len(settings.ladder(adapter, family.moving))
+            for family in settings.sets
+            for adapter in settings.adapters
+        }
+        self._spent: dict[tuple[str, str], list[float]] = {key: [] for key in self._levels}
+        self._swept: dict[tuple[str, str], list[float]] = {key: [] for key in self._levels}
         self._asked = {family.name: settings.asked(family) for family in settings.sets}
         self._building: dict[str, list[float]] = {family.name: [] for family in settings.sets}
 
     def note(self, chunk: Chunk) -> None:
         """Take a finished chunk into account."""
         self._building[chunk.set].append(chunk.building)
-        for adapter, seconds in chunk.spent.items():
-            place = self._place[chunk.set, adapter]
-            self._spent[place] += seconds
-            self._cases[place] += 1
-        for adapter, seconds in chunk.swept.items():
-            place = self._place[chunk.set, adapter]
-            self._swept[place] += seconds
-            self._sweeps[place] += 1
+        for known, taken in ((self._spent, chunk.spent), (self._swept, chunk.swept)):
+            for adapter, seconds in taken.items():
+                known[chunk.set, adapter].append(seconds)
 
     def cases(self, family: str) -> int:
         """How many cases of a set there is time to build."""
@@ -78,29 +151,30 @@ class Plan:
 
     def allowed(self) -> dict[tuple[str, str], Allowed]:
         """Cases of every method in every set, by what is known of the costs now."""
-        one, sweep = self._costs()
-        built = sum(self.cases(name) * self._built(name) for name in self._building)
-        most = np.array([self.cases(family) for family, _ in self._keys], dtype=float)
-        swept = np.array([self._asked[family][1] for family, _ in self._keys], dtype=float)
-        cases, sweeps = share_out(one, sweep, most, np.minimum(most, swept), self._total - built)
-        return {key: Allowed(int(cases[place]), int(sweeps[place])) for key, place in self._place.items()}
+        one, sweep, built = self._costs()
+        most = np.array([self.cases(family) for family, _ in self._levels], dtype=float)
+        swept = np.array([self._asked[family][1] for family, _ in self._levels], dtype=float)
+        counts = share_out(one, sweep, most, np.minimum(most, swept), self._total - built)
+        return {key: Allowed(int(cases), int(sweeps)) for key, cases, sweeps in zip(self._levels, *counts, strict=True)}
 
     @property
     def share(self) -> float:
         """Seconds of a method in a set, if all had the same."""
-        return self._total / len(self._keys)
+        return self._total / len(self._levels)
 
     def seconds(self, allowed: dict[tuple[str, str], Allowed]) -> float:
         """What all cases that are allowed will have taken."""
-        one, sweep = self._costs()
-        counts = np.array([allowed[key] for key in self._keys], dtype=float)
-        built = sum(self.cases(name) * self._built(name) for name in self._building)
+        one, sweep, built = self._costs()
+        counts = np.array([allowed[key] for key in self._levels], dtype=float)
         return float(one @ counts[:, 0] + sweep @ counts[:, 1]) + built
 
-    def _costs(self) -> tuple[Array, Array]:
-        one = self._spent / np.maximum(self._cases, 1.0)
-        known = self._swept / np.maximum(self._sweeps, 1.0)
-        return one, np.where(self._sweeps > 0, known, one * self._levels)  # as long at every budget, until it is known
+    def _costs(self) -> tuple[Array, Array, float]:
+        """Seconds of a case (n,) and of a sweep (n,) of each method in each set, and to build all cases."""
+        one = {key: float(np.mean(self._spent[key] or [0.0])) for key in self._levels}
+        # as long at every budget, until it is known
+        sweep = [float(np.mean(self._swept[key] or [one[key] * levels])) for key, levels in self._levels.items()]
+        built = sum(self.cases(name) * self._built(name) for name in self._building)
+        return np.array(list(one.values())), np.array(sweep), built
 
 
 def share_out(one: Array, sweep: Array, most: Array, most_swept: Array, total: float) -> tuple[Array, Array]:
@@ -147,7 +221,7 @@ def run(
     for chunk in store.chunks:
         plan.note(chunk)
     began = time.perf_counter()
-    before = sum(_seconds(chunk) for chunk in store.chunks)
+    before = sum(each.building + sum(each.spent.values()) + sum(each.swept.values()) for each in store.chunks)
     done = {(chunk.set, chunk.number) for chunk in store.chunks}
     end = began + 60.0 * settings.minutes - before / jobs
     for chunk in spread(work, _tasks(settings, plan, done, end), jobs, cluster):
@@ -184,10 +258,6 @@ def turned(adapters: tuple[Adapter, ...], number: int) -> tuple[Adapter, ...]:
     # The order is turned by five methods from case to case, so that a family does not stay together.
     first = 5 * number % len(adapters)
     return adapters[first:] + adapters[:first]
-
-
-def _seconds(chunk: Chunk) -> float:
-    return chunk.building + sum(chunk.spent.values()) + sum(chunk.swept.values())
 
 
 def _check_built(store: Store) -> None:

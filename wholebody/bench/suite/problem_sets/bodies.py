@@ -49,8 +49,8 @@ def floor_scene(figure: wb.Figure) -> wb.Scene:
 def is_free(scene: wb.Scene, q: Array, room: float = ROOM) -> bool:
     """Whether nothing but the soles on the floor is nearer than `room`, metres, in the posture q, shape (nq,)."""
     owners = scene.piece_owner
-    soles = {frozenset(("floor", name)) for name in (*FEET, "left_toes", "right_toes")}
-    return all(frozenset((owners[a], owners[b])) in soles for a, b in scene.contacts(q, within=room).pair)
+    near = [(owners[a], owners[b]) for a, b in scene.contacts(q, within=room).pair]
+    return all(other == "floor" and name.endswith(("_foot", "_toes")) for name, other in near)
 
 
 def sampled_posture(figure: wb.Figure, start: Array, rng: np.random.Generator) -> Array:
@@ -103,8 +103,8 @@ def movable(figure: wb.Figure) -> NDArray[np.intp]:
 def standing_problem(
     scene: wb.Scene, start: Array, goals: Sequence[wb.Goal], *constraints: wb.Constraint
 ) -> wb.Problem:
-    """What a person keeps: both feet stay where they are at the start (nq,), and all pairs `CLEARANCE` apart."""
-    feet = [wb.Hold(foot) for foot in FEET]
+    """What people keep: their feet stay where they are at the start (nq,), and all pairs `CLEARANCE` apart."""
+    feet = [wb.Hold(name) for name in sorted(scene.figure.segments) if name.endswith(FEET)]
     return wb.Problem(
         scene, start, goals=goals, constraints=[*constraints, *feet], clearance=CLEARANCE,
         range_of_motion=False, balance=False,
@@ -148,7 +148,7 @@ class Held(wb.Goal):
         return self.hold.jacobian(state)
 
 
-def held(problem: wb.Problem) -> list[wb.Goal]:
+def held(problem: wb.Problem) -> list[Held]:
     """The holds of a problem as equalities."""
     return [Held(term) for term in problem.constraints if isinstance(term, wb.Hold)]
 

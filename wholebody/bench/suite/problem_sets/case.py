@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.base.files import parsed_toml
+from wholebody.base.files import packaged_toml
 from wholebody.problem import Problem
 from wholebody.tasks.base import Goal
 
@@ -55,15 +55,10 @@ class ProblemSet:
         return Case(self.name, number, *self.pose(number, generator(self.name, number, seed)))
 
 
+@cache
 def numbers(name: str) -> Any:
     """What `sets.toml` says of a set, as attributes."""
-    return _data()[name]
-
-
-@cache
-def _data() -> dict[str, Any]:
-    file = Path(__file__).with_name("sets.toml")
-    return {name: _attributes(values) for name, values in parsed_toml(file.read_text("utf-8"), file.name).items()}
+    return _attributes(packaged_toml(Path(__file__).with_name("sets.toml"))[name])
 
 
 def _attributes(value: Any) -> Any:

@@ -16,8 +16,8 @@ import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.bench.suite.problem_sets.bodies import alone, bent, fitted, is_free, movable, until_found
 from wholebody.bench.suite.problem_sets.case import numbers
-from wholebody.bench.suite.problem_sets.things import coal_distance, just_outside, placed
-from wholebody.figures.postures import lowest, support
+from wholebody.bench.suite.problem_sets.things import coal_distance, just_outside
+from wholebody.figures.postures import lowest, placed, support
 
 given = numbers("drivers")
 

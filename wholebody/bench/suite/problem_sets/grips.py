@@ -18,7 +18,8 @@ import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.bench.suite.problem_sets import bodies
 from wholebody.bench.suite.problem_sets.case import numbers
-from wholebody.bench.suite.problem_sets.things import coal_distance, just_outside, placed
+from wholebody.bench.suite.problem_sets.things import coal_distance, just_outside
+from wholebody.figures.postures import placed
 from wholebody.tasks.grasp import FINGERS
 
 given = numbers("hands")

@@ -119,7 +119,6 @@ def _on_arm(hand: str, along: tuple[float, float], around: tuple[float, float], 
 
 
 def _on_hip(hand: str, rng: np.random.Generator) -> Touch:
-    """A place on the side of the pelvis."""
     out = 1.0 if hand == "left" else -1.0
     normal = np.array((rng.uniform(-0.3, 0.6), out, rng.uniform(-0.1, 0.3)))
     axis = np.array((0.0, 0.05 * out, 0.03))
@@ -157,6 +156,5 @@ def _gap(scene: wb.Scene, q: Array, touch: Touch) -> float:
 def _goal(figure: wb.Figure, q: Array, touch: Touch, turned: bool) -> wb.Relative:
     """The palm where it is in the posture q, as seen from the segment."""
     palm = f"{touch.hand}_palm"
-    state = bodies.alone(figure).state(q)
-    base, hand = (pin.SE3(state.frame(figure.frame_id(name))) for name in (touch.segment, palm))
-    return wb.Relative(palm, touch.segment, base.actInv(hand), orientation=turned)
+    there = figure.placement(q, touch.segment).actInv(figure.placement(q, palm))
+    return wb.Relative(palm, touch.segment, there, orientation=turned)

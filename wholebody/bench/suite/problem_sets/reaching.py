@@ -12,7 +12,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.bench.suite.problem_sets import bodies
 from wholebody.bench.suite.problem_sets.case import Posed, numbers
-from wholebody.bench.suite.problem_sets.things import Occupied, add_things
+from wholebody.bench.suite.problem_sets.things import Make, Occupied, add_things, household_thing
 
 
 def free(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
@@ -39,15 +39,17 @@ def several(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
 
 def among(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """A reach among things that touch neither how the person stands nor the witness."""
-    return reach_among(bodies.human(), bodies.TIPS[number % len(bodies.TIPS)], rng)
+    return reach_among("clutter", bodies.human(), bodies.TIPS[number % len(bodies.TIPS)], rng)
 
 
-def reach_among(figure: wb.Figure, tip: str, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
-    """A problem with twenty random things, and a posture (nq,) that solves it."""
+def reach_among(
+    family: str, figure: wb.Figure, tip: str, rng: np.random.Generator, make: Make = household_thing
+) -> tuple[wb.Problem, Array]:
+    """A problem with random things, as many as `sets.toml` says of a set, and a posture (nq,) that solves it."""
     start = figure.posture("standing")
     witness = bodies.sampled_posture(figure, start, rng)
     scene = bodies.floor_scene(figure)
-    add_things(scene, numbers("clutter").things, Occupied(figure, (start, witness)), bodies.ROOM, rng)
+    add_things(scene, numbers(family).things, Occupied(figure, (start, witness)), bodies.ROOM, rng, make=make)
     return bodies.standing_problem(scene, start, [bodies.point(figure, witness, tip)]), witness
 
 
@@ -89,19 +91,12 @@ def person(number: int) -> wb.Figure:
 def people(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """The reach among twenty things, by other people."""
     count = numbers("other_people").people
-    return reach_among(person(number % count), bodies.TIPS[number // count % 2], rng)
+    return reach_among("clutter", person(number % count), bodies.TIPS[number // count % 2], rng)
 
 
 def clutter(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """A reach among more and other things."""
-    figure = bodies.human()
-    start = figure.posture("standing")
-    witness = bodies.sampled_posture(figure, start, rng)
-    scene = bodies.floor_scene(figure)
-    add_things(
-        scene, numbers("other_clutter").things, Occupied(figure, (start, witness)), bodies.ROOM, rng, make=_other_thing
-    )
-    return bodies.standing_problem(scene, start, [bodies.point(figure, witness, bodies.TIPS[number % 2])]), witness
+    return reach_among("other_clutter", bodies.human(), bodies.TIPS[number % 2], rng, _other_thing)
 
 
 def _other_thing(number: int, rng: np.random.Generator) -> tuple[str, wb.Shape]:

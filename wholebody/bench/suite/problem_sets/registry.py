@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from wholebody.base.errors import InputError, UnknownNameError
-from wholebody.bench.suite.problem_sets import drivers, grips, hands, pairs, reaching, robots
+from wholebody.bench.suite.problem_sets import drivers, grips, hands, reaching, robots
 from wholebody.bench.suite.problem_sets.case import Pose, ProblemSet, numbers
 
 
@@ -43,7 +43,7 @@ NAMED = _sets(
         "robots": robots.described,
         "drivers": drivers.posed,
         "hands": grips.posed,
-        "two_figures": pairs.posed,
+        "two_figures": robots.two_figures,
     }
 )
 """Sets that take part where they are named: distributions that nothing was tuned on, of which the robots need files

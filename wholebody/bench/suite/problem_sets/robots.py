@@ -1,4 +1,4 @@
-"""Robots, their tools to places among things: arms of random and of known lengths, and robots as they come.
+"""Robots, their tools to places among things: arms of random and known lengths, robots as they come, two figures.
 
 Robots as they come are six arms and six humanoids of public descriptions. These are not a part of this package: the
 environment variable `WHOLEBODY_ROBOTS` names the folder of the wheel example-robot-data, or one that holds it.
@@ -18,9 +18,11 @@ import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.base.files import Scratch
+from wholebody.bench.suite.problem_sets import bodies
 from wholebody.bench.suite.problem_sets.bodies import CLEARANCE, ROOM, alone, fitted, floor_scene, is_free, until_found
 from wholebody.bench.suite.problem_sets.case import numbers
 from wholebody.bench.suite.problem_sets.things import Occupied, add_things
+from wholebody.bench.tables import render
 from wholebody.figures.self_pairs import random_postures
 
 of_arm = numbers("robot_arm")
@@ -182,39 +184,28 @@ def _urdf(name: str, axes: list[Axis], tool: tuple[float, ...], ends_m: list[flo
     """The file: every link is a cylinder from its joint to the next one."""
     ends = [axis.at for axis in axes] + [tool]
     radii = np.linspace(ends_m[0], ends_m[-1], len(ends))
-    lines = [f'<robot name="{name}">']
-    lines += [_link(f"link{number}", end, float(radii[number])) for number, end in enumerate(ends)]
-    lines.append('<link name="tool"/>')
-    for number, axis in enumerate(axes, start=1):
-        lines.append(
-            f'<joint name="axis{number}" type="revolute"><parent link="link{number - 1}"/><child link="link{number}"/>'
-            f'<origin xyz="{_numbers(axis.at)}"/><axis xyz="{axis.axis}"/>'
-            f'<limit lower="{axis.low}" upper="{axis.high}" effort="100" velocity="3"/></joint>'
-        )
-    lines.append(
-        f'<joint name="grip" type="fixed"><parent link="link{len(axes)}"/><child link="tool"/>'
-        f'<origin xyz="{_numbers(tool)}"/></joint>'
-    )
-    return "\n".join([*lines, "</robot>"])
+    links = [_link(f"link{number}", end, float(radii[number])) for number, end in enumerate(ends)]
+    joints = [
+        {"name": f"axis{number}", "kind": "revolute", "at": _numbers(axis.at), "axis": axis.axis,
+         "limit": f'lower="{axis.low}" upper="{axis.high}" effort="100" velocity="3"'}
+        for number, axis in enumerate(axes, start=1)
+    ] + [{"name": "grip", "kind": "fixed", "at": _numbers(tool)}]  # fmt: skip
+    links.append({"name": "tool"})
+    for joint, parent, child in zip(joints, links, links[1:], strict=False):
+        joint |= {"parent": parent["name"], "child": child["name"]}
+    return render("robot.urdf", name=name, links=links, joints=joints)
 
 
-def _link(name: str, end: tuple[float, ...], radius: float) -> str:
+def _link(name: str, end: tuple[float, ...], radius: float) -> dict[str, str]:
     way = np.array(end)
     length = float(np.linalg.norm(way))
-    middle = _numbers(tuple(0.5 * way))
-    if length < of_arm.short_m:
-        shape = f'<geometry><sphere radius="{radius:.4f}"/></geometry>'
-        turn = (0.0, 0.0, 0.0)
-    else:
-        shape = f'<geometry><cylinder radius="{radius:.4f}" length="{length:.4f}"/></geometry>'
-        turn = (0.0, float(np.arccos(way[2] / length)), float(np.arctan2(way[1], way[0])))
     mass = 20.0 * length + 0.5
-    spin = 0.1 * mass * length**2 + 1e-3
-    return (
-        f'<link name="{name}"><inertial><mass value="{mass:.3f}"/><origin xyz="{middle}"/>'
-        f'<inertia ixx="{spin:.5f}" ixy="0" ixz="0" iyy="{spin:.5f}" iyz="0" izz="{spin:.5f}"/></inertial>'
-        f'<collision><origin xyz="{middle}" rpy="{_numbers(turn)}"/>{shape}</collision></link>'
-    )
+    link = {"name": name, "middle": _numbers(tuple(0.5 * way)), "mass": f"{mass:.3f}"}
+    link["spin"] = f"{0.1 * mass * length**2 + 1e-3:.5f}"
+    if length < of_arm.short_m:
+        return link | {"shape": f'<sphere radius="{radius:.4f}"/>'}
+    turn = (0.0, float(np.arccos(way[2] / length)), float(np.arctan2(way[1], way[0])))
+    return link | {"rpy": _numbers(turn), "shape": f'<cylinder radius="{radius:.4f}" length="{length:.4f}"/>'}
 
 
 def _numbers(values: tuple[float, ...]) -> str:
@@ -261,7 +252,74 @@ def described(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]
 
     witness = until_found(sampled)
     scene = wb.Scene(figure)
-    taken = Occupied(figure, (start, witness))
-    space = taken.centres.min(axis=0) - of_robots.around_m, taken.centres.max(axis=0) + of_robots.around_m
-    add_things(scene, of_robots.things, taken, ROOM, rng, (space[0].tolist(), space[1].tolist()))
+    _surround(scene, (start, witness), of_robots, rng)
     return _asked(scene, start, witness, tip, number // len(of_robots.files) % 2 == 1), witness
+
+
+def _surround(scene: wb.Scene, postures: tuple[Array, Array], given: Any, rng: np.random.Generator) -> None:
+    """Put things around a figure in some postures, as many and as far as `sets.toml` says."""
+    taken = Occupied(scene.figure, postures)
+    space = taken.centres.min(axis=0) - given.around_m, taken.centres.max(axis=0) + given.around_m
+    add_things(scene, given.things, taken, ROOM, rng, (space[0].tolist(), space[1].tolist()))
+
+
+of_pairs = numbers("two_figures")
+
+
+class One(NamedTuple):
+    """One of the two: alone, how it begins (nq,), the frame it reaches with, and the joints that a witness moves."""
+
+    figure: wb.Figure
+    start: Array
+    tip: str
+    joints: tuple[str, ...]
+
+
+@lru_cache(maxsize=8)
+def one(name: str) -> One:
+    """A figure by what it is: the sex of a person, or an arm of `sets.toml`."""
+    if name in ("female", "male"):
+        person = wb.load("human", sex=name)
+        return One(person, person.posture("standing"), "right_palm", person.groups["upper_body"])
+    figure, ready = known_arm(name)
+    return One(figure, ready, "tool", figure.joints)
+
+
+def two_figures(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
+    """The kinds in turn; in every other round the second tip is turned as the witness has it."""
+    kind = of_pairs.kinds[number % len(of_pairs.kinds)]
+    pair = {"one": one(str(rng.choice(kind.one))), "other": one(str(rng.choice(kind.other)))}
+
+    def attempt() -> tuple[wb.Scene, Array, Array] | None:
+        turn = pin.utils.rotate("z", float(np.pi + rng.uniform(-of_pairs.turn_rad, of_pairs.turn_rad)))
+        at = {"one": pin.SE3.Identity(), "other": pin.SE3(turn, rng.uniform(*kind.at_m))}
+        scene = wb.Scene({name: (each.figure, at[name]) for name, each in pair.items()})
+        scene.add(wb.HalfSpace(), name="floor")
+        figure = scene.figure
+        start = figure.neutral
+        for name, each in pair.items():
+            if not each.figure.roots:
+                figure.part(name, start)[:] = each.start
+        for _ in range(of_pairs.tries if is_free(scene, start) else 0):
+            witness = _moved(figure, start, pair, rng)
+            ends = [figure.placement(witness, f"{name}/{each.tip}").translation for name, each in pair.items()]
+            if np.linalg.norm(ends[1] - ends[0]) < of_pairs.apart_m and is_free(scene, witness):
+                return scene, start, witness
+        return None
+
+    scene, start, witness = until_found(attempt)
+    _surround(scene, (start, witness), of_pairs, rng)
+    first, second = (f"{name}/{each.tip}" for name, each in pair.items())
+    relation = scene.figure.placement(witness, first).actInv(scene.figure.placement(witness, second))
+    turned = number // len(of_pairs.kinds) % 2 == 1
+    goals = [bodies.point(scene.figure, witness, first), wb.Relative(second, first, relation, orientation=turned)]
+    return bodies.standing_problem(scene, start, goals), witness
+
+
+def _moved(figure: wb.Figure, start: Array, pair: dict[str, One], rng: np.random.Generator) -> Array:
+    """The start (nq,) with the joints of both at random within their limits."""
+    q = np.array(start)
+    names = [f"{name}/{joint}" for name, each in pair.items() for joint in each.joints]
+    places = np.array([figure.model.joints[figure.joint_id(name)].idx_q for name in names])
+    q[places] = rng.uniform(figure.model.lowerPositionLimit[places], figure.model.upperPositionLimit[places])
+    return q

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import lru_cache
 from typing import Any
 
 import coal
@@ -13,11 +12,13 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
+from wholebody.figures.postures import placed
 from wholebody.figures.urdf.writing import exact
-from wholebody.geometry.pieces import swept_points
+from wholebody.geometry.pieces import hull_triangles, swept_points
 from wholebody.geometry.placement import placement
 
-KINDS = ("box", "sphere", "capsule", "hull")
+Make = Callable[[int, np.random.Generator], tuple[str, wb.Shape]]
+"""Makes the thing of a number: its kind and its shape."""
 
 
 def coal_distance(first: Any, at: pin.SE3, second: Any, there: pin.SE3, exact: bool = False) -> float:
@@ -27,19 +28,6 @@ def coal_distance(first: Any, at: pin.SE3, second: Any, there: pin.SE3, exact: b
     if exact:
         request.gjk_tolerance = request.epa_tolerance = 1e-9
     return float(coal.distance(first, put, second, other, request, coal.DistanceResult()))
-
-
-@lru_cache(maxsize=2)
-def _room(figure: wb.Figure) -> tuple[pin.Data, pin.GeometryData]:
-    """For all postures of a figure: making it takes a hundred times as long as placing the pieces."""
-    return figure.model.createData(), pin.GeometryData(figure.geometry)
-
-
-def placed(figure: wb.Figure, q: Array) -> list[tuple[pin.GeometryObject, pin.SE3]]:
-    """The pieces of a figure, and where each is in a posture (nq,)."""
-    data, found = _room(figure)
-    pin.updateGeometryPlacements(figure.model, data, figure.geometry, found, q)
-    return [(piece, pin.SE3(at)) for piece, at in zip(figure.geometry.geometryObjects, found.oMg, strict=True)]
 
 
 def just_outside(gap: Callable[[float], float], inside: float, outside: float) -> float:
@@ -69,8 +57,7 @@ def shape_of(geometry: Any) -> tuple[str, list[float]]:
 def hull_obj(hull: Any) -> str:
     """A convex hull of coal as the text of a Wavefront file."""
     lines = [f"v {exact(point)}" for point in np.array(hull.points()) + 0.0]  # no negative zero
-    triangles = map(hull.polygons, range(hull.num_polygons))
-    lines += [f"f {' '.join(str(int(triangle[corner]) + 1) for corner in range(3))}" for triangle in triangles]
+    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in hull_triangles(hull).tolist()]
     return "\n".join(lines) + "\n"
 
 
@@ -83,17 +70,12 @@ class Occupied:
 
     def __init__(self, figure: wb.Figure, postures: Iterable[Array]) -> None:
         """Place the figure's pieces at each posture (nq,)."""
-        geometry = figure.geometry
-        data, placed = figure.model.createData(), pin.GeometryData(geometry)
-        self.places: list[pin.SE3] = []
-        self._shapes: list[Any] = []
-        for q in postures:
-            pin.updateGeometryPlacements(figure.model, data, geometry, placed, q)
-            self.places += [pin.SE3(place) for place in placed.oMg]
-            self._shapes += [piece.geometry for piece in geometry.geometryObjects]
+        pieces = [each for q in postures for each in placed(figure, q)]
+        self.places = [place for _, place in pieces]
+        self._shapes: list[Any] = [piece.geometry for piece, _ in pieces]
         self.centres = np.array([place.translation for place in self.places]).reshape(-1, 3)
         self._reach = np.array([swept_points(shape).reach for shape in self._shapes])
-        self.count = geometry.ngeoms
+        self.count = figure.geometry.ngeoms
 
     def keep_free(self, places: Array, radius: float) -> None:
         """Take up balls about places (n, 3) too, metres."""
@@ -132,14 +114,14 @@ def add_things(
     room: float,
     rng: np.random.Generator,
     space: Sequence[Sequence[float]] = ((-0.6, -1.0, 0.1), (1.2, 1.0, 2.0)),
-    make: Callable[[int, np.random.Generator], tuple[str, wb.Shape]] | None = None,
+    make: Make | None = None,
 ) -> None:
     """Put random things into a box of space [m], clear of what is taken up; they may cross. `make`: kind and shape."""
     for number in range(count):
         for _ in range(5000):  # many times what the most crowded postures have needed
             kind, shape = (make or household_thing)(number, rng)
-            turn = rng.normal(size=4)
-            at = (*rng.uniform(space[0], space[1]), *(turn / np.linalg.norm(turn)))
+            turn = turned(rng)
+            at = (*rng.uniform(space[0], space[1]), *turn)
             if taken.clear_of(shape, at, room):
                 break
         else:
@@ -150,19 +132,20 @@ def add_things(
         scene.add(shape, name=f"{kind} {number}", at=at)
 
 
+def turned(rng: np.random.Generator) -> Array:
+    """A quaternion (4,) of any rotation."""
+    turn = rng.normal(size=4)
+    return np.asarray(turn / np.linalg.norm(turn))
+
+
 def household_thing(number: int, rng: np.random.Generator) -> tuple[str, wb.Shape]:
-    """The kinds of `KINDS` in turn."""
-    kind = KINDS[number % len(KINDS)]
-    return kind, random_shape(kind, rng)
-
-
-def random_shape(kind: str, rng: np.random.Generator) -> wb.Shape:
-    """A box, sphere, capsule or hull of the size of household things."""
+    """A box, sphere, capsule or hull in turn, of the size of household things."""
+    kind = ("box", "sphere", "capsule", "hull")[number % 4]
     if kind == "box":
-        edges = rng.uniform(0.05, 0.5, 3)
-        return wb.Box((float(edges[0]), float(edges[1]), float(edges[2])))
+        x, y, z = rng.uniform(0.05, 0.5, 3).tolist()
+        return kind, wb.Box((x, y, z))
     if kind == "sphere":
-        return wb.Sphere(float(rng.uniform(0.03, 0.2)))
+        return kind, wb.Sphere(float(rng.uniform(0.03, 0.2)))
     if kind == "capsule":
-        return wb.Capsule(float(rng.uniform(0.02, 0.1)), float(rng.uniform(0.1, 0.6)))
-    return wb.Hull(rng.normal(size=(30, 3)) * rng.uniform(0.03, 0.12, 3))
+        return kind, wb.Capsule(float(rng.uniform(0.02, 0.1)), float(rng.uniform(0.1, 0.6)))
+    return kind, wb.Hull(rng.normal(size=(30, 3)) * rng.uniform(0.03, 0.12, 3))

@@ -61,54 +61,53 @@ def read_answers(path: Path, folder: Path) -> Answers:
     texts = {key: _text(content, key, str(path)) for key in ("method", "about", "machine")}
     if not 0 < len(texts["method"].strip()) <= 200:
         raise FileFormatError(f"{path}: method has no name, or one of more than 200 letters; name your solver")
-    reader = _Reader(path, folder, known)
+    read: dict[tuple[str, str], Answer] = {}
+    for place, item in enumerate(listed):
+        answer = _answer(item, where := f"{path}: answers[{place}]", folder, known)
+        if (answer.problem, answer.seed) in read:
+            told = f"answers {answer.problem} from the {answer.seed} seed a second time"
+            raise FileFormatError(f"{where} {told}; keep one of them")
+        read[answer.problem, answer.seed] = answer
     return Answers(
         **texts,
         kernel_seconds=_seconds(content, "kernel_seconds", str(path)),
-        answers=tuple(reader.read(item, f"{path}: answers[{place}]") for place, item in enumerate(listed)),
+        answers=tuple(read.values()),
     )
 
 
-class _Reader:
-    def __init__(self, path: Path, folder: Path, known: set[str]) -> None:
-        self._folder, self._known = folder, known
-        self._seen: dict[tuple[str, str], str] = {}
+def _answer(item: Any, where: str, folder: Path, known: set[str]) -> Answer:
+    if not isinstance(item, dict):
+        raise FileFormatError(f"{where} is {_kind(item)}; give an object with problem and posture")
+    _check_keys(item, {"problem", "seed", "posture", "postures", "seconds", "refused"}, where)
+    name, seed = item.get("problem"), item.get("seed", "near")
+    if not isinstance(name, str):
+        raise FileFormatError(f"{where}.problem is {shown(name)}; give a name such as 'clutter/0007'")
+    if name not in known:
+        raise UnknownNameError("problem", name, known, where)
+    if seed not in SEEDS:
+        raise FileFormatError(f"{where}.seed is {shown(seed)}; give 'near' or 'far'")
+    given = [key for key in ("posture", "postures", "refused") if item.get(key) is not None]
+    if len(given) != 1:
+        raise FileFormatError(f"{where} has {' and '.join(given) or 'no posture'}; give one of posture(s), refused")
+    seconds = _seconds(item, "seconds", where)
+    refused = _text(item, "refused", where)
+    if given == ["refused"]:
+        return Answer(name, cast(Seed, seed), None, seconds, refused.strip() or "without a reason")
+    return Answer(name, cast(Seed, seed), _postures(folder, name, item, given[0], where), seconds, "")
 
-    def read(self, item: Any, where: str) -> Answer:
-        if not isinstance(item, dict):
-            raise FileFormatError(f"{where} is {_kind(item)}; give an object with problem and posture")
-        _check_keys(item, {"problem", "seed", "posture", "postures", "seconds", "refused"}, where)
-        name, seed = item.get("problem"), item.get("seed", "near")
-        if not isinstance(name, str):
-            raise FileFormatError(f"{where}.problem is {shown(name)}; give a name such as 'clutter/0007'")
-        if name not in self._known:
-            raise UnknownNameError("problem", name, self._known, where)
-        if seed not in SEEDS:
-            raise FileFormatError(f"{where}.seed is {shown(seed)}; give 'near' or 'far'")
-        if (name, seed) in self._seen:
-            raise FileFormatError(f"{where} answers {name} from the {seed} seed a second time; keep one of them")
-        self._seen[name, seed] = where
-        given = [key for key in ("posture", "postures", "refused") if item.get(key) is not None]
-        if len(given) != 1:
-            raise FileFormatError(f"{where} has {' and '.join(given) or 'no posture'}; give one of posture(s), refused")
-        seconds = _seconds(item, "seconds", where)
-        refused = _text(item, "refused", where)
-        if given == ["refused"]:
-            return Answer(name, cast(Seed, seed), None, seconds, refused.strip() or "without a reason")
-        return Answer(name, cast(Seed, seed), self._postures(name, item, given[0], where), seconds, "")
 
-    def _postures(self, name: str, item: Mapping[str, Any], key: str, where: str) -> Array:
-        problem = Rebuilt(self._folder, name)
-        wanted = "postures" if problem.moving else "posture"
-        if key != wanted:
-            what = f"one for each of its {problem.frames} frames" if problem.moving else "one list of numbers"
-            raise FileFormatError(f"{where} has {key}, and {name} takes {wanted}: {what}")
-        rows = item[key] if problem.moving else [item[key]]
-        if not isinstance(rows, list) or len(rows) != problem.frames:
-            count = len(rows) if isinstance(rows, list) else 0
-            raise FileFormatError(f"{where}.postures has {count} entries; {name} has {problem.frames} frames")
-        places = [f"{where}.{key}[{number}]" if problem.moving else f"{where}.{key}" for number in range(len(rows))]
-        return np.array([_posture(row, problem, place) for row, place in zip(rows, places, strict=True)])
+def _postures(folder: Path, name: str, item: Mapping[str, Any], key: str, where: str) -> Array:
+    problem = Rebuilt(folder, name)
+    wanted = "postures" if problem.moving else "posture"
+    if key != wanted:
+        what = f"one for each of its {problem.frames} frames" if problem.moving else "one list of numbers"
+        raise FileFormatError(f"{where} has {key}, and {name} takes {wanted}: {what}")
+    rows = item[key] if problem.moving else [item[key]]
+    if not isinstance(rows, list) or len(rows) != problem.frames:
+        count = len(rows) if isinstance(rows, list) else 0
+        raise FileFormatError(f"{where}.postures has {count} entries; {name} has {problem.frames} frames")
+    places = [f"{where}.{key}[{number}]" if problem.moving else f"{where}.{key}" for number in range(len(rows))]
+    return np.array([_posture(row, problem, place) for row, place in zip(rows, places, strict=True)])
 
 
 def _posture(row: Any, problem: Rebuilt, where: str) -> Array:

@@ -17,9 +17,9 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
 from wholebody.bench.suite.problem_sets.things import hull_obj, shape_of
-from wholebody.bench.suite.published.rebuilt import VERSION, model_of
+from wholebody.bench.suite.published.rebuilt import SHAPES, VERSION, model_of
 from wholebody.figures.figure import Figure
-from wholebody.figures.joined import one_figure
+from wholebody.figures.loading import one_figure
 from wholebody.figures.urdf.writing import add_joint, exact, urdf_axis
 
 Meshes = dict[str, str]
@@ -35,20 +35,13 @@ def described(geometry: Any, meshes: Meshes, name: str) -> dict[str, Any]:
         path = f"meshes/{name.replace(' ', '-').replace(':', '-')}.obj"
         meshes[path] = hull_obj(geometry)
         return {"type": "convex", "mesh": path}
-    match kind:
-        case "box":
-            said: dict[str, Any] = {"size": lengths}
-        case "sphere":
-            said = {"radius": lengths[0]}
-        case "capsule":
-            said = {"radius": lengths[0], "length": lengths[1]}
-        case "ellipsoid":
-            said = {"semi_axes": lengths}
-        case "half-space":
-            said = {"normal": lengths[:3], "offset": lengths[3]}
-        case _:
-            raise InputError(f"{name}: it is a {type(geometry).__name__}, which the files have no word for")
-    return {"type": kind, **said}
+    if kind not in SHAPES:
+        raise InputError(f"{name}: it is a {type(geometry).__name__}, which the files have no word for")
+    said: dict[str, Any] = {"type": kind}
+    for key, count in SHAPES[kind][1].items():
+        said[key] = lengths[:count] if count > 1 else lengths[0]
+        lengths = lengths[count:]
+    return said
 
 
 def pose_of(place: pin.SE3) -> list[float]:

@@ -180,17 +180,10 @@ def _rounded(value: Any) -> Any:
 
 def _difficulty(case: Case, body: BodyFiles, rebuilt: Rebuilt, far: Array) -> dict[str, Any]:
     """How hard a case is; the judge of the files says what a descent solves; of moving goals the first."""
-    way = away(case)
-    return {
-        "witness_distance": float(np.linalg.norm(way)),
-        "witness_largest": float(np.abs(way).max(initial=0.0)),
-        "gauss_newton": {
-            "near": _solves(case, body, rebuilt, case.problem.start),
-            "far": _solves(case, body, rebuilt, far),
-        },
-    }
-
-
-def _solves(case: Case, body: BodyFiles, rebuilt: Rebuilt, seed: Array) -> bool:
-    found = descended(case, seed)
-    return found is not None and bool(rebuilt.score(np.array(body.posture(found))).worst <= SOLVED)
+    way, solved = away(case), {}
+    for seed, start in (("near", case.problem.start), ("far", far)):
+        found = descended(case, start)
+        worst = math.inf if found is None else rebuilt.score(np.array(body.posture(found))).worst
+        solved[seed] = bool(worst <= SOLVED)
+    largest = float(np.abs(way).max(initial=0.0))
+    return {"witness_distance": float(np.linalg.norm(way)), "witness_largest": largest, "gauss_newton": solved}

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from math import inf, isfinite, nan
 from pathlib import Path
 from typing import Any
 
-from wholebody.bench.report import spanned, words
+from wholebody.base.files import finite
 from wholebody.bench.statistics import Interval, median, share, shifted_geometric_mean
 from wholebody.bench.suite.published.answers import SEEDS, Answer, Answers
 from wholebody.bench.suite.published.rebuilt import (
@@ -22,7 +22,7 @@ from wholebody.bench.suite.published.rebuilt import (
     read_json,
     worst_of,
 )
-from wholebody.bench.tables import flat, formatted
+from wholebody.bench.tables import flat, formatted, spanned, words
 
 TIMEOUT = 10.0  # s: that a failure counts with in a mean time
 ANSWERED, REFUSED, UNANSWERED = "answered", "refused", "unanswered"
@@ -168,9 +168,8 @@ def as_json(verdict: Verdict) -> dict[str, Any]:
         "sets": [_row(row) for row in verdict.sets],
         "answers": [_answer(one) for one in verdict.judged],
     }
-    found = _plain(content)
-    assert isinstance(found, dict)
-    return found
+    plain: dict[str, Any] = finite(content)
+    return plain
 
 
 def _row(row: SetScore) -> dict[str, Any]:
@@ -185,14 +184,6 @@ def _answer(one: Judged) -> dict[str, Any]:
     given = {name: getattr(one, name) for name in ("problem", "seed", "outcome", "said", "solved", "solved_fine")}
     figures = {"effort_above": one.effort_above, "seconds": one.seconds, **asdict(one.score), "worst": one.score.worst}
     return given | figures
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {name: _plain(item) for name, item in value.items()}
-    return [_plain(item) for item in value] if isinstance(value, Iterable) and not isinstance(value, str) else value
 
 
 COLUMNS = (

@@ -8,16 +8,14 @@ from pathlib import Path
 
 from wholebody.base.errors import InputError
 from wholebody.base.files import is_folder
-from wholebody.bench.report import page, render
-from wholebody.bench.suite.compare.advice import advice, choices, named, reference, standings
 from wholebody.bench.suite.compare.report import groups, overview, write_summary
 from wholebody.bench.suite.compare.results import ANSWERED, FAILED, REFUSED, Record, Results
-from wholebody.bench.suite.compare.summary import summaries
+from wholebody.bench.suite.compare.summary import advice, choices, named, reference, standings, summaries
 from wholebody.bench.suite.published import judging
 from wholebody.bench.suite.published.answers import read_answers
 from wholebody.bench.suite.published.judging import Judged, Verdict, cells, judge, left_out
 from wholebody.bench.suite.published.rebuilt import read_index
-from wholebody.bench.tables import write_text
+from wholebody.bench.tables import page, render, write_text
 
 PAGE = "leaderboard.html"
 

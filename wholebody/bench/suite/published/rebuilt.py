@@ -84,6 +84,15 @@ def files_of(folder: Path) -> list[Path]:
     ]
 
 
+SHAPES: Mapping[str, tuple[Any, Mapping[str, int]]] = {
+    "box": (coal.Box, {"size": 3}),
+    "sphere": (coal.Sphere, {"radius": 1}),
+    "capsule": (coal.Capsule, {"radius": 1, "length": 1}),
+    "ellipsoid": (coal.Ellipsoid, {"semi_axes": 3}),
+    "half-space": (coal.Halfspace, {"normal": 3, "offset": 1}),
+}
+"""Shapes by the words of the files: coal's class, and its arguments with how many numbers each has."""
+
 SOLVED = 1e-3  # m, rad: worst of goals and of all that must hold, up to which a problem counts as solved
 EXACT = 1e-6  # m, rad: what a witness meets, and an answer whose effort counts as the best known
 
@@ -288,18 +297,10 @@ def _piece(body: Body, item: Mapping[str, Any], shape: Any) -> pin.GeometryObjec
 
 
 def _shape(folder: Path, stated: Mapping[str, Any]) -> Any:
-    kind = stated["type"]
-    if kind == "box":
-        return coal.Box(*stated["size"])
-    if kind == "sphere":
-        return coal.Sphere(stated["radius"])
-    if kind == "capsule":
-        return coal.Capsule(stated["radius"], stated["length"])
-    if kind == "ellipsoid":
-        return coal.Ellipsoid(*stated["semi_axes"])
-    if kind == "half-space":
-        return coal.Halfspace(np.array(stated["normal"]), stated["offset"])
-    return _convex(folder / stated["mesh"])
+    if stated["type"] == "convex":
+        return _convex(folder / stated["mesh"])
+    kind, sizes = SHAPES[stated["type"]]
+    return kind(*(np.array(stated[name]) if count > 1 else stated[name] for name, count in sizes.items()))
 
 
 def _convex(path: Path) -> Any:

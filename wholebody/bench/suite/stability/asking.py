@@ -172,11 +172,7 @@ def ask(case: HardCase, adapter: Adapter, alive: Callable[[], None] = lambda: No
 
 
 def _posed(question: Posed, adapter: Adapter) -> Answer:
-    if question.hindered and adapter.hindered is not None:
-        method = adapter.hindered(tolerance=ASKED)
-    else:
-        method = adapter.make(ASKED, 1 if question.hindered else question.iterations)
-    solution = method.solve(question.problem)
+    solution = adapter.make(ASKED, question.iterations).solve(question.problem)
     left = max(solution.assessment.goal_error, solution.assessment.goal_angle)
     return Answer(
         np.array(solution.q, dtype=float)[None], str(solution.status), (float(left),),

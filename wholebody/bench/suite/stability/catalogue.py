@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cache, partial
+from functools import partial
 from math import inf, nan
 from pathlib import Path
 from typing import Any, Literal
@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.checks import known
-from wholebody.base.files import parsed_toml
+from wholebody.base.files import packaged_toml
 from wholebody.bench.suite.adapters.base import Adapter
 from wholebody.bench.suite.stability.bodies import human_arm, planar_arm, sliding_tool, spatial_arm, star
 from wholebody.figures.figure import Figure
@@ -32,11 +32,10 @@ FRAME = 1.0 / 60.0  # s: a frame of a screen
 
 @dataclass(frozen=True)
 class Posed:
-    """A problem to solve once, with the most iterations (None: the method's own), or by a method that is `hindered`."""
+    """A problem to solve once, with the most iterations (None: the method's own)."""
 
     problem: Problem
     iterations: int | None = None
-    hindered: bool = False
 
 
 @dataclass(frozen=True)
@@ -137,10 +136,8 @@ def cases(chosen: Iterable[str] | None = None) -> tuple[HardCase, ...]:
     return tuple(_case(name, given) for name, given in listed.items() if name in wanted)
 
 
-@cache
 def _data() -> dict[str, Any]:
-    file = Path(__file__).with_name("cases.toml")
-    return parsed_toml(file.read_text("utf-8"), file.name)
+    return packaged_toml(Path(__file__).with_name("cases.toml"))
 
 
 def _case(name: str, given: Mapping[str, Any]) -> HardCase:
@@ -163,7 +160,7 @@ def asked(ask: Mapping[str, Any]) -> Question:
     constraints += [StepLimit(speed)] if np.isfinite(speed) else []
     problem = Problem(scene, q, goals=goals, constraints=constraints)
     if "legs" not in ask:
-        return Posed(problem, ask.get("iterations"), ask.get("hindered", False))
+        return Posed(problem, ask.get("iterations"))
     frames = tuple(frame for leg in ask["legs"] for frame in _frames(problem, leg))
     return Stream(problem, frames, ask.get("dt", FRAME), speed)
 

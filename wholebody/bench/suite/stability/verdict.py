@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from wholebody.bench import plot_style
-from wholebody.bench.report import render
 from wholebody.bench.rows import Figure, Row
 from wholebody.bench.suite.stability.asking import INSIDE, Cell, Judged
 from wholebody.bench.suite.stability.catalogue import Answer, HardCase, Kind
+from wholebody.bench.tables import render
 
 BROKEN = 1e-4  # m, rad: farther than this a constraint does not hold
 
@@ -135,11 +135,6 @@ class Result:
     def acceptable(self, method: str) -> int:
         """How many of a method's answers are acceptable."""
         return sum(self.verdicts[case.name, method].acceptable for case in self.cases)
-
-    def of_kind(self, kind: Kind) -> list[tuple[str, HardCase, Verdict]]:
-        """All verdicts of a kind: method, case and verdict, method by method."""
-        found = [(method, case, self.verdicts[case.name, method]) for method in self.methods for case in self.cases]
-        return [one for one in found if one[2].kind == kind]
 
     def short_of_best(self, case: HardCase) -> list[tuple[str, list[str]]]:
         """Answers to a case that neither solve it nor are as good as can be: signs with figures, and their methods."""
