@@ -265,6 +265,8 @@ def test_a_whole_track_with_a_thing_that_moves_is_judged_with_it(planar_arm) -> 
     recording = tracking.follow(scene, track, moves={"ball": places})
     assert scene.objects["ball"].placement.translation == pytest.approx([0.7, 0.5, 0.0])
     assert np.abs(recording.q - q).max() > 0.1  # it gave way
+    carried = wb.Clip(scene.figure, track.q, DT, things={"ball": places})
+    np.testing.assert_allclose(tracking.follow(scene, carried).q, recording.q, atol=1e-9)
     judged = tracking.judge(scene, recording)
     deepest = []
     for shown, tracked, place in zip(recording.q, recording.tracked, places, strict=True):

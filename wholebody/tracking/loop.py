@@ -288,7 +288,7 @@ def follow(
 
     Args:
         scene: the figure among things.
-        track: the tracked postures; they may overlap things.
+        track: the tracked postures; they may overlap things. Its own `things` move with it.
         overlap: name of the overlap strategy, see `FrameLoop`.
         seed: of all random orders; the same seed gives the same frames.
         rigid: whether the figure is displaced as a whole, see `FrameLoop`.
@@ -308,8 +308,11 @@ def follow(
     instance(track, Clip, "follow: track", "make one with wb.Clip(figure, q, dt)")
     function(progress, "progress")
     same_joints(track, scene.figure, "follow")
-    ways = frame_placements(scene, moves, len(track.q), "follow: moves")
+    own = frame_placements(scene, track.things, len(track.q), "follow: things of the track")
+    ways = {**own, **frame_placements(scene, moves, len(track.q), "follow: moves")}
     scene = copy.copy(scene) if ways else scene
+    for name, places in own.items():
+        scene.move(name, at=places[0])
     loop = FrameLoop(scene, track.q[0], overlap=overlap, dt=track.dt, seed=seed, rigid=rigid)
     frames = []
     for number, tracked in enumerate(track.q):
