@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.tracking import inner_paths
 from wholebody.tracking.inner_paths import resampled, timed
 from wholebody.tracking.loop import follow
 
@@ -48,6 +49,19 @@ def test_a_file_of_a_motion_goes_along_its_paths(planar_arm, tmp_path) -> None:
     assert (len(track) - 1) * track.dt == pytest.approx(2 * DT)
     straight = SimpleNamespace(q=motion.q, dt=DT)
     np.testing.assert_array_equal(resampled(arm, straight).q, motion.q)
+
+
+def test_no_more_rows_than_a_clip_may_have(planar_arm, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A detour of a thousandth of a frame asks for more than 64 rows a frame."""
+    figure = planar_arm((0.4, 0.3))
+    there, beside = np.array([0.2, 0.1]), np.array([1.2, 0.1])
+    path = ((0.0, there), (0.499, there), (0.5, beside), (0.501, there), (1.0, there))
+    motion = SimpleNamespace(q=np.array([there] * 10), dt=0.1, paths=((), path, *[()] * 8))
+    with pytest.warns(UserWarning, match="64 rows a frame"):
+        assert len(resampled(figure, motion)) == 9 * 64 + 1
+    monkeypatch.setattr(inner_paths, "MOST_FRAMES", 100)
+    with pytest.warns(UserWarning, match="; 8 rows a frame"):
+        assert len(resampled(figure, motion)) == 9 * 8 + 1
 
 
 def test_as_many_paths_as_postures() -> None:

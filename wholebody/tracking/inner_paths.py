@@ -12,9 +12,10 @@ from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import time_step, warn
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.motion.clip import Clip, check_figure
+from wholebody.motion.clip import MOST_FRAMES, Clip, check_figure
 
 NEAR = 1e-3  # m, rad: from the track to a posture of a path at its time
+MOST_ROWS = 64  # a frame; fewer of a motion so long that a clip would have more than `MOST_FRAMES`
 
 
 class Timed(NamedTuple):
@@ -56,8 +57,8 @@ def resampled(figure: Figure, motion: Any, name: str = "clip") -> Clip:
     """A clip at a finer fixed rate, which goes straight from row to row along the inner paths of a motion.
 
     Files of motion have one time step. The rate is the least power of two times the motion's at which all postures of
-    the paths are met; a motion without paths keeps its rate. Where 64 rows a frame are not enough, a warning says how
-    far off the track is.
+    the paths are met; a motion without paths keeps its rate. Where 64 rows a frame, or a million in all, are not
+    enough, a warning says how far off the clip is.
 
     Args:
         figure: the figure of the postures.
@@ -79,14 +80,15 @@ def resampled(figure: Figure, motion: Any, name: str = "clip") -> Clip:
             float(np.abs(pin.difference(model, _between(model, rows, time * finer / dt), q)).max())
             for time, q in zip(given.times, given.q, strict=True)
         )
-        # rows a frame
-        if left <= NEAR or finer == 64:
+        if left <= NEAR or finer == MOST_ROWS or 2 * finer * len(plain.q) > MOST_FRAMES:
             break
         finer *= 2
         at = np.interp(np.arange((len(plain.q) - 1) * finer + 1) * dt / finer, given.times, np.arange(len(given.q)))
         rows = np.array([_between(model, given.q, place) for place in at])
     if left > NEAR:
-        warn(f"{name}: the inner paths are met to {left:.2g} m or rad; 64 rows a frame get no nearer")
+        warn(
+            f"{name}: the inner paths are met to {left:.2g} m or rad; {finer} rows a frame are as many as there can be"
+        )
     return Clip(figure, rows, dt / finer, name)
 
 
