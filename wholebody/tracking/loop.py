@@ -10,7 +10,7 @@ from __future__ import annotations
 import copy
 import itertools
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 import pinocchio as pin
@@ -233,7 +233,7 @@ def _clocks() -> tuple[float, float]:
 
 
 def frame_placements(
-    scene: Scene, moves: Mapping[str, Sequence[PlacementLike]] | None, count: int, what: str
+    scene: Scene, moves: Mapping[str, Iterable[PlacementLike]] | None, count: int, what: str
 ) -> dict[str, tuple[pin.SE3, ...]]:
     """Placements of things at the ends of `count` frames."""
     if moves is None:
