@@ -61,7 +61,6 @@ def shown(scene: wb.Scene) -> wb.Viewer:
         "goal",
         "assess",
         "clip",
-        "track",
         "frame",
         "reduced",
         "qp step",

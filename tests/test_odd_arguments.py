@@ -486,7 +486,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Newton", Call(wb.Newton, {"tolerance": 1e-4, "iterations": 5, **newton}, used)
     yield "Newton.solve", Call(wb.Newton().solve, {"problem": ask, "progress": print})
     yield "Newton.tracker", Call(wb.Newton().tracker, {"problem": ask, "dt": 0.1}, lambda made: made.step(q))
-    yield "NewtonTracker.step", Call(wb.Newton().tracker(ask).step, {"q": q, "tolerance": 1e-4})
+    yield "NewtonTracker.step", Call(wb.Newton().tracker(ask).step, {"q": q})
     yield "NewtonTracker.solve", Call(wb.Newton().tracker(ask).solve, {"q": q})
     yield (
         "Placo",
@@ -887,6 +887,8 @@ DERIVATIVES = (
     "value",
     "gradient",
     "curvature",
+    "curvature_of",
+    "expansion",
     "squares",
     "braking",
     "bounds",

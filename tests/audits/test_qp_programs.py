@@ -13,6 +13,7 @@ import pytest
 from tests.audits.qp_programs import files
 from tests.audits.qp_programs.measuring import measure, residuals, summaries
 from tests.audits.qp_programs.recording import Recorded, record
+from tests.reference.active_set import objective
 from wholebody.base.arrays import with_values
 from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
@@ -82,7 +83,7 @@ def test_files_come_back_and_are_programs_of_qpsolvers(recorded: list[Recorded],
         assert (problem.G @ z <= problem.h + 1e-12).all()
         assert (z >= problem.lb).all()
         assert (z <= problem.ub).all()
-        least = one.program.value(x)
+        least = objective(one.program, x)
         constant = 0.5 * z @ problem.P @ z + problem.q @ z
         assert constant == pytest.approx(least, rel=1e-9, abs=1e-9)
 

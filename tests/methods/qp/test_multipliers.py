@@ -92,7 +92,7 @@ def test_elastic_rows_count_by_their_names():
 
 def test_steps_do_not_swing_across_a_curved_constraint():
     """Judged by the measures alone, steps of this reach grew from one to the next until one was rejected, 88 in all."""
-    problem, _ = reach_among(wb.load("human"), TIPS[0], np.random.default_rng(26))
+    problem, _ = reach_among("clutter", wb.load("human"), TIPS[0], np.random.default_rng(26))
     solution = wb.QP(restarts=0).solve(problem)
     assert solution.solved
     assert solution.iterations < 60
