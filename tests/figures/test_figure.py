@@ -249,3 +249,11 @@ def test_a_placement_is_kept_when_the_next_one_is_asked_for():
     pin.forwardKinematics(figure.model, data, sitting)
     assert np.array_equal(first.homogeneous, before)
     assert np.array_equal(later.homogeneous, data.oMi[figure.joint_id("left_knee_flexion")].homogeneous)
+
+
+def test_a_person_of_whom_no_pair_is_tested_stands_as_its_joints_say() -> None:
+    person = load("human")
+    geometry = person.geometry.copy()
+    geometry.removeAllCollisionPairs()
+    alone = Figure("alone", person.model, geometry, person.detail, person.describe(), person.visual)
+    np.testing.assert_array_equal(alone.posture("standing"), person.posture("standing"))

@@ -13,6 +13,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
 from wholebody.figures.description import Articulated
+from wholebody.geometry.large_models import pairs_of
 from wholebody.geometry.pieces import swept_points
 
 GAP = 0.004
@@ -31,7 +32,7 @@ def stand(figure: Articulated, degrees: Mapping[str, float]) -> Array:
     spread = [name for name in figure.joints if name.endswith(("shoulder_abduction", "hip_abduction"))]
     free: Array = q
     reach = np.array([swept_points(piece.geometry).reach for piece in figure.geometry.geometryObjects])
-    pairs = np.array([(pair.first, pair.second) for pair in figure.geometry.collisionPairs]).reshape(-1, 2)
+    pairs = pairs_of(figure.geometry)
     within = reach[pairs].sum(axis=1) + GAP
     for _ in range(45):
         close = _close_segments(figure, free, pairs, within)
