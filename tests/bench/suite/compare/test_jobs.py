@@ -20,6 +20,7 @@ CAP = 0.4  # s of the processor: more than a solve computes, and less than it wa
 def chunks(fakes: ModuleType) -> Iterator[tuple[Chunk, Chunk]]:
     """Return two chunks of one process: methods that compile and sleep, and with a cap below what one sleeps."""
     solves = {does: (fakes.adapter(does), ()) for does in ("compiles", "sleeps")}
+    close_own_child()  # one of another test does not know how long to sleep
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("FAKES_SLEEP", str(WAITS))
         try:
