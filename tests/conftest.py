@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 from weakref import WeakKeyDictionary
 
-from wholebody.base import runner
+from wholebody.base import batches, runner
 from wholebody.base.compiled import compile_all
 from wholebody.base.runner import ONE_THREAD
 
@@ -225,6 +225,7 @@ def warm_processes(request: pytest.FixtureRequest) -> Iterator[None]:
         if not getattr(request.module, "FROM_SCRATCH", False):
             patch.setattr(runner, "start_process", _start_warm)
         yield
+        batches.close_children()  # one that is left would have the variables and the patches of this module
 
 
 @pytest.fixture(autouse=True, scope="module")

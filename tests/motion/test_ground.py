@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import warnings
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,7 @@ def rocks(x: float) -> float:
     return float(0.05 * np.sin(9.0 * x) + 0.04 * np.cos(23.0 * x))
 
 
+@cache
 def walker(height: Terrain, seconds: float = 3.0, raised: float = 0.0) -> tuple[SkeletonMotion, dict[str, np.ndarray]]:
     """A walk along x with level soles, and in which frames each foot stands; `raised`: or the right foot is held up."""
     count = round(seconds / DT)
@@ -146,7 +148,7 @@ def test_a_foot_that_is_held_up_does_not_rest() -> None:
 
 
 def test_a_person_stands_on_the_floor_and_does_not_slide(human: wb.Figure) -> None:
-    motion, stands = walker(flat)
+    motion, stands = walker(flat, 1.5)
     clip = wb.retarget(motion, human)
     scene = wb.Scene(human).add(wb.HalfSpace(), name="floor")
     assert max(-scene.contacts(q, 0.01).distance.min(initial=0.0) for q in clip.q) < 5e-4
@@ -160,7 +162,7 @@ def test_a_person_stands_on_the_floor_and_does_not_slide(human: wb.Figure) -> No
 
 
 def test_a_person_climbs_stairs_that_stand_there(human: wb.Figure) -> None:
-    motion, stands = walker(stairs)
+    motion, stands = walker(stairs, 2.0)
     scene = wb.Scene(human).add(wb.HalfSpace(), name="floor")
     for step in (1, 2, 3):  # each from its edge, half a step before its foothold, to x = 5 m
         edge = STEP * step - 0.25
@@ -171,7 +173,7 @@ def test_a_person_climbs_stairs_that_stand_there(human: wb.Figure) -> None:
 
 
 def test_arms_that_were_recorded_inside_the_trunk_are_outside(human: wb.Figure) -> None:
-    motion, _ = walker(flat, 1.0)
+    motion, _ = walker(flat, 0.5)
     at = np.array(motion.positions)
     for joint, inside in ((13, (0.0, 0.12, 1.0)), (14, (0.05, 0.02, 0.85))):
         at[:, joint] = at[:, 0] * [1.0, 0.0, 0.0] + inside
@@ -187,7 +189,7 @@ def test_arms_that_were_recorded_inside_the_trunk_are_outside(human: wb.Figure) 
 
 def test_speed_limits_hold() -> None:
     """Feet that go twice as fast, of a person whose knees turn at 3 rad/s at most."""
-    motion, _ = walker(flat, 1.5)
+    motion, _ = walker(flat, 1.0)
     slow = wb.load("human")
     limit = np.array(slow.model.velocityLimit)
     limit[6:] = 3.0
