@@ -31,6 +31,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from wholebody.base.errors import WholebodyError
+from wholebody.figures import load
 from wholebody.figures.description import Description
 from wholebody.figures.figure import Figure
 from wholebody.scene.scene import Scene
@@ -191,6 +192,18 @@ def free_bodies() -> Callable[..., Figure]:
 def planar_arm() -> Callable[..., Figure]:
     """Return a function: lengths -> a fixed arm in the plane z = 0, joints "turn0", ..., frame "tip"."""
     return _planar_arm
+
+
+@pytest.fixture(scope="session")
+def human() -> Figure:
+    """Return the person as it is by default; figures do not change."""
+    return load("human")
+
+
+@pytest.fixture(scope="session")
+def hand() -> Figure:
+    """Return a right hand."""
+    return load("hand")
 
 
 _LAID: WeakKeyDictionary[Scene, tuple[Any, Any, Any]] = WeakKeyDictionary()

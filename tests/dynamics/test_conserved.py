@@ -18,11 +18,6 @@ AWAY = 5.0
 ROUNDING = 1e-10  # J: by which the energy of a frame may grow
 
 
-@pytest.fixture(scope="module")
-def hand() -> wb.Figure:
-    return wb.load("hand")
-
-
 def still(hand: wb.Figure, *things: tuple[wb.Shape, Any, wb.Body]) -> RigidBodies:
     """Things without weight, named 0, 1, ..."""
     scene = wb.Scene(hand)

@@ -14,11 +14,6 @@ G = 9.81
 AWAY = np.array([5.0, 0.0, 0.0])
 
 
-@pytest.fixture(scope="module")
-def hand() -> wb.Figure:
-    return wb.load("hand")
-
-
 def elliptic(k: float) -> float:
     """Complete elliptic integral of the first kind, by the arithmetic-geometric mean."""
     a, b = 1.0, float(np.sqrt(1.0 - k * k))

@@ -495,10 +495,10 @@ def test_every_domino_falls(example: Example, tmp_path: Path) -> None:
     assert module.main(out=tmp_path, pictures=False) == 3
 
 
-@pytest.mark.parametrize("name", ["driver", "hold_a_pole"])
-def test_hands_hold_what_they_are_told(name: str, example: Example) -> None:
+@pytest.mark.parametrize(("name", "measures"), [("driver", True), ("hold_a_pole", False)])
+def test_hands_hold_what_they_are_told(name: str, measures: bool, example: Example) -> None:
     problem = example(name).build()
-    solution = wb.solve(problem, wb.QP(measures=False))
+    solution = wb.solve(problem, wb.QP(measures=measures))
     assert solution.solved
     least, where = deepest(problem, solution.q)
     assert least > -1e-5, where

@@ -183,7 +183,7 @@ def two_bodies(free_bodies, kind):
     return wb.Scene(free_bodies(*(SHAPES[name] for name in kind)))
 
 
-@pytest.mark.parametrize("gap", [0.02, 0.001, -0.004])
+@pytest.mark.parametrize("gap", [0.02, -0.004])
 @pytest.mark.parametrize("kind", pairs_with_levers(), ids="-".join)
 def test_lever_rows_tell_the_gap_where_they_stand(free_bodies, kind, gap):
     """Not less than the distance, nor more than what is really between the pieces there, along the normal.

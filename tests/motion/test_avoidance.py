@@ -22,11 +22,6 @@ DT = 1 / 30
 BALL, RADIUS, LINK, WIDTH = np.array([0.95, 0.0]), 0.1, 0.5, 0.02
 
 
-@pytest.fixture(scope="module")
-def human() -> Figure:
-    return wb.load("human")
-
-
 def swing(frames: int, bend: float = 0.5) -> np.ndarray:
     """A bent arm of two links that turns past the ball."""
     return np.stack([np.linspace(-1.2, 1.2, frames) - 0.5 * bend, np.full(frames, bend)], axis=1)

@@ -20,11 +20,6 @@ from wholebody.motion.batch_table import SHEET, TABLE
 
 
 @pytest.fixture(scope="module")
-def human() -> wb.Figure:
-    return wb.load("human")
-
-
-@pytest.fixture(scope="module")
 def clip(human: wb.Figure) -> wb.Clip:
     """An arm that goes into the thigh and comes back."""
     angles = np.concatenate([np.linspace(0.1, -0.2, 4), np.linspace(-0.2, 0.1, 4)[1:]])

@@ -20,11 +20,6 @@ DT = 1 / 30
 FRAMES = 90
 
 
-@pytest.fixture(scope="module")
-def human() -> Figure:
-    return wb.load("human")
-
-
 def waves(figure: Figure, size: float) -> wb.Clip:
     """One joint that swings at 10 rad/s: speed and jerk are its size times known factors."""
     t = DT * np.arange(FRAMES)

@@ -13,11 +13,6 @@ from wholebody.base.errors import InputError
 from wholebody.motion.skeleton import SkeletonMotion
 
 
-@pytest.fixture(scope="module")
-def human() -> wb.Figure:
-    return wb.load("human")
-
-
 def streamed(stream: wb.motion.Retargeter, motion: SkeletonMotion) -> np.ndarray:
     """Postures of a stream; each comes out `ahead` frames after its skeleton, but for the last ones."""
     found = []

@@ -22,11 +22,6 @@ from wholebody.methods.newton.terms import FigureSystem
 from wholebody.tasks.base import Bound
 
 
-@pytest.fixture(scope="module")
-def human() -> wb.Figure:
-    return wb.load("human")
-
-
 def _standing(scene: wb.Scene, *goals: Any, **more: Any) -> wb.Problem:
     holds = [wb.Hold("left_foot"), wb.Hold("right_foot")]
     return wb.Problem(scene, "standing", goals=goals, constraints=holds, **more)
