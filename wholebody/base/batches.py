@@ -156,8 +156,8 @@ def own_child() -> Child:
     key = os.getpid(), threading.get_ident()
     if key not in _own:
         _own[key] = Child(ONE_THREAD)
-        parent = multiprocessing.parent_process()
-        if parent is not None and multiprocessing.current_process().name.startswith("LokyProcess"):
+        parent, name = multiprocessing.parent_process(), multiprocessing.current_process().name
+        if parent is not None and name.startswith("LokyProcess"):
             end_with(int(parent.pid or 0))  # joblib's process would wait for minutes
     return _own[key]
 
@@ -165,8 +165,7 @@ def own_child() -> Child:
 @atexit.register
 def close_children() -> None:
     """End the processes that this process keeps for the next call."""
-    here = os.getpid()
-    for child in [*_idle.get(here, []), *(child for (process, _), child in _own.items() if process == here)]:
+    for child in [*_idle.get(os.getpid(), []), *(one for key, one in _own.items() if key[0] == os.getpid())]:
         child.close()
 
 
@@ -205,13 +204,11 @@ def _client(address: str) -> AbstractContextManager[Any]:
         from distributed import Client
     except ImportError:
         raise MissingPackageError("--cluster needs dask; install it with: pip install 'wholebody[cluster]'") from None
+    connect: Callable[..., AbstractContextManager[Any]] = Client
     try:
-        connect: Callable[..., AbstractContextManager[Any]] = Client
-        # s: for which a scheduler is waited for
-        client = connect(address, timeout=10.0)
+        return connect(address, timeout=10.0)  # s: for which a scheduler is waited for
     except (OSError, ValueError) as error:
         raise WholebodyError(f"no dask scheduler answers at {address} ({error}); start one: dask scheduler") from None
-    return client
 
 
 def reporter(value: Callable[..., Any] | bool | None, what: str) -> Callable[..., Any] | None:
