@@ -183,7 +183,8 @@ def run_cases(
     tails = [run[1:] if heads else run for run in linked] + [run for run in waiting if len(run) == 1]
     for work in (heads, tails, alone):  # the cases of a run whose process ended are done again, one by one
         if not over and work:
-            starts = {run[0]: _solved_before(run[0], heads[0], done) for run in tails} if heads and work is tails else {}
+            leading = heads[0] if heads and work is tails else []
+            starts = {run[0]: _solved_before(run[0], leading, done) for run in work}
             over = _run(work, order, running, keep, alone, {k: done[j].q for k, j in starts.items() if j is not None})
     if not over and waiting:
         family = Family(order, done, partial(_computed, order, running), keep)
