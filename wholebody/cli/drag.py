@@ -69,9 +69,9 @@ def run(arguments: argparse.Namespace) -> int:
         return live(arguments)
     arguments.method = arguments.method or "newton"
     from wholebody.base.files import make_folder
-    from wholebody.bench.measure.frames import drag_rows, frame_panels, is_clean
     from wholebody.bench.rows import chart, report
     from wholebody.bench.tables import machine, write_rows, write_text
+    from wholebody.cli.frames import drag_rows, frame_panels, is_clean
     from wholebody.cli.tables import print_rows
     from wholebody.methods.solve import method_named
     from wholebody.taskfile import read_task
