@@ -34,8 +34,8 @@ def run(arguments: argparse.Namespace) -> int:
     """List the scenes, or run one or all."""
     from wholebody.base.checks import known
     from wholebody.base.files import check_writable, make_folder
-    from wholebody.bench.measure.frames import is_held, paper_report
     from wholebody.bench.tables import machine, write_text
+    from wholebody.cli.frames import is_held, paper_report
     from wholebody.cli.tables import print_rows
     from wholebody.tracking import SCENES, build_scene
     from wholebody.tracking.loop import OVERLAPS
@@ -62,9 +62,9 @@ def run(arguments: argparse.Namespace) -> int:
 def _run_one(scene: InteractionScene, overlap: str, seed: int, out: Path, facts: dict[str, str]) -> Row:
     import gc
 
-    from wholebody.bench.measure.frames import frame_panels, loop_rows
     from wholebody.bench.rows import chart
     from wholebody.bench.tables import write_rows
+    from wholebody.cli.frames import frame_panels, loop_rows
     from wholebody.cli.tables import bar
     from wholebody.tracking import follow, judge
 

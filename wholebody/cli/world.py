@@ -55,8 +55,8 @@ exit code: 1 if pieces were deeper in each other than 0.1 mm after a frame, or a
 def run(arguments: argparse.Namespace) -> int:
     """List the scenes, or run one or all."""
     from wholebody.base.files import check_writable, make_folder
-    from wholebody.bench.measure.frames import paper_report
     from wholebody.bench.tables import machine, write_text
+    from wholebody.cli.frames import paper_report
     from wholebody.cli.tables import print_rows
     from wholebody.dynamics.world import WORLD_SCENES
     from wholebody.tracking.loop import OVERLAPS
@@ -124,9 +124,9 @@ def _scene(name: str, arguments: argparse.Namespace) -> InteractionScene:
 
 
 def _run_one(scene: InteractionScene, arguments: argparse.Namespace, facts: dict[str, str]) -> Row:
-    from wholebody.bench.measure.frames import frame_panels, world_rows
     from wholebody.bench.rows import chart
     from wholebody.bench.tables import write_rows
+    from wholebody.cli.frames import frame_panels, world_rows
     from wholebody.cli.tables import bar
     from wholebody.dynamics.world import World
     from wholebody.tracking.overlaps import overlaps
@@ -159,7 +159,7 @@ def _animation(
     """Write the animation, with PD_g of what the spring wanted; the seconds that each frame takes to draw."""
     import time
 
-    from wholebody.bench.measure.frames import moments
+    from wholebody.cli.frames import moments
     from wholebody.view import Viewer
     from wholebody.view.side_by_side import write_filmstrip
     from wholebody.view.viewed_scene import ViewedWorld

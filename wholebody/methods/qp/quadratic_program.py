@@ -118,23 +118,3 @@ class QPSolution(NamedTuple):
     # what closed the program: "active set" where one that was known led to the answer, the solver's name, "semismooth
     # newton" where the solver's answer did not lead to an exact one, or "not exact"
     by: str = ""
-
-
-class Scaling(NamedTuple):
-    """How solvers get a program."""
-
-    x: float = 100.0  # what it is multiplied by, so that its entries are as large as the residuals
-    heaviest: float = 1e5  # scale of a row at most, squared; larger = heavy rows closer, light ones later
-    # least value of slots without a row: never active, and no other kind of row than those in use
-    inactive: float = -1e3
-    infinite: float = 1e30  # what a solver takes for infinite
-
-
-class SplitForm(NamedTuple):
-    """Objective and rows over z of size n + m + k."""
-
-    diagonal: Array  # (n + m + k,) diagonal Hessian
-    linear: Array  # (n + m + k,)
-    matrix: Array  # (m + k, n + m + k) rows [T -I 0; C 0 I]
-    least: Array  # (m + k,) what the first m rows are, and the others are at least
-    box: Array  # (2, n) bounds of x; r and s have none

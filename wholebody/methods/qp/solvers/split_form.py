@@ -7,12 +7,35 @@ are nearly hard, since their residuals hardly count in them.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram, Scaling, SplitForm
+from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram
+
+
+class Scaling(NamedTuple):
+    """How solvers get a program."""
+
+    x: float = 100.0  # what it is multiplied by, so that its entries are as large as the residuals
+    heaviest: float = 1e5  # scale of a row at most, squared; larger = heavy rows closer, light ones later
+    # least value of slots without a row: never active, and no other kind of row than those in use
+    inactive: float = -1e3
+    infinite: float = 1e30  # what a solver takes for infinite
+
 
 SCALING = Scaling()
+
+
+class SplitForm(NamedTuple):
+    """Objective and rows over z of size n + m + k."""
+
+    diagonal: Array  # (n + m + k,) diagonal Hessian
+    linear: Array  # (n + m + k,)
+    matrix: Array  # (m + k, n + m + k) rows [T -I 0; C 0 I]
+    least: Array  # (m + k,) what the first m rows are, and the others are at least
+    box: Array  # (2, n) bounds of x; r and s have none
 
 
 def scaled_split(program: QuadraticProgram) -> SplitForm:
