@@ -16,7 +16,7 @@ from tests.needs import each
 from wholebody.base.pool import OneAtATime, Pool
 from wholebody.figures.state import State
 
-THREADS = 3
+THREADS = 2
 FEET = ("left_foot", "right_foot")
 
 

@@ -85,7 +85,7 @@ def test_rows_say_what_was_measured() -> None:
 
 
 def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    sizes = {"joints": (3,), "things around": (4,)}
+    sizes = {"things around": (4,)}
     monkeypatch.setattr(scaling, "SIZES", sizes)
     (tmp_path / "results.md").write_text("<!-- bench:scaling -->\n<!-- /bench:scaling -->")
     words = ["bench", "scaling", "--quick", "--methods", "ccd", "--out", str(tmp_path / "out")]

@@ -290,7 +290,7 @@ def test_short_clips_are_freed(swing: Clip, frames: int) -> None:
 
 def test_a_middle_that_cannot_be_freed_ends_with_a_sentence(swing: Clip) -> None:
     """Everything is frozen: the thesis' recursion would call itself without end."""
-    scene = dressed(swing.figure, "side_sphere")
+    scene, swing = dressed(swing.figure, "side_sphere"), swing[:15]
     names = ("root", "lower_body", "upper_body", "neck")
     result = freed_by(Bisection(frozen=names, evaluation=()), swing, scene)
     assert result.posture_solves < 4 * len(swing)
