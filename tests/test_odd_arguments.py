@@ -877,7 +877,8 @@ BY_OWNERS = ("Trajectory.avoid", "PerFrame.avoid", "Bisection.avoid", "QP.batche
 DERIVATIVES = (
     "of_arms",
     "on_polygon",
-    "joint_placement",
+    "joint_placements",
+    "place_of",
     "companion",
     "folded",
     "spread",

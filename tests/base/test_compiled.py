@@ -87,6 +87,43 @@ def test_loops_work_where_nothing_can_be_kept(run, tmp_path: Path) -> None:
     assert len(told) == 1
 
 
+ASKS = """
+import sys
+from pathlib import Path
+from wholebody.base import compiled
+
+compiled.PRECOMPILED = Path(sys.argv[1])
+from wholebody import loop_of_a_test
+
+print(loop_of_a_test.of_another(1.5), compiled.compile_seconds() > 0.0)
+if not compiled.PRECOMPILED.is_dir():
+    compiled.PRECOMPILED.mkdir()
+    loop_of_a_test.of_another.copy_kept()
+"""
+
+
+def test_loops_of_a_wheel_are_not_compiled_again(run: object, tmp_path: Path) -> None:
+    """By a processor that has what they need, in a cache that is empty, as long as the source is the same."""
+    from llvmlite import binding
+
+    has = {f"+{name}" for name, there in binding.get_host_cpu_features().items() if there}
+    if not has >= compiled.BASELINE_FEATURES:
+        pytest.skip(f"the processor cannot run code for {compiled.BASELINE[0]}")
+
+    def ask(cache: str, **target: str) -> str:
+        environment = {**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / cache), **target}
+        command = [sys.executable, "-c", ASKS, str(tmp_path / "precompiled")]
+        done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=True)
+        return done.stdout.strip()
+
+    name, features = compiled.BASELINE
+    assert ask("makers", NUMBA_CPU_NAME=name, NUMBA_CPU_FEATURES=features) == "4.0 True"
+    assert ask("users") == "4.0 False"
+    path = tmp_path / "wholebody" / "loop_of_a_test.py"
+    path.write_text(path.read_text().replace("+ 1.0", "+ 2.0"))
+    assert ask("users") == "5.0 True"
+
+
 INNER = """
 from wholebody.base.compiled import compiled
 
