@@ -48,9 +48,11 @@ docs: $(VENV)/.docs ## build the documentation into site/, with every link check
 compare: $(VENV)/.compare ## add the other tools and QP solvers that `wholebody bench` can be compared with
 	$(BIN)/wholebody doctor
 
-wheel: $(VENV)/.test ## build the source archive into dist/, and the wheel from it
+wheel: $(VENV)/.test ## build the source archive into dist/, and the wheel, which has the compiled loops for this Python
 	rm -rf dist
-	$(BIN)/python -m build --no-isolation --outdir dist .
+	$(BIN)/python -m wholebody.base.compiled --precompile
+	$(BIN)/python -m build --no-isolation --outdir dist --sdist --wheel .
+	rm -rf wholebody/base/precompiled
 
 lock: $(VENV)/.lock ## choose the newest versions that work together and write them to requirements/
 	$(CHOOSE) --extra placo --output-file requirements/run.txt

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.special import ellipk
 
 import wholebody as wb
 from wholebody.dynamics.articulated import Articulated
@@ -73,7 +77,7 @@ def test_a_ragdoll_falls_and_rests_and_its_energy_never_grows() -> None:
     start[2], start[3:7] = 0.4, (0.0, np.sin(-0.75), 0.0, np.cos(0.75))  # on its back, in the air
     world = wb.World(scene, start, spring=wb.Actuated(scene.figure, stiffness=0.0, damping=1.0))
     energies = [world.energy]
-    for _ in range(50):
+    for _ in range(90):  # the feet, on their heels, fall last
         assert world.step().deepest < 1e-3
         energies.append(world.energy)
     assert np.diff(energies).max() < 1e-6
@@ -117,6 +121,82 @@ def test_a_person_catches_a_ball_and_bears_its_weight() -> None:
     assert frame.placements["ball"].translation[2] > 1.3
     assert np.mean(given[-10:], axis=0) == pytest.approx((0.0, 0.0, 0.5 * 9.81 * DT), abs=0.01)
     assert np.abs(frame.q - start).max() < 0.05
+
+
+def chain(folder: Path, joints: int, kind: str = "continuous") -> wb.Figure:
+    """A chain of rods of 0.4 m and 1 kg on axes that are not parallel."""
+    length, text = 0.4, '<robot name="chain"><link name="l0"/>'
+    across = length**2 / 12.0
+    for k in range(joints):
+        text += f"""<link name="l{k + 1}"><inertial><origin xyz="{length / 2} 0 0"/><mass value="1"/>
+        <inertia ixx="1e-3" iyy="{across}" izz="{across}" ixy="0" ixz="0" iyz="0"/></inertial></link>
+        <joint name="j{k}" type="{kind}"><parent link="l{k}"/><child link="l{k + 1}"/><axis xyz="0 {1 - 0.4 * (k % 2)}
+        {0.8 * (k % 2)}"/><origin xyz="{length * (k > 0)} 0 0"/><limit lower="-4" upper="4" effort="1" velocity="9"/>
+        </joint>"""
+    path = folder / "chain.urdf"
+    path.write_text(text + "</robot>")
+    return wb.load(path)
+
+
+@pytest.mark.parametrize("kind", ["continuous", "revolute"])
+def test_a_pendulum_swings_with_the_period_of_its_integral_and_keeps_its_energy(tmp_path: Path, kind: str) -> None:
+    figure = chain(tmp_path, 1, kind)
+    world = wb.World(wb.Scene(figure), dt=1.0 / 240.0, spring=wb.Actuated(figure, stiffness=0.0, damping=0.0))
+    began, energies, speeds = world.energy, [], []
+    for _ in range(960):
+        world.step()
+        energies.append(world.energy)
+        speeds.append(world.velocity[0])
+    assert np.abs(np.array(energies) - began).max() < 1e-9  # J, of 3.9 from end to end of a swing
+    turns = np.flatnonzero(np.diff(np.sign(speeds)))  # it began where it turns
+    speed = np.array(speeds)
+    times = (turns + 1.0 + speed[turns] / (speed[turns] - speed[turns + 1])) / 240.0
+    inertia, arm = 0.4**2 / 3.0, 0.2
+    half = 2.0 * np.sqrt(inertia / (9.81 * arm)) * ellipk(np.sin(np.pi / 4.0) ** 2)  # of a swing from the horizontal
+    assert len(times) > 5
+    assert times == pytest.approx(half * np.arange(1, len(times) + 1), rel=2e-4)
+
+
+def test_a_chain_swings_as_its_equations_of_motion_say(tmp_path: Path) -> None:
+    figure = chain(tmp_path, 3)
+    free = wb.Actuated(figure, stiffness=0.0, damping=0.0)
+    moving = Articulated(wb.Scene(figure), figure.neutral, free, None)
+    began = moving.energy()
+    for _ in range(60):
+        moving.advance(moving.q, DT, {}, {})
+        assert moving.energy() == pytest.approx(began, abs=1e-9)
+    model, data = figure.model, figure.model.createData()
+
+    def rate(_: float, state: Any) -> Any:
+        q = np.stack([np.cos(state[:3]), np.sin(state[:3])], axis=1).ravel()
+        return np.concatenate([state[3:], pin.aba(model, data, q, state[3:], np.zeros(3))])
+
+    end = solve_ivp(rate, (0.0, 1.0), np.zeros(6), rtol=1e-10, atol=1e-10).y[:, -1]
+    assert np.abs(end[3:]).max() > 2.0  # rad/s
+    angles = np.arctan2(moving.q[1::2], moving.q[::2])
+    assert np.abs(np.angle(np.exp(1j * (angles - end[:3])))).max() < 2e-3
+    assert moving.velocity == pytest.approx(end[3:], abs=2e-2)
+
+
+def test_a_figure_in_the_air_keeps_its_energy_and_momentum() -> None:
+    figure = wb.load("hand")
+    start = figure.posture("relaxed")
+    moving = Articulated(wb.Scene(figure), start, wb.Actuated(figure, stiffness=0.0, damping=0.0), None)
+    moving.velocity = np.concatenate([(0.3, -0.2, 1.0, 2.0, -3.0, 1.0), 0.2 * np.cos(np.arange(figure.model.nv - 6))])
+    mass = sum(inertia.mass for inertia in figure.model.inertias)
+    began, energy, centre = (
+        moving.momentum(),
+        moving.energy(),
+        pin.centerOfMass(figure.model, figure.model.createData(), start),
+    )
+    for _ in range(6):
+        moving.advance(start, DT, {}, {})
+        assert moving.energy() == pytest.approx(energy, abs=1e-12)
+    weight, time = np.array((0.0, 0.0, -9.81 * mass)), 6 * DT
+    fallen = began[:3] + time * weight
+    # the torque of the weight about the origin, of a centre of mass on its parabola
+    turned = began[3:] + np.cross(time * centre + 0.5 * time**2 * began[:3] / mass, weight)
+    assert moving.momentum() == pytest.approx(np.concatenate([fallen, turned]), abs=1e-4)
 
 
 def test_what_drives_a_joint_is_given_by_its_name() -> None:

@@ -40,7 +40,7 @@ def arm_of(folder: Path, stiffness: float, damping: float, weight: float, step: 
 @pytest.mark.parametrize(("stiffness", "damping"), [(0.0, 0.0), (0.0, 0.1), (20.0, 1.0)])
 def test_an_arm_swings_and_is_driven_as_in_mujoco(tmp_path: Path, stiffness: float, damping: float) -> None:
     figure, text = arm_of(tmp_path, stiffness, damping, -9.81, DT / 200)
-    model = mujoco.MjModel.from_xml_string(text.replace("{ball}", ""))
+    model = mujoco.MjModel.from_xml_string(text.replace("{ball}", "").replace("implicit", "RK4"))
     data = mujoco.MjData(model)
     aim = np.array([0.5, -0.3, 0.8])
     actuated = wb.Actuated(figure, stiffness=stiffness, damping=damping)
@@ -59,7 +59,7 @@ def test_an_arm_swings_and_is_driven_as_in_mujoco(tmp_path: Path, stiffness: flo
         errors.append(worst)
     assert np.abs(data.qpos).max() > 0.4
     assert errors[0] < 0.03  # rad
-    assert errors[1] < 0.4 * errors[0]  # of the first order in the step
+    assert errors[1] < (0.4 if stiffness + damping else 0.1) * errors[0]  # of the first order, freely of the second
 
 
 def test_an_elastic_blow_gives_the_joints_and_the_ball_the_velocities_of_mujoco(tmp_path: Path) -> None:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import atexit
 import gc
+import hashlib
 import logging
 import os
+import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -15,6 +18,7 @@ from functools import lru_cache
 from importlib import import_module
 from itertools import zip_longest
 from multiprocessing import parent_process
+from pathlib import Path
 from typing import Any, TypeVar
 
 TOGETHER = (
@@ -50,6 +54,15 @@ BESIDE = {"wholebody.terms.linearisation": "wholebody.terms.kernel"}
 """Modules of `TOGETHER` that a first solve needs last, half of all that it compiles, and where their loops are."""
 
 LOOPS = tuple(name for names in TOGETHER for name in names)
+
+PRECOMPILED = Path(__file__).with_name("precompiled")
+"""Folder of a wheel with loops that the maker's numba and Python compiled for the processor `BASELINE`."""
+
+BASELINE = ("x86-64-v3", "")
+"""LLVM's name of a processor with AVX2, and no more features than it has."""
+
+BASELINE_FEATURES = frozenset(("+avx", "+avx2", "+bmi", "+bmi2", "+f16c", "+fma", "+lzcnt", "+movbe"))
+"""What a processor must have to run code for `BASELINE`."""
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -125,6 +138,26 @@ def compile_alone() -> None:
     _compiling["alone"] = True
 
 
+def precompile() -> None:
+    """Compile all loops for `BASELINE` and write them to `PRECOMPILED`, for a wheel."""
+    with tempfile.TemporaryDirectory() as kept:
+        target = {"NUMBA_CPU_NAME": BASELINE[0], "NUMBA_CPU_FEATURES": BASELINE[1], "NUMBA_CACHE_DIR": kept}
+        command = [sys.executable, "-m", __name__]
+        for more in ([], ["--collect"]):
+            subprocess.run([*command, *more], env={**os.environ, **target}, check=True)
+
+
+def collect_precompiled() -> None:
+    """Write what Python calls of the loops in the cache to `PRECOMPILED`."""
+    shutil.rmtree(PRECOMPILED, ignore_errors=True)
+    PRECOMPILED.mkdir()
+    compile_all()
+    modules = [module for name, module in sys.modules.items() if name.startswith("wholebody.")]
+    loops = {loop for module in modules for loop in vars(module).values() if isinstance(loop, _loop_type())}
+    for loop in loops:
+        loop.copy_kept()
+
+
 def usable_cores() -> int:
     """How many cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -145,7 +178,7 @@ def _loop_type() -> Any:
     number. Here a constant is a value as any: where that is faster, LLVM puts the function into its caller anyway.
     """
     from numba.core import event
-    from numba.core.caching import FunctionCache
+    from numba.core.caching import FunctionCache, IndexDataCacheFile
     from numba.core.registry import CPUDispatcher
     from numba.core.runtime import rtsys
     from numba.core.types.misc import unliteral
@@ -154,7 +187,8 @@ def _loop_type() -> Any:
         def load_overload(self, sig: Any, target_context: Any) -> Any:
             rtsys.initialize(target_context)
             try:
-                return self._load_overload(sig, target_context)
+                found = self._load_overload(sig, target_context)
+                return self._load_precompiled(sig, target_context) if found is None else found
             except Exception as error:  # cut short or unreadable, pickle raises anything: as if nothing were kept
                 logging.getLogger(__name__).info("%s: what was kept of it cannot be read (%s)", self._name, error)
                 with suppress(OSError):
@@ -165,9 +199,34 @@ def _loop_type() -> Any:
             with suppress(Exception):  # a folder that is full or read-only: the next process compiles anew
                 self._save_overload(sig, data)
 
+        def _load_precompiled(self, sig: Any, target_context: Any) -> Any:
+            """What a wheel has of it, if the source is the same and this processor can run it."""
+            if not PRECOMPILED.is_dir():
+                return None
+            sig, (system, _, features), code = self._index_key(sig, target_context.codegen())
+            if not set(features.split(",")) >= BASELINE_FEATURES:
+                return None
+            data = self._precompiled().load((sig, (system, *BASELINE), code))
+            return None if data is None else self._impl.rebuild(target_context, data)
+
+        def _precompiled(self) -> Any:
+            """Its file in `PRECOMPILED`, valid for the same text of the module; times of files differ."""
+            name = f"{self._py_func.__module__}.{self._impl.filename_base}"
+            text = Path(self._py_func.__code__.co_filename).read_bytes()
+            return IndexDataCacheFile(str(PRECOMPILED), name, hashlib.sha256(text).digest())
+
+        def copy(self, sig: Any, codegen: Any) -> None:
+            """Copy what is kept of one signature to `PRECOMPILED`."""
+            key = self._index_key(sig, codegen)
+            self._precompiled().save(key, self._cache_file.load(key))
+
     class Loop(CPUDispatcher):  # type: ignore[misc]
         def enable_caching(self) -> None:
             self._cache = Kept(self.py_func)
+
+        def copy_kept(self) -> None:
+            for sig in self.overloads:
+                self._cache.copy(sig, self.targetctx.codegen())
 
         def compile(self, sig: Any) -> Any:
             if _beside and self.__module__ in BESIDE.values() and isinstance(self._cache, Kept):
@@ -228,7 +287,11 @@ if __name__ == "__main__":
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     shared = import_module("wholebody.base.compiled")  # which the loops know; this module is another one
     shared.compile_alone()
-    if sys.argv[1:]:
+    if sys.argv[1:] == ["--precompile"]:
+        shared.precompile()
+    elif sys.argv[1:] == ["--collect"]:
+        shared.collect_precompiled()
+    elif sys.argv[1:]:
         shared.compile_all(sys.argv[1:])
     else:
         shared.compile_in_processes(min(usable_cores(), len(TOGETHER)))

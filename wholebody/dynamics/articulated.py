@@ -7,6 +7,8 @@ With the inertia M of the joints, springs K and dampers R towards a tracker, a s
 e from the figure to the tracker, c the forces of motion and weight. The springs are implicit, so any are stable. The
 impulses p are equation 9 of Schmidl and Lin with the whole articulated body in it, J M^-1 J^T in place of its mass and
 inertia: what is hit anywhere moves all joints. Impacts come first, without forces; a step ends where the next begins.
+M and c are those half way (midpoint rule); joints without springs, in a step without contacts, move by the mean of v
+and v+. Where nothing drives or touches the figure, its velocities are scaled so that energy is conserved.
 """
 
 from __future__ import annotations
@@ -78,7 +80,7 @@ class Articulated:
         inertia = self._inertia(self.q)
         self._armature = np.where(inertia.diagonal() < 1e-5, 1e-5, 0.0)  # kg m2: of links without mass
         self.stiffness, self.damping = actuated.gains(inertia.diagonal() + self._armature)
-        free = [joint for joint in self._model.joints if joint.nq == joint.nv == 1]
+        free = [joint for joint in self._model.joints[1:] if joint.nq == joint.nv == 1]  # the first is the world
         self._limited: Indices = np.array([(joint.idx_q, joint.idx_v) for joint in free], dtype=np.intp).reshape(-1, 2)
         impulse_kernel.compiled_kernel()
         compiled_kernel()
@@ -128,22 +130,29 @@ class Articulated:
         start = self.velocity.copy()
         impulse = self._bounce(own, points)
         time = self._until_impact(points, time)
-        weight = np.asarray(pin.computeGeneralizedGravity(model, self._data, self.q)).copy()
-        forces = np.asarray(pin.nonLinearEffects(model, self._data, self.q, self.velocity)).copy()
-        borne = np.where(self.stiffness > 0.0, weight, 0.0)
-        apart = np.asarray(pin.difference(model, self.q, aim))
+        begin, apart = self.velocity, np.asarray(pin.difference(model, self.q, aim))
         soft = time * self.damping + time * time * self.stiffness
-        driven = own + np.diag(soft)
-        rest = own @ self.velocity + time * (self.stiffness * apart - forces + borne) + soft * steady
-        self.velocity = np.linalg.solve(driven, rest)
-        impulse = impulse + self._bear(driven, points, time)
+        middle, mean = self.q, begin
+        for _ in range(2):  # first with the forces at the start, then those half way
+            weight = np.asarray(pin.computeGeneralizedGravity(model, self._data, middle)).copy()
+            forces = np.asarray(pin.nonLinearEffects(model, self._data, middle, mean)).copy()
+            masses = self._inertia(middle) + np.diag(self._armature)
+            borne = np.where(self.stiffness > 0.0, weight, 0.0)
+            driven = masses + np.diag(soft)
+            rest = masses @ begin + time * (self.stiffness * apart - forces + borne) + soft * steady
+            self.velocity = np.linalg.solve(driven, rest)
+            mean = 0.5 * (begin + self.velocity)
+            middle = np.asarray(pin.integrate(model, self.q, 0.5 * time * mean))
+        bearing = self._bear(driven, points, time)
+        impulse = impulse + bearing
         after = self.velocity
         motor = self.stiffness * (apart + time * (steady - after)) + self.damping * (steady - after) + borne
         work = np.einsum("ij,ij->i", impulse, (points.figure @ (0.5 * (start + after))).reshape(-1, 3))
         paid = time * float(motor @ (0.5 * (start + after))) + float(work[points.driven].sum())
-        ways = self._move(time, segments)
+        # springs and contacts are implicit; what is free of them moves by the mean of both velocities
+        ways = self._move(time * np.where((self.stiffness > 0.0) | bearing.any(), after, mean), segments)
         ways |= {name: (way[0], pin.SE3.Interpolate(*way, time / planned)) for name, way in moved.items()}
-        self._settle(began + paid)
+        self._settle(began + paid, 1.0 if impulse.any() or self.stiffness.any() else 1.05)
         if engine is not None:
             frame = engine.advance(time, ways)
             self.frames.append(frame)
@@ -173,10 +182,9 @@ class Articulated:
             np.zeros((3 * count, model.nv)), np.zeros((3 * count, 6 * len(bodies))), np.zeros(3 * count),
             np.zeros(count), np.zeros(count), np.zeros(count), [], bodies, np.zeros(count, dtype=bool),
         )  # fmt: skip
-        jacobians = np.array(
-            [np.zeros((6, model.nv))]
-            + [pin.getJointJacobian(model, self._data, joint, pin.WORLD) for joint in range(1, model.njoints)]
-        )
+        columns = [pin.getJointJacobian(model, self._data, joint, pin.WORLD) for joint in range(1, model.njoints)]
+        # pin gives those of a model of one freedom as a vector
+        jacobians = np.array([np.zeros((6, model.nv)), *(one.reshape(6, -1) for one in columns)])
         axes_of = _axes(normal)
         directions_of = np.concatenate([axes_of, cross(place[:, None], axes_of)], axis=2)
         moves = directions_of @ (jacobians[rows.second[kept]] - jacobians[rows.first[kept]])
@@ -277,10 +285,10 @@ class Articulated:
                 self.impulses[name] = self.impulses.get(name, np.zeros(3)) + push
         return impulse
 
-    def _move(self, time: float, segments: Mapping[str, int]) -> dict[str, tuple[pin.SE3, pin.SE3]]:
-        """Move the joints; the ways of the segments."""
+    def _move(self, way: Array, segments: Mapping[str, int]) -> dict[str, tuple[pin.SE3, pin.SE3]]:
+        """Move the joints by a way (nv,); the ways of the segments."""
         before = self._placements(segments)
-        self.q = np.asarray(pin.integrate(self._model, self.q, time * self.velocity))
+        self.q = np.asarray(pin.integrate(self._model, self.q, way))
         after = self._placements(segments)
         return {name: (before[name], after[name]) for name in segments}
 
@@ -288,13 +296,12 @@ class Articulated:
         state = self._workspace.state.update(self.q)
         return {name: pin.SE3(state.frame(number)) for name, number in segments.items()}
 
-    def _settle(self, most: float) -> None:
-        """Take the energy away that a step of this length added, so that kinetic and potential are at most `most`."""
-        inertia = self._inertia(self.q)
-        kinetic = self._kinetic(inertia, self.velocity)
-        excess = kinetic + float(pin.computePotentialEnergy(self._model, self._data, self.q)) - most
-        if excess > 0.0 and kinetic > 0.0:
-            self.velocity = self.velocity * np.sqrt(max(0.0, 1.0 - excess / kinetic))
+    def _settle(self, energy: float, most: float) -> None:
+        """Scale the velocities by at most a factor, so that kinetic and potential energy are at most `energy`."""
+        kinetic = self._kinetic(self._inertia(self.q), self.velocity)
+        excess = kinetic + float(pin.computePotentialEnergy(self._model, self._data, self.q)) - energy
+        if kinetic > 0.0:
+            self.velocity = self.velocity * min(most, np.sqrt(max(0.0, 1.0 - excess / kinetic)))
 
     def _react(self, wrenches: Mapping[str, Array], segments: Mapping[str, int]) -> None:
         """Give the figure the impulses that things gave its segments while they went on."""

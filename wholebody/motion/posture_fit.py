@@ -21,6 +21,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices
 from wholebody.figures.figure import Figure
 from wholebody.scene.workspace import Workspace
+from wholebody.terms.residual_kernel import cones as cone_angles
 
 STEP = 0.6  # rad: largest change of a joint in one step; beyond it the linearisation says little
 CONE_MARGIN, CONE_SLACK = 2e-3, 1e-6  # rad: inside of a cone that rows aim at, as they are curved; outside, of rounding
@@ -60,26 +61,35 @@ class Fitter:
     def __init__(self, figure: Figure, layout: Layout, workspace: Workspace) -> None:
         self.figure, self.model, self.layout, self._workspace = figure, figure.model, layout, workspace
         self._state = workspace.state
-        self._point_joints, self._point_parts = self._carried(layout.points)
+        point_joints, point_parts = self._carried(layout.points)
+        held = np.array([place for _, place in layout.held]).reshape(-1, 3)
+        self._place_joints = np.array([*point_joints, *(joint for joint, _ in layout.held)], dtype=np.intp)
+        self._local = np.concatenate([point_parts[:, 3], held])
         self._turn_joints, self._turn_parts = self._carried(layout.turns)
-        self._held_joints = np.array([joint for joint, _ in layout.held], dtype=np.intp)
-        self._held_places = np.array([place for _, place in layout.held]).reshape(-1, 3)
-        joints = (self._point_joints, self._held_joints, self._turn_joints)
-        self._joints = np.concatenate([np.repeat(each, 3) for each in joints])
-        self._world = np.zeros(len(self._joints), dtype=np.intp)
-        places = 3 * (len(layout.points) + len(layout.held))
-        self._wrenches = np.zeros((len(self._joints), 6))
+        self._moved = np.repeat(self._state.support[[*self._place_joints, *self._turn_joints]], 3, axis=0)
+        places = 3 * len(self._local)
+        self._wrenches = np.zeros((len(self._moved), 6))
         for axis in range(3):
             self._wrenches[axis:places:3, axis] = 1.0
             self._wrenches[places + axis :: 3, 3 + axis] = 1.0
         self._bones = np.kron(layout.bone_weights[:, None] * layout.bones, np.eye(3))
         self._turn_weights = np.repeat(layout.turn_weights, 3)
-        self._cones = list(figure.cones.values())
-        self._limb_joints, limb_parts = self._carried([cone.limb for cone in self._cones])
-        self._base_joints, base_parts = self._carried([cone.reference for cone in self._cones])
-        self._base_turns = base_parts[:, :3]
-        self._axes = np.array([part[:3] @ cone.axis for part, cone in zip(limb_parts, self._cones, strict=True)])
+        cones = list(figure.cones.values())
+        self._limb_joints, limb_parts = self._carried([cone.limb for cone in cones])
+        self._base_joints, base_parts = self._carried([cone.reference for cone in cones])
+        axes = [part[:3] @ cone.axis for part, cone in zip(limb_parts, cones, strict=True)]
+        turns = np.swapaxes(base_parts[:, :3], 1, 2)
+        edges = [cone.cone.planes.reshape(5, -1, 3).swapaxes(0, 1).reshape(-1, 15) for cone in cones]
+        counts = np.array([len(each) for each in edges], dtype=np.int64)
+        rows = np.arange(len(cones)), self._limb_joints, self._base_joints, counts, np.cumsum(counts) - counts
+        # what `terms.entries.CONE` says
+        self._cones = (
+            np.hstack([np.array(axes).reshape(-1, 3), turns.reshape(-1, 9)]), np.column_stack(rows).astype(np.int64),
+            np.concatenate([*edges, np.zeros((0, 15))]),
+        )  # fmt: skip
+        self._cone_rows, self._angles = np.zeros((len(cones), 6)), np.zeros(len(cones))
         self._free = 6 if figure.root == "free" else 0
+        self._diagonal = np.diag_indices(figure.model.nv)
 
     def _carried(self, frames: list[str]) -> tuple[Indices, Array]:
         """The joint that carries each frame, and in it the frame's rotation (3, 3) over its place: (k, 4, 3)."""
@@ -94,13 +104,12 @@ class Fitter:
     def held(self, q: Array) -> Array:
         """(h, 3) where the points are at a posture (nq,) that may be held."""
         self._state.update(q)
-        return self._placed(self._held_joints, self._held_places)
+        return self._places()[len(self.layout.points) :]
 
     def outside(self, q: Array) -> bool:
         """Whether a posture (nq,) has a limb outside of its reach cone."""
         self._state.update(q)
-        cones = zip(self._cones, self._directions(), strict=True) if self._cones else ()
-        return any(cone.cone.signed_angle(along)[0] < -CONE_SLACK for cone, along in cones)
+        return bool((self._cone_angles() < -CONE_SLACK).any())
 
     def overlaps(self, q: Array) -> bool:
         """Whether a pair overlaps at a posture (nq,) by more than the clearance that rows ask for."""
@@ -109,7 +118,7 @@ class Fitter:
     def cost(self, q: Array, goals: Goals) -> float:
         """Half the sum of the squared weighted errors."""
         self._state.update(q)
-        errors = self._errors(q, goals)
+        errors = self._errors(self._places(), goals)
         posture = goals.posture_weights * pin.difference(self.model, goals.posture, q)
         return 0.5 * float(errors @ errors + posture @ posture)
 
@@ -117,25 +126,25 @@ class Fitter:
         self, q: Array, goals: Goals, *, damping: float = DAMPING, among: bool = True, most: Array | None = None
     ) -> Array:
         """The posture (nq,) after one program from q (nq,); `most` (2, nv) displacements, contacts only if `among`."""
-        near = self._workspace.near(q, WITHIN) if among else None
         self._state.update(q)
-        rows, errors = self._rows(goals), self._errors(q, goals)
+        near = self._workspace.proximity.query(self._state.data, WITHIN) if among else None
+        places = self._places()
+        rows, errors = self._rows(places, goals), self._errors(places, goals)
         posture = np.asarray(pin.difference(self.model, goals.posture, q))
         square = goals.posture_weights**2
         gradient = rows.T @ errors + square * posture
         hessian = rows.T @ rows
-        hessian[np.diag_indices(len(hessian))] += square + damping
+        hessian[self._diagonal] += square + damping
         lower, upper = self.figure.tangent_bounds(q)
         lower, upper = np.maximum(lower, -STEP), np.minimum(upper, STEP)
         lower[: self._free], upper[: self._free] = -10.0, 10.0  # m, rad
         if most is not None:
             lower, upper = np.clip(most[0], lower, upper), np.clip(most[1], lower, upper)
-        limits, least = [np.zeros((0, self.model.nv))], [np.zeros(0)]
-        if self._cones:
-            # a limb outside of its cone returns by half a step at a time; nearer to the edge it stays inside
-            angles, cones = self._cone_rows()
-            limits.append(cones)
-            least.append(np.minimum(CONE_MARGIN - angles, 0.5 * STEP))
+        # a limb outside of its cone returns by half a step at a time; nearer to the edge it stays inside
+        edge = self._cone_angles() < STEP
+        joints = self._limb_joints[edge], self._base_joints[edge]
+        limits = [self._state.rows(self._cone_rows[edge], *joints)]
+        least = [np.minimum(CONE_MARGIN - self._angles[edge], 0.5 * STEP)]
         if near is not None and len(near.distance):
             found = self._workspace.rows.rows(near, CLEARANCE)
             limits.append(self._state.rows(found.wrench, found.second, found.first))
@@ -169,56 +178,36 @@ class Fitter:
                 break
         return q, cost
 
-    def _placed(self, joints: Indices, places: Array) -> Array:
-        at = self._state.joints[joints]
-        return np.asarray(np.einsum("pki,pk->pi", at[:, :3], places) + at[:, 3])
+    def _places(self) -> Array:
+        """(p + h, 3) where the points are, and those that may be held."""
+        at = self._state.joints[self._place_joints]
+        return np.asarray(np.einsum("pki,pk->pi", at[:, :3], self._local) + at[:, 3])
 
-    def _errors(self, q: Array, goals: Goals) -> Array:
+    def _errors(self, places: Array, goals: Goals) -> Array:
         """Weighted errors of bones, held points and orientations."""
-        points = self._placed(self._point_joints, self._point_parts[:, 3]) - goals.points
-        held = goals.held_weights * (self._placed(self._held_joints, self._held_places) - goals.held)
+        points = places[: len(goals.points)] - goals.points
+        held = goals.held_weights * (places[len(goals.points) :] - goals.held)
         at = self._state.joints[self._turn_joints]
         turned = np.swapaxes(at[:, :3], 1, 2) @ self._turn_parts[:, :3] @ np.swapaxes(goals.turns, 1, 2)
         angles = self._turn_weights * np.array([pin.log3(turn) for turn in turned]).reshape(-1)
         return np.concatenate([self._bones @ points.ravel(), held.ravel(), angles])
 
-    def _rows(self, goals: Goals) -> Array:
+    def _rows(self, places: Array, goals: Goals) -> Array:
         """Derivatives (m, nv) of the weighted errors."""
-        places = [
-            self._placed(self._point_joints, self._point_parts[:, 3]),
-            self._placed(self._held_joints, self._held_places),
-        ]
-        x, y, z = np.concatenate(places).T
-        count = 3 * len(x)
+        (x, y, z), count = places.T, 3 * len(places)
         wrenches = self._wrenches  # rows of a point p along n are [n, p x n]
         wrenches[0:count:3, 4], wrenches[0:count:3, 5] = z, -y
         wrenches[1:count:3, 3], wrenches[1:count:3, 5] = -z, x
         wrenches[2:count:3, 3], wrenches[2:count:3, 4] = y, -x
-        rows = self._state.rows(wrenches, self._joints, self._world)
-        points = 3 * len(places[0])
+        rows = self._state.folded((wrenches @ self._state.jacobian) * self._moved)
+        points = 3 * len(goals.points)
         return np.concatenate([
             self._bones @ rows[:points],
             goals.held_weights.reshape(-1, 1) * rows[points:count],
             self._turn_weights[:, None] * rows[count:],
         ])  # fmt: skip
 
-    def _directions(self) -> Array:
-        """(c, 3) directions of the limbs in the axes of their cones."""
-        joints = self._state.joints
-        worlds = np.einsum("cki,ck->ci", joints[self._limb_joints][:, :3], self._axes)
-        found: Array = np.einsum("cki,ci->ck", joints[self._base_joints][:, :3], worlds)
-        return np.asarray(np.einsum("ckj,ck->cj", self._base_turns, found))
-
-    def _cone_rows(self) -> tuple[Array, Array]:
-        """Angles (k,) of the limbs that are near to the edges of their cones, and their rows (k, nv)."""
-        near, angles, wrenches = list[int](), list[float](), list[list[float]]()
-        for row, (cone, along) in enumerate(zip(self._cones, self._directions(), strict=True)):
-            angle, gradient = cone.cone.signed_angle(along)
-            if angle < STEP:
-                turn = self._state.joints[self._base_joints[row], :3].T @ self._base_turns[row]
-                (x, y, z), (u, v, w) = (turn @ along).tolist(), (turn @ gradient).tolist()
-                near.append(row)
-                angles.append(angle)
-                wrenches.append([0.0, 0.0, 0.0, y * w - z * v, z * u - x * w, x * v - y * u])
-        rows = self._state.rows(np.array(wrenches).reshape(-1, 6), self._limb_joints[near], self._base_joints[near])
-        return np.array(angles), rows
+    def _cone_angles(self) -> Array:
+        """Angles (c,) of the limbs to the edges of their cones, positive inside; writes their wrenches."""
+        cone_angles(*self._cones, self._state.joints, self._cone_rows, self._angles)
+        return self._angles

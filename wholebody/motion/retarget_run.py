@@ -88,6 +88,7 @@ class Run:
             self.stay[:6] = 1.0  # nothing says where the figure is, so it stays
         limit = np.array(self.model.velocityLimit, dtype=float)
         self.most = np.where(limit > 0.0, np.minimum(limit, 1e9) * dt, np.inf)
+        self.reach = np.stack([-self.most, self.most])
         # where a posture has the joints of one value that have a speed limit, and by how much they move in a frame
         joints = [one for one in self.model.joints[1:] if one.nq == one.nv == 1 and np.isfinite(self.most[one.idx_v])]
         self.slow: Indices = np.array([one.idx_q for one in joints], dtype=np.intp)
@@ -96,10 +97,12 @@ class Run:
         self.none = (np.zeros((len(self.fitter.layout.held), 3)),) * 2
         self.calm, self.spread = (normal(time, dt) for time in (CALM, SPREAD))
         # by frames: goals, free postures with their costs, those within speed limits, the free fit, where it has the
-        # points that may be held, deviations of the first pass, postures and deviations of the sweeps
+        # points that may be held, deviations of the first pass, what is held in sweeps, postures, deviations of the
+        # sweeps
         self._wanted, self._chain = dict[int, Wanted](), dict[int, tuple[Array, float]]()
         self._slow, self._free, self._paths = (dict[int, Array]() for _ in range(3))
         self._first, self._found, self._deviation = (dict[int, Array]() for _ in range(3))
+        self._held = dict[int, tuple[Array, Array]]()
         self._backward = dict[int, tuple[Array, float]]()
         self._came, self.ended = 0, False
         self._front, self._latest = np.zeros(0), (np.zeros(self.model.nv), np.zeros(self.model.nv))
@@ -158,6 +161,7 @@ class Run:
         for frame in range(given - KEPT, come - KEPT):
             self._wanted.pop(frame, None)
             self._chain.pop(frame, None)
+            self._held.pop(frame, None)
         return found
 
     def _goals(self, frame: int, posture: Array, weights: Array, held: tuple[Array, Array] | None = None) -> Goals:
@@ -296,8 +300,9 @@ class Run:
         wanted = (4.0 * (near[1] + near[3]) - (near[0] + near[4])) / 6.0
         reference = np.asarray(pin.integrate(self.model, self._free[k], wanted))
         self.fitter.see(self.holds.moved(k))
-        held = self.holds.goals(k, self._paths, np.zeros(3), again=True)
-        goals = self._goals(k, reference, BEND / self.dt * self.levers, held)
+        if k not in self._held:
+            self._held[k] = self.holds.goals(k, self._paths, np.zeros(3), again=True)
+        goals = self._goals(k, reference, BEND / self.dt * self.levers, self._held[k])
         before = self._found[k - 1] if k else None
         q = self._reached(before, reference)
         for number in range(8 * SWEEP):  # more than the usual where cones, or contacts, are curved
@@ -310,7 +315,7 @@ class Run:
         """Least and greatest displacement (2, nv) of q that joints reach from the posture before in time."""
         if before is None:
             return None
-        return np.asarray(np.stack([-self.most, self.most]) - pin.difference(self.model, before, q))
+        return np.asarray(self.reach - pin.difference(self.model, before, q))
 
     def _reached(self, before: Array | None, q: Array) -> Array:
         """The posture nearest to q (nq,) that joints reach from the posture before in time."""
