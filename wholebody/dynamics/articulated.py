@@ -77,9 +77,9 @@ class Articulated:
         self.velocity, self.impulses, self.points = np.zeros(self._model.nv), dict[str, Array](), 0
         self.frames, self.ends = list[EngineFrame](), list[float]()
         self._tracked = self.q
-        inertia = self._inertia(self.q)
-        self._armature = np.where(inertia.diagonal() < 1e-5, 1e-5, 0.0)  # kg m2: of links without mass
-        self.stiffness, self.damping = actuated.gains(inertia.diagonal() + self._armature)
+        light = self._inertia(self.q).diagonal() < 1e-5  # kg m2: of links without mass
+        self._model.armature += np.where(light, 1e-5, 0.0)
+        self.stiffness, self.damping = actuated.gains(self._inertia(self.q).diagonal())
         free = [joint for joint in self._model.joints[1:] if joint.nq == joint.nv == 1]  # the first is the world
         self._limited: Indices = np.array([(joint.idx_q, joint.idx_v) for joint in free], dtype=np.intp).reshape(-1, 2)
         impulse_kernel.compiled_kernel()
@@ -113,7 +113,7 @@ class Articulated:
         return np.asarray(upper + upper.T - np.diag(upper.diagonal()))
 
     def _kinetic(self) -> float:
-        return 0.5 * float(self.velocity @ self._inertia(self.q) @ self.velocity + self._armature @ self.velocity**2)
+        return 0.5 * float(self.velocity @ self._inertia(self.q) @ self.velocity)
 
     # ---- a step
 
@@ -121,7 +121,7 @@ class Articulated:
         """Advance by at most a time, to the next impact if that comes first; by how much."""
         model, engine = self._model, self._engine
         planned, points, began, start = time, self._points(time, moved), self.energy(), self.velocity.copy()
-        impulse = self._bounce(self._inertia(self.q) + np.diag(self._armature), points)
+        impulse = self._bounce(self._inertia(self.q), points)
         time = self._until_impact(points, time)
         begin, apart = self.velocity, np.asarray(pin.difference(model, self.q, aim))
         soft = time * self.damping + time * time * self.stiffness
@@ -129,8 +129,7 @@ class Articulated:
         for _ in range(2):  # first with the forces at the start, then those half way
             weight = np.asarray(pin.computeGeneralizedGravity(model, self._data, middle)).copy()
             forces = np.asarray(pin.nonLinearEffects(model, self._data, middle, mean)).copy()
-            masses = self._inertia(middle) + np.diag(self._armature)
-            borne = np.where(self.stiffness > 0.0, weight, 0.0)
+            masses, borne = self._inertia(middle), np.where(self.stiffness > 0.0, weight, 0.0)
             driven = masses + np.diag(soft)
             rest = masses @ begin + time * (self.stiffness * apart - forces + borne) + soft * steady
             self.velocity = np.linalg.solve(driven, rest)
@@ -295,7 +294,7 @@ class Articulated:
         if not given:
             return
         model = self._model
-        inertia = self._inertia(self.q) + np.diag(self._armature)
+        inertia = self._inertia(self.q)
         pin.computeJointJacobians(model, self._data, self.q)
         total = np.zeros(model.nv)
         for name, wrench in given.items():
