@@ -60,7 +60,7 @@ def test_a_circle_by_ccd(task: Path, tmp_path: Path) -> None:
     command = ["drag", str(task), "--path", "circle", "--size", "0.05", "--method", "ccd", "--out", str(out)]
     assert main([*command, "--frames", "30"]) == 0
     rows = csv_rows(out / "reach-ccd.csv")
-    assert float(rows[-1]["left mm"]) < 1.0
+    assert float(rows[-1]["error mm"]) < 1.0
     assert max(float(row["between mm"]) for row in rows) <= 1.0
 
 
@@ -73,7 +73,7 @@ def test_a_file_that_leads_into_the_wall_ends_there(
     assert main([*command, "--goal", "0", "--frames", "40"]) == 1
     assert "unreachable" in "".join(capsys.readouterr().out.split())
     rows = csv_rows(out / "reach-qp.csv")
-    assert float(rows[-1]["left mm"]) > 100.0
+    assert float(rows[-1]["error mm"]) > 100.0
     assert max(float(row["deepest mm"]) for row in rows) < 0.1
 
 

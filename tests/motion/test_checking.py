@@ -216,7 +216,10 @@ def test_a_check_is_told_in_three_lines() -> None:
     found = wb.check(wb.Clip(human, [standing, inside, standing], 0.5, "an arm"))  # type: ignore[arg-type]
     lines = str(found).splitlines()
     assert len(lines) == 3
-    assert lines[0].startswith("an arm, 3 frames: 1 frames and 0 gaps")
+    assert (
+        lines[0]
+        == f"an arm, 3 frames: {len(found.contacts)} pairs collide in 1 frames, and 0 times between free frames"
+    )
     assert f"{1e3 * found.deepest:.2f} mm" in lines[1]
     assert "at 0.50 s" in lines[1]
     assert len(repr(found)) < 200

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +58,9 @@ def test_a_planar_arm_reaches_its_ring(planar: wb.Problem, found: wb.studies.Rea
     for place in zip(*np.nonzero(found.reached), strict=True):
         there = planar.scene.figure.placement(found.q[place], "tip").translation
         np.testing.assert_allclose(there[:2], (found.x[place[0]], found.y[place[1]]), atol=2e-5)
-    assert found.volume == pytest.approx(0.01 * found.reached.sum())
+    assert found.volume == pytest.approx(0.01 * found.reached.sum())  # no place at the edge of the grid is reached
+    whole = replace(found, verdict=np.full_like(found.verdict, REACHED))
+    assert whole.volume == pytest.approx(1.6**2)
 
 
 def test_what_is_left_is_the_distance_from_the_ring(found: wb.studies.ReachMap) -> None:
@@ -128,7 +131,7 @@ def test_files(found: wb.studies.ReachMap, tmp_path: Path) -> None:
 def test_the_command_writes_all_files(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     grid = ["--frame", "tip", "--low=-0.4,-0.4,0", "--high", "0.4,0.4,0", "--step", "0.2"]
     assert main(["reach", str(folder / "task.toml"), *grid, "--out", str(tmp_path)]) == 0
-    assert "reach volume" in capsys.readouterr().out
+    assert "m^2" in capsys.readouterr().out
     assert {path.name for path in tmp_path.iterdir()} == {"reach.png", "reach.html", "reach.npz", "reach.vtk"}
     for wrong in (["--step", "x"], ["--step", "-1"], ["--low", "1,2"], ["--frame", "tap"], ["--low", "9,9,9"]):
         assert main(["reach", str(folder / "task.toml"), *grid, *wrong, "--out", str(tmp_path)]) == 2

@@ -59,8 +59,8 @@ hold it; "undo" goes back, "save" writes the posture as a task file into the fol
 examples:
   wholebody drag shelf.toml --live
   wholebody drag sit_on_chair.toml --path line --method newton
-  wholebody drag shelf.toml --path circle --size 0.05 --method qp
-  wholebody drag shelf.toml --path corners.csv --frames 300 --out out/shelf
+  wholebody drag look_and_touch_overhead.toml --path circle --normal 0 0 1 --method qp
+  wholebody drag sit_on_chair.toml --path sit_on_chair.csv --frames 300 --out out/chair
 exit code: 1 if the end is not met, or if the overlap in a frame or between two exceeds 1 mm, or a limit is violated""",
 )
 def run(arguments: argparse.Namespace) -> int:
@@ -88,14 +88,14 @@ def run(arguments: argparse.Namespace) -> int:
     row, frames = drag_rows(task.path.stem, dragged, judged)
     write_rows(out / f"{name}.csv", facts, frames)
     meaning = (
-        "Left to the goal is the distance of what is dragged from where the goal is in that frame; at the end its "
+        "The error is the distance of what is dragged from where the goal is in that frame; at the end its "
         "angle, in mrad, where that is more. Depths are found by coal over every pair of pieces; between frames "
         "stands a bound, found by a continuous sweep, on how much deeper any pair gets on the way than at its deeper "
         "end. Jerk is the third difference of the joint angles, rad/s³; CPU is the time that the processor worked on a "
         "frame; holds are in mm or mrad."
     )
     write_text(out / f"{name}.md", report(meaning, {"": [row]}, facts) + "\n")
-    chart(frame_panels(frames, ("ms", "CPU ms"), ("left mm",)), out / name)
+    chart(frame_panels(frames, ("ms", "CPU ms"), ("error mm",)), out / name)
     _animation(task, dragged, out / f"{name}.html")
     print_rows([row])
     print(f"end: {dragged.end.message}")
@@ -121,7 +121,7 @@ def live(arguments: argparse.Namespace) -> int:
     def saved(path: Path) -> Path:
         return write_task(drag.stated(goals=drag.problem.goals), path, title=f"{task.title}, dragged")
 
-    page = LivePage(drag, out / "posture.toml", arguments.port, saved)
+    page = LivePage(drag, out / "posture.toml", arguments.port, saved, view=task.view)
     print(f"drag the handles at {page.url}; Ctrl-C ends", flush=True)
     page.serve()
     return 0

@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
             task.problem, arguments.frame, low, high, step, jobs=arguments.jobs, cluster=arguments.cluster,
             progress=lambda done, total: status.update(f"{done} of {total} places"),
         )  # fmt: skip
-    print(f"{found}\n  {found.share:.1%} reached; reach volume {found.volume:.4g}")
+    print(found)
     for write, name in ((found.picture, "png"), (found.html, "html"), (found.save, "npz"), (found.to_vtk, "vtk")):
         print(f"wrote {write(out / f'reach.{name}')}")
     return 0 if found.reached.any() else 1

@@ -61,13 +61,13 @@ def run(arguments: argparse.Namespace) -> int:
             warm_start=asked.warm_start, jobs=arguments.jobs, cluster=arguments.cluster, folder=out,
             progress=lambda told: status.update(f"{told.done} of {told.total}"),
         )  # fmt: skip
-    made = table("case", "outcome", "left", "overlap", "time")
+    made = table("case", "outcome", "goal error", "overlap", "time")
     for one in records:
-        left, overlap = f"{1e3 * one.goal_error:.2f} mm", f"{1e3 * one.penetration:.3f} mm"
-        made.add_row(one.name, one.outcome, left, overlap, f"{1e3 * one.seconds:.0f} ms")
+        error, overlap = f"{1e3 * one.goal_error:.2f} mm", f"{1e3 * one.penetration:.3f} mm"
+        made.add_row(one.name, one.outcome, error, overlap, f"{1e3 * one.seconds:.0f} ms")
     console().print(made)
     counts = ", ".join(f"{count} {outcome}" for outcome, count in records.counts().items())
-    print(f"{len(records)} cases: {counts}")
+    print(f"{len(records)} case{'' if len(records) == 1 else 's'}: {counts}")
     for one in records:
         if one.q is None:
             print(f"{one.name}: {one.message}", file=sys.stderr)

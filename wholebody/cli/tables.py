@@ -117,7 +117,7 @@ def judgement(made: Table, judged: Assessment) -> Table:
 
 
 def _goals(task: Task, solution: Solution) -> Table:
-    made = table("goal", "distance left", "angle left")
+    made = table("goal", "distance", "angle")
     for goal in goals_left(task, solution.q):
         distance = "" if goal.distance is None else f"{1e3 * goal.distance:.3f} mm"
         angle = "" if goal.angle is None else f"{math.degrees(goal.angle):.3f} deg"

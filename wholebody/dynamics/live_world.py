@@ -163,7 +163,9 @@ class LiveWorld:
         return LiveFrame(self.q, 0.0, 0, 0.0, 0.0, self._status())
 
     def _status(self) -> str:
-        doing = f"dragging {self.taken}" if self.taken else "take a handle or a thing and drag it; click one to hold it"
+        doing = (
+            f"dragging {self.taken}" if self.taken else "drag a handle or a thing; click a handle to hold or release it"
+        )
         return f"{doing}: {self._note}" if self._note else doing
 
     def _handle_place(self, state: Any, q: Array, name: str) -> Array:

@@ -127,9 +127,8 @@ class ClipCheck(Shown):
         told = f"{self.clip.name}, {len(self.clip)} frames: "
         first = f"nothing overlaps by more than {1e3 * self.tolerance:g} mm"
         if not self.free:
-            first = (
-                f"{self.colliding} frames and {self.dips} gaps between free frames collide, {len(self.contacts)} pairs"
-            )
+            between = f"{self.dips} times between free frames"
+            first = f"{len(self.contacts)} pairs collide in {self.colliding} frames, and {between}"
         deepest = f"deepest {1e3 * self.deepest:.2f} mm in a frame and {1e3 * self.deepest_between:.2f} mm at any time"
         if self.contacts:
             worst = max(self.contacts, key=lambda contact: contact.deepest)

@@ -123,9 +123,9 @@ class Torques:
             )
         force, moment = (np.linalg.norm(part, axis=1) for part in (self.missing[:, :3], self.missing[:, 3:]))
         return (
-            f"{first}\nthe ground cannot give up to {force.max():.0f} N and {moment.max():.0f} N m (median "
-            f"{np.median(force):.0f} N, {np.median(moment):.0f} N m)\na foot stands in {int(self.supported.sum())} of "
-            f"{len(self.torque)} frames"
+            f"{first}\nthe ground cannot give, of what the motion needs: at most {force.max():.0f} N, "
+            f"{moment.max():.0f} N m; in the median {np.median(force):.0f} N, {np.median(moment):.0f} N m\n"
+            f"a foot stands in {int(self.supported.sum())} of {len(self.torque)} frames"
         )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from threading import Lock
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Indices, brief
+from wholebody.base.arrays import Indices, Mask, brief
 from wholebody.base.pool import Pool
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.continuous.moved_pairs import compiled_kernel
@@ -171,6 +171,11 @@ class SceneGeometry:
             if len(self._known) > 32:
                 del self._known[next(iter(self._known))]
         return found
+
+    def between(self, owners: Set[tuple[str, str]]) -> Mask:
+        """Which collision pairs are of owners that stand in some pairs of names, in either order."""
+        pairs = ((self.owners[a], self.owners[b]) for a, b in self.table.pairs.tolist())
+        return np.array([pair in owners or pair[::-1] in owners for pair in pairs], dtype=bool)
 
     def copied(self) -> SceneGeometry:
         """A copy with placements of its own."""

@@ -59,7 +59,9 @@ class Exclusion(NamedTuple):
     def __str__(self) -> str:
         unit = "kg" if self.dimension == "mass" else "m"
         words = f"{self.dimension.replace('_', ' ')} {self.side} {self.value:.3f} {unit}"
-        return f"{self.excluded} {'men' if self.sex == 'male' else 'women'} do not {self.verdict}: {words}"
+        who = {"male": ("man", "men"), "female": ("woman", "women")}[self.sex]
+        said = f"{who[0]} does" if self.excluded == 1 else f"{who[1]} do"
+        return f"{self.excluded} {said} not {self.verdict}: {words}"
 
 
 @dataclass(frozen=True, repr=False)

@@ -39,7 +39,8 @@ def slices_chart(found: Any) -> Any:
     bar = chart.colorbar(image, ax=list(axes.flat), shrink=0.8)
     bar.set_label(MEANING, fontsize="x-small")
     bar.ax.tick_params(labelsize="x-small")
-    chart.suptitle(f"{plain(found.frame)}: {found.share:.0%} of {found.verdict.size} places reached, seen from above")
+    reached = f"{found.share:.0%} of {found.verdict.size} places reached, seen from above"
+    chart.suptitle(f"{plain(found.frame)}\n{reached}", fontsize="medium")
     return chart
 
 
@@ -51,7 +52,7 @@ def write_page(found: Any, path: Path) -> Path:
         image = _slice(axes[0, 0], found, values, k)
         chart.colorbar(image, ax=axes[0, 0]).set_label(MEANING, fontsize="small")
         images.append((height, base64.b64encode(png(chart)).decode()))
-    facts = {**found.counts(), "solves": found.solves, "reach volume": f"{found.volume:.3g}"}
+    facts = {**found.counts(), "solves": found.solves, "reached": found.extent}
     first = int(np.argmax(found.reached.sum(axis=(0, 1))))
     page = templates(Path(__file__).parent).get_template("reach.html.jinja")
     return write(path, page.render(title=f"Reach of {found.frame}", facts=facts, first=first, images=images))
@@ -88,6 +89,7 @@ def _slice(axis: Any, found: Any, values: Array, k: int) -> Any:
     axis.set_xlabel("y, left [m]", fontsize="x-small")
     axis.set_ylabel("x, forward [m]", fontsize="x-small")
     axis.tick_params(labelsize="x-small")
+    axis.locator_params(nbins=5)
     return image
 
 

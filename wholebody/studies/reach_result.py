@@ -75,11 +75,14 @@ class ReachMap(Shown):
 
     @property
     def volume(self) -> float:
-        """Reached places times the volume of a cell, m^3; of a plane its area, m^2; of a line its length, m."""
-        cell = 1.0
-        for axis in (self.x, self.y, self.z):
-            cell *= float(axis[1] - axis[0]) if len(axis) > 1 else 1.0
-        return cell * int(self.reached.sum())
+        """Part of the grid's volume that is reached, m^3; of a plane the area, m^2; of a line the length, m.
+
+        By the trapezoidal rule: a place at an end of an axis stands for half a step.
+        """
+        steps = [np.gradient(axis) if len(axis) > 1 else np.ones(1) for axis in (self.x, self.y, self.z)]
+        for step in steps:
+            step[[0, -1]] *= 0.5 if len(step) > 1 else 1.0
+        return float(np.einsum("ijk,i,j,k", self.reached, *steps))
 
     def counts(self) -> dict[str, int]:
         """How many places have each verdict."""
@@ -94,7 +97,12 @@ class ReachMap(Shown):
         )
         again = f", {self.from_neighbours} reached only from a neighbour" if self.from_neighbours else ""
         head = f"ReachMap of {self.frame!r}: {self.verdict.size} places, {self.solves} solves"
-        return f"{head}\n  {counts}{again}\n  {span}"
+        return f"{head}\n  {counts}{again}\n  {span}\n  {self.share:.1%} of the places, {self.extent}"
+
+    @property
+    def extent(self) -> str:
+        """`volume` with its unit."""
+        return f"{self.volume:.3g} {('m', 'm', 'm^2', 'm^3')[sum(size > 1 for size in self.verdict.shape)]}"
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write all arrays into an npz file; returns the path."""

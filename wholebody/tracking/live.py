@@ -276,8 +276,9 @@ class LiveDrag:
         contacts = self._contacts(self.q)
         overlap = self._deepest = max(0.0, -float(contacts.distance.min(initial=0.0)))
         verb = "turning" if self._turns else "dragging"
-        doing = f"{verb} {self.taken}" if self.taken else "take a handle and drag it; click one to hold it"
-        status = f"{doing}, by {self.method.name}"
+        status = "drag a handle; click one to hold or release it"
+        if self.taken:
+            status = f"{verb} {self.taken} by {self.method.name}"
         if self._trouble or self._stopped:
             status = f"{status}: {self._trouble or self._stopped}"
         return LiveFrame(self.q, error, len(contacts.distance), overlap, seconds, status)

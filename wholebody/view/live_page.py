@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import WholebodyError
 from wholebody.dynamics.live_world import LiveWorld
 from wholebody.motion.files.gltf import triangles
+from wholebody.taskfile.task import View
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.live import LiveDrag, LiveFrame
 from wholebody.view.style import LOOK
@@ -48,10 +49,11 @@ class LivePage:
         port: int = 8080,
         save: Callable[[Path], Path] | None = None,
         places: Callable[[], Mapping[str, Array]] | None = None,
+        view: View | None = None,
     ) -> None:
         """Open the page at the port, or the next free one; its button "save" writes the posture to `save_to`."""
         # `places` are asked for before every frame of a world: where handles are to follow from outside.
-        self.drag, self.frames, self._places = drag, 0, places
+        self.drag, self.frames, self._places, view = drag, 0, places, view or View()
         self._save_to, self._save = save_to, save
         self._lock = threading.RLock()
         self._target: Any = None
@@ -61,15 +63,17 @@ class LivePage:
         self._constraints: dict[str, Any] = {}
         self._rings: Any = None
         self._stopped = threading.Event()
-        self.server = viser_server(port, "wholebody drag")
+        self.server = viser_server(port, "wholebody world" if isinstance(drag, LiveWorld) else "wholebody drag")
         self.url = f"http://127.0.0.1:{self.server.get_port()}"
         self.server.scene.set_up_direction("+z")
         self.server.scene.configure_default_lights(cast_shadow=False)  # shadows cost most of a frame without a GPU
         middle = np.mean([drag.place(name) for name in drag.handles], axis=0)
-        # m: of the camera, from the middle of the handles, which it looks at from the front right
-        self.server.initial_camera.position = middle + np.array((2.2, -1.6, 0.6))
-        self.server.initial_camera.look_at = middle
-        self._pieces = self._draw()
+        camera = self.server.initial_camera
+        # m: from the front right of the middle of the handles
+        camera.position, camera.look_at = middle + np.array((2.2, -1.6, 0.6)), middle
+        if view.eye is not None:
+            camera.position, camera.look_at, camera.fov = view.eye, view.target, np.radians(LOOK.field_of_view)
+        self._pieces = self._draw(view.see_through)
         self._handles = {name: self._handle(name) for name in (*drag.handles, *drag.things)}
         self._panel()
         self._show(drag.report())
@@ -100,7 +104,7 @@ class LivePage:
         finally:
             self.stop()
 
-    def _draw(self) -> list[Any]:
+    def _draw(self, see_through: Collection[str]) -> list[Any]:
         scene = self.drag.scene
         pieces = []
         for number, piece in enumerate(scene.geometry.geometryObjects):
@@ -111,6 +115,8 @@ class LivePage:
             color = (214, 180, 150) if thing is None else _bytes(given, number)
             # opacity of the figure, so that the handles in it are seen
             opacity = 0.7 if thing is None else None if thing.color is None else thing.color[3]
+            if thing is not None and thing.name in see_through:
+                opacity = LOOK.see_through
             mesh = triangles(piece.geometry)
             pieces.append(
                 self.server.scene.add_mesh_simple(

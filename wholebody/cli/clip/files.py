@@ -43,7 +43,8 @@ def info(arguments: argparse.Namespace) -> int:
     values = [figure.joint_values(q) for q in clip.q]
     made = table("joints that move most", "from", "to", "greatest speed")
     ranges = {name: [frame[name] for frame in values] for name in values[0]}
-    for name in sorted(ranges, key=lambda name: min(ranges[name]) - max(ranges[name]))[:12]:
+    moving = [name for name in ranges if max(ranges[name]) > min(ranges[name])]
+    for name in sorted(moving, key=lambda name: min(ranges[name]) - max(ranges[name]))[:12]:
         slides = figure.model.joints[figure.joint_id(name)].shortname().startswith("JointModelP")
         unit, factor = ("m", 1.0) if slides else ("deg", float(np.degrees(1.0)))
         low, high = (factor * end for end in (min(ranges[name]), max(ranges[name])))
