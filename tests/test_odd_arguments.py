@@ -876,7 +876,7 @@ BY_OWNERS = ("Trajectory.avoid", "PerFrame.avoid", "Bisection.avoid", "QP.batche
 
 DERIVATIVES = (
     "of_arms",
-    "on_polygon",
+    "on_points",
     "joint_placements",
     "place_of",
     "companion",

@@ -169,18 +169,20 @@ class Balance(Constraint):
 
     def resolve(self, scene: Surroundings, start: Array) -> Balance:
         """Compute the support polygon at the start."""
-        return self.on_polygon(convex_polygon(standing_points(scene, start, self.feet)[:, :2]), scene)
+        return self.on_points(standing_points(scene, start, self.feet), scene)
 
-    def on_polygon(self, corners: Array, scene: Surroundings) -> Balance:
-        """Copy that is ready to be evaluated, on a support polygon with these corners (k, 2)."""
-        joints = inputs.joints_with_mass(scene, "Balance", self.feet)
+    def on_points(self, points: Array, scene: Surroundings, steady: bool = False) -> Balance:
+        """Copy that is ready to be evaluated, on points (n, 3) of the soles; if `steady`, with that as its margin."""
+        joints, corners = inputs.joints_with_mass(scene, "Balance", self.feet), convex_polygon(points)
+        width = least_width(corners)
+        margin = STEADY * width if steady else self.margin
         # The circle inside a convex set has at least a third of its width as radius (Blaschke 1915).
-        if 3.0 * self.margin > least_width(corners) and len(shrunk(corners, self.margin)) == 0:
+        if 3.0 * margin > width and len(shrunk(corners, margin)) == 0:
             raise InputError(
-                f"Balance: a margin of {self.margin:g} m leaves nothing of the support polygon; make it smaller"
+                f"Balance: a margin of {margin:g} m leaves nothing of the support polygon; make it smaller"
             )
         normals, offsets = edges(corners)
-        return filled(self, joints=joints, normals=normals, offsets=offsets)
+        return filled(self, margin=margin, joints=joints, normals=normals, offsets=offsets)
 
     @property
     def lower(self) -> Array:

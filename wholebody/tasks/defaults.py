@@ -10,7 +10,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
-from wholebody.tasks.balance import STEADY, Balance, convex_polygon, least_width, standing_points
+from wholebody.tasks.balance import Balance, standing_points
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings
 from wholebody.tasks.bounds import Freeze
 from wholebody.tasks.distance import Effort
@@ -102,8 +102,7 @@ def default_constraints(
     for body in standing:
         feet = tuple(body + foot for foot in FEET)
         try:
-            corners = convex_polygon(standing_points(scene, start, feet)[:, :2])
-            found.append(Balance(feet, margin=STEADY * least_width(corners)).on_polygon(corners, scene))
+            found.append(Balance(feet).on_points(standing_points(scene, start, feet), scene, steady=True))
         except InputError as error:
             if required:
                 raise

@@ -79,21 +79,14 @@ def placement_floats(place: Any) -> Array:
 
 
 def _residual(residual: PlacementResidual) -> list[Entry]:
-    based = residual.base.frame != WORLD.frame
-    floats = np.zeros(36)
-    floats[:12] = placement_floats(residual.place.placement)
+    place, base, target, undo, position, orientation = residual
+    based, floats = base.frame != WORLD.frame, np.zeros(36)
+    floats[:12] = placement_floats(place.placement)
     if based:
-        floats[12:24] = placement_floats(residual.base.placement)
-    floats[24:27] = residual.target
-    floats[27:].reshape(3, 3)[:] = residual.undo.rotation.T
-    integers = (
-        residual.place.joint,
-        residual.base.joint,
-        int(residual.position),
-        int(residual.orientation),
-        int(based),
-    )
-    return [Entry(RESIDUAL, integers, floats, 3 * (integers[2] + integers[3]))]
+        floats[12:24] = placement_floats(base.placement)
+    floats[24:27], floats[27:] = target, undo.rotation.T.ravel()
+    integers = place.joint, base.joint, int(position), int(orientation), int(based)
+    return [Entry(RESIDUAL, integers, floats, 3 * (position + orientation))]
 
 
 def _point(term: tasks.Point, model: pin.Model) -> list[Entry]:
