@@ -19,7 +19,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from tests.motion import test_ground
+from tests.motion import test_retargeting
 from tests.motion.test_things import gaps
 from tests.saved_page import unpacked
 from wholebody.assessment.motion import assess_motion
@@ -489,7 +489,7 @@ def test_a_lift_keeps_feet_on_the_floor_and_hands_at_the_crate(example: Example,
     assert assess_motion(module.build(clip.things["crate"]), clip.q, clip.dt, moves).depth.max() <= 1e-4
     for side in ("left", "right"):
         assert np.abs(gaps(clip, side, "crate", coal.Box(*module.CRATE))[:, 0]).max() < 1e-3
-        assert np.ptp(test_ground.sole(clip, f"{side}_heel"), axis=0).max() < 1e-3
+        assert np.ptp(test_retargeting.places(clip, f"{side}_heel"), axis=0).max() < 1e-3
     assert not list(tmp_path.iterdir())
 
 
