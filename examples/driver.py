@@ -15,9 +15,9 @@ def turned(degrees: float) -> tuple[float, float, float, float]:
     return 0.0, float(np.sin(np.radians(degrees) / 2)), 0.0, float(np.cos(np.radians(degrees) / 2))
 
 
-def build() -> wb.Problem:
-    """State the problem."""
-    car = wb.Scene(wb.load("human", sex="female", percentile=50))
+def build(figure: wb.Figure | None = None) -> wb.Problem:
+    """State the problem, of a woman if nobody is given."""
+    car = wb.Scene(figure or wb.load("human", sex="female", percentile=50))
     car.add(wb.Box((0.50, 0.52, 0.08)), name="seat", at=(-0.30, 0.0, 0.26), color=LEATHER)
     car.add(wb.Box((0.08, 0.52, 0.60)), name="backrest", at=(-0.60, 0.0, 0.60, *turned(-12.0)), color=LEATHER)
     car.add(wb.Box((0.35, 0.60, 0.02)), name="pedals", at=(0.45, 0.0, 0.13, *turned(-25.0)), color=DARK)

@@ -13,9 +13,9 @@ ON_TABLE = (0.45, 0.0, 0.86)  # m: its middle
 LIFTED = (0.42, 0.0, 1.15)  # m
 
 
-def build() -> wb.Problem:
-    """State the first problem: both palms on the sides of the box."""
-    scene = wb.Scene(wb.load("human", sex="male", stature=1.78))
+def build(figure: wb.Figure | None = None) -> wb.Problem:
+    """State the first problem, of a man if nobody is given: both palms on the sides of the box."""
+    scene = wb.Scene(figure or wb.load("human", sex="male", stature=1.78))
     scene.add(wb.HalfSpace(), name="floor")
     scene.add(wb.Box((0.60, 1.2, 0.04)), name="table", at=(0.62, 0.0, 0.72), color=OAK)
     scene.add(BOX, name="box", at=ON_TABLE, color=CARDBOARD)

@@ -9,9 +9,9 @@ from presenting import OAK, command_line, picture, report
 import wholebody as wb
 
 
-def build() -> wb.Problem:
-    """State the problem; tasks/take_a_seat.toml states the same."""
-    scene = wb.Scene(wb.load("human", sex="female", stature=1.65))
+def build(figure: wb.Figure | None = None) -> wb.Problem:
+    """State the problem, of a woman if nobody is given; tasks/take_a_seat.toml states the same."""
+    scene = wb.Scene(figure or wb.load("human", sex="female", stature=1.65))
     scene.add(wb.HalfSpace(), name="floor")
     scene.add(wb.Box((0.44, 0.48, 0.04)), name="seat", at=(-0.35, 0.0, 0.36), color=OAK)
     scene.add(wb.Box((0.03, 0.48, 0.36)), name="backrest", at=(-0.56, 0.0, 0.80), color=OAK)
