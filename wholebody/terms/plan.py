@@ -98,8 +98,7 @@ class TermPlan(NamedTuple):
                 floats[place : place + columns] = entry.floats
                 places[entry.table] = place + columns
         kept = self.constraints if constraints is None else tuple(found[len(goals) :])
-        goal_entries = tuple(found[: len(goals)])
-        return self._replace(floats=floats, goals=goal_entries, constraints=kept, others=tuple(others))
+        return self._replace(floats=floats, goals=tuple(found[: len(goals)]), constraints=kept, others=tuple(others))
 
 
 def make_plan(limits: Limits, terms: Terms, dt: float | None, state: State) -> TermPlan:
