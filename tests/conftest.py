@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 from weakref import WeakKeyDictionary
 
-from wholebody.base import runner
+from wholebody.base import batches, runner
 from wholebody.base.compiled import compile_all
 from wholebody.base.runner import ONE_THREAD
 
@@ -31,6 +31,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from wholebody.base.errors import WholebodyError
+from wholebody.figures import load
 from wholebody.figures.description import Description
 from wholebody.figures.figure import Figure
 from wholebody.scene.scene import Scene
@@ -193,6 +194,18 @@ def planar_arm() -> Callable[..., Figure]:
     return _planar_arm
 
 
+@pytest.fixture(scope="session")
+def human() -> Figure:
+    """Return the person as it is by default; figures do not change."""
+    return load("human")
+
+
+@pytest.fixture(scope="session")
+def hand() -> Figure:
+    """Return a right hand."""
+    return load("hand")
+
+
 _LAID: WeakKeyDictionary[Scene, tuple[Any, Any, Any]] = WeakKeyDictionary()
 """Of scenes: the geometry as it was built, and Pinocchio's data of both; to make them takes longer than to use them."""
 
@@ -225,6 +238,7 @@ def warm_processes(request: pytest.FixtureRequest) -> Iterator[None]:
         if not getattr(request.module, "FROM_SCRATCH", False):
             patch.setattr(runner, "start_process", _start_warm)
         yield
+        batches.close_children()  # one that is left would have the variables and the patches of this module
 
 
 @pytest.fixture(autouse=True, scope="module")

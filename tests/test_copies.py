@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import copy
-import multiprocessing
 import pickle
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -141,17 +139,6 @@ def test_a_problem_with_every_kind_of_term(scene: wb.Scene, way: Callable[[wb.Pr
 
 def solved(problem: wb.Problem) -> wb.Solution:
     return wb.QP(budget=0).solve(problem)
-
-
-def test_another_process_has_the_same_answer(scene: wb.Scene) -> None:
-    problem = wb.Problem(
-        scene, goals=[wb.Point("right_index_tip", (0.4, -0.2, 1.1))], constraints=[wb.Hold("left_foot")]
-    )
-    here = solved(problem)
-    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
-        there = pool.submit(solved, problem).result()
-    assert np.array_equal(there.q, here.q)
-    assert (there.status, there.assessment, there.trace) == (here.status, here.assessment, here.trace)
 
 
 def test_a_simplified_problem_and_its_scene(scene: wb.Scene) -> None:

@@ -876,8 +876,9 @@ BY_OWNERS = ("Trajectory.avoid", "PerFrame.avoid", "Bisection.avoid", "QP.batche
 
 DERIVATIVES = (
     "of_arms",
-    "on_polygon",
-    "joint_placement",
+    "on_points",
+    "joint_placements",
+    "place_of",
     "companion",
     "folded",
     "spread",

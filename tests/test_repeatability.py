@@ -9,7 +9,6 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from tests.needs import each
 from wholebody.geometry.pair_distances import PairDistances
 
 FEET = ("left_foot", "right_foot")
@@ -55,23 +54,6 @@ def test_a_solve_after_others_is_the_solve_before_them(scene: wb.Scene, method: 
     assert (first.status, first.iterations, first.trace) == (again.status, again.iterations, again.trace)
     restated = method.solve(problem(scene, PLACES[place]))
     assert np.array_equal(first.q, restated.q)
-
-
-@pytest.mark.parametrize("name", each(["ccd", "newton", "placo"]))
-def test_so_it_is_for_the_other_methods(scene: wb.Scene, name: str) -> None:
-    def asked(place: str) -> wb.Problem:
-        holds = [] if name == "ccd" else [wb.Hold(foot) for foot in FEET]
-        return wb.Problem(scene, goals=[wb.Point("right_index_tip", PLACES[place])], constraints=holds)
-
-    methods = {
-        "ccd": wb.methods.CCD(restarts=1, iterations=40, time_limit=None),
-        "newton": wb.Newton(restarts=0, iterations=4, time_limit=None),
-        "placo": wb.methods.Placo(iterations=10, time_limit=None),
-    }
-    method, problems = methods[name], [asked(place) for place in PLACES]
-    before = [method.solve(one).q for one in problems]
-    after = [method.solve(one).q for one in problems[::-1]][::-1]
-    assert all(np.array_equal(one, other) for one, other in zip(before, after, strict=True))
 
 
 def test_a_judgement_does_not_depend_on_the_one_before(scene: wb.Scene) -> None:

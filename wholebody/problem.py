@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from functools import partial
 from operator import is_
@@ -13,19 +13,18 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices
 from wholebody.base.charts import listing
 from wholebody.base.errors import InputError, TermError
 from wholebody.base.fields import Range
 from wholebody.base.pool import Loan
 from wholebody.figures.state import UNIT_TOLERANCE, State
 from wholebody.geometry.placement import FARTHEST
-from wholebody.scene.geometry_model import SceneGeometry
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace, borrowed
 from wholebody.tasks.answers import in_words, is_own
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
-from wholebody.tasks.checks import KINDS, check_measure, check_rows, checked_terms
+from wholebody.tasks.checks import KINDS, check_measure, check_rows, checked_terms, owner_pair
 from wholebody.tasks.defaults import balancing, default_constraints, default_measures, seated, stances, standing
 from wholebody.tasks.inputs import once
 from wholebody.terms.linearisation import Lineariser
@@ -33,7 +32,6 @@ from wholebody.terms.plan import TermPlan, Terms, make_plan
 
 CLEARANCE = Range(0.0, 0.5, "m")  # more is refused as a wrong unit
 _TermError = TypeVar("_TermError", bound=TermError)
-_State = Callable[[], State]
 _Planned = tuple[tuple[Constraint, ...], tuple[Bound, ...], tuple[Measure, ...]]
 
 
@@ -73,6 +71,25 @@ class Problem(checks.FixedAttributes):
     _settable = frozenset({"start", "goals", "constraints", "bounds", "measures", "measures_given", "clearances"})
     _correction = "state another problem with wb.Problem(...)"
 
+    scene: Scene
+    start: Array
+    goals: tuple[Goal, ...]
+    constraints: tuple[Constraint, ...]
+    bounds: tuple[Bound, ...]
+    measures: tuple[Measure, ...]
+    defaults: tuple[Constraint, ...]
+    left_out: str
+    measures_given: bool
+    clearance: float
+    touching: tuple[tuple[str, str], ...]
+    range_of_motion: bool
+    balance: bool | None
+    clearances: Array
+    _plan: tuple[_Planned, TermPlan] | None
+    """The terms as arrays, and the terms that they were made of; every solve begins with it."""
+    _places: tuple[int, ...]
+    _revision: int
+
     def __init__(
         self,
         scene: Scene,
@@ -103,39 +120,35 @@ class Problem(checks.FixedAttributes):
             InputError: a value of the wrong kind, shape or range.
             UnknownNameError: a name that the figure or scene does not have.
         """
-        self.scene = checks.instance(scene, Scene, "Problem: scene", "make one with wb.Scene(figure)")
-        self._revision = scene.revision
-        self.start = _start(scene, start)
-        self.clearance = CLEARANCE(clearance, "clearance")
-        terms = [*checked_terms(goals, (Goal,), "goals")]
-        given = [*checked_terms(constraints, (Constraint, Bound), "constraints")]
-        self.measures_given = measures is not None
-        self.range_of_motion = checks.flag(range_of_motion, "range_of_motion")
-        self.balance = balance if balance is None else checks.flag(balance, "balance")
+        scene = checks.instance(scene, Scene, "Problem: scene", "make one with wb.Scene(figure)")
+        q = _start(scene, start)
+        listed = checked_terms(goals, (Goal,), "goals")
+        given = checked_terms(constraints, (Constraint, Bound), "constraints")
         measured = None if measures is None else checked_terms(measures, (Measure,), "measures")
-        self.goals: tuple[Goal, ...] = tuple(goal.resolve(scene, self.start) for goal in terms)
-        stated = self._resolved([term for term in given if isinstance(term, Constraint)])
-        self._places = tuple(place for place, term in enumerate(given) if isinstance(term, Constraint))
-        self.bounds: tuple[Bound, ...] = tuple(
-            term.resolve(scene, self.start) for term in given if isinstance(term, Bound)
-        )
         pairs = checks.listed(touching, "touching", "[('right_hand', 'table')]")
-        self.touching = tuple(_owner_pair(scene, pair) for pair in pairs)
-        self._plan: tuple[_Planned, TermPlan] | None = None
-        """The terms as arrays, and the terms that they were made of; every solve begins with it."""
-        self.measures: tuple[Measure, ...] = (
-            self._usual_measures(stated) if measured is None else tuple(m.resolve(scene, self.start) for m in measured)
+        vars(self).update(  # a tenth of the time of setting one after the other
+            scene=scene,
+            _revision=scene.revision,
+            start=q,
+            clearance=CLEARANCE(clearance, "clearance"),
+            measures_given=measures is not None,
+            range_of_motion=checks.flag(range_of_motion, "range_of_motion"),
+            balance=balance if balance is None else checks.flag(balance, "balance"),
+            goals=tuple([goal.resolve(scene, q) for goal in listed]),
+            bounds=tuple([term.resolve(scene, q) for term in given if isinstance(term, Bound)]),
+            touching=tuple([owner_pair(scene, pair) for pair in pairs]),
+            _places=tuple([place for place, term in enumerate(given) if isinstance(term, Constraint)]),
+            _plan=None,
         )
-        with borrowed(scene.built, Workspace.refresh) as workspace:
-            at = partial(workspace.state.update, self.start)
-            self.defaults, self.left_out = self._usual_constraints(at, stated)
-            self.constraints: tuple[Constraint, ...] = (*stated, *self.defaults)
-            if self.bounds:
-                self._check_frozen(at())
-            if any(map(is_own, (*self.goals, *self.constraints, *self.measures))):
-                _check_goals(self.goals, at())
-                self._check_terms(at())
-            self.clearances = self._clearances(workspace)
+        stated = self._resolved([given[place] for place in self._places])
+        measures = self._usual_measures(stated) if measured is None else tuple([m.resolve(scene, q) for m in measured])
+        defaults, left_out = self._usual_constraints(stated)
+        constraints = (*stated, *defaults)
+        vars(self).update(measures=measures, constraints=constraints, defaults=defaults, left_out=left_out)
+        if self.bounds or any(map(is_own, (*self.goals, *constraints, *measures))):
+            self._check_frozen(state := scene.state(q))
+            _check_own(state, goals=self.goals, constraints=constraints, measures=measures)
+        vars(self).update(clearances=self._clearances())
 
     def _resolved(self, terms: Sequence[Constraint]) -> tuple[Constraint, ...]:
         """Constraints that were stated, resolved; the same ones in the same scene at the same start are known."""
@@ -153,12 +166,12 @@ class Problem(checks.FixedAttributes):
         make = partial(default_measures, scene, start, feet, sits, ranges=ranges)
         return scene.built.known(("measures", ranges, feet, sits, start.tobytes()), make)
 
-    def _usual_constraints(self, at: _State, stated: Sequence[Constraint]) -> tuple[tuple[Constraint, ...], str]:
+    def _usual_constraints(self, stated: Sequence[Constraint]) -> tuple[tuple[Constraint, ...], str]:
         scene, start, ranges = self.scene, self.start, self.range_of_motion
         if not (scene.figure.ranges or self.balance):
             return (), ""  # no person
         known = frozenset(map(type, stated))
-        steady = standing(scene, at, (*stated, *self.goals), self.bounds) if self.balance is None else ()
+        steady = standing(scene, start, (*stated, *self.goals), self.bounds) if self.balance is None else ()
         steady = balancing(scene, stated) if (required := self.balance is True) else steady
         if not (steady or (ranges and scene.figure.ranges)):
             return (), ""
@@ -243,7 +256,7 @@ class Problem(checks.FixedAttributes):
         resolved = tuple(goal.resolve(self.scene, self.start) for goal in listed)
         if any(map(is_own, resolved)):
             with self.borrow() as workspace:
-                _check_goals(resolved, workspace.state.update(self.start))
+                _check_own(workspace.state.update(self.start), goals=resolved)
         object.__setattr__(self, "goals", resolved)  # they need no other check
 
     def with_start(self, q: Array) -> Problem:
@@ -332,46 +345,34 @@ class Problem(checks.FixedAttributes):
                 told = f"{type(bound).__name__} keeps {self.scene.model.names[joint.id]} where it starts"
                 raise InputError(f"{told}, out of its limits; start it within them")
 
-    def _check_terms(self, state: State) -> None:
-        """Evaluate terms of one's own at the start; those of the package find mistakes when they are resolved."""
-        for number, constraint in enumerate(self.constraints):
-            if is_own(constraint):
-                check_rows(f"constraints[{number}]", constraint, constraint.value, state)
-        for number, measure in enumerate(self.measures):
-            if is_own(measure):
-                check_measure(f"measures[{number}]", measure, state)
-
-    def _clearances(self, workspace: Workspace) -> Array:
+    def _clearances(self) -> Array:
         built = self.scene.built
         asked = np.full(len(built.table.pairs), self.clearance)
         brought = [pair for term in (*self.goals, *self.constraints, *self.measures) for pair in term.touching]
         allowed = frozenset((*self.touching, *brought))
         if allowed:
-            asked[built.known(("touching", allowed), partial(_between, built, allowed))] = 0.0
-        key = "resting", self.clearance, built.moves, self.start.tobytes()
-        number, kept = built.known(key, partial(self._resting, workspace))
-        asked[number] = np.minimum(asked[number], kept)
+            asked[built.known(("touching", allowed), partial(built.between, allowed))] = 0.0
+        number, kept = built.known(("resting", self.clearance, built.moves, self.start.tobytes()), self._resting)
+        if len(number):
+            asked[number] = np.minimum(asked[number], kept)
         return asked
 
-    def _resting(self, workspace: Workspace) -> tuple[Indices, Array]:
+    def _resting(self) -> tuple[Indices, Array]:
         """Pairs (k,) nearer than the clearance at the start that do not penetrate, and their distances (k,)."""
-        workspace.begin()
-        near = workspace.near_views(self.start, self.clearance + 1e-9)
-        resting = near.distance >= -1e-6
-        return near.number[resting], np.maximum(near.distance[resting], 0.0)
+        with borrowed(self.scene.built) as workspace:
+            near = workspace.near_views(self.start, self.clearance + 1e-9)
+            resting = near.distance >= -1e-6
+            return near.number[resting], np.maximum(near.distance[resting], 0.0)
 
 
-def _between(built: SceneGeometry, allowed: Set[tuple[str, str]]) -> Mask:
-    """Which pairs are of owners that stand in some pairs of names, in either order."""
-    pairs = ((built.owners[a], built.owners[b]) for a, b in built.table.pairs.tolist())
-    return np.array([pair in allowed or pair[::-1] in allowed for pair in pairs], dtype=bool)
-
-
-def _check_goals(goals: Sequence[Goal], state: State) -> None:
-    """Evaluate goals of one's own at the start."""
-    for number, goal in enumerate(goals):
-        if is_own(goal):
-            check_rows(f"goals[{number}]", goal, goal.error, state)
+def _check_own(state: State, **groups: Iterable[Any]) -> None:
+    """Evaluate terms of one's own at the start; those of the package find mistakes when they are resolved."""
+    for name, terms in groups.items():
+        for number, term in enumerate(terms):
+            if is_own(term) and name == "measures":
+                check_measure(f"{name}[{number}]", term, state)
+            elif is_own(term):
+                check_rows(f"{name}[{number}]", term, term.error if name == "goals" else term.value, state)
 
 
 def _start(scene: Scene, start: Array | str | Mapping[str, Array | str] | None) -> Array:
@@ -387,13 +388,3 @@ def _start(scene: Scene, start: Array | str | Mapping[str, Array | str] | None) 
     if not pin.isNormalized(scene.model, q, UNIT_TOLERANCE):
         raise InputError("the start's quaternion is not of unit length; normalise it with pin.normalize(model, q)")
     return np.array(pin.normalize(scene.model, q))
-
-
-def _owner_pair(scene: Scene, pair: Any) -> tuple[str, str]:
-    known = {*scene.figure.segments, *scene.objects}
-    if not isinstance(pair, (tuple, list)) or len(pair) != 2:
-        told = checks.shown(pair)
-        raise InputError(f"touching takes a list of pairs of names, such as [('right_hand', 'table')], not of {told}")
-    for name in pair:
-        checks.known(name, known, "segment or object", "touching")
-    return str(pair[0]), str(pair[1])

@@ -18,11 +18,6 @@ from wholebody.geometry.proximity import Proximity
 LENGTHS = (0.5, 0.4)
 
 
-@pytest.fixture(scope="module")
-def human():
-    return wb.load("human")
-
-
 def test_depth_and_lack_of_clearance(free_bodies):
     scene = wb.Scene(free_bodies(wb.Sphere(0.1))).add(wb.Sphere(0.2), name="ball").add(wb.HalfSpace(), name="floor")
     start = scene.figure.neutral

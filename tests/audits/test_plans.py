@@ -20,8 +20,7 @@ def test_both_ends_are_free_and_the_straight_motion_between_them_is_not(name: st
     assert asked.scene.sweep(asked.start, asked.goal) is not None
 
 
-@pytest.mark.parametrize("name", ["cage", "kitchen"])
-def test_an_arm_gets_into_furniture(name: str) -> None:
-    asked = SCENES[name](3)
+def test_an_arm_gets_into_furniture() -> None:
+    asked = SCENES["kitchen"](3)
     found = wb.plan(asked.scene, asked.start, asked.goal)
     assert found.solved, found.message

@@ -98,7 +98,7 @@ def work(seconds: float) -> str:
 
 def wait_long() -> str:
     allow(60.0, 0.3)
-    time.sleep(1.0)
+    time.sleep(0.5)
     return "done"
 
 

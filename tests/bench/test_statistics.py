@@ -6,8 +6,8 @@ from math import inf, isnan
 
 import numpy as np
 import pytest
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 from wholebody.bench import statistics
 from wholebody.bench.statistics import NOTHING, Interval
@@ -16,7 +16,7 @@ from wholebody.bench.tables import spanned
 
 @pytest.mark.parametrize(("count", "of"), [(0, 7), (199, 200), (200, 200), (3, 20), (1, 1)])
 def test_intervals_of_shares_are_wilsons(count: int, of: int) -> None:
-    expected = stats.binomtest(count, of).proportion_ci(method="wilson")
+    expected = scipy.stats.binomtest(count, of).proportion_ci(method="wilson")
     assert statistics.wilson(count, of) == pytest.approx((expected.low, expected.high), abs=1e-12)
     assert statistics.wilson(0, 0) == (0.0, 1.0)
 
@@ -57,7 +57,7 @@ def test_the_bootstrap_is_scipys_up_to_its_own_chance() -> None:
         (statistics.shifted_geometric_mean(values.tolist()), mean),
         (statistics.median(values.tolist()), np.median),
     ):
-        expected = stats.bootstrap(
+        expected = scipy.stats.bootstrap(
             (values,), statistic, n_resamples=20_000, method="percentile", vectorized=True,
             random_state=np.random.default_rng(6),
         ).confidence_interval  # fmt: skip
@@ -88,7 +88,7 @@ def test_the_interval_of_a_ratio_is_students_where_logarithms_are_normal() -> No
     logs = np.random.default_rng(7).normal(0.3, 0.5, 80)
     ones = {("a", k): 1.0 for k in range(80)}
     found = statistics.ratio({("a", k): float(np.exp(value)) for k, value in enumerate(logs)}, ones)
-    low, high = stats.t.interval(0.95, 79, logs.mean(), logs.std(ddof=1) / np.sqrt(80))
+    low, high = scipy.stats.t.interval(0.95, 79, logs.mean(), logs.std(ddof=1) / np.sqrt(80))
     assert found.value == pytest.approx(np.exp(logs.mean()))
     assert (np.log(found.low), np.log(found.high)) == pytest.approx((low, high), abs=0.1 * (high - low))
 

@@ -14,11 +14,6 @@ G = 9.81
 AWAY = np.array([5.0, 0.0, 0.0])
 
 
-@pytest.fixture(scope="module")
-def hand() -> wb.Figure:
-    return wb.load("hand")
-
-
 def elliptic(k: float) -> float:
     """Complete elliptic integral of the first kind, by the arithmetic-geometric mean."""
     a, b = 1.0, float(np.sqrt(1.0 - k * k))
@@ -42,7 +37,7 @@ def test_a_pendulum_has_the_period_of_the_elliptic_integral(hand: wb.Figure, ang
     engine = RigidBodies(scene)
     about = (size[0] ** 2 + size[2] ** 2) / 12.0 + half**2
     period = 4.0 * elliptic(np.sin(0.5 * angle)) / np.sqrt(G * half / about)
-    energy, frames, spins = engine.energy(), int(120 * 1.3 * period), []
+    energy, frames, spins = engine.energy(), int(120 * 1.05 * period), []
     weight = engine._pieces.mass[0] * G * half
     for _ in range(frames):
         engine.advance(1 / 120)
@@ -69,7 +64,7 @@ def test_a_double_pendulum_keeps_its_energy_and_its_joints(hand: wb.Figure) -> N
     start = engine.energy()
     fall = engine._pieces.mass[0] * G * (0.25 + 0.75)
     energies = []
-    for _ in range(120):
+    for _ in range(60):
         frame = engine.advance(1 / 60)
         energies.append(frame.energy)
         first, second = (engine.placement(f"rod {k}") for k in (1, 2))
@@ -109,7 +104,7 @@ def test_a_door_against_a_wall_stays_on_its_hinge(hand: wb.Figure) -> None:
     scene.add(wb.Box((0.2, 0.2, 2.0)), name="stop", at=AWAY + (-0.5, 0.3, 0.0))
     engine = RigidBodies(scene)
     energy, hits = engine.energy(), 0
-    for _ in range(240):
+    for _ in range(90):
         frame = engine.advance(1 / 60)
         hits += len(frame.events)
         assert frame.energy <= energy + 1e-6
@@ -142,7 +137,7 @@ def test_a_chain_on_a_thing_that_is_moved_follows_it(hand: wb.Figure) -> None:
         place = AWAY - (0.0, 0.0, 0.06 + 0.12 * number)
         scene.add(wb.Capsule(0.01, 0.09), name=(above := f"link {number}"), at=place, body=body)
     engine = RigidBodies(scene)
-    for number in range(60):
+    for number in range(30):
         ways = [pin.SE3(np.eye(3), AWAY + (0.5 * k / 60, 0.0, 0.0)) for k in (number, number + 1)]
         engine.advance(1 / 60, {"beam": (ways[0], ways[1])})
         held = engine.placement("link 0").act(np.array([0.0, 0.0, 0.06]))

@@ -29,8 +29,8 @@ def live() -> LiveWorld:
 def test_a_hand_is_dragged_and_pushes_a_ball_off_its_shelf(live: LiveWorld) -> None:
     live.take("right_palm")
     began, feet = live.place("ball"), np.array([live.place(name) for name in ("left_sole", "right_sole")])
-    way = np.linspace(live.place("right_palm"), began + [0.0, -0.25, 0.05], 60)
-    for place in [*way, *np.linspace(way[-1], began + [0.0, 0.15, 0.05], 60)]:
+    way = np.linspace(live.place("right_palm"), began + [0.0, -0.25, 0.05], 40)
+    for place in [*way, *np.linspace(way[-1], began + [0.0, 0.15, 0.05], 40)]:
         assert live.move(place).overlap < 2e-4
     for _ in range(60):
         live.move()

@@ -16,11 +16,6 @@ from wholebody.dynamics.step_program import SKIN
 G = 9.81
 
 
-@pytest.fixture(scope="module")
-def hand() -> wb.Figure:
-    return wb.load("hand")
-
-
 def floor(hand: wb.Figure, normal: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> wb.Scene:
     return wb.Scene(hand).add(wb.HalfSpace(normal, -2.0), name="floor")
 

@@ -69,8 +69,8 @@ def arm_world(planar_arm, **more: object) -> tuple[wb.World, wb.Scene]:
 def test_an_arm_pushes_a_ball_and_never_is_in_it(planar_arm, overlap: str, give_way: str) -> None:
     world, scene = arm_world(planar_arm, overlap=overlap, give_way=give_way)
     pushed, ball = 0, []
-    for frame in range(90):
-        made = world.step(np.array([min(0.6, 0.01 * frame), 0.0, 0.0]))
+    for frame in range(45):
+        made = world.step(np.array([min(0.6, 0.02 * frame), 0.0, 0.0]))
         assert made.deepest <= 1e-4
         assert not made.collisions
         assert not made.overlaps
@@ -81,7 +81,7 @@ def test_an_arm_pushes_a_ball_and_never_is_in_it(planar_arm, overlap: str, give_
         ball.append(place.translation.copy())
     assert pushed
     assert ball[-1][1] > 0.45  # away, the way the arm turned
-    assert made.time == pytest.approx(1.5)
+    assert made.time == pytest.approx(0.75)
 
 
 def test_a_ball_goes_on_from_where_half_an_overlap_has_put_it(planar_arm, monkeypatch) -> None:
@@ -115,7 +115,7 @@ def test_the_same_seed_gives_the_same_motion(planar_arm) -> None:
     runs = []
     for _ in range(2):
         world, _ = arm_world(planar_arm, seed=3)
-        frames = [world.step(np.array([0.015 * k, 0.0, 0.1])) for k in range(40)]
+        frames = [world.step(np.array([0.015 * k, 0.0, 0.1])) for k in range(25)]
         runs.append([(frame.q, frame.placements["ball"].homogeneous) for frame in frames])
     for (q, place), (other, placed) in zip(*runs, strict=True):
         assert (q == other).all()
@@ -222,14 +222,13 @@ def test_a_world_begins_in_its_start_and_not_in_the_first_posture() -> None:
         RigidBodies(scene, start=aside)
 
 
-@pytest.mark.parametrize("count", [1, 10])
-def test_a_tower_that_touches_exactly_gains_no_more_than_its_work(count: int) -> None:
+def test_a_tower_that_touches_exactly_gains_no_more_than_its_work() -> None:
     scene = wb.Scene(wb.load("hand")).add(wb.HalfSpace(offset=-2.0), name="floor")
-    for k in range(count):
+    for k in range(10):
         scene.add(wb.Box((0.2, 0.2, 0.2)), name=f"box {k}", at=(3.0, 0.0, -1.9 + 0.2 * k), body=wb.Body(mass=8.0))
     engine = RigidBodies(scene)
     energy = engine.energy()
-    for _ in range(60):
+    for _ in range(30):
         frame = engine.advance(1 / 60)
         assert frame.energy - energy <= frame.work + 1e-9
         energy = frame.energy

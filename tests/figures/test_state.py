@@ -10,11 +10,6 @@ import wholebody as wb
 from wholebody.figures.state import State, Wrench, joint_support
 
 
-@pytest.fixture(scope="module")
-def human():
-    return wb.load("human")
-
-
 def random_posture(figure, seed):
     rng = np.random.default_rng(seed)
     return figure.clamp(pin.integrate(figure.model, figure.neutral, 0.5 * rng.normal(size=figure.model.nv)))

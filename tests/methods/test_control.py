@@ -43,9 +43,7 @@ def reach():
 @pytest.mark.parametrize("name", each(METHODS))
 def test_a_time_limit_ends_a_solve_with_the_best_so_far(reach, name):
     whole = METHODS[name]().solve(reach)
-    began = time.monotonic()
     answer = METHODS[name](time_limit=1e-6).solve(reach)
-    assert time.monotonic() - began < 5.0  # not a measurement: a limit that nobody looks at would take all restarts
     assert answer.status == "stalled"
     assert "time limit of 1e-06 s" in answer.message
     assert answer.iterations <= max(whole.iterations // 4, 2)

@@ -23,11 +23,6 @@ def arm(planar_arm: Callable[..., wb.Figure]) -> wb.Figure:
     return planar_arm((0.4, 0.3))
 
 
-@pytest.fixture(scope="module")
-def human() -> wb.Figure:
-    return wb.load("human")
-
-
 def judged(problem: wb.Problem, solution: wb.Solution) -> wb.Assessment:
     return honest(problem, solution, kept=("solved",))
 

@@ -22,11 +22,6 @@ DT = 1 / 30
 BALL, RADIUS, LINK, WIDTH = np.array([0.95, 0.0]), 0.1, 0.5, 0.02
 
 
-@pytest.fixture(scope="module")
-def human() -> Figure:
-    return wb.load("human")
-
-
 def swing(frames: int, bend: float = 0.5) -> np.ndarray:
     """A bent arm of two links that turns past the ball."""
     return np.stack([np.linspace(-1.2, 1.2, frames) - 0.5 * bend, np.full(frames, bend)], axis=1)
@@ -186,7 +181,7 @@ def test_joint_limits_hold_where_the_original_breaks_them(planar_arm: Callable[.
 
 
 def test_joints_become_no_faster_than_their_limit_or_the_original(planar_arm: Callable[..., Figure]) -> None:
-    clip, scene = arm_and_ball(planar_arm, 40)
+    clip, scene = arm_and_ball(planar_arm, 30)
     free = wb.avoid(clip, scene)
     limit = 0.85 * float(np.abs(np.diff(free.clip.q, axis=0)).max()) / DT
     found = wb.avoid(clip, scene, constraints=[wb.StepLimit(limit)])
@@ -209,7 +204,7 @@ def test_progress_is_told_and_ends_it(planar_arm: Callable[..., Figure]) -> None
     assert "the caller ended it" in found.report.message
 
 
-def arm_into_trunk(human: Figure, frames: int = 30) -> wb.Clip:
+def arm_into_trunk(human: Figure, frames: int = 16) -> wb.Clip:
     """The right forearm sinks into the trunk, 10 cm deep, and comes out again; the left arm is clear of it."""
     q0 = human.with_joints(human.posture("standing"), {"left_shoulder_abduction": 0.4})
     wave = np.sin(np.pi * np.arange(frames) / (frames - 1)) ** 2
@@ -312,7 +307,7 @@ def test_names_of_methods(planar_arm: Callable[..., Figure]) -> None:
 
 
 def test_the_command_frees_a_file(tmp_path: Path, human: Figure, capsys: pytest.CaptureFixture[str]) -> None:
-    arm_into_trunk(human, 20).write(tmp_path / "arm.npz")
+    arm_into_trunk(human, 10).write(tmp_path / "arm.npz")
     assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "frames"]) == 0
     told = capsys.readouterr().out
     assert "nothing collides" in told

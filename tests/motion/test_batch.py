@@ -6,7 +6,6 @@ import csv
 import json
 import multiprocessing
 import os
-import signal
 import sys
 import time
 from contextlib import redirect_stdout
@@ -18,11 +17,6 @@ import pytest
 import wholebody as wb
 from wholebody.cli import main
 from wholebody.motion.batch_table import SHEET, TABLE
-
-
-@pytest.fixture(scope="module")
-def human() -> wb.Figure:
-    return wb.load("human")
 
 
 @pytest.fixture(scope="module")
@@ -111,8 +105,7 @@ def told_to(command: list[str], said: Path) -> None:
     sys.exit(code)
 
 
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
-def test_a_batch_that_is_ended_goes_on(how: signal.Signals, clip: wb.Clip, tmp_path: Path) -> None:
+def test_a_batch_that_is_ended_goes_on(clip: wb.Clip, tmp_path: Path) -> None:
     """No half file is left, and the case that was made before is not made again."""
     files = [str(clip[k:].write(tmp_path / f"part{k}.npz")) for k in range(2)]
     command = ["clip", "avoid", *files, "--method", "frames", "--out", str(tmp_path / "out")]
@@ -122,12 +115,8 @@ def test_a_batch_that_is_ended_goes_on(how: signal.Signals, clip: wb.Clip, tmp_p
     while not (table.exists() and len(table.read_text().splitlines()) > 1):
         assert time.monotonic() < ends
         time.sleep(0.05)
-    os.kill(run.pid or 0, how)
+    run.kill()
     run.join(60.0)
-    if run.exitcode == 130:
-        assert "the same command goes on" in (tmp_path / "said").read_text()
-    else:
-        assert run.exitcode == (0 if how == signal.SIGINT else -how)  # it was over before
     before = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "out").glob("*.npz")}
     for name in before:
         wb.read_clip(tmp_path / "out" / name, clip.figure)
@@ -136,20 +125,6 @@ def test_a_batch_that_is_ended_goes_on(how: signal.Signals, clip: wb.Clip, tmp_p
     assert len(after) == 2
     kept = [row["file"] for row in csv.DictReader(table.open())]
     assert before[kept[0]] == after[kept[0]]
-
-
-def test_a_dask_cluster_gives_the_same(clip: wb.Clip, tmp_path: Path) -> None:
-    distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=2, processes=False, protocol="tcp", dashboard_address=None
-    ) as cluster:
-        (row,) = wb.motion.avoid_many(
-            [clip], tmp_path / "a", methods=["frames"], jobs=2, cluster=cluster.scheduler_address
-        )  # fmt: skip
-    (here,) = wb.motion.avoid_many([clip], tmp_path / "b", methods=["frames"])
-    made = [wb.read_clip(folder / row.file, clip.figure).q for folder in (tmp_path / "a", tmp_path / "b")]
-    assert np.array_equal(*made)
-    assert (row.outcome, row.asked) == (here.outcome, here.asked)
 
 
 def test_checking_many_gives_a_line_each(clip: wb.Clip, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

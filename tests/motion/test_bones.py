@@ -14,11 +14,6 @@ from wholebody.motion.skeleton import SkeletonMotion
 NAMES = {"skeleton": {"left_shoulder": "a", "left_elbow": "b", "left_wrist": "c"}}
 
 
-@pytest.fixture(scope="module")
-def human() -> wb.Figure:
-    return wb.load("human")
-
-
 def arm(human: wb.Figure, turn: float) -> tuple[SkeletonMotion, wb.Clip]:
     """A figure that keeps still, and its own arm whose forearm is turned by an angle about an axis across it."""
     q = human.neutral

@@ -18,11 +18,6 @@ from wholebody.figures.figure import Figure
 SYMMETRIC = ("shoulder", "elbow", "wrist", "palm", "hip", "knee", "ankle", "toe_tip")
 
 
-@pytest.fixture(scope="module")
-def human() -> Figure:
-    return wb.load("human")
-
-
 def moving(figure: Figure, frames: int, seed: int = 0, dt: float = 0.1) -> wb.Clip:
     """A clip of random small displacements, each from the frame before."""
     random = np.random.default_rng(seed)

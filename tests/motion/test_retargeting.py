@@ -19,11 +19,6 @@ BONES = (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "w
 SIDES = ("left", "right")
 
 
-@pytest.fixture(scope="module")
-def human() -> Figure:
-    return wb.load("human")
-
-
 def bone(clip: wb.Clip, first: str, second: str) -> np.ndarray:
     """Unit directions (n, 3) from one frame of the figure to another."""
     model, data = clip.figure.model, clip.figure.model.createData()

@@ -33,11 +33,6 @@ KNOWN = {
 }
 
 
-@pytest.fixture(scope="module")
-def human() -> wb.Figure:
-    return wb.load("human")
-
-
 def still(names: tuple[str, ...]) -> SkeletonMotion:
     """A skeleton of these names, a chain whose bones are ten centimetres each."""
     parents, offsets = np.arange(-1, len(names) - 1), np.tile([0.0, 0.0, 0.1], (len(names), 1))

@@ -11,11 +11,6 @@ from wholebody.motion.measures import foot_sliding
 from wholebody.motion.stance import held_feet, standing
 
 
-@pytest.fixture(scope="module")
-def human() -> wb.Figure:
-    return wb.load("human")
-
-
 def kicking(human: wb.Figure) -> np.ndarray:
     """The left foot stands, swings in frames 10 to 19, and stands again; the right one stands all the time."""
     q0 = human.posture("standing")

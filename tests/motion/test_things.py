@@ -21,7 +21,7 @@ from wholebody.motion.thing_contacts import ThingContact, Things
 SIZE = (0.25, 0.30, 0.2)  # m: of the box, whose sides are 3 cm inwards of the wrists
 
 
-def lifting(frames: int = 30) -> tuple[SkeletonMotion, list[pin.SE3]]:
+def lifting(frames: int = 18) -> tuple[SkeletonMotion, list[pin.SE3]]:
     """A person of 1.75 m whose arms lift a box between the wrists, and where the box is."""
     motion, turns = person(frames), []
     local = np.tile(np.eye(3), (frames, len(motion.names), 1, 1))
@@ -86,7 +86,7 @@ def test_hands_stay_at_their_places_of_a_box_that_they_lift(stature: float) -> N
 
 
 def test_what_is_out_of_reach_is_said_and_let_go_of(recwarn: pytest.WarningsRecorder) -> None:
-    motion, track = lifting()
+    motion, track = lifting(30)
     figure = wb.load("human", stature=1.4)
     scene = among(figure, track[0]).add(wb.Box((0.1, 0.1, 0.1)), name="post", at=(3.0, 3.0, 0.05))
     clip = wb.retarget(motion, figure, scene, things={"box": track})  # beside the post the box keeps its way

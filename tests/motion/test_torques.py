@@ -16,11 +16,6 @@ from wholebody.motion.strength import Strength
 GRAVITY = 9.81
 
 
-@pytest.fixture(scope="module")
-def human() -> wb.Figure:
-    return wb.load("human")
-
-
 def swaying(human: wb.Figure, frames: int = 60, dt: float = 1 / 60) -> wb.Clip:
     """A clip that bends the knees and swings the arms smoothly, both feet near the ground."""
     base = human.posture("standing")

@@ -16,6 +16,14 @@ def same(one: ActiveSet, other: ActiveSet) -> bool:
     return all(map(np.array_equal, one, other))
 
 
+def guess_active_set(program: QuadraticProgram, x: Array, tolerance: float) -> ActiveSet:
+    """Active set read off an approximate minimiser x, shape (n,): what is within `tolerance` of its bound."""
+    gradient = program.gradient(x)
+    lower = (x <= program.lower + tolerance) & (gradient >= 0.0)
+    upper = (x >= program.upper - tolerance) & (gradient <= 0.0) & ~lower
+    return ActiveSet(lower, upper, program.elastic @ x <= program.least + tolerance)
+
+
 def objective(program: QuadraticProgram, x: Array) -> float:
     """What a program minimises, at x (n,)."""
     residual = program.rows @ x - program.target

@@ -212,6 +212,21 @@ def test_a_method_derived_from_qp_solves_each_problem(arm: wb.Figure) -> None:
     assert len(solved) == len(PLACES)
 
 
+def test_after_a_miss_the_last_solved_answer_is_the_start(arm: wb.Figure) -> None:
+    begun = []
+
+    class Noted(wb.QP):
+        def solve(self, problem: wb.Problem, progress: Any = None) -> wb.Solution:
+            begun.append(problem.start)
+            return super().solve(problem, progress)
+
+    places = [PLACES[0], (5.0, 0.0, 0.5), PLACES[1]]
+    first, far, last = wb.solve_many([problem(arm, place) for place in places], Noted(), warm_start=True)
+    assert (first.solved, far.solved, last.solved) == (True, False, True)
+    # the first's own start; the second from the first's answer, and its own start; the third from the first's answer
+    np.testing.assert_array_equal(begun[3], first.q)
+
+
 def test_a_place_that_no_neighbour_reaches_stays_out_of_reach(arm: wb.Figure) -> None:
     reached, far = wb.solve_many([problem(arm, PLACES[0]), problem(arm, (5.0, 0.0, 0.5))])
     assert (reached.solved, far.outcome, far.neighbour) == (True, "unreachable", "")

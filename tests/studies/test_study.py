@@ -89,11 +89,6 @@ def test_a_study_file_is_solved_by_command(folder: Path, capsys: pytest.CaptureF
     assert ",short,far,nearer,unreachable," in rows[2]
 
 
-def test_people_differ_in_a_study_of_a_file(folder: Path) -> None:
-    short, tall = wb.study(folder / "task.toml", people=[{"stature": 1.5}, {"stature": 2.0}], targets=[(3.0, 0.0, 1.0)])
-    assert short.goal_error > tall.goal_error + 0.1  # both stretch towards it; the tall one comes nearer
-
-
 def test_a_person_takes_the_place_of_the_percentile_of_a_file(folder: Path) -> None:
     small = TASK.replace('name = "human"', 'name = "human"\nsex = "female"\npercentile = 5')
     (folder / "task.toml").write_text(small)

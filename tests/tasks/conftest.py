@@ -11,6 +11,7 @@ import pinocchio as pin
 import pytest
 
 from wholebody.base.errors import UnknownNameError
+from wholebody.figures.description import Place
 
 
 class StandInFigure:
@@ -35,10 +36,14 @@ class StandInFigure:
     def warn_of_angles(self, q: Any, what: str) -> bool:
         return False
 
-    def joint_placement(self, q: Any, joint: int) -> pin.SE3:
+    def joint_placements(self, q: Any, joints: Any) -> dict[int, pin.SE3]:
         data = self.model.createData()
         pin.forwardKinematics(self.model, data, q)
-        return data.oMi[joint]
+        return {joint: data.oMi[joint] for joint in joints}
+
+    def place_of(self, name: str) -> Place:
+        frame = self.model.frames[self.frame_id(name)]
+        return Place(self.frame_id(name), int(frame.parentJoint), pin.SE3(frame.placement))
 
     def frame_id(self, name: str) -> int:
         if not self.model.existFrame(name):

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wholebody import tasks
+from wholebody.figures.description import Place
 from wholebody.figures.state import State, Wrench
 
 TIP = "tip"
@@ -154,8 +155,9 @@ class _Ball:
     def __init__(self, model: Any) -> None:
         self.model = model
 
-    def frame_id(self, name: str) -> int:
-        return int(self.model.getFrameId(name))
+    def place_of(self, name: str) -> Place:
+        index = int(self.model.getFrameId(name))
+        return Place(index, int(self.model.frames[index].parentJoint), self.model.frames[index].placement.copy())
 
 
 def test_following_the_rows_closes_a_loop_and_reaches_with_both_hands(humanoid: Any, random_posture: Any) -> None:

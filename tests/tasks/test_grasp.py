@@ -26,8 +26,8 @@ def _start(figure: wb.Figure) -> Any:
     return figure.with_joints(figure.posture("standing"), {"right_elbow_flexion": np.radians(80.0)})
 
 
-def _normal(scene: wb.Scene, q: Any, pieces: str | tuple[str, ...]) -> Any:
-    """Of the nearest contact of pieces, by the beginnings of their names, with the thing."""
+def _nearest(scene: wb.Scene, q: Any, pieces: str | tuple[str, ...]) -> tuple[float, Any]:
+    """Distance and normal of the nearest contact of pieces, by the beginnings of their names, with the thing."""
     data = scene.model.createData()
     pin.forwardKinematics(scene.model, data, q)
     best, request = None, coal.DistanceRequest()
@@ -41,7 +41,11 @@ def _normal(scene: wb.Scene, q: Any, pieces: str | tuple[str, ...]) -> Any:
                 if best is None or result.min_distance < best[0]:
                     best = result.min_distance, np.array(result.normal)
     assert best is not None
-    return best[1]
+    return best
+
+
+def _normal(scene: wb.Scene, q: Any, pieces: str | tuple[str, ...]) -> Any:
+    return _nearest(scene, q, pieces)[1]
 
 
 def _apart(a: Any, b: Any) -> float:
@@ -59,11 +63,12 @@ def _apart(a: Any, b: Any) -> float:
 def test_thumb_and_fingers_oppose(figure: wb.Figure, kind: Any, shape: Any) -> None:
     scene = wb.Scene(figure).add(shape, name="thing", at=AT)
     grasp = wb.Grasp("right", "thing", kind)
-    solution = wb.solve(wb.Problem(scene, start=_start(figure), goals=[grasp], constraints=FEET))
+    solution = wb.solve(wb.Problem(scene, start=_start(figure), goals=[grasp], constraints=FEET), wb.QP(measures=False))
     assert solution.status == "solved", solution.message
     fingers = ("index",) if kind == "pinch" else FOUR
-    mean = np.sum([_normal(scene, solution.q, f"right_{finger}_distal") for finger in fingers], axis=0)
-    assert _apart(_normal(scene, solution.q, "right_thumb_distal"), mean) > 135.0 - 0.1
+    thumb, *others = (_nearest(scene, solution.q, f"right_{finger}_distal") for finger in ("thumb", *fingers))
+    assert _apart(thumb[1], np.sum([normal for _, normal in others], axis=0)) > 135.0 - 0.1
+    assert max(abs(distance) for distance, _ in (thumb, *others)) < 2e-5
 
 
 def test_an_edged_thing_is_pinched_from_two_sides(figure: wb.Figure) -> None:
@@ -84,48 +89,39 @@ def _outer(finger: str) -> tuple[str, ...]:
 
 
 @pytest.mark.parametrize(
-    ("shape", "at", "measures"),
+    ("shape", "at"),
     [
-        (wb.Sphere(0.04), AT, True),
-        (wb.Capsule(0.025, 0.3), AT, False),
-        (wb.Capsule(0.0141, 0.515), (0.433, -0.157, 1.237, -0.6237, -0.5206, 0.5251, -0.2534), False),
-        (wb.Capsule(0.0222, 0.52), (0.49, -0.467, 1.252), False),
-        (wb.Capsule(0.028, 0.488), (0.364, -0.388, 1.0977, 0.0208, 0.4411, 0.8921, -0.0954), True),
+        (wb.Sphere(0.04), AT),
+        (wb.Capsule(0.025, 0.3), AT),
+        (wb.Capsule(0.0141, 0.515), (0.433, -0.157, 1.237, -0.6237, -0.5206, 0.5251, -0.2534)),
+        (wb.Capsule(0.0222, 0.52), (0.49, -0.467, 1.252)),
     ],
-    ids=["ball 80 mm", "rod 50 mm", "thin rod behind the fingers", "rod aside", "thick rod, reached through it"],
+    ids=["ball 80 mm", "rod 50 mm", "thin rod behind the fingers", "rod aside"],
 )
-def test_in_a_power_grip_the_thumb_opposes_the_fingers(figure: wb.Figure, shape: Any, at: Any, measures: bool) -> None:
-    """The last three were called unreachable, although postures that solve neighbouring rods lead to them."""
+def test_in_a_power_grip_the_thumb_opposes_the_fingers(figure: wb.Figure, shape: Any, at: Any) -> None:
+    """The last two were called unreachable, although postures that solve neighbouring rods lead to them."""
     quaternion = np.array(at[3:] or (0.0, 0.0, 0.0, 1.0))
     scene = wb.Scene(figure).add(shape, name="thing", at=(*at[:3], *(quaternion / np.linalg.norm(quaternion))))
     problem = wb.Problem(scene, start=_start(figure), goals=[wb.Grasp("right", "thing", "power")], constraints=FEET)
-    solution = wb.solve(problem, wb.QP(measures=measures))
+    solution = wb.solve(problem, wb.QP(measures=False))
     assert solution.status == "solved", solution.message
     mean = np.sum([_normal(scene, solution.q, _outer(finger)) for finger in FOUR], axis=0)
     assert _apart(_normal(scene, solution.q, _outer("thumb")), mean) > 135.0 - 0.1
 
 
-@pytest.mark.parametrize(
-    ("hand", "radius", "at", "top", "options"),
-    [
-        ("right", 0.035, (0.42, -0.18), 1.1, {}),
-        ("left", 0.04, (0.40, 0.10), 0.85, {"approach": "side"}),
-    ],
-    ids=["at 1.10 m", "left at 0.85 m"],
-)
-def test_a_mug_is_taken_from_a_table(hand: Any, radius: float, at: Any, top: float, options: Any) -> None:
+def test_a_mug_is_taken_from_a_table() -> None:
     """From below the table no descent leads around it, and around so thick a bar no thumb reaches across its middle."""
     scene = wb.Scene(wb.load("human", sex="female", hands="fingers"))
-    scene.add(wb.Box((0.5, 1.2, 0.03)), name="table", at=(0.50, 0.0, top - 0.015))
-    scene.add(wb.Cylinder(radius, 0.12), name="thing", at=(*at, top + 0.0601))
-    grasp = wb.Grasp(hand, "thing", "power", **options)
+    scene.add(wb.Box((0.5, 1.2, 0.03)), name="table", at=(0.50, 0.0, 0.835))
+    scene.add(wb.Cylinder(0.04, 0.12), name="thing", at=(0.40, 0.10, 0.9101))
+    grasp = wb.Grasp("left", "thing", "power", approach="side")
     solution = wb.solve(wb.Problem(scene, goals=[grasp], constraints=FEET), wb.QP(measures=False))
     assert solution.status == "solved", solution.message
-    palm = scene.figure.placement(solution.q, f"{hand}_palm")
-    assert top < palm.translation[2] < top + 0.12
+    palm = scene.figure.placement(solution.q, "left_palm")
+    assert 0.85 < palm.translation[2] < 0.97
     assert abs(palm.rotation[2, 1]) > 0.999  # the mug stands across the palm
     toward = scene.objects["thing"].placement.translation - palm.translation
-    assert palm.rotation[:2, 2] @ toward[:2] > 0.9 * radius  # which looks at it
+    assert palm.rotation[:2, 2] @ toward[:2] > 0.9 * 0.04  # which looks at it
 
 
 def test_derivative_of_a_hand_about_to_close(figure: wb.Figure) -> None:

@@ -22,11 +22,6 @@ def before_plate() -> Callable[..., wb.Problem]:
     return build
 
 
-@pytest.fixture(scope="session")
-def hand() -> wb.Figure:
-    return wb.load("hand")
-
-
 @pytest.fixture
 def scene(hand: wb.Figure) -> wb.Scene:
     """A hand above a thick table whose top is z = 0."""

@@ -14,7 +14,7 @@ import wholebody as wb
 from wholebody.assessment.motion import assess_motion
 from wholebody.tracking import follow
 
-ALONG, ACROSS = 41, 9  # points on a capsule's axis, and along each edge of a box
+ALONG, ACROSS = 21, 7  # points on a capsule's axis, and along each edge of a box
 
 
 @pytest.fixture(scope="module")

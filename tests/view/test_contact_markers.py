@@ -29,7 +29,7 @@ def test_each_of_two_that_may_move_gets_its_half_of_the_depth(planar_arm: Any) -
     ways = [one[:3, 2] / np.linalg.norm(one[:3, 2]) for one in (first, second)]
     assert ways[0] == pytest.approx(-ways[1])
     # the arrow of the ball begins outside of it, and dashes lead there from the overlap
-    assert np.linalg.norm(second[:3, 3] - scene.objects["ball"].placement.translation) > 0.1
+    assert np.linalg.norm(second[:3, 3] - scene.objects["ball"].placement.translation) > 0.1 - 1e-9
     marker, dashes = keyframe.markers[f"/contacts/overlap {ball}/second inside"]
     assert marker.kind == "dashes"
     assert dashes[:3, 3] == pytest.approx(found[ball].point)
@@ -61,3 +61,18 @@ def test_a_depth_that_cancels_is_a_ball_and_says_how_deep_it_is(planar_arm: Any)
     markers = viewed.keyframe(q, None, overlaps=[both]).markers
     assert {marker.kind for marker, _ in markers.values()} == {"ball", "label"}
     assert any("cancels; 5.0 mm deep" in marker.text for marker, _ in markers.values())
+
+
+def test_an_arrow_begins_outside_of_both_that_overlap(planar_arm: Any) -> None:
+    """A link inside of a board, half a metre from its ends: the arrow out of it can be seen."""
+    scene = wb.Scene(planar_arm((0.5, 0.4))).add(wb.Box((1.0, 0.3, 0.3)), name="board", at=(0.4, 0.02, 0.0))
+    found = overlaps(scene, np.zeros(2))
+    markers = Composition(scene, SceneGraph(), -1.0, (), False).keyframe(np.zeros(2), None, overlaps=found).markers
+    arrow = next(place for marker, place in markers.values() if marker.kind == "arrow")
+    assert abs(arrow[1, 3] - 0.02) > 0.15 - 1e-9
+    assert np.abs(arrow[:3, 3] - (0.4, 0.02, 0.0)).max() < 0.5  # at the board, not at the end of its diagonal
+    lifted = [one._replace(depth=up, moves_first=up) for one in found for up in [np.array((0.0, 0.0, 0.02))]]
+    markers = Composition(scene, SceneGraph(), -1.0, (), False).keyframe(np.zeros(2), None, overlaps=lifted).markers
+    arrow = next(place for marker, place in markers.values() if marker.kind == "arrow")
+    words = next(place for marker, place in markers.values() if marker.kind == "label")
+    assert words[:3, 3] == pytest.approx(arrow[:3, 3] + arrow[:3, 2])  # at its end, where they hide nothing

@@ -143,7 +143,6 @@ def test_mouse_drags_holds_undoes_and_saves(
     until(lambda: np.array_equal(drag.q, start))
 
     for arrow, shift, wanted in (
-        ("ArrowUp", False, (0.0, 0.0, 0.03)),
         ("ArrowRight", False, (0.03 * 1.6 / np.hypot(1.6, 2.2), 0.03 * 2.2 / np.hypot(1.6, 2.2), 0.0)),
         ("ArrowDown", True, (0.03 * 2.2 / np.hypot(1.6, 2.2), -0.03 * 1.6 / np.hypot(1.6, 2.2), 0.0)),
     ):

@@ -70,7 +70,7 @@ def judged(problem: Problem, numbers: Numbers, q: Array) -> Judged:
     joints, penetration, short = (np.concatenate(each) for each in zip(*parts, strict=True))
     far, turned = np.zeros((2, 1 + len(problem.goals), len(q)))
     for g, goal in enumerate(problem.goals):
-        far[g], turned[g] = _errors(model, goal, joints, [part[:, g] for part in numbers[:3]])
+        far[g], turned[g] = _errors(goal, joints, [part[:, g] for part in numbers[:3]])
     values = q[:, figure.limits.idx_q]
     beyond = np.maximum(figure.limits.lower - values, values - figure.limits.upper).max(axis=1, initial=0.0)
     if model.nq == model.nv:
@@ -93,17 +93,17 @@ def _numbers(goal: Any) -> tuple[Array, Array, Array]:
     return _UNMOVED, goal.residual.target, goal.residual.undo.rotation
 
 
-def _errors(model: pin.Model, goal: Any, joints: Array, asked: Sequence[Array]) -> tuple[Array, Array]:
-    """Distances and angles (k,) of a goal from its targets, with the joints (k, njoints, 4, 3) of a model there."""
+def _errors(goal: Any, joints: Array, asked: Sequence[Array]) -> tuple[Array, Array]:
+    """Distances and angles (k,) of a goal from its targets, with the joints (k, njoints, 4, 3) there."""
     offset, target, undo = asked
     if type(goal) is Point:
         place, base, position, orientation = goal.place, WORLD, True, False
     else:
         place, base, _, _, position, orientation = goal.residual
-    turn, at = _placed(model, place, joints)
+    turn, at = _placed(place, joints)
     at = at + (turn @ offset[:, :, None])[:, :, 0]
     if base.frame:
-        back, origin = _placed(model, base, joints)
+        back, origin = _placed(base, joints)
         back = back.transpose(0, 2, 1)
         turn, at = back @ turn, (back @ (at - origin)[:, :, None])[:, :, 0]
     none = np.zeros(len(joints))
@@ -115,8 +115,8 @@ def _errors(model: pin.Model, goal: Any, joints: Array, asked: Sequence[Array]) 
     return far, np.arctan2(np.linalg.norm(sine, axis=0), np.trace(left, axis1=1, axis2=2) - 1.0)
 
 
-def _placed(model: pin.Model, place: Place, joints: Array) -> tuple[Array, Array]:
+def _placed(place: Place, joints: Array) -> tuple[Array, Array]:
     """Rotations (k, 3, 3) and origins (k, 3) of a frame in the world."""
-    at, joint = model.frames[place.frame].placement, joints[:, place.joint]
+    at, joint = place.placement, joints[:, place.joint]
     turn = joint[:, :3].transpose(0, 2, 1)
     return turn @ at.rotation, joint[:, 3] + turn @ at.translation

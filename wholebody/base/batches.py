@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import multiprocessing
 import os
 import sys
@@ -20,8 +21,6 @@ from wholebody.base.runner import ONE_THREAD, Child, EndedError, Job, Outcome, e
 from wholebody.version import __version__
 
 T = TypeVar("T")
-
-_local = threading.local()
 
 _Sent = tuple[int, Callable[..., Any], tuple[Any, ...], float]
 """A job as it is sent: its number, its function with the arguments, and its seconds."""
@@ -101,6 +100,9 @@ _ready = object()
 _idle: dict[int, list[Child]] = {}
 """Processes that are kept for the next call, by the id of the process that began them: a fork has its own."""
 
+_own: dict[tuple[int, int], Child] = {}
+"""The child process of each thread, by the ids of the process and of the thread that began it."""
+
 
 def _works(child: Child) -> bool:
     """Whether a process does a job that is waited for."""
@@ -146,24 +148,25 @@ def spread(
             finally:
                 answers.close()
     finally:
-        close_own_child()  # which does the jobs where there is one at a time
+        own_child().close()  # which does the jobs where there is one at a time
 
 
 def own_child() -> Child:
-    """The child process of this thread; it lives as long as this process, or until `close_own_child`."""
-    if not hasattr(_local, "child"):
-        _local.child = Child(ONE_THREAD)
-        parent = multiprocessing.parent_process()
-        if parent is not None and multiprocessing.current_process().name.startswith("LokyProcess"):
+    """The child process of this thread; it lives as long as this process, or until `close_children`."""
+    key = os.getpid(), threading.get_ident()
+    if key not in _own:
+        _own[key] = Child(ONE_THREAD)
+        parent, name = multiprocessing.parent_process(), multiprocessing.current_process().name
+        if parent is not None and name.startswith("LokyProcess"):
             end_with(int(parent.pid or 0))  # joblib's process would wait for minutes
-    child: Child = _local.child
-    return child
+    return _own[key]
 
 
-def close_own_child() -> None:
-    """End the child process of this thread, if there is one."""
-    if hasattr(_local, "child"):
-        _local.child.close()
+@atexit.register
+def close_children() -> None:
+    """End the processes that this process keeps for the next call."""
+    for child in [*_idle.get(os.getpid(), []), *(one for key, one in _own.items() if key[0] == os.getpid())]:
+        child.close()
 
 
 def _in_own_child(sent: _Sent) -> tuple[int, Any, tuple[int, str] | None]:
@@ -201,13 +204,11 @@ def _client(address: str) -> AbstractContextManager[Any]:
         from distributed import Client
     except ImportError:
         raise MissingPackageError("--cluster needs dask; install it with: pip install 'wholebody[cluster]'") from None
+    connect: Callable[..., AbstractContextManager[Any]] = Client
     try:
-        connect: Callable[..., AbstractContextManager[Any]] = Client
-        # s: for which a scheduler is waited for
-        client = connect(address, timeout=10.0)
+        return connect(address, timeout=10.0)  # s: for which a scheduler is waited for
     except (OSError, ValueError) as error:
         raise WholebodyError(f"no dask scheduler answers at {address} ({error}); start one: dask scheduler") from None
-    return client
 
 
 def reporter(value: Callable[..., Any] | bool | None, what: str) -> Callable[..., Any] | None:

@@ -12,6 +12,7 @@ import re
 import warnings
 from collections.abc import Collection, Iterable
 from difflib import get_close_matches
+from functools import cache
 from numbers import Number
 from operator import index
 from pathlib import Path
@@ -264,14 +265,18 @@ def array(value: object, what: str, wanted: str) -> Array:
 
 def numbers(value: object, shape: tuple[int, ...], what: str) -> Array:
     """Read-only copy with finite numbers of this shape."""
-    plain = "one number" if not shape else f"numbers of shape {shape}"
-    found: Array = array(value, what, plain).copy()
+    found: Array = array(value, what, _of_shape(shape)).copy()
     if found.shape != shape:
         raise InputError(f"{what} has shape {shape}, not {found.shape}; give {math.prod(shape)} numbers")
     if not math.isfinite(np.vdot(found, found)) and not np.isfinite(found).all():  # the first takes a fifth of the time
         raise InputError(f"{what} is {shown(found.tolist())}; give finite numbers")
     found.flags.writeable = False
     return found
+
+
+@cache
+def _of_shape(shape: tuple[int, ...]) -> str:
+    return f"numbers of shape {shape}" if shape else "one number"
 
 
 def posture(value: object, size: int, what: str = "a posture") -> Array:

@@ -111,23 +111,24 @@ class Checked:
     def __post_init__(self) -> None:
         """Check the fields."""
         kind: Any = type(self)
-        where = ""
-        for field in _checked(kind):
-            value = getattr(self, field.name)
-            if value is field.default:
-                checks.settle(self, field.kept, field.found)
-            elif value is not None or not field.optional:
+        own, where = vars(self), ""
+        for name, check, optional, kept, default, found in _checked(kind):
+            value = own[name]
+            if value is default:
+                own[kept] = found
+            elif value is not None or not optional:
                 where = where or called(self)
-                checks.settle(self, field.kept, field.check(value, f"{where}: {field.name}"))
-                if field.kept != field.name and hasattr(value, "copy"):  # the caller may change an array of its own
-                    checks.settle(self, field.name, value.copy())
+                own[kept] = check(value, f"{where}: {name}")
+                if kept != name and hasattr(value, "copy"):  # the caller may change an array of its own
+                    own[name] = value.copy()
 
 
 def called(record: object) -> str:
     """A record in messages: its class, and the names that it must be given."""
     kind: Any = type(record)
-    names = ", ".join(checks.shown(getattr(record, name)) for name in _names(kind))
-    return f"{kind.__name__}({names})" if names else str(kind.__name__)
+    names = _names(kind)
+    told = ", ".join([checks.shown(getattr(record, name)) for name in names])
+    return f"{kind.__name__}({told})" if names else str(kind.__name__)
 
 
 def check_of(kind: Any, name: str) -> Check:

@@ -89,6 +89,14 @@ class Limits(NamedTuple):
         return brief(self)
 
 
+class Place(NamedTuple):
+    """Index of a frame of the model, of the joint that carries it, and its placement in that joint."""
+
+    frame: int
+    joint: int
+    placement: pin.SE3
+
+
 class Follower(NamedTuple):
     """A joint whose value is that of another times a slope plus an offset (mimic)."""
 

@@ -14,7 +14,7 @@ from wholebody.base.arrays import Array, Indices, as_dict
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.pool import Pool
 from wholebody.figures.body_spec import geometry_of
-from wholebody.figures.description import Description, followers_of, is_root, limits_of
+from wholebody.figures.description import Description, Place, followers_of, is_root, limits_of
 from wholebody.figures.joining import mounted_parts, posture_of_all
 from wholebody.figures.model_check import LARGEST, Turning, check_model
 from wholebody.figures.postures import grounded
@@ -117,6 +117,7 @@ class Figure(checks.FixedAttributes):
         self.root = "several" if several else "free" if self.roots else "fixed"
         self.bodies = MappingProxyType({prefix: _joints_of(names, prefix) for prefix in description.prefixes})
         self._frame_ids = {frame.name: index for index, frame in reversed(list(enumerate(model.frames)))}
+        self._places: dict[str, Place] = {}
         self._joint_ids = {name: index for index, name in enumerate(model.names) if index > 0}
         self.joints: tuple[str, ...] = tuple(name for name in self._joint_ids if not is_root(name))
         self.limits = limits_of(model)
@@ -207,6 +208,14 @@ class Figure(checks.FixedAttributes):
             checks.known(name, self._frame_ids, "frame", offered={*self.frames, *self.segments})
         return int(self._frame_ids[name])
 
+    def place_of(self, name: str) -> Place:
+        """Return where a frame, a segment or a joint is fixed to the model; found once."""
+        index = self.frame_id(name)
+        if name not in self._places:
+            frame = self.model.frames[index]
+            self._places[name] = Place(index, int(frame.parentJoint), pin.SE3(frame.placement))
+        return self._places[name]
+
     def placement(self, q: Array, name: str) -> pin.SE3:
         """Return the placement in the world, at the posture q (nq,), of a frame, a segment or a joint."""
         frame, q = self.frame_id(name), self._checked(q)
@@ -214,11 +223,11 @@ class Figure(checks.FixedAttributes):
             pin.forwardKinematics(self.model, data, q)
             return pin.updateFramePlacement(self.model, data, frame).copy()
 
-    def joint_placement(self, q: Array, joint: int) -> pin.SE3:
-        """Return the placement in the world, at the posture q (nq,), of a joint by its index in the model."""
+    def joint_placements(self, q: Array, joints: Iterable[int]) -> dict[int, pin.SE3]:
+        """Return the placements in the world, at the posture q (nq,), of joints by their indices in the model."""
         with self._data.borrow() as data:
             pin.forwardKinematics(self.model, data, self._checked(q))
-            return data.oMi[joint].copy()
+            return {joint: data.oMi[joint].copy() for joint in joints}
 
     def joint_id(self, name: str) -> int:
         """Return the index of a joint in the model; "root", or "anna/root", is a free root."""

@@ -33,9 +33,9 @@ def stand(figure: Articulated, degrees: Mapping[str, float]) -> Array:
     free: Array = q
     reach = np.array([swept_points(piece.geometry).reach for piece in figure.geometry.geometryObjects])
     pairs = pairs_of(figure.geometry)
-    within = reach[pairs].sum(axis=1) + GAP
+    within, data = reach[pairs].sum(axis=1) + GAP, figure.model.createData()
     for _ in range(45):
-        close = _close_segments(figure, free, pairs, within)
+        close = _close_segments(placed(figure, free, data), pairs, within)
         if not close:
             break
         moved = {
@@ -47,7 +47,7 @@ def stand(figure: Articulated, degrees: Mapping[str, float]) -> Array:
     if figure.root == "free":
         half = math.radians(degrees.get("pelvis_pitch", 0.0)) / 2.0
         free[3:7] = 0.0, math.sin(half), 0.0, math.cos(half)
-        free[2] = -lowest(figure, free)
+        free[2] = -lowest(figure, free, data)
     return free
 
 
@@ -58,9 +58,9 @@ def _moves(abduction: str, segment: str) -> bool:
     return segment.startswith(side) and segment.endswith(leg) == (part == "hip") and not segment.endswith("clavicle")
 
 
-def _close_segments(figure: Articulated, q: Array, pairs: Indices, within: Array) -> set[str]:
+def _close_segments(parts: list[tuple[pin.GeometryObject, pin.SE3]], pairs: Indices, within: Array) -> set[str]:
     """Segments with pieces nearer to others than `GAP`, of pairs (k, 2) whose origins are `within` (k,) then."""
-    pieces, places = zip(*placed(figure, q), strict=True)
+    pieces, places = zip(*parts, strict=True)
     centers = np.array([place.translation for place in places])
     apart = np.linalg.norm(centers[pairs[:, 0]] - centers[pairs[:, 1]], axis=1)
     at = [coal.Transform3s(place.rotation, place.translation) for place in places]
@@ -72,17 +72,17 @@ def _close_segments(figure: Articulated, q: Array, pairs: Indices, within: Array
     return close
 
 
-def placed(figure: Articulated, q: Array) -> list[tuple[pin.GeometryObject, pin.SE3]]:
-    """The pieces of a figure, and where each is in a posture (nq,)."""
-    data = figure.model.createData()
+def placed(figure: Articulated, q: Array, data: pin.Data | None = None) -> list[tuple[pin.GeometryObject, pin.SE3]]:
+    """The pieces of a figure, and where each is in a posture (nq,); new data take longer than the rest."""
+    data = figure.model.createData() if data is None else data
     pin.forwardKinematics(figure.model, data, q)
     return [(piece, data.oMi[piece.parentJoint] * piece.placement) for piece in figure.geometry.geometryObjects]
 
 
-def lowest(figure: Articulated, q: Array) -> float:
+def lowest(figure: Articulated, q: Array, data: pin.Data | None = None) -> float:
     """Height of the lowest point of all pieces, metres."""
     down = np.array([0.0, 0.0, -1.0])
-    return min(-support(piece.geometry, place, down) for piece, place in placed(figure, q))
+    return min(-support(piece.geometry, place, down) for piece, place in placed(figure, q, data))
 
 
 def support(shape: Any, placement: pin.SE3, direction: Array) -> float:

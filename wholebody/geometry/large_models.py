@@ -18,12 +18,14 @@ MANY = 300  # number of pieces from which entries are made at once; as many are 
 TABLED = 2000  # number of pieces up to which a model has Pinocchio's table of pair numbers, of 16 MB then
 
 
-def geometry_model(pieces: Sequence[pin.GeometryObject], pairs: Indices | None = None) -> pin.GeometryModel:
+def geometry_model(
+    pieces: Sequence[pin.GeometryObject], pairs: Indices | None = None, most: int = TABLED
+) -> pin.GeometryModel:
     """Pinocchio's geometry model of these pieces and pairs (k, 2), the lesser index first."""
-    # With more than `TABLED` pieces it has no table of pair numbers, which `addCollisionPair` and others use.
-    tabled = pairs is None or len(pieces) <= TABLED
+    # With more than `most` pieces it has no table of pair numbers, which `addCollisionPair` and others use.
+    tabled = pairs is None or len(pieces) <= most
     pairs = np.zeros((0, 2), dtype=np.intp) if pairs is None else pairs
-    if len(pieces) < MANY:
+    if tabled and len(pieces) < MANY:
         return _one_by_one(pieces, pairs)
     geometry = _counted(len(pieces), None if tabled else pairs)
     if geometry is None:

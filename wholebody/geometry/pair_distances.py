@@ -52,13 +52,15 @@ class PairDistances:
             pieces = geometry.copy()
             pieces.removeAllCollisionPairs()
         self.data = data = pin.GeometryData(pieces)
-        for k in range(geometry.ngeoms):
-            data.oMg[k] = pin.SE3(np.eye(3), np.array([AWAY * k, 0.0, 0.0]))
-        for number in computed_first(len(data.distanceResults)):
-            pin.computeDistance(geometry, data, number)
-        self.results, view = result_view(data.distanceResults), placement_view(data.oMg)
+        view = placement_view(data.oMg)
         self._viewed = view is not None
         self.placed: Array = self._copied() if view is None else view
+        apart = np.tile(np.eye(4)[:, :3], (geometry.ngeoms, 1, 1))
+        apart[:, 3, 0] = AWAY * np.arange(geometry.ngeoms)
+        self.put(apart)
+        for number in computed_first(len(data.distanceResults)):
+            pin.computeDistance(geometry, data, number)
+        self.results = result_view(data.distanceResults)
         self._guesses = guess_views(data.distanceRequests)
         self._single = SinglePairs(geometry)
 

@@ -9,6 +9,7 @@ which parts of a piece can touch next when the posture changes; one witness poin
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import coal
@@ -92,14 +93,19 @@ def swept_points(geometry: Any) -> SweptPoints:
         face = np.array([[*geometry.n, geometry.d]])
         return SweptPoints(_NONE, 0.0, face, np.inf, _NO_AXIS, np.inf, np.full(3, np.inf))
     if isinstance(geometry, coal.Convex):
-        points = np.array(geometry.points())
-        faces = _convex_faces(geometry, points)
-        width = float((faces[:, 3] - (points @ faces[:, :3].T).min(axis=0)).min())
-        reach = float(np.linalg.norm(points, axis=1).max())
-        return SweptPoints(points, 0.0, faces, reach, _NO_AXIS, width, np.abs(points).max(axis=0))
+        return _swept_hull(geometry)
     raise InputError(
         f"{type(geometry).__name__} is not a convex piece; use Box, Sphere, Capsule, Ellipsoid, HalfSpace, Hull or Mesh"
     )
+
+
+@lru_cache(maxsize=1024)  # scenes of one study share the hulls of their things
+def _swept_hull(geometry: Any) -> SweptPoints:
+    points = np.array(geometry.points())
+    faces = _convex_faces(geometry, points)
+    width = float((faces[:, 3] - (points @ faces[:, :3].T).min(axis=0)).min())
+    reach = float(np.linalg.norm(points, axis=1).max())
+    return SweptPoints(points, 0.0, faces, reach, _NO_AXIS, width, np.abs(points).max(axis=0))
 
 
 def normal_across(axis_a: Array, axis_b: Array) -> Array:

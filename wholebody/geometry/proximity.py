@@ -7,6 +7,7 @@ pieces are apart. Telling this takes some 5 us for 1,000 pairs.
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -18,7 +19,7 @@ from wholebody.base.checks import number
 from wholebody.geometry.large_models import pairs_of
 from wholebody.geometry.memory_views import RESULT_DOUBLES, fields
 from wholebody.geometry.pair_distances import PairDistances
-from wholebody.geometry.pieces import COAL_ACCURACY, ENDLESS, normal_across, swept_points
+from wholebody.geometry.pieces import COAL_ACCURACY, ENDLESS, SweptPoints, normal_across, swept_points
 
 PENETRATION = 1e-5  # m: deeper than this a pair is called inside of each other; what touches is solved to it
 
@@ -111,12 +112,20 @@ class PairTable:
         points_meet: (pairs,) distance at and below which coal's normal means nothing, metres; -inf for most pairs.
     """
 
-    def __init__(self, model: pin.Model, geometry: pin.GeometryModel, pairs: Indices | None = None) -> None:
-        """Read the pieces, and the pairs where they are not given; an InputError for what is no convex piece."""
+    def __init__(
+        self,
+        model: pin.Model,
+        geometry: pin.GeometryModel,
+        pairs: Indices | None = None,
+        swept: Sequence[SweptPoints] | None = None,
+    ) -> None:
+        """Read the pieces, and the pairs and swept points that are not given; an InputError for no convex piece."""
         self.model, self.geometry = model, geometry
-        shapes = [piece.geometry for piece in geometry.geometryObjects]  # things of one size share them
-        swept = {id(shape): swept_points(shape) for shape in {id(shape): shape for shape in shapes}.values()}
-        self.swept = [swept[id(shape)] for shape in shapes]
+        if swept is None:
+            shapes = [piece.geometry for piece in geometry.geometryObjects]  # things of one size share them
+            known = {id(shape): swept_points(shape) for shape in {id(shape): shape for shape in shapes}.values()}
+            swept = [known[id(shape)] for shape in shapes]
+        self.swept: Sequence[SweptPoints] = swept
         self.pairs: Indices = pairs_of(geometry) if pairs is None else pairs
         self.joint: Indices = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
         self.reach = np.array([swept.reach for swept in self.swept]).reshape(-1)

@@ -202,11 +202,10 @@ class _Finder:
             if not isinstance(goal, (Point, Frame)):
                 continue
             found = goal.place if isinstance(goal, Point) else goal.residual.place
-            place = self._problem.scene.model.frames[found.frame].placement
             if isinstance(goal, Point):
-                here, wanted = place.act(goal.resolved_offset), goal.resolved_target
+                here, wanted = found.placement.act(goal.resolved_offset), goal.resolved_target
             else:
-                here, wanted = place.translation, goal.residual.target
+                here, wanted = found.placement.translation, goal.residual.target
             own = [k for k in np.flatnonzero(table.joint == found.joint).tolist() if self._depth(k, here) > -ON_SURFACE]
             pairs = np.isin(table.pairs, own).any(axis=1) & (table.joint[table.pairs] == 0).any(axis=1)
             deepest, thing = 0.0, -1
@@ -246,8 +245,7 @@ class _Finder:
 
     def _frame(self, place: Place) -> tuple[int, pin.SE3]:
         """The group that carries a frame, and the frame's placement in it."""
-        frame = self._problem.scene.model.frames[place.frame]
-        return self._group[place.joint], self._local(place.joint) * frame.placement
+        return self._group[place.joint], self._local(place.joint) * place.placement
 
     def _at(self, group: int, local: pin.SE3) -> pin.SE3 | None:
         """Placement in the world of a local placement of a group, if the group is fixed."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from threading import Lock
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -11,11 +11,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Indices, brief
+from wholebody.base.arrays import Indices, Mask, brief
 from wholebody.base.pool import Pool
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.continuous.moved_pairs import compiled_kernel
 from wholebody.geometry.large_models import geometry_model, pairs_of
+from wholebody.geometry.pieces import SweptPoints
 from wholebody.geometry.proximity import PairTable, Proximity
 from wholebody.scene.matter.body import DEFAULT, Material
 
@@ -90,9 +91,10 @@ class SceneGeometry:
         owners: tuple[str, ...],
         pieces_of: dict[str, list[tuple[int, pin.SE3]]],
         pairs: Indices | None = None,
+        swept: Sequence[SweptPoints] | None = None,
     ) -> None:
         self.model, self.geometry, self.owners, self.pieces_of = model, geometry, owners, pieces_of
-        self.table = PairTable(model, geometry, pairs)
+        self.table = PairTable(model, geometry, pairs, swept)
         self.number_of = {name: number for number, name in enumerate(pieces_of, start=1)}
         standing: Indices = np.flatnonzero(self.table.joint == 0).astype(np.intp)
         # those of joined figures, "anna/seat", have numbers below zero: each figure's its own
@@ -170,12 +172,16 @@ class SceneGeometry:
                 del self._known[next(iter(self._known))]
         return found
 
+    def between(self, owners: Set[tuple[str, str]]) -> Mask:
+        """Which collision pairs are of owners that stand in some pairs of names, in either order."""
+        pairs = ((self.owners[a], self.owners[b]) for a, b in self.table.pairs.tolist())
+        return np.array([pair in owners or pair[::-1] in owners for pair in pairs], dtype=bool)
+
     def copied(self) -> SceneGeometry:
         """A copy with placements of its own."""
         with self.lock:
-            return SceneGeometry(
-                self.model, self.geometry.copy(), self.owners, dict(self.pieces_of), self.table.pairs
-            )  # fmt: skip
+            pieces, table = dict(self.pieces_of), self.table
+            return SceneGeometry(self.model, self.geometry.copy(), self.owners, pieces, table.pairs, table.swept)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the arguments that it is made from."""

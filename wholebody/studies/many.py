@@ -7,7 +7,6 @@ from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 from wholebody.base import checks
@@ -99,7 +98,7 @@ def solve_many(
         method: name or settings, see `solve`.
         jobs: problems at a time.
         cluster: address of a dask scheduler that runs them; None for this machine.
-        warm_start: begin each problem at the answer of the one before it, if that is solved and of the same figure.
+        warm_start: begin each problem at the answer of the last one before it that is solved, if of the same figure.
             One that is not solved from there is solved from its own start. Runs of 16 problems in the order given are
             linked so, and their first ones, whatever `jobs` is. Where neighbours differ by more than 10 degrees in a
             joint, both are solved from their own starts and each other's answers, and the lower measure stays: at most
@@ -184,13 +183,20 @@ def run_cases(
     tails = [run[1:] if heads else run for run in linked] + [run for run in waiting if len(run) == 1]
     for work in (heads, tails, alone):  # the cases of a run whose process ended are done again, one by one
         if not over and work:
-            begun = {k: done[k - 1].q for run in tails for k in run[:1] if heads and work is tails and k - 1 in done}
-            over = _run(work, order, running, keep, alone, begun)
+            leading = heads[0] if heads and work is tails else []
+            starts = {run[0]: _solved_before(run[0], leading, done) for run in work}
+            over = _run(work, order, running, keep, alone, {k: done[j].q for k, j in starts.items() if j is not None})
     if not over and waiting:
         family = Family(order, done, partial(_computed, order, running), keep)
-        before_it = {k: j for run in (*linked, *heads) for j, k in pairwise(run)}
+        starts = {k: _solved_before(k, run, done) for run in (*heads, *linked) for k in run[1:]}
+        before_it = {k: j for k, j in starts.items() if j is not None}
         _ = solve_from_neighbours(family, before_it) or (linked and lowers and (lower(family) or name_changes(family)))
     return Records([done.get(k, order[k].record) for k in range(len(order))])
+
+
+def _solved_before(number: int, run: Iterable[int], done: Mapping[int, SolveRecord]) -> int | None:
+    """The last case of a run before one that is solved; None if none is."""
+    return max((j for j in run if j < number and j in done and done[j].solved), default=None)
 
 
 def _computed(order: Sequence[Case], running: Running, function: Callable[..., Any], work: Work) -> dict[Any, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from functools import partial
+from itertools import pairwise
 from math import dist, hypot
 from typing import Annotated, Any, TypeAlias
 
@@ -38,20 +39,21 @@ NEAREST = 1e-5  # Distance [m] below which two points count as one corner
 
 def standing_points(scene: Surroundings, q: Array, feet: Sequence[str]) -> Array:
     """Points (n, 3) on which the feet, toes included, stand at q: the lowest corners of their pieces."""
-    places: dict[int, pin.SE3] = {}
-    points = []
+    soles = []
     for foot in feet:
         joint = inputs.find_place(scene, foot, "Balance").joint
-        pieces = inputs.once(scene, ("pieces", joint), partial(_pieces_of, scene, joint))
-        if not pieces or joint == 0:
+        soles.append(inputs.once(scene, ("pieces", joint), partial(_pieces_of, scene, joint)))
+        if not soles[-1] or joint == 0:
             raise InputError(f"Balance: {foot!r} has no pieces to stand on; name segments with geometry as feet")
-        for carrier in {joint for joint, *_ in pieces} - places.keys():
-            places[carrier] = scene.figure.joint_placement(q, carrier)
-        lows = np.vstack(
+    places = scene.figure.joint_placements(q, {joint for pieces in soles for joint, *_ in pieces})
+    points = []
+    for pieces in soles:
+        lows = np.concatenate(
             [outermost(shape, places[joint] * placed, DOWN, swept) for joint, placed, shape, swept in pieces]
         )
-        points.append(lows[lows[:, 2] <= lows[:, 2].min() + STANDING_HEIGHT])
-    return np.vstack(points)
+        height = lows[:, 2]
+        points.append(lows[height <= height.min() + STANDING_HEIGHT])
+    return np.concatenate(points)
 
 
 def _pieces_of(scene: Surroundings, joint: int) -> list[tuple[int, pin.SE3, Any, SweptPoints]]:
@@ -78,7 +80,7 @@ def hull_corners(points: Array) -> list[int]:
     """Indices of the convex hull's corners of points (n, 2), anticlockwise; none on a line."""
     # Andrew's monotone chain (1979), on micrometres: an edge that is rounding alone would have no direction.
     places = points[:, :2].tolist()
-    order = sorted(range(len(places)), key=lambda k: (round(places[k][0], 6), round(places[k][1], 6)))
+    order = np.lexsort(np.round(points[:, 1::-1], 6).T).tolist()
 
     def half(indices: list[int]) -> list[int]:
         chain: list[int] = []
@@ -100,11 +102,14 @@ def hull_corners(points: Array) -> list[int]:
 
 def edges(corners: Array) -> tuple[Array, Array]:
     """Inward unit normals (k, 2) and offsets (k,) of a convex polygon: inside, normals @ x >= offsets."""
-    along = np.concatenate([corners[1:], corners[:1]]) - corners
-    normals = np.empty_like(along)
-    normals[:, 0], normals[:, 1] = -along[:, 1], along[:, 0]
-    normals /= np.sqrt((along * along).sum(axis=1))[:, None]
-    return normals, np.einsum("ij,ij->i", normals, corners)
+    normals, offsets = [], []
+    places = corners.tolist()  # few: numbers are faster than arrays
+    for (x, y), (following_x, following_y) in pairwise([*places, *places[:1]]):
+        along_x, along_y = following_x - x, following_y - y
+        length = hypot(along_x, along_y)
+        normals.append((-along_y / length, along_x / length))
+        offsets.append((along_x * y - along_y * x) / length)
+    return np.reshape(normals, (-1, 2)), np.array(offsets)
 
 
 def shrunk(corners: Array, margin: float) -> Array:
@@ -125,8 +130,10 @@ def shrunk(corners: Array, margin: float) -> Array:
 
 def least_width(corners: Array) -> float:
     """Least extent of a polygon over the directions of its normals."""
-    normals, offsets = edges(corners)
-    return float((corners @ normals.T - offsets).max(axis=0).min())
+    (normals, offsets), places = edges(corners), corners.tolist()
+    lines = zip(normals.tolist(), offsets.tolist(), strict=True)
+    width: float = min(max([a * x + b * y for x, y in places]) - offset for (a, b), offset in lines)
+    return width
 
 
 Feet: TypeAlias = Annotated[Sequence[str], Names("['left_foot', 'right_foot']")]
@@ -162,17 +169,20 @@ class Balance(Constraint):
 
     def resolve(self, scene: Surroundings, start: Array) -> Balance:
         """Compute the support polygon at the start."""
-        return self.on_polygon(convex_polygon(standing_points(scene, start, self.feet)[:, :2]), scene)
+        return self.on_points(standing_points(scene, start, self.feet), scene)
 
-    def on_polygon(self, corners: Array, scene: Surroundings) -> Balance:
-        """Copy that is ready to be evaluated, on a support polygon with these corners (k, 2)."""
-        joints = inputs.joints_with_mass(scene, "Balance", self.feet)
-        if self.margin and len(shrunk(corners, self.margin)) == 0:
+    def on_points(self, points: Array, scene: Surroundings, steady: bool = False) -> Balance:
+        """Copy that is ready to be evaluated, on points (n, 3) of the soles; if `steady`, with that as its margin."""
+        joints, corners = inputs.joints_with_mass(scene, "Balance", self.feet), convex_polygon(points)
+        width = least_width(corners)
+        margin = STEADY * width if steady else self.margin
+        # The circle inside a convex set has at least a third of its width as radius (Blaschke 1915).
+        if 3.0 * margin > width and len(shrunk(corners, margin)) == 0:
             raise InputError(
-                f"Balance: a margin of {self.margin:g} m leaves nothing of the support polygon; make it smaller"
+                f"Balance: a margin of {margin:g} m leaves nothing of the support polygon; make it smaller"
             )
         normals, offsets = edges(corners)
-        return filled(self, joints=joints, normals=normals, offsets=offsets)
+        return filled(self, margin=margin, joints=joints, normals=normals, offsets=offsets)
 
     @property
     def lower(self) -> Array:

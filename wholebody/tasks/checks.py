@@ -34,6 +34,17 @@ def checked_terms(terms: Any, kinds: type | tuple[type, ...], what: str) -> Sequ
     return listed
 
 
+def owner_pair(scene: Any, pair: Any) -> tuple[str, str]:
+    """Two names of segments or things that may touch; InputError for anything else."""
+    known = {*scene.figure.segments, *scene.objects}
+    if not isinstance(pair, (tuple, list)) or len(pair) != 2:
+        told = checks.shown(pair)
+        raise InputError(f"touching takes a list of pairs of names, such as [('right_hand', 'table')], not of {told}")
+    for name in pair:
+        checks.known(name, known, "segment or object", "touching")
+    return str(pair[0]), str(pair[1])
+
+
 @contextmanager
 def named(where: str, term: object) -> Iterator[None]:
     """A context in which a TermError names the term's place, such as "goals[1] (Mine)"."""

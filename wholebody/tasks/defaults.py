@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Sequence, Set
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
-from wholebody.tasks.balance import STEADY, Balance, convex_polygon, least_width, standing_points
+from wholebody.tasks.balance import Balance, standing_points
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings
 from wholebody.tasks.bounds import Freeze
 from wholebody.tasks.distance import Effort
@@ -102,8 +102,7 @@ def default_constraints(
     for body in standing:
         feet = tuple(body + foot for foot in FEET)
         try:
-            corners = convex_polygon(standing_points(scene, start, feet)[:, :2])
-            found.append(Balance(feet, margin=STEADY * least_width(corners)).on_polygon(corners, scene))
+            found.append(Balance(feet).on_points(standing_points(scene, start, feet), scene, steady=True))
         except InputError as error:
             if required:
                 raise
@@ -113,15 +112,12 @@ def default_constraints(
 
 
 def standing(
-    scene: Surroundings, at: Callable[[], State], terms: Sequence[Constraint | Goal], bounds: Sequence[Bound]
+    scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound]
 ) -> tuple[str, ...]:
-    """The persons who stand, by what the names of each begin with; see `_stands`. `at` gives the state at the start."""
+    """The persons who stand, by what the names of each begin with; see `_stands`."""
     figure = scene.figure
     bodies = [body for body in balancing(scene, terms) if figure.ranges and f"{body}root" in figure.roots]
-    if not bodies:
-        return ()
-    state = at()
-    return tuple(body for body in bodies if _stands(scene, state, terms, bounds, body))
+    return tuple(body for body in bodies if _stands(scene, start, terms, bounds, body))
 
 
 def balancing(scene: Surroundings, terms: Sequence[Constraint | Goal]) -> tuple[str, ...]:
@@ -136,7 +132,7 @@ def balancing(scene: Surroundings, terms: Sequence[Constraint | Goal]) -> tuple[
 
 
 def _stands(
-    scene: Surroundings, state: State, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound], body: str
+    scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound], body: str
 ) -> bool:
     """Whether a person stands: both feet are held where they are at the start, and nothing else carries it."""
     figure = scene.figure
@@ -148,7 +144,7 @@ def _stands(
         return False
     if any(isinstance(term, (Sit, Lean)) and str(term.frame).startswith(body) for term in terms):
         return False
-    feet = {int(scene.model.frames[figure.frame_id(foot)].parentJoint) for foot in feet_names}
+    feet = {figure.place_of(foot).joint for foot in feet_names}
     mine = figure.bodies[body]
     holds = [
         term
@@ -157,5 +153,9 @@ def _stands(
     ]
     if {term.residual.place.joint for term in holds} != feet:
         return False
+    placed = [term for term in holds if term.at is not None]  # the others are where they are at the start
+    if not placed:
+        return True
+    state = State(scene.model).update(start)
     # m, rad: a foot held this near to its place at the start stands where the support polygon is computed.
-    return all(np.abs(term.value(state)).max() <= 1e-3 for term in holds)
+    return all(np.abs(term.value(state)).max() <= 1e-3 for term in placed)

@@ -15,7 +15,7 @@ from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
-from wholebody.tasks.balance import STEADY, Balance, Feet, Margin, convex_polygon, least_width, standing_points
+from wholebody.tasks.balance import Balance, Feet, Margin, standing_points
 from wholebody.tasks.base import Constraint, Surroundings, filled
 
 GRAVITY = 9.81
@@ -140,12 +140,10 @@ class LoadedBalance(Constraint):
     def resolve(self, scene: Surroundings, start: Array) -> LoadedBalance:
         """Compute the support polygon at the start."""
         points = standing_points(scene, start, self.feet)
-        corners = convex_polygon(points[:, :2])
-        keeps = STEADY * least_width(corners) if self.margin is None else self.margin
-        polygon = Balance(self.feet, margin=keeps).on_polygon(corners, scene)
+        polygon = Balance(self.feet, margin=self.margin or 0.0).on_points(points, scene, self.margin is None)
         loads, height = resolved(self.forces, scene, "LoadedBalance: forces"), float(points[:, 2].min())
         pressure(State(scene.model).update(start), loads, polygon.joints, height)  # forces that lift are refused here
-        return filled(self, loads=loads, polygon=polygon, keeps=keeps, height=height)
+        return filled(self, loads=loads, polygon=polygon, keeps=polygon.margin, height=height)
 
     @property
     def lower(self) -> Array:

@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Hashable, Sequence
-from typing import Annotated, Any, NamedTuple, TypeAlias, TypeVar
+from typing import Annotated, Any, TypeAlias, TypeVar
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.checks import array, numbers, shown
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.fields import Range
+from wholebody.figures.description import Place as Place
 from wholebody.figures.state import State
 from wholebody.geometry.placement import PlacementLike, placement, unit_vector
 from wholebody.tasks.base import Surroundings
@@ -27,14 +29,7 @@ WEIGHT = Range(1e-12, 1e12, wanted="a positive number such as 1, or leave it out
 """Weights of terms: beyond this range the squares of weights make other terms vanish in rounding."""
 
 
-class Place(NamedTuple):
-    """Index of a frame of the model, and of the joint that carries it."""
-
-    frame: int
-    joint: int
-
-
-WORLD = Place(0, 0)  # The world: Pinocchio's frame and joint 0
+WORLD = Place(0, 0, pin.SE3.Identity())  # The world: Pinocchio's frame and joint 0
 
 
 def once(scene: Surroundings, key: Hashable, make: Callable[[], T]) -> T:
@@ -48,10 +43,9 @@ def find_place(scene: Surroundings, name: str, where: str) -> Place:
     if not isinstance(name, str):
         raise InputError(f"{where} takes the name of a frame, not {shown(name)}")
     try:
-        frame = int(scene.figure.frame_id(name))
+        return scene.figure.place_of(name)
     except UnknownNameError as error:
         raise UnknownNameError(error.kind, error.name, error.known, where) from None
-    return Place(frame, int(scene.model.frames[frame].parentJoint))
 
 
 def find_base(scene: Surroundings, name: str | None, moved: str, where: str) -> Place:

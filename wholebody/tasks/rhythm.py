@@ -124,14 +124,11 @@ class Rhythm(SumOfSquares):
 
     def resolve(self, scene: Surroundings, start: Array) -> Rhythm:
         """Find the joints, and what the lumbar spine has at the start."""
-        girdles, knees, spines = inputs.once(scene, Rhythm, partial(_parts, scene.figure))
+        girdles, knees, spines = inputs.once(scene, (Rhythm, self.style), partial(_parts, scene.figure, self.style))
         if not girdles and not spines:
             raise InputError("Rhythm: this figure has no clavicles and no lumbar spine; leave the measure out")
-        own = STYLES[self.style]
-        knees = tuple(with_values(knee, most=own.knee, weight=own.knee_weight) for knee in knees)
         knees = tuple(with_values(knee, rest=_beyond(start, knee)[0]) for knee in knees)
-        lumbar = tuple(with_values(spine, most=own.lumbar, weight=own.lumbar_weight) for spine in spines)
-        lumbar = tuple(with_values(spine, rest=_bent(start, spine)[0]) for spine in lumbar)
+        lumbar = tuple(with_values(spine, rest=_bent(start, spine)[0]) for spine in spines)
         return filled(self, girdles=girdles, knees=knees, lumbar=lumbar)
 
     def of_arms(self, idx_v: Set[int]) -> Rhythm:
@@ -163,12 +160,14 @@ def girdles_of(figure: Figure) -> tuple[Elevation, ...]:
     return _elevations(figure, parts, CLAVICLE_WEIGHT, math.radians(13.0), 0.0, figure.bodies)
 
 
-def _parts(figure: Figure) -> tuple[tuple[Elevation, ...], tuple[Elevation, ...], tuple[Lumbar, ...]]:
-    """Clavicles, knees and lumbar spines, at rest at zero."""
+def _parts(figure: Figure, style: str) -> tuple[tuple[Elevation, ...], tuple[Elevation, ...], tuple[Lumbar, ...]]:
+    """Clavicles, knees and lumbar spines in a style, at rest at zero."""
     spines = {body: spine for body in figure.bodies for spine in _lumbar(figure, body)}
     names = ("knee_flexion", "hip_flexion", "hip_abduction")
-    knees = _elevations(figure, names, KNEE_WEIGHT, KNEE_SHARE, KNEE_ONSET, spines)
-    return girdles_of(figure), knees, tuple(spines.values())
+    own = STYLES[style]
+    knees = _elevations(figure, names, own.knee_weight, own.knee, KNEE_ONSET, spines)
+    lumbar = (with_values(spine, most=own.lumbar, weight=own.lumbar_weight) for spine in spines.values())
+    return girdles_of(figure), knees, tuple(lumbar)
 
 
 def _elevations(

@@ -74,10 +74,10 @@ class Sit(ContactTerm):
             raise InputError(f"{where}: {shown(self.pelvis)} has no pieces to sit on; name a segment with geometry")
         thing = surface(scene, self.on, where)
         edge = np.maximum(seat.half - np.minimum(MARGIN, 0.5 * seat.half), 0.0)
-        # m: how much higher than on the deepest point of the pelvis and thighs the pelvis may sit
-        deep = _depth(scene, self.pelvis, place) + 0.01
-        over = Over(place, seat, np.append(-edge, -np.inf), np.append(edge, deep))
         rest = upright(scene)
+        # m: how much higher than on the deepest point of the pelvis and thighs the pelvis may sit
+        deep = _depth(scene, self.pelvis, place, rest) + 0.01
+        over = Over(place, seat, np.append(-edge, -np.inf), np.append(edge, deep))
         root = inputs.root_of(scene, place)  # in the first posture it looks ahead, wherever that is
         left = rest.frame(place.frame).rotation.T @ rest.data.oMi[root].rotation[:, 1]
         parts: list[Part] = [Gap(bottom, thing, seat), over]
@@ -165,9 +165,8 @@ def _thighs(scene: Surroundings, pelvis: inputs.Place, trunk: inputs.Place) -> l
     return found
 
 
-def _depth(scene: Surroundings, name: str, place: inputs.Place) -> float:
-    """How far the pelvis reaches below its origin when it is upright, metres."""
-    state = upright(scene)
+def _depth(scene: Surroundings, name: str, place: inputs.Place, state: State) -> float:
+    """How far the pelvis reaches below its origin in the upright state, metres."""
     shape = joined(scene, name, [name])
     lows = [outermost(piece, shape.placed(k, state), -UP)[:, 2].min() for k, piece in enumerate(shape.shapes)]
     return float(state.frame(place.frame).translation[2] - min(lows))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from wholebody import tasks
 from wholebody.base.arrays import Array
 from wholebody.tasks.base import Constraint, Goal
-from wholebody.tasks.inputs import WORLD, Place
+from wholebody.tasks.inputs import WORLD
 from wholebody.tasks.range_of_motion import Coordinate, CoupledRow, EllipticRow
 from wholebody.tasks.residuals import PlacementResidual
 
@@ -78,42 +78,31 @@ def placement_floats(place: Any) -> Array:
     return floats.ravel()
 
 
-def _in_joint(place: Place, model: pin.Model) -> pin.SE3:
-    return model.frames[place.frame].placement
-
-
-def _residual(residual: PlacementResidual, model: pin.Model) -> list[Entry]:
-    based = residual.base.frame != WORLD.frame
-    floats = np.zeros(36)
-    floats[:12] = placement_floats(_in_joint(residual.place, model))
+def _residual(residual: PlacementResidual) -> list[Entry]:
+    place, base, target, undo, position, orientation = residual
+    based, floats = base.frame != WORLD.frame, np.zeros(36)
+    floats[:12] = placement_floats(place.placement)
     if based:
-        floats[12:24] = placement_floats(_in_joint(residual.base, model))
-    floats[24:27] = residual.target
-    floats[27:].reshape(3, 3)[:] = residual.undo.rotation.T
-    integers = (
-        residual.place.joint,
-        residual.base.joint,
-        int(residual.position),
-        int(residual.orientation),
-        int(based),
-    )
-    return [Entry(RESIDUAL, integers, floats, 3 * (integers[2] + integers[3]))]
+        floats[12:24] = placement_floats(base.placement)
+    floats[24:27], floats[27:] = target, undo.rotation.T.ravel()
+    integers = place.joint, base.joint, int(position), int(orientation), int(based)
+    return [Entry(RESIDUAL, integers, floats, 3 * (position + orientation))]
 
 
 def _point(term: tasks.Point, model: pin.Model) -> list[Entry]:
-    frame, floats = _in_joint(term.place, model), np.zeros(36)
+    frame, floats = term.place.placement, np.zeros(36)
     floats[:9], floats[9:12] = frame.rotation.T.ravel(), frame.act(term.resolved_offset)
     floats[24:27] = term.resolved_target
     return [Entry(RESIDUAL, (term.place.joint, 0, 1, 0, 0), floats, 3)]
 
 
 def _plane(term: tasks.Plane, model: pin.Model) -> list[Entry]:
-    origin = _in_joint(term.place, model).translation
+    origin = term.place.placement.translation
     return [Entry(PLANE, (term.place.joint,), np.array([*origin, *term.resolved_normal, term.height]), 1)]
 
 
 def _axis(term: tasks.Axis, model: pin.Model) -> list[Entry]:
-    floats = np.concatenate([placement_floats(_in_joint(term.place, model)), term.basis.ravel(), term.resolved_target])
+    floats = np.concatenate([placement_floats(term.place.placement), term.basis.ravel(), term.resolved_target])
     return [Entry(AXIS, (term.place.joint, int(term.toward is not None)), floats, 2)]
 
 
@@ -160,8 +149,8 @@ def _posture(term: tasks.Posture, model: pin.Model) -> list[Entry] | None:
 def _cones(term: tasks.ReachCones, model: pin.Model) -> list[Entry]:
     entries = []
     for limb in term.limbs:
-        axis = _in_joint(limb.limb, model).rotation @ limb.axis
-        reference = _in_joint(limb.reference, model).rotation
+        axis = limb.limb.placement.rotation @ limb.axis
+        reference = limb.reference.placement.rotation
         edges = np.hstack(limb.cone.planes.reshape(5, -1, 3))
         floats = np.concatenate([axis, reference.T.ravel()])
         entries.append(Entry(CONE, (limb.limb.joint, limb.reference.joint), floats, 1, edges))
@@ -185,8 +174,8 @@ def _ranges(term: tasks.RangeOfMotion, model: pin.Model) -> list[Entry] | None:
             limits[1:, len(row.axes) :] = np.array([[-1.0], [1.0]])
             entries.append(Entry(ELLIPSE, places, np.array([*limits.ravel(), row.size]), 1))
         else:
-            limb = _in_joint(row.limb, model).rotation
-            center = _in_joint(row.reference, model).rotation @ row.part.center
+            limb = row.limb.placement.rotation
+            center = row.reference.placement.rotation @ row.part.center
             slope = row.part.slope @ row.part.center
             floats = np.concatenate([limb.T.ravel(), center.T.ravel(), slope, [row.part.bound, row.part.sign]])
             entries.append(Entry(TWIST, (row.limb.joint, row.reference.joint), floats, 1))
@@ -200,10 +189,10 @@ def _places(coordinates: Sequence[Coordinate], count: int) -> tuple[int, ...]:
 
 _WRITERS: dict[type, Callable[[Any, pin.Model], list[Entry] | None]] = {
     tasks.Point: _point,
-    tasks.Frame: lambda term, model: _residual(term.residual, model),
-    tasks.Orientation: lambda term, model: _residual(term.residual, model),
-    tasks.Relative: lambda term, model: _residual(term.residual, model),
-    tasks.Hold: lambda term, model: _residual(term.residual, model),
+    tasks.Frame: lambda term, _: _residual(term.residual),
+    tasks.Orientation: lambda term, _: _residual(term.residual),
+    tasks.Relative: lambda term, _: _residual(term.residual),
+    tasks.Hold: lambda term, _: _residual(term.residual),
     tasks.Plane: _plane,
     tasks.Axis: _axis,
     tasks.CenterOfMass: _mass_center,

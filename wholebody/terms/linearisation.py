@@ -153,7 +153,8 @@ class Lineariser:
         if goals is not self.goals or others is not None:
             self.constraints = self.constraints if others is None else others
             before, self._plan = self._plan, self._again(self._plan, goals, others)
-            self._own = self._own_terms()
+            if before.others or self._plan.others:
+                self._own = self._own_terms()
             if (before.goal_rows, before.value_rows) != (self._plan.goal_rows, self._plan.value_rows):
                 self._grow(self._near.size)
         self.goals, self.clearances = goals, clearances

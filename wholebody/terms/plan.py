@@ -73,7 +73,7 @@ class TermPlan(NamedTuple):
         if len(goals) != len(self.goals) or len(terms) != len(old):
             return None
         floats = self.floats.copy()
-        filled = dict.fromkeys(kinds.WIDTHS, 0)
+        places = dict[int, int]()  # in each table, of the next row
         found: list[list[Entry] | None] = []
         others = list(self.others)
         number = 0
@@ -87,18 +87,19 @@ class TermPlan(NamedTuple):
                 others[number] = with_values(others[number], term=term, value=value)
                 number += 1
                 continue
-            if [entry[:2] for entry in entries] != [entry[:2] for entry in known]:
+            if len(entries) != len(known):
                 return None
             for entry, before in zip(entries, known, strict=True):
-                if entry.edges is not before.edges and not np.array_equal(entry.edges, before.edges):
+                edges = before.edges
+                if entry[:2] != before[:2] or (entry.edges is not edges and not np.array_equal(entry.edges, edges)):
                     return None
-                start, _, columns = self.layout[entry.table, :3].tolist()
-                place = start + columns * filled[entry.table]
+                columns = len(entry.floats)
+                place = places.get(entry.table, int(self.layout[entry.table, 0]))
                 floats[place : place + columns] = entry.floats
-                filled[entry.table] += 1
+                places[entry.table] = place + columns
         kept = self.constraints if constraints is None else tuple(found[len(goals) :])
         goal_entries = tuple(found[: len(goals)])
-        return with_values(self, floats=floats, goals=goal_entries, constraints=kept, others=tuple(others))
+        return self._replace(floats=floats, goals=goal_entries, constraints=kept, others=tuple(others))
 
 
 def make_plan(limits: Limits, terms: Terms, dt: float | None, state: State) -> TermPlan:

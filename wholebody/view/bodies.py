@@ -280,11 +280,18 @@ class Bodies:
         chosen = [index for index in solid if (self.all[index].thing is not None) == things]
         return self._boxes(chosen, data).reshape(-1, 3)
 
-    def beyond(self, data: Any, index: int, start: Array, direction: Array) -> float:
-        """How far the box around a piece extends from a point (3,) along a unit vector (3,), metres; 0 of a plate."""
-        if self.all[index].plate:
-            return 0.0
-        return max(0.0, float(((self._boxes([index], data)[0] - start) @ direction).max()))
+    def beyond(self, data: Any, pieces: Sequence[int], start: Array, way: Array) -> float:
+        """How far a ray from a point (3,) along a unit vector (3,) is inside of the boxes around pieces, metres."""
+        farthest = 0.0
+        for index in pieces:
+            body = self.all[index]
+            place = data.oMi[body.joint] * self.scene.geometry.geometryObjects[index].placement
+            along = place.rotation.T @ way
+            along[np.abs(along) < 1e-9] = 1e-9
+            ends = np.where(along > 0.0, body.corners.max(axis=0), body.corners.min(axis=0)) - place.actInv(start)
+            if not body.plate:
+                farthest = max(farthest, float((ends / along).min()))
+        return farthest
 
     def tops(self, data: Any) -> dict[str, tuple[str, Array]]:
         """Labels of things: by node, the name and the top middle (3,) of its boxes; no half-spaces."""

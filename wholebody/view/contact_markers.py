@@ -72,35 +72,37 @@ def checked_overlaps(given: object, what: str) -> list[Overlap]:
 def mark_overlaps(keyframe: Keyframe, bodies: Bodies, data: Any, overlaps: Sequence[Overlap]) -> None:
     """Draw PD_g of every two objects, and its length in words.
 
-    An arrow for each that gives way begins where its piece ends; dashes lead there from where the two overlap
+    An arrow for each that gives way begins where both pieces end; dashes lead there from where the two overlap
     most. Where both give way, each arrow has half of PD_g, but at least `LOOK.shortest_depth`. A ball is drawn where
-    PD_g is much shorter than the deepest overlap, since the normals of several pairs cancel. `data` is Pinocchio's, at
-    the posture.
+    PD_g is much shorter than the deepest overlap, since the normals of several pairs cancel. The words stand at the
+    end of an upward arrow, where they hide none. `data` is Pinocchio's, at the posture.
     """
     for number, one in enumerate(overlaps):
         root, depth = f"{LOOK.contact_node}/overlap {number}", float(np.linalg.norm(one.depth))
         moves = (one.moves_first, one.moves_second)
-        cancelled = depth < _CANCELLED * one.deepest and one.pairs > 1
-        for name, move, piece in zip(("first", "second"), moves, one.pieces, strict=True):
+        cancelled, end = depth < _CANCELLED * one.deepest and one.pairs > 1, one.point
+        for name, move in zip(("first", "second"), moves, strict=True):
             length = float(np.linalg.norm(move))
             if length < 1e-9 or cancelled:  # m: shorter moves are none
                 continue
             way = move / length
-            start = one.point + bodies.beyond(data, piece, one.point, way) * way
+            start = one.point + bodies.beyond(data, one.pieces, one.point, way) * way
             place = drawing.arrow_placement(start, way, max(length, LOOK.shortest_depth))
             keyframe.markers[f"{root}/{name}"] = (_GLOBAL, place)
+            end = max(end, start + place[:3, 2], key=lambda at: float(at[2]))  # words stand above of where they belong
             line = drawing.rod_placement(one.point, start, LOOK.line_radius)
             if line is not None:
                 keyframe.markers[f"{root}/{name} inside"] = (Marker("dashes", LOOK.global_depth), line)
         free = [name for name, move in zip((one.first, one.second), moves, strict=True) if np.any(move)]
         taken = "half each" if len(free) > 1 else "".join(f"by {name}" for name in free)
-        text = f"PD_g of {one.first} and {one.second}: {1e3 * depth:.1f} mm {taken}".rstrip()
+        both = f"PD_g of {one.first} and {one.second}"
+        text = f"{both}: {1e3 * depth:.1f} mm {taken}".rstrip()
         if cancelled:
             ball = Marker("ball", LOOK.global_depth, LOOK.blocker_radius)
             keyframe.markers[f"{root}/cancelled"] = (ball, drawing.point_placement(one.point))
-            text += f", cancels; {1e3 * one.deepest:.1f} mm deep"
+            text = f"{both} cancels; {1e3 * one.deepest:.1f} mm deep"
         label = Marker("label", LOOK.global_depth_label, LOOK.label_size, text)
-        keyframe.markers[f"{root}/text"] = (label, drawing.point_placement(one.point))
+        keyframe.markers[f"{root}/text"] = (label, drawing.point_placement(end))
 
 
 def mark_blockers(keyframe: Keyframe, scene: ViewedScene, state: State, contacts: Any, blockers: Sequence[Any]) -> None:

@@ -83,12 +83,12 @@ def test_a_figure_that_cannot_reach_is_refused(tmp_path: Path) -> None:
 def test_the_command_writes_the_same_tables(
     tmp_path: Path, root: Path, arm: list[Track], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(reaches, "figure_tracks", lambda *_: [replace(one, targets=one.targets[:8]) for one in arm])
+    monkeypatch.setattr(reaches, "figure_tracks", lambda *_: [replace(arm[1], targets=arm[1].targets[:8])])
     out, file = str(tmp_path / "out"), str(root / "tests/data/arm/arm.urdf")
     words = ("--figure", file, "--repeats", "1", "--steps", "8", "--tools", "wholebody", "--out", out)
     assert main(["bench", "step", *words, "--update-docs", str(tmp_path)]) == 0
     rows = csv_rows(tmp_path / "out" / "step-figures-time.csv")
-    assert list(dict.fromkeys(row["case"] for row in rows)) == ["arm, free", "arm, contact", "arm, alone"]
+    assert {row["case"] for row in rows} == {"arm, contact"}
     page = (tmp_path / "assets/bench/step-figures.txt").read_text()
     assert "| arm, contact | wholebody |" in page
     assert "standing human" not in page

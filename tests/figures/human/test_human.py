@@ -82,9 +82,8 @@ def test_wrist_hangs_where_it_was_measured(case, measured):
 
 
 @pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("detail", DETAILS)
-def test_stands_on_the_ground_at_its_stature(case, detail):
-    figure = person(case, detail)
+def test_stands_on_the_ground_at_its_stature(case):
+    figure = person(case)
     q = figure.posture("standing")
     at = frames(figure, q)
     for name in ("left_heel", "right_heel", "left_ball", "right_ball", "left_toe_tip", "right_toe_tip"):
@@ -94,8 +93,9 @@ def test_stands_on_the_ground_at_its_stature(case, detail):
     assert at["gaze"].rotation[:, 0] == pytest.approx([1.0, 0.0, 0.0], abs=1e-9)
 
 
-@pytest.mark.parametrize("detail", DETAILS)
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    ("case", "detail"), [(c, d) for c in CASES for d in DETAILS if d == "capsules" or c in ("F5", "M50", "M95")]
+)
 def test_every_posture_is_free_and_within_limits(case, detail):
     figure = person(case, detail)
     data, geometry = figure.model.createData(), figure.geometry

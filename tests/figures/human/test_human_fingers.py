@@ -87,20 +87,6 @@ def test_the_thumb_moves_out_of_the_palm_and_fingers_towards_it(figure):
             assert ends[1] > ends[0] + 0.002
 
 
-@pytest.mark.parametrize(("radius", "kind", "fingers"), [(0.02, "pinch", TIPS[:2]), (0.01, "fingertips", TIPS)])
-def test_a_ball_is_taken_by_two_or_by_all_fingertips(figure, radius, kind, fingers):
-    scene = wb.Scene(figure).add(wb.Sphere(radius), name="ball", at=(0.40, -0.2, 1.1))
-    start = figure.with_joints(figure.posture("standing"), {"right_elbow_flexion": np.radians(80.0)})
-    problem = wb.Problem(scene, start=start, goals=[wb.Grasp("right", "ball", kind)], constraints=FEET)
-    solution = wb.solve(problem, method="qp")
-    assert solution.status == "solved"
-    found = gaps(scene.model, scene.geometry, solution.q)
-    assert min(found)[0] > -1e-5
-    at_ball = {a if b.startswith("ball") else b: gap for gap, a, b in found if "ball" in a + b}
-    for finger in fingers:
-        assert abs(at_ball[f"right_{finger}_distal"]) < 2e-5
-
-
 def test_a_pencil_is_taken_by_a_pinch(figure):
     scene = wb.Scene(figure).add(wb.Capsule(0.004, 0.15), name="pencil", at=(0.45, -0.25, 1.2))
     assert wb.solve(wb.Problem(scene, goals=[wb.Grasp("right", "pencil", "pinch")], constraints=FEET)).solved

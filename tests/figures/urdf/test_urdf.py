@@ -334,7 +334,7 @@ def test_more_joints_than_memory_suffices_for_are_refused_at_once(tmp_path):
 
 
 @given(st.data())
-@settings(max_examples=20)
+@settings(max_examples=10)
 def test_a_damaged_file_is_read_or_refused_by_one_sentence(data):
     text = TEXT
     for _ in range(data.draw(st.integers(1, 3))):

@@ -15,11 +15,6 @@ import wholebody as wb
 
 
 @pytest.fixture(scope="session")
-def human() -> wb.Figure:
-    return wb.load("human")
-
-
-@pytest.fixture(scope="session")
 def avatar() -> wb.Figure:
     return wb.load("avatar")
 

@@ -14,11 +14,6 @@ from wholebody.methods.newton.measures import FigureObjective
 from wholebody.methods.newton.terms import constraint_equations, goal_equations
 
 
-@pytest.fixture(scope="module")
-def human() -> wb.Figure:
-    return wb.load("human")
-
-
 def _postures(figure: wb.Figure, count: int = 5) -> list[np.ndarray]:
     rng = np.random.default_rng(5)
     lower, upper = figure.tangent_bounds(figure.neutral)

@@ -17,11 +17,6 @@ from wholebody.methods.placo.robot import Robot
 pytest.importorskip("placo", reason="placo is not installed (the extra placo)")
 
 
-@pytest.fixture(scope="module")
-def human() -> wb.Figure:
-    return wb.load("human")
-
-
 def feet() -> list[wb.Hold]:
     return [wb.Hold("left_foot"), wb.Hold("right_foot")]
 

@@ -207,7 +207,7 @@ def test_the_effort_is_as_little_as_scipy_finds_from_many_starts(arm, turned):
         problem = wb.Problem(wb.Scene(arm), START, goals=[random_goal(arm, "tip", rng, turned)])
         weights, errors = problem.measures[0].distance.weights, problem.goals[0].error
         least = np.inf
-        for start in [START, *rng.uniform(lower, upper, (12, len(lower)))]:
+        for start in [START, *rng.uniform(lower, upper, (8, len(lower)))]:
             answer = minimize(
                 lambda q, w: float(w @ (q - START) ** 2), start, (weights,), jac=lambda q, w: 2.0 * w * (q - START),
                 bounds=list(zip(lower, upper, strict=True)), method="SLSQP", options={"ftol": 1e-12},

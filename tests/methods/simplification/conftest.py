@@ -12,11 +12,6 @@ import wholebody as wb
 from wholebody.figures.figure import Figure
 
 
-@pytest.fixture(scope="session")
-def human() -> Figure:
-    return wb.load("human")
-
-
 def _cluttered(figure: Figure, seed: int, count: int, within: float) -> wb.Scene:
     """A figure among small boxes and balls, none of which it touches where it stands."""
     rng = np.random.default_rng(seed)

@@ -170,6 +170,28 @@ def test_the_whole_problem_is_left_as_it_was(human: Figure) -> None:
     assert before == after
 
 
+def test_what_a_figure_was_asked_before_changes_nothing() -> None:
+    """It carries a pole, begins outside of its limits or has a frozen arm, and is asked again without."""
+
+    def pairs(figure: Figure, case: str) -> tuple[str, ...]:
+        scene = wb.Scene(figure)
+        for k, at in enumerate(((0.6, 0.2, 0.9), (-0.9, 0.1, 1.3), (0.2, 1.4, 1.0), (1.9, 0.0, 1.0), (2.6, -1.0, 1.0))):
+            scene.add(wb.Box((0.2, 0.2, 0.2)), name=f"box {k}", at=at)
+        if case == "carries":
+            scene.attach(wb.Capsule(0.02, 1.0), name="pole", to="right_hand", at=(0.0, 0.0, -0.6))
+        start = figure.posture("standing")
+        if case == "outside":
+            start = figure.with_joints(start, {"right_elbow_flexion": -1.2})
+        terms = [wb.Hold("left_foot"), *([wb.Freeze("right_arm")] if case == "frozen" else [])]
+        return tuple(str(wb.simplify(wb.Problem(scene, start, constraints=terms)).left_out).splitlines())
+
+    cases = ("plain", "carries", "outside", "frozen", "plain")
+    one = wb.load("human")
+    found = [pairs(one, case) for case in cases]
+    assert found == [pairs(wb.load("human"), case) for case in cases]
+    assert len(set(found)) > 2
+
+
 def test_mistakes_are_refused(human: Figure) -> None:
     problem = standing(human)
     with pytest.raises(InputError, match="problem is a Scene"):

@@ -27,11 +27,6 @@ CLOSE = {".npz": 1e-14, ".csv": 1e-14, ".txt": 1e-6, ".bvh": 1e-4}
 """Radians and metres by which a file may change a value; near a gimbal lock three angles lose digits of a rotation."""
 
 
-@pytest.fixture(scope="module")
-def human() -> Figure:
-    return wb.load("human")
-
-
 def swinging(figure: Figure, frames: int, seed: int, dt: float = 0.04) -> wb.Clip:
     """A clip that moves between random postures within the limits, its root turning all the way round."""
     random = np.random.default_rng(seed)

@@ -21,11 +21,6 @@ STEP = 1e-6
 SMALL = 2e-4  # rad, m: the ground can give what such a motion of a person who stands needs
 
 
-@pytest.fixture(scope="module")
-def human() -> Figure:
-    return wb.load("human")
-
-
 def wandering(figure: Figure, frames: int, size: float = 0.15, seed: int = 0) -> np.ndarray:
     random = np.random.default_rng(seed)
     q = [np.array(figure.posture(figure.postures[0]))]

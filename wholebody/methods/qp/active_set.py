@@ -25,14 +25,6 @@ NOT_EXACT = "not exact"
 """What it says of programs that nothing closed: the answer is the best that was found."""
 
 
-def guess_active_set(program: QuadraticProgram, x: Array, tolerance: float) -> ActiveSet:
-    """Active set read off an approximate minimiser x, shape (n,): what is within `tolerance` of its bound."""
-    gradient = program.gradient(x)
-    lower = (x <= program.lower + tolerance) & (gradient >= 0.0)
-    upper = (x >= program.upper - tolerance) & (gradient <= 0.0) & ~lower
-    return ActiveSet(lower, upper, program.elastic @ x <= program.least + tolerance)
-
-
 def violated_set(program: QuadraticProgram) -> ActiveSet:
     """Active set to begin from where nothing is known: no bounds, and the elastic rows that x = 0 does not meet."""
     free = np.zeros(program.size, dtype=bool)

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, with_values
+from wholebody.base.arrays import with_values
 from wholebody.figures.state import State
 from wholebody.methods.qp.closest import ENDLESS
 from wholebody.methods.qp.iterates import LocalSolution, Run
@@ -124,6 +124,7 @@ def _places(problem: Problem, term: Any, state: State) -> list[Goal]:
     for joint in (near.joint,) if turned else (near.joint, near.against):
         if joint:
             number = next(k for k, frame in enumerate(frames) if frame.parentJoint == joint)  # a body may have its name
-            offset: Array = state.frame(number).actInv(near.point)
-            found.append(filled(Point(frames[number].name, near.point, offset=offset), place=Place(number, joint)))
+            offset, frame = state.frame(number).actInv(near.point), frames[number]
+            place = Place(number, joint, frame.placement.copy())
+            found.append(filled(Point(frame.name, near.point, offset=offset), place=place))
     return found

@@ -10,6 +10,7 @@ reference. Balls grow from joint to joint and cover every posture: the bound is 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +20,9 @@ from wholebody.base.arrays import Array, Indices, Mask, with_values
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.pieces import COAL_ACCURACY
+from wholebody.geometry.proximity import PairTable
 from wholebody.problem import Problem
+from wholebody.scene.workspace import Workspace, borrowed
 from wholebody.tasks.base import Constraint
 from wholebody.tasks.frame import Hold
 
@@ -47,7 +50,7 @@ class Reach:
     def __init__(self, model: pin.Model, start: Array, resting: Balls, joint: Indices, frozen: Iterable[int]) -> None:
         """Read the joints; `start` (nq,) counts as possible, `resting` are balls around pieces in their joints (n,)."""
         self._model, self._start, self._frozen = model, start, set(frozen)
-        self.placed = data = model.createData()
+        data = model.createData()
         pin.forwardKinematics(model, data, start)
         self._still: dict[int, pin.SE3] = {}
         self._ranges: dict[int, Range | None] = {}
@@ -147,29 +150,31 @@ def reachable_pairs(problem: Problem, still: Iterable[int], numbers: Indices) ->
 
     Of two pieces that both move nothing is said.
     """
-    scene = problem.scene
-    pieces, table, clearances = scene.geometry.geometryObjects, scene.pair_table, problem.clearances[numbers]
-    joint, pairs = table.joint, table.pairs[numbers]
-    center = np.array([piece.placement.translation for piece in pieces]).reshape(-1, 3)
-    reach = Reach(scene.model, problem.start, Balls(center, table.reach, np.arange(len(pieces))), joint, still)
-    views, model = [(reach.seen_from(0), 0.0)], scene.model
+    scene, model = problem.scene, problem.scene.model
+    table, clearances, own = scene.pair_table, problem.clearances[numbers], scene.figure.geometry.ngeoms
+    joint, pairs, start, kept = table.joint, table.pairs[numbers], problem.start, set(still)
+    within = (start >= model.lowerPositionLimit).all() and (start <= model.upperPositionLimit).all()
+    if within and not kept and not joint[own:].any():
+        reach = _of_figure(scene.figure)
+    else:
+        reach = Reach(model, start, _resting(scene.geometry, table.reach), joint, kept)
     # m: largest displacement of a piece by errors of holds; an accepted answer has less
-    views += [(balls, 1e-3) for balls in held_balls(scene.figure, reach, problem.constraints)]
-    rests, kept = np.zeros(model.njoints, dtype=bool), set(still)
+    views = [(reach.seen_from(0), 0.0), *((b, 1e-3) for b in held_balls(scene.figure, reach, problem.constraints))]
+    rests = np.zeros(model.njoints, dtype=bool)
     for j in range(model.njoints):
         dofs = range(model.idx_vs[j], model.idx_vs[j] + model.nvs[j]) if j else ()
         rests[j] = (not j or rests[model.parents[j]]) and kept.issuperset(dofs)
-    at = [reach.placed.oMi[piece.parentJoint] * piece.placement for piece in pieces]  # of those that rest, in the world
+    with borrowed(scene.built, Workspace.refresh) as workspace:
+        at = workspace.proximity.placements(workspace.state.update(start).data)
     open_, fixed = np.ones(len(pairs), dtype=bool), rests[joint[pairs]]
     row = np.flatnonzero(fixed[:, 0] != fixed[:, 1])
     side = fixed[row, 1].astype(np.intp)  # of the piece that is fixed
     own, other = pairs[row, side], pairs[row, 1 - side]
-    turn = np.array([place.rotation for place in at]).reshape(-1, 3, 3)[own]
-    origin = np.array([place.translation for place in at]).reshape(-1, 3)[own]
+    turn, origin = at[own, :3], at[own, 3]  # columns of rotations, translations
     for balls, slack in views:
-        place, radius = np.zeros((len(pieces), 3)), np.full(len(pieces), np.inf)
+        place, radius = np.zeros((len(joint), 3)), np.full(len(joint), np.inf)
         place[balls.piece], radius[balls.piece] = balls.center, balls.radius
-        away = np.einsum("kji,kj->ki", turn, place[other] - origin)  # in the axes of the piece
+        away = np.einsum("kij,kj->ki", turn, place[other] - origin)  # in the axes of the piece
         room = radius[other] + clearances[row] + slack + COAL_ACCURACY
         apart = np.sqrt((away * away).sum(axis=1)) - table.reach[own] > room
         apart |= np.sqrt((np.maximum(np.abs(away) - table.half[own], 0.0) ** 2).sum(axis=1)) > room
@@ -178,6 +183,18 @@ def reachable_pairs(problem: Problem, still: Iterable[int], numbers: Indices) ->
             apart[mine] |= away[mine] @ plane[:3] - plane[3] > room[mine]
         open_[row] &= ~apart
     return open_
+
+
+@lru_cache(maxsize=8)
+def _of_figure(figure: Figure) -> Reach:
+    """The bounds of a figure of which nothing is frozen or carries things, which are known once they were asked for."""
+    table = PairTable(figure.model, figure.geometry)
+    return Reach(figure.model, figure.neutral, _resting(figure.geometry, table.reach), table.joint, ())
+
+
+def _resting(geometry: pin.GeometryModel, radius: Array) -> Balls:
+    center = np.array([piece.placement.translation for piece in geometry.geometryObjects]).reshape(-1, 3)
+    return Balls(center, radius, np.arange(len(center)))
 
 
 def held_balls(figure: Figure, reach: Reach, constraints: Iterable[Constraint]) -> list[Balls]:

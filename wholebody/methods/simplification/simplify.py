@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -148,7 +149,7 @@ def simplify(problem: Problem) -> Simplified:
 
     Things without a remaining pair are left out too, but for those of contact terms. The statement holds for the
     present placements of things. Frozen joints stay where a term cannot be stated on the smaller figure. A solve takes
-    a twelfth less time in the median, so it repays after some 20 solves of a person, 60 of an arm.
+    a twelfth less time in the median, so it repays after some 10 solves.
 
     Raises:
         InputError: it is no problem, or objects came to or left its scene after it was stated.
@@ -230,6 +231,7 @@ class _Comparison:
     def __init__(self, problem: Problem, part: _Part, small: pin.Model) -> None:
         self._part, self._whole, self._small = part, State(problem.scene.model), State(small)
         self._postures = [part.start[part.idx_q], *random_postures(small, 1, seed=1)]
+        self._found: dict[int, list[Array]] = {}
 
     def matters(self, term: Constraint) -> bool:
         """Whether a constraint of the whole figure has a row that does not hold, or that a joint moves."""
@@ -250,26 +252,29 @@ class _Comparison:
 
     def _values(self, term: Any, state: State) -> list[Array]:
         """Values of a term at the postures: all that a method reads, except the constant part of a measure."""
+        if id(term) in self._found:
+            return self._found[id(term)]
+        values: list[Array] = []
         columns = self._part.idx_v if state is self._whole else np.arange(state.model.nv)
-        ask: list[Callable[[], Any]]
-        if isinstance(term, Goal):
-            ask = [lambda: term.error(state), lambda: state.dense_jacobian(term.jacobian(state))[:, columns]]
-        elif isinstance(term, Measure):
-            ask = [lambda: term.gradient(state)[columns], lambda: term.curvature(state)[columns]]
-        elif isinstance(term, Bound):
-            ask = [lambda: np.array(term.bounds(state, None))[:, columns]]
-        else:
-            ask = [
-                lambda: np.atleast_1d(term.value(state)),
-                lambda: state.dense_jacobian(term.jacobian(state))[:, columns],
-                lambda: np.broadcast_to(term.lower, np.atleast_1d(term.value(state)).shape),
-                lambda: np.broadcast_to(term.upper, np.atleast_1d(term.value(state)).shape),
-            ]
-        values = []
         for q in self._postures:
             state.update(self._part.embed(q) if state is self._whole else q)
-            values += [np.nan_to_num(np.array(one(), dtype=float), posinf=1e300, neginf=-1e300) for one in ask]
+            read = map(partial(np.array, dtype=float), _read(term, state, columns))
+            values += [np.nan_to_num(one, posinf=1e300, neginf=-1e300) for one in read]
+        if state is self._whole:  # whose terms outlive this; constraints are asked for twice
+            self._found[id(term)] = values
         return values
+
+
+def _read(term: Any, state: State, columns: Indices) -> list[Any]:
+    """What a method reads of a term at a state, of these columns."""
+    if isinstance(term, Goal):
+        return [term.error(state), state.dense_jacobian(term.jacobian(state))[:, columns]]
+    if isinstance(term, Measure):
+        return [term.gradient(state)[columns], term.curvature(state)[columns]]
+    if isinstance(term, Bound):
+        return [np.array(term.bounds(state, None))[:, columns]]
+    value, jacobian = np.atleast_1d(term.value(state)), state.dense_jacobian(term.jacobian(state))[:, columns]
+    return [value, jacobian, *(np.broadcast_to(end, value.shape) for end in (term.lower, term.upper))]
 
 
 def _moving_rows(values: list[Array]) -> list[Array]:
@@ -282,17 +287,18 @@ def _moving_rows(values: list[Array]) -> list[Array]:
 
 def _scene(problem: Problem, figure: Figure, geometry: pin.GeometryModel, numbers: Indices) -> tuple[Scene, Indices]:
     """A scene of a figure, the things of these pairs and of contact terms, and these pairs, in their original order."""
-    whole = problem.scene
+    whole, owned, things = problem.scene, problem.scene.piece_owner, problem.scene.objects
     terms = (*problem.goals, *problem.constraints, *problem.measures)
-    used = {whole.piece_owner[index] for index in np.unique(whole.pair_table.pairs[numbers]).tolist()}
+    used = {owned[index] for index in np.unique(whole.pair_table.pairs[numbers]).tolist()}
     used |= {name for term in terms for pair in term.touching for name in pair}
-    kept = [k for k, owner in enumerate(whole.piece_owner) if owner in used or owner not in whole.objects]
+    kept = [k for k, owner in enumerate(owned) if owner in used or owner not in things]
     place = np.full(geometry.ngeoms, -1, dtype=np.intp)
     place[kept] = np.arange(len(kept))
     pairs: Indices = place[whole.pair_table.pairs[numbers]]
-    made = geometry_model([pin.GeometryObject(geometry.geometryObjects[old]) for old in kept], pairs)
-    owners = tuple(whole.piece_owner[old] for old in kept)
-    objects: list[SceneObject] = [thing for name, thing in whole.objects.items() if name in set(owners)]
+    made = geometry_model([pin.GeometryObject(geometry.geometryObjects[old]) for old in kept], pairs, most=0)
+    owners = tuple(owned[old] for old in kept)
+    objects: list[SceneObject] = [things[name] for name in things if name in used]
     known = whole.built.pieces_of
     places = {thing.name: [(int(place[old]), local) for old, local in known[thing.name]] for thing in objects}
-    return Scene.of_parts(figure, objects, SceneGeometry(figure.model, made, owners, places, pairs)), numbers
+    swept = [whole.pair_table.swept[old] for old in kept]
+    return Scene.of_parts(figure, objects, SceneGeometry(figure.model, made, owners, places, pairs, swept)), numbers

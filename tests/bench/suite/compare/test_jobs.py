@@ -7,7 +7,6 @@ from types import ModuleType
 
 import pytest
 
-from wholebody.base.batches import close_own_child
 from wholebody.bench.suite.compare.results import Chunk
 from wholebody.bench.suite.compare.solving import Task, work
 
@@ -20,16 +19,12 @@ CAP = 0.4  # s of the processor: more than a solve computes, and less than it wa
 def chunks(fakes: ModuleType) -> Iterator[tuple[Chunk, Chunk]]:
     """Return two chunks of one process: methods that compile and sleep, and with a cap below what one sleeps."""
     solves = {does: (fakes.adapter(does), ()) for does in ("compiles", "sleeps")}
-    close_own_child()  # one of another test does not know how long to sleep
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("FAKES_SLEEP", str(WAITS))
-        try:
-            yield (
-                work(Task(fakes.SET, 0, 0, tuple(solves.values()), cap=10.0, most=1.0)),
-                work(Task(fakes.SET, 0, 0, (solves["sleeps"],), cap=CAP, most=1.0)),
-            )
-        finally:
-            close_own_child()
+        yield (
+            work(Task(fakes.SET, 0, 0, tuple(solves.values()), cap=10.0, most=1.0)),
+            work(Task(fakes.SET, 0, 0, (solves["sleeps"],), cap=CAP, most=1.0)),
+        )
 
 
 def test_what_a_method_compiles_is_not_taken_for_what_its_solves_cost(

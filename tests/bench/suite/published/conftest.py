@@ -1,19 +1,16 @@
 from __future__ import annotations
 
 import json
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.bench.suite.published.published_helpers import SEED
 from wholebody.bench.suite.problem_sets.case import Posed
 from wholebody.bench.suite.problem_sets.registry import SETS
 from wholebody.bench.suite.published.export import export
-
-sys.path.insert(0, str(Path(__file__).parent))
-from published_helpers import SEED
 
 EVERY = 10  # of how many frames of a drag one is there: each of them is judged
 

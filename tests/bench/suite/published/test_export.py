@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from published_helpers import SEED, witness
 
 import wholebody as wb
+from tests.bench.suite.published.published_helpers import SEED, witness
 from wholebody.base.errors import InputError
 from wholebody.bench.suite.problem_sets.registry import SETS, problem_set
 from wholebody.bench.suite.published.bodies import body_files

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from published_helpers import answers
 
+from tests.bench.suite.published.published_helpers import answers
 from wholebody.base.errors import FileFormatError, InputError, WholebodyError
 from wholebody.bench.suite.published.answers import read_answers
 from wholebody.bench.suite.published.judging import TIMEOUT, as_json, judge, left_out

@@ -7,8 +7,8 @@ import re
 from pathlib import Path
 
 import pytest
-from published_helpers import answers
 
+from tests.bench.suite.published.published_helpers import answers
 from wholebody.base.errors import InputError
 from wholebody.bench.suite.published.leaderboard import judge_folder, publish, results
 from wholebody.cli import main
