@@ -14,7 +14,7 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib import import_module
 from itertools import zip_longest
 from multiprocessing import parent_process
@@ -222,8 +222,13 @@ def _loop_type() -> Any:
             key = self._index_key(sig, codegen)
             self._precompiled().save(key, self._cache_file.load(key))
 
+    class Library(JITCodeLibrary):  # type: ignore[misc]
+        @classmethod
+        def read(cls, codegen: Any, kept: Any) -> Any:
+            return cls._unserialize(codegen, kept)
+
     class Loop(CPUDispatcher):  # type: ignore[misc]
-        library = JITCodeLibrary  # of its code
+        library = Library  # of its code
 
         def enable_caching(self) -> None:
             self._cache = Kept(self.py_func)
@@ -240,11 +245,13 @@ def _loop_type() -> Any:
                         time.sleep(0.05)
             with global_compiler_lock:
                 codegen = self.targetctx.codegen()
-                outer, codegen._library_class = codegen._library_class, self.library
+                outer = codegen.create_library, codegen.unserialize_library
+                codegen.create_library = partial(self.library, codegen)
+                codegen.unserialize_library = partial(self.library.read, codegen)
                 try:
                     return super().compile(sig)
                 finally:
-                    codegen._library_class = outer
+                    codegen.create_library, codegen.unserialize_library = outer
 
         def get_call_template(self, args: Any, kws: Any) -> Any:
             args = tuple(unliteral(kind) for kind in args)
@@ -259,9 +266,8 @@ def _inner_type() -> Any:
 
     Its code is optimised and made the processor's in its callers alone, which takes a seventh less time in all.
     """
-    from numba.core.codegen import JITCodeLibrary
 
-    class Unlinked(JITCodeLibrary):  # type: ignore[misc]
+    class Unlinked(_loop_type().library):  # type: ignore[misc]
         """Code for LLVM to put into that of callers."""
 
         codegen = property(lambda self: self)
@@ -277,7 +283,7 @@ def _inner_type() -> Any:
             return self.serialize_using_bitcode()
 
         def _optimize_functions(self, module: Any) -> None:
-            module.data_layout = self._codegen._data_layout
+            module.data_layout = str(self._codegen.target_data)
 
         def _optimize_final_module(self) -> None:
             pass
