@@ -21,7 +21,7 @@ def build() -> wb.Problem:
     car.add(wb.Box((0.50, 0.52, 0.08)), name="seat", at=(-0.30, 0.0, 0.26), color=LEATHER)
     car.add(wb.Box((0.08, 0.52, 0.60)), name="backrest", at=(-0.60, 0.0, 0.60, *turned(-12.0)), color=LEATHER)
     car.add(wb.Box((0.35, 0.60, 0.02)), name="pedals", at=(0.45, 0.0, 0.13, *turned(-25.0)), color=DARK)
-    car.add(wb.Torus(0.18, 0.015), name="wheel", at=(0.15, 0.0, 0.72, *turned(-65.0)), color=DARK)
+    car.add(wb.Torus(0.18, 0.015), name="wheel", at=(0.05, 0.0, 0.75, *turned(-65.0)), color=DARK)
     return wb.Problem(
         car,
         "sitting",

@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.motion.test_things import SIZE, among, gaps, lifting
 from wholebody import view
 from wholebody.cli import main
 
@@ -53,6 +55,25 @@ def test_retarget_writes_a_clip_of_the_figure(walk: Path, tmp_path: Path, capsys
     clip = wb.read_clip(out, wb.load("human", sex="female", stature=1.55))
     values = [clip.figure.joint_values(q)["left_elbow_flexion"] for q in clip.q]
     assert np.degrees(values) == pytest.approx(np.linspace(10.0, 120.0, 12), abs=6.0)
+
+
+def test_retarget_takes_things_and_where_they_go(tmp_path: Path) -> None:
+    """A man lifts a box in a BVH; a woman's hands are at the box of the task file where its track has it."""
+    motion, track = lifting()
+    man = wb.load("human")
+    wb.retarget(motion, man, among(man, track[0]), things={"box": track}).write(tmp_path / "lift.bvh")
+    (tmp_path / "room.toml").write_text(
+        '[figure]\nname = "human"\nsex = "female"\n[[object]]\nname = "floor"\nshape = "halfspace"\n'
+        f'[[object]]\nname = "box"\nshape = "box"\nsize = {list(SIZE)}\nat = [0.4, 0.0, 1.0]\n'
+    )
+    rows = np.array([pin.SE3ToXYZQUAT(at) for at in track])
+    np.savetxt(tmp_path / "box.csv", rows, delimiter=",", header="x, y, z, qx, qy, qz, qw")
+    given = [str(tmp_path / "lift.bvh"), "--scene", str(tmp_path / "room.toml")]
+    given += ["--track", f"box={tmp_path / 'box.csv'}", "--out", str(tmp_path / "lift.npz")]
+    assert main(["clip", "retarget", *given]) == 0
+    clip = wb.read_clip(tmp_path / "lift.npz", wb.load("human", sex="female"))
+    assert np.abs(np.diff(clip.things["box"][:, 2]) / np.diff(rows[:, 2]) - 1.0).max() < 0.15
+    assert max(np.abs(gaps(clip, side)[:, 0]).max() for side in ("left", "right")) < 4e-3
 
 
 def test_a_robot_goes_about_where_that_is_asked(walk: Path, tmp_path: Path) -> None:
@@ -196,6 +217,8 @@ def test_play_shows_what_the_body_wears_on_a_floor_below_it(
         (["avoid", "bend.npz", "--out", "bend.npz"], "bend.npz is a file that is read"),
         (["retarget", "bend.bvh", "--to", "g1.urdf", "--figure", "h1.urdf", "--out", "o.npz"], "one and the same"),
         (["retarget", "bend.bvh", "--bare", "--out", "o.npz"], "ending .csv"),
+        (["retarget", "bend.npz", "--track", "box", "--out", "o.npz"], "is no skeleton"),
+        (["retarget", "a.bvh", "b.bvh", "--track", "box=b.csv", "--out", "o"], "--track is for one file"),
         (["retarget", "bend.bvh", "--rate", "0", "--out", "o.csv"], "--rate is 0"),
         (["play", "bend.npz", "--pictures", "0", "--out", "out.png"], "--pictures is 0"),
     ],

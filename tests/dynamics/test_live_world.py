@@ -43,9 +43,9 @@ def test_a_hand_is_dragged_and_pushes_a_ball_off_its_shelf(live: LiveWorld) -> N
 def test_a_body_follows_the_mouse_and_flies_on_when_it_is_let_go(live: LiveWorld) -> None:
     live.take("ball")
     began = live.place("ball")
-    for number in range(40):
+    for number in range(70):
         live.move(began + [0.0, 0.0, min(0.4, 0.02 * number)])
-    assert live.place("ball") == pytest.approx(began + [0.0, 0.0, 0.4], abs=0.03)  # against its weight
+    assert live.place("ball") == pytest.approx(began + [0.0, 0.0, 0.4], abs=2e-3)  # against its weight
     for number in range(12):
         live.move(began + [0.04 * number, 0.0, 0.4])
     live.let_go()

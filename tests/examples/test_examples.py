@@ -19,6 +19,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.motion import test_ground
+from tests.motion.test_things import gaps
 from tests.saved_page import unpacked
 from wholebody.assessment.motion import assess_motion
 
@@ -31,6 +33,7 @@ OTHERS = (
     *("four_bar_among_obstacles", "scissor_lift", "carry_together", "take_a_seat", "lift_a_box", "push_a_cart"),
     *("reach_map", "study_of_people", "own_method", "two_arms_one_bar", "person_and_arm"),
     *("boundary_people", "branches_of_an_arm", "dominoes", "driver", "hold_a_pole", "plan_for_an_arm"),
+    "lift_retargeted",
 )
 REST_ON = {("pelvis", "pouch"), ("lower_lumbar", "pouch")}  # what the figure wears lies on it
 
@@ -477,6 +480,17 @@ def test_a_planned_motion_is_free_between_its_ends(example: Example, tmp_path: P
     scene, first, last = module.build()
     np.testing.assert_allclose(found.clip.q[[0, -1]], [first.q, last.q], atol=1e-9)
     assert assess_motion(scene, found.clip.q, found.clip.dt).depth.max() <= 1e-4
+
+
+def test_a_lift_keeps_feet_on_the_floor_and_hands_at_the_crate(example: Example, tmp_path: Path) -> None:
+    module = example("lift_retargeted")
+    clip = module.main(out=tmp_path, pictures=False)
+    moves = {name: [pin.XYZQUATToSE3(at) for at in track] for name, track in clip.things.items()}
+    assert assess_motion(module.build(clip.things["crate"]), clip.q, clip.dt, moves).depth.max() <= 1e-4
+    for side in ("left", "right"):
+        assert np.abs(gaps(clip, side, "crate", coal.Box(*module.CRATE))[:, 0]).max() < 1e-3
+        assert np.ptp(test_ground.sole(clip, f"{side}_heel"), axis=0).max() < 1e-3
+    assert not list(tmp_path.iterdir())
 
 
 def test_branches_of_an_arm_differ_and_reach_one_place(example: Example, tmp_path: Path) -> None:

@@ -143,14 +143,14 @@ def test_other_ranges_do_not_depend_on_age():
 
 @pytest.mark.parametrize("joint", ["knee_flexion", "elbow_flexion"])
 def test_soft_parts_stop_stout_people_earlier(joint):
-    """Obese men flex the knee by 11 % less than others (Park et al. 2010)."""
+    """Obese men flex the knee by 11 % less than others (Park et al. 2010), of which the flesh takes a part."""
     thin, usual, obese, heavy = (
         load("human", stature=1.755, mass=mass).model for mass in (65.0, 84.6, 101.6, 130.0)
     )  # kg: the second is the median man's, the third is 33 kg/m^2
     ends = [model.upperPositionLimit[model.joints[model.getJointId(f"left_{joint}")].idx_q]
             for model in (thin, usual, obese, heavy)]  # fmt: skip
     assert ends[0] == ends[1] == pytest.approx(math.radians(150.0))
-    assert 0.889 < ends[2] / ends[1] < 0.97
+    assert 0.889 < ends[2] / ends[1] < 0.98
     assert 0.8 < ends[3] / ends[1] < ends[2] / ends[1]
 
 

@@ -16,7 +16,7 @@ from wholebody.tasks.range_of_motion import Coordinate, CoupledRow
 METHODS = {
     "qp": lambda: wb.QP(restarts=0),
     "ccd": wb.methods.CCD,
-    "newton": lambda: wb.Newton(restarts=0, iterations=10),
+    "newton": lambda: wb.Newton(restarts=0, iterations=4),
     "placo": wb.methods.Placo,
     "dls": wb.methods.DampedLeastSquares,
 }

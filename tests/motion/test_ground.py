@@ -132,6 +132,24 @@ def test_a_foot_that_is_held_up_does_not_rest() -> None:
     assert not found.rests["right_ankle"][10:].any()
 
 
+def test_feet_of_who_kneels_do_not_rest() -> None:
+    motion, _ = walker(flat, 1.0)
+    at = np.repeat(motion.positions[:1], len(motion), axis=0)
+    for joint in (2, 6):  # knees; the shanks are level, and the feet up behind
+        at[:, joint, 2] = 0.05
+        at[:, joint + 1] = at[:, joint] + [-SHANK, 0.0, 0.12]
+        at[:, joint + 2] = at[:, joint + 1] + [-0.03, 0.0, TOE]
+    assert not wb.motion.ground(dataclasses.replace(motion, positions=at)).footholds
+
+
+def test_feet_slide_no_more_at_higher_rates(human: wb.Figure, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(f"{__name__}.DT", 1 / 120)
+    motion, stands = walker(flat, 1.2)
+    slid = slides(wb.retarget(motion, human), stands)
+    assert slid.mean() < 1e-3
+    assert slid.max() < 2e-2
+
+
 def test_a_person_stands_on_the_floor_and_does_not_slide(human: wb.Figure) -> None:
     motion, stands = walker(flat, 1.5)
     clip = wb.retarget(motion, human)

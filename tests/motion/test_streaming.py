@@ -24,14 +24,14 @@ def streamed(stream: wb.motion.Retargeter, motion: SkeletonMotion) -> np.ndarray
 
 
 def test_a_stream_gives_the_postures_of_the_recording(human: wb.Figure) -> None:
-    motion, stands = walker(flat, 2.5)
+    motion, stands = walker(flat, 2.2)
     ground = wb.motion.ground(motion)
     batch = wb.retarget(motion, human, ground=ground)
     stream = wb.motion.Retargeter(motion, human, ground=ground)
     assert stream.ahead < len(motion)
     assert stream.latency == pytest.approx(stream.ahead * motion.dt)
     assert np.abs(streamed(stream, motion) - batch.q).max() < 1e-9
-    found = wb.Clip(human, streamed(wb.motion.Retargeter(motion.part(0, 40), human), motion), motion.dt)  # type: ignore[arg-type]
+    found = wb.Clip(human, streamed(wb.motion.Retargeter(motion.part(0, 36), human), motion), motion.dt)  # type: ignore[arg-type]
     assert slides(found, stands)[5:].mean() < 2e-3  # where feet rest is found as frames come
     scene = wb.Scene(human).add(wb.HalfSpace(), name="floor")
     assert max(-scene.contacts(q, 0.01).distance.min(initial=0.0) for q in found.q) < 5e-4

@@ -19,6 +19,7 @@ from wholebody.motion.standing_ground import NOTHING, Foothold
 from wholebody.motion.thing_contacts import ThingContact, Things
 
 SIZE = (0.25, 0.30, 0.2)  # m: of the box, whose sides are 3 cm inwards of the wrists
+BOX = coal.Box(*SIZE)
 
 
 def lifting(frames: int = 18) -> tuple[SkeletonMotion, list[pin.SE3]]:
@@ -42,17 +43,17 @@ def among(figure: wb.Figure, at: pin.SE3) -> wb.Scene:
     return wb.Scene(figure).add(wb.HalfSpace(), name="floor").add(wb.Box(SIZE), name="box", at=at)
 
 
-def gaps(clip: wb.Clip, side: str) -> np.ndarray:
-    """(n,) distance of a hand's pieces to the box of the clip, by coal; and (n, 3) the wrist in the box's axes."""
+def gaps(clip: wb.Clip, side: str, thing: str = "box", shape: coal.ShapeBase = BOX) -> np.ndarray:
+    """(n,) distance of a hand's pieces to a thing of the clip, by coal; and (n, 3) the wrist in the thing's axes."""
     figure, found = clip.figure, []
     data, placed = figure.model.createData(), figure.geometry.createData()
-    box, joint = coal.Box(*SIZE), figure.model.frames[figure.frame_id(f"{side}_hand")].parentJoint
-    for q, at in zip(clip.q, clip.things["box"], strict=True):
+    joint = figure.model.frames[figure.frame_id(f"{side}_hand")].parentJoint
+    for q, at in zip(clip.q, clip.things[thing], strict=True):
         pin.updateGeometryPlacements(figure.model, data, figure.geometry, placed, q)
         where = pin.XYZQUATToSE3(at)
         apart = [
             coal.distance(
-                piece.geometry, coal.Transform3s(own.rotation, own.translation), box,
+                piece.geometry, coal.Transform3s(own.rotation, own.translation), shape,
                 coal.Transform3s(where.rotation, where.translation), coal.DistanceRequest(), coal.DistanceResult(),
             )
             for piece, own in zip(figure.geometry.geometryObjects, placed.oMg, strict=True)
@@ -83,6 +84,43 @@ def test_hands_stay_at_their_places_of_a_box_that_they_lift(stature: float) -> N
         return
     alone = wb.retarget(motion, figure, ground=None)  # without the box the hands are inside it
     assert np.abs(gaps(wb.Clip(figure, alone.q, alone.dt, things=clip.things), "left")[:, 0]).min() > 5e-3
+
+
+def with_hands(motion: SkeletonMotion) -> SkeletonMotion:
+    """The skeleton with hands 7 cm beyond its wrists."""
+    wrists = [motion.names.index(f"{side}_wrist") for side in ("left", "right")]
+    offsets = np.array([[0.0, 0.07, 0.0], [0.0, -0.07, 0.0]])
+    turns = motion.rotations[:, wrists]
+    return SkeletonMotion(
+        (*motion.names, "left_hand", "right_hand"), np.append(motion.parents, wrists),
+        np.concatenate([motion.offsets, offsets]), np.concatenate([motion.rotations, turns], axis=1),
+        np.concatenate([motion.positions, motion.positions[:, wrists] + (turns @ offsets[..., None])[..., 0]], axis=1),
+        motion.dt,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("stature", [1.5, 1.9])
+def test_two_hands_stay_on_a_bar(stature: float) -> None:
+    """A bar below the hands, along y: they are as far apart on it as in the recording."""
+    motion, track = lifting()
+    motion = with_hands(motion)
+    hands = {side: motion.positions[:, motion.names.index(f"{side}_hand")] for side in ("left", "right")}
+    lying = pin.utils.rotate("x", 0.5 * np.pi)  # a cylinder is along z
+    bars = [
+        pin.SE3(at.rotation @ lying, middle - 0.03 * at.rotation[:, 2])
+        for at, middle in zip(track, 0.5 * (hands["left"] + hands["right"]), strict=True)
+    ]
+    figure = wb.load("human", stature=stature)
+    scene = wb.Scene(figure).add(wb.HalfSpace(), name="floor").add(wb.Cylinder(0.015, 0.9), name="bar", at=bars[0])
+    clip = wb.retarget(motion, figure, scene, things={"bar": bars})
+    for side, path in hands.items():
+        off = gaps(clip, side, "bar", coal.Cylinder(0.015, 0.9))
+        along = [bar.actInv(hand)[2] for bar, hand in zip(bars, path, strict=True)]
+        assert off[:, 0].min() > 0.0
+        assert off[:, 0].max() < 1e-3
+        assert np.ptp(off[:, 1:], axis=0).max() < 1e-3
+        assert np.abs(off[:, 3] - along).max() < 1e-2
+    assert wb.check(clip, scene).free
 
 
 def test_what_is_out_of_reach_is_said_and_let_go_of(recwarn: pytest.WarningsRecorder) -> None:

@@ -6,6 +6,7 @@ import pickle
 import re
 from dataclasses import replace
 from fractions import Fraction
+from functools import cache
 
 import numpy as np
 import pytest
@@ -89,6 +90,7 @@ def stated(scene: wb.Scene, term: object) -> wb.Problem:
     return wb.Problem(scene, start, goals=goals, constraints=[*held, *more], measures=measures)
 
 
+@cache
 def reached(scene: wb.Scene) -> np.ndarray:
     return wb.solve(stated(scene, wb.Effort())).q
 

@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from wholebody.figures.description import Place
 from wholebody.view import screenshot
 from wholebody.view.browser import Browser, find_chromium
 
@@ -24,7 +25,8 @@ class Exhibit:
         """Build it."""
         self.model = pin.buildSampleModelHumanoid()
         self.geometry = pin.buildSampleGeometryModelHumanoid(self.model)
-        self.figure = SimpleNamespace(frame_id=self.model.getFrameId, warn_of_angles=lambda q, what: False)
+        ours = {"frame_id": self.model.getFrameId, "place_of": self.place_of}
+        self.figure = SimpleNamespace(**ours, warn_of_angles=lambda q, what: False)
         self.piece_owner = [piece.name for piece in self.geometry.geometryObjects]
         self.objects: dict[str, Any] = {}
         self.revision = 0
@@ -49,6 +51,11 @@ class Exhibit:
             if self.geometry.geometryObjects[other].parentJoint != joint:
                 self.geometry.addCollisionPair(pin.CollisionPair(other, index))
         self.revision += 1
+
+    def place_of(self, name: str) -> Place:
+        """Where a frame is fixed."""
+        index = self.model.getFrameId(name)
+        return Place(index, self.model.frames[index].parentJoint, self.model.frames[index].placement)
 
     def posture(self, seed: int) -> Any:
         """A posture near the neutral one."""

@@ -90,7 +90,7 @@ def _numbers(goal: Any) -> tuple[Array, Array, Array]:
     """Offset (3,), target (3,), and the inverse (3, 3) of the target's rotation of a goal."""
     if type(goal) is Point:
         return goal.resolved_offset, goal.resolved_target, _UNTURNED
-    return _UNMOVED, goal.residual.target, goal.residual.undo.rotation
+    return _UNMOVED, goal.residual.placement.translation, goal.residual.placement.rotation.T
 
 
 def _errors(goal: Any, joints: Array, asked: Sequence[Array]) -> tuple[Array, Array]:
@@ -99,7 +99,7 @@ def _errors(goal: Any, joints: Array, asked: Sequence[Array]) -> tuple[Array, Ar
     if type(goal) is Point:
         place, base, position, orientation = goal.place, WORLD, True, False
     else:
-        place, base, _, _, position, orientation = goal.residual
+        place, _, base, position, orientation = goal.residual
     turn, at = _placed(place, joints)
     at = at + (turn @ offset[:, :, None])[:, :, 0]
     if base.frame:

@@ -77,9 +77,9 @@ class Articulated:
         self.velocity, self.impulses, self.points = np.zeros(self._model.nv), dict[str, Array](), 0
         self.frames, self.ends = list[EngineFrame](), list[float]()
         self._tracked = self.q
-        inertia = self._inertia(self.q)
-        self._armature = np.where(inertia.diagonal() < 1e-5, 1e-5, 0.0)  # kg m2: of links without mass
-        self.stiffness, self.damping = actuated.gains(inertia.diagonal() + self._armature)
+        light = self._inertia(self.q).diagonal() < 1e-5  # kg m2: of links without mass
+        self._model.armature += np.where(light, 1e-5, 0.0)
+        self.stiffness, self.damping = actuated.gains(self._inertia(self.q).diagonal())
         free = [joint for joint in self._model.joints[1:] if joint.nq == joint.nv == 1]  # the first is the world
         self._limited: Indices = np.array([(joint.idx_q, joint.idx_v) for joint in free], dtype=np.intp).reshape(-1, 2)
         impulse_kernel.compiled_kernel()
@@ -100,8 +100,7 @@ class Articulated:
 
     def energy(self) -> float:
         """Kinetic and potential energy, joules."""
-        potential = pin.computePotentialEnergy(self._model, self._data, self.q)
-        return self._kinetic(self._inertia(self.q), self.velocity) + float(potential)
+        return self._kinetic() + float(pin.computePotentialEnergy(self._model, self._data, self.q))
 
     def momentum(self) -> Array:
         """Momentum [kg m/s] and angular momentum about the world's origin [kg m2/s], (6,)."""
@@ -113,22 +112,16 @@ class Articulated:
         upper = np.triu(pin.crba(self._model, self._data, q))
         return np.asarray(upper + upper.T - np.diag(upper.diagonal()))
 
-    def _kinetic(self, inertia: Array, velocity: Array) -> float:
-        return 0.5 * float(velocity @ inertia @ velocity + self._armature @ velocity**2)
+    def _kinetic(self) -> float:
+        return 0.5 * float(self.velocity @ self._inertia(self.q) @ self.velocity)
 
     # ---- a step
 
     def _step(self, time: float, aim: Array, steady: Array, moved: Moved, segments: Mapping[str, int]) -> float:
         """Advance by at most a time, to the next impact if that comes first; by how much."""
         model, engine = self._model, self._engine
-        inertia = self._inertia(self.q)
-        own = inertia + np.diag(self._armature)
-        planned, points = time, self._points(time, moved)
-        began = self._kinetic(inertia, self.velocity) + float(
-            pin.computePotentialEnergy(model, self._data, self.q)
-        )  # of the figure alone
-        start = self.velocity.copy()
-        impulse = self._bounce(own, points)
+        planned, points, began, start = time, self._points(time, moved), self.energy(), self.velocity.copy()
+        impulse = self._bounce(self._inertia(self.q), points)
         time = self._until_impact(points, time)
         begin, apart = self.velocity, np.asarray(pin.difference(model, self.q, aim))
         soft = time * self.damping + time * time * self.stiffness
@@ -136,8 +129,7 @@ class Articulated:
         for _ in range(2):  # first with the forces at the start, then those half way
             weight = np.asarray(pin.computeGeneralizedGravity(model, self._data, middle)).copy()
             forces = np.asarray(pin.nonLinearEffects(model, self._data, middle, mean)).copy()
-            masses = self._inertia(middle) + np.diag(self._armature)
-            borne = np.where(self.stiffness > 0.0, weight, 0.0)
+            masses, borne = self._inertia(middle), np.where(self.stiffness > 0.0, weight, 0.0)
             driven = masses + np.diag(soft)
             rest = masses @ begin + time * (self.stiffness * apart - forces + borne) + soft * steady
             self.velocity = np.linalg.solve(driven, rest)
@@ -211,16 +203,10 @@ class Articulated:
 
     def _limits(self, time: float) -> list[tuple[int, float, float]]:
         """Freedoms that can come to a limit within a time, the sign of motion away from it, and how far it is."""
-        found = []
-        for at, freedom in self._limited.tolist():
-            for sign, limit in (
-                (1.0, self._model.lowerPositionLimit[at]),
-                (-1.0, self._model.upperPositionLimit[at]),
-            ):
-                gap = sign * (self.q[at] - limit)
-                if gap < 0.02 + 1.5 * time * abs(self.velocity[freedom]):  # rad, m
-                    found.append((freedom, sign, gap))
-        return found
+        at, freedom = self._limited.T
+        gaps = self.q[at] - self._model.lowerPositionLimit[at], self._model.upperPositionLimit[at] - self.q[at]
+        near = [gap < 0.02 + 1.5 * time * np.abs(self.velocity[freedom]) for gap in gaps]  # rad, m
+        return [(freedom[k], sign, gaps[s][k]) for s, sign in enumerate((1.0, -1.0)) for k in np.flatnonzero(near[s])]
 
     def _owners(self, pair: Array) -> tuple[str, str]:
         owners = self._workspace.owners
@@ -298,8 +284,7 @@ class Articulated:
 
     def _settle(self, energy: float, most: float) -> None:
         """Scale the velocities by at most a factor, so that kinetic and potential energy are at most `energy`."""
-        kinetic = self._kinetic(self._inertia(self.q), self.velocity)
-        excess = kinetic + float(pin.computePotentialEnergy(self._model, self._data, self.q)) - energy
+        excess, kinetic = self.energy() - energy, self._kinetic()
         if kinetic > 0.0:
             self.velocity = self.velocity * min(most, np.sqrt(max(0.0, 1.0 - excess / kinetic)))
 
@@ -309,7 +294,7 @@ class Articulated:
         if not given:
             return
         model = self._model
-        inertia = self._inertia(self.q) + np.diag(self._armature)
+        inertia = self._inertia(self.q)
         pin.computeJointJacobians(model, self._data, self.q)
         total = np.zeros(model.nv)
         for name, wrench in given.items():

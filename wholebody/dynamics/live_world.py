@@ -212,7 +212,8 @@ class LiveWorld:
             way *= min(1.0, FASTEST * dt / max(length, 1e-12))
             self.scene.move(name, at=pin.SE3(at.rotation, at.translation + way), over=dt)
             return
-        drawn = RATE**2 * way - 2.0 * RATE * engine.twist(name)[:3]
+        mean = engine.twist(name)[:3] - 0.5 * dt * np.asarray(engine.gravity)  # velocity of the last frame, as it fell
+        drawn = RATE**2 * way - 2.0 * RATE * mean
         drawn *= min(1.0, STRONGEST / max(float(np.linalg.norm(drawn)), 1e-12))
         mass = float(np.linalg.norm(engine.weight(name)) / np.linalg.norm(engine.gravity))
         engine.push(name, dt * (mass * drawn - engine.weight(name)), engine.centre(name))

@@ -371,7 +371,7 @@ class Figure(checks.FixedAttributes):
     def mounted(self, other: Figure, *, on: str, name: str | None = None, at: Any = (0.0, 0.0, 0.0)) -> Figure:
         """Return this figure with another one on a frame: a hand on an arm, a tool with joints in a hand.
 
-        A free root of the other is fixed as in its first posture. Its name comes before its names: "hand/palm".
+        A free root of the other is fixed as in its first posture. Its name comes before its names: "tool/tip".
         Pieces of the two are tested against each other, but for those that touch where it is mounted; see
         `excluded_pairs`.
 

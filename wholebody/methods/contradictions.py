@@ -205,7 +205,7 @@ class _Finder:
             if isinstance(goal, Point):
                 here, wanted = found.placement.act(goal.resolved_offset), goal.resolved_target
             else:
-                here, wanted = found.placement.translation, goal.residual.target
+                here, wanted = found.placement.translation, goal.residual.placement.translation
             own = [k for k in np.flatnonzero(table.joint == found.joint).tolist() if self._depth(k, here) > -ON_SURFACE]
             pairs = np.isin(table.pairs, own).any(axis=1) & (table.joint[table.pairs] == 0).any(axis=1)
             deepest, thing = 0.0, -1

@@ -37,10 +37,14 @@ def speeds(places: Array, dt: float) -> Array:
     return np.asarray(np.linalg.norm(np.gradient(places, dt, axis=0), axis=-1))
 
 
-def resting(places: Array, dt: float, limits: RestLimits, kinds: Sequence[int]) -> Mask:
-    """(n, p) when points (n, p, 3) rest, `dt` seconds apart; points of one kind are equally high on level ground."""
+def resting(places: Array, dt: float, limits: RestLimits, kinds: Sequence[int], allowed: Mask | None = None) -> Mask:
+    """(n, p) when points (n, p, 3) rest, `dt` seconds apart; points of one kind are equally high on level ground.
+
+    They rest only where that is `allowed` (n, p).
+    """
     found = np.zeros(places.shape[:2], dtype=bool)
-    rests = [slow(places[:, k], dt, limits) for k in range(places.shape[1])]
+    may = np.ones_like(found) if allowed is None else allowed
+    rests = [slow(places[:, k], dt, limits) & may[:, k] for k in range(places.shape[1])]
     if not rests:
         return found
     marks = np.stack(rests, axis=1)

@@ -25,7 +25,8 @@ from wholebody.motion.structure import upright
 from wholebody.motion.thing_contacts import ThingContact, Things, thickness
 from wholebody.motion.windows import long_runs, runs
 
-STRONG, NEARING, SWING = 800.0, 30.0, 0.3  # weights of what rests, nearly does, and of a sole between; 1 of a bone
+STRONG = 24.0  # s, weight of what rests, over the time step, as that of accelerations; 1 of a bone
+NEARING, SWING = 30.0, 0.3  # weights of what nearly rests, and of a sole between
 TOUCH = 100.0  # of what touches a thing
 LANDING = 3.0  # weight in the frame in which a point comes down, where contact decides
 BESIDE = np.array([0.1, 0.1, 1.0])  # shares of that weight: soles that meet come down beside each other
@@ -165,6 +166,7 @@ class Holds:
         # of the highest surface below a place (3,), None for the recording's ground.
         self.points, self._scale, self._surface, self._touched = points, scale, surface, touched
         self.over, self.ahead = max(1, round(OVER / dt)), max(1, round(AHEAD / dt))
+        self._strong = STRONG / dt
         contacts = () if touched is None else touched.contacts
         # a part that touches a thing while it seems to rest on the ground rests on the thing
         apart = [
@@ -267,7 +269,7 @@ class Holds:
                 if self.points[number].thing:
                     weights[number] = TOUCH
                 else:
-                    weights[number] = LANDING * BESIDE if frame == around[0].first and not again else STRONG
+                    weights[number] = LANDING * BESIDE if frame == around[0].first and not again else self._strong
             else:
                 goals[number], share = self._swing(number, frame, nearest, places, paths)
                 weights[number] = (

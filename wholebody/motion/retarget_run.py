@@ -6,14 +6,16 @@ time, each frame from the deviation of the one before. Sweeps follow, each two f
 solved anew between its neighbours, whose deviations say where the acceleration of d is least (block coordinate descent
 on the sum of all frames' costs and of |w d''|^2),
 
-    d_k* = (4 (d_{k-1} + d_{k+1}) - (d_{k-2} + d_{k+2})) / 6
+    d_k* = (4 (d_{k-1} + d_{k+1}) - (d_{k-2} + d_{k+2})) / 6,
 
-so that the body begins to give way before a contact comes.
+by successive over-relaxation (Young 1954): a sweep seeks d_k + omega (d_k* - d_k), the last one with omega = 1. The
+body begins to give way before a contact comes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -33,7 +35,7 @@ EVERY, WORTH = 10, 0.8  # frames after which a free posture is sought anew, and 
 SLOWING = 8  # frames before it would be too fast in which a joint begins to move
 JUMP = 0.5  # rad, m: postures of neighbouring frames that are farther apart were found otherwise
 STARTS = 4  # how often the first frame is solved, each time from where soles came down beside each other
-SWEEPS = 6  # more: less jerk, and slower by a tenth each
+SWEEPS = (1.8, 1.7, 1.6, 1.4, 1.2, 1.0)  # omega of each; more: less jerk, and slower by a tenth each
 ANCHOR = 0.3  # weight of the place of the hips; 1 is that of a bone
 STAY = 0.03  # m/rad from the neutral posture, for what no goal determines
 CHANGE = 0.3  # weight of a change of the deviation in the first pass, in metres that limbs move
@@ -115,7 +117,7 @@ class Run:
             self._stages += [
                 (self._passed, holds.ahead + holds.over),
                 (self._spread, max(len(self.spread) // 2, holds.ahead)),
-                *[(self._swept, 2)] * SWEEPS,
+                *[(partial(self._swept, omega=omega), 2) for omega in SWEEPS],
             ]
             holds.begin(self._free)
         self._done = [0] * len(self._stages)  # frames that each stage has passed
@@ -293,11 +295,12 @@ class Run:
                 break
         return q
 
-    def _swept(self, k: int) -> None:
+    def _swept(self, k: int, omega: float) -> None:
         assert self.holds is not None
         last = self._came - 1
         near = [self._deviation[min(max(j, 0), last)] for j in range(k - 2, k + 3)]
-        wanted = (4.0 * (near[1] + near[3]) - (near[0] + near[4])) / 6.0
+        smooth = (4.0 * (near[1] + near[3]) - (near[0] + near[4])) / 6.0
+        wanted = near[2] + omega * (smooth - near[2])
         reference = np.asarray(pin.integrate(self.model, self._free[k], wanted))
         self.fitter.see(self.holds.moved(k))
         if k not in self._held:

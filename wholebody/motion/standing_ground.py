@@ -196,7 +196,9 @@ def ground(
     feet = [f"{side}_{part}" for side in ("left", "right") for part in FEET if f"{side}_{part}" in joints]
     limits, kinds = RestLimits(), [FEET.index(role.split("_")[1]) for role in feet]
     places = motion.positions[:, [joints[role] for role in feet]]
-    marks = resting(places, motion.dt, limits, kinds)
+    # what kneels or lies with its feet up does not stand on them: they are above their knees
+    knees = [joints.get(f"{role.split('_')[0]}_knee", joints[role]) for role in feet]
+    marks = resting(places, motion.dt, limits, kinds, places[:, :, 2] <= motion.positions[:, knees, 2])
     rests = {role: marks[:, k] for k, role in enumerate(feet)}
     lows = {role: lowest(motion.positions[rests[role], joints[role], 2]) for role in feet if rests[role].any()}
     parts = {

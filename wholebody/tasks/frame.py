@@ -70,7 +70,7 @@ class Frame(PlacementGoal):
     def resolve(self, scene: Surroundings, start: Array) -> Frame:
         """Find the frame."""
         place = inputs.find_place(scene, self.frame, "Frame")
-        return filled(self, residual=PlacementResidual.build(place, self.resolved_target))
+        return filled(self, residual=PlacementResidual(place, self.resolved_target))
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +102,7 @@ class Orientation(PlacementGoal):
     def resolve(self, scene: Surroundings, start: Array) -> Orientation:
         """Find the frame."""
         place = inputs.find_place(scene, self.frame, "Orientation")
-        return filled(self, residual=PlacementResidual.build(place, self.resolved_target, position=False))
+        return filled(self, residual=PlacementResidual(place, self.resolved_target, position=False))
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +144,7 @@ class Relative(PlacementGoal):
         base = inputs.find_base(scene, self.to, self.frame, "Relative")
         given = self.placement is not None
         target = self.resolved_placement if given else placement_between(scene, start, self.frame, self.to)
-        return filled(self, residual=PlacementResidual.build(place, target, base, orientation=self.orientation))
+        return filled(self, residual=PlacementResidual(place, target, base, orientation=self.orientation))
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,12 +182,12 @@ class Hold(PlacementTerm, Constraint):
         place = inputs.find_place(scene, self.frame, "Hold")
         base = inputs.find_base(scene, self.relative_to, self.frame, "Hold")
         at = placement_between(scene, start, self.frame, self.relative_to) if self.at is None else self.resolved_at
-        return filled(self, residual=PlacementResidual.build(place, at, base, orientation=self.orientation))
+        return filled(self, residual=PlacementResidual(place, at, base, orientation=self.orientation))
 
     @property
     def kept_at(self) -> Any:
         """The placement at which the frame is held, in the world or in the other frame, once resolved."""
-        return self.residual.placement
+        return self.residual.placement.copy()
 
     def value(self, state: State) -> Array:
         """(m,) difference in position [m] and orientation [rad]."""

@@ -49,24 +49,10 @@ class PlacementResidual(NamedTuple):
     """Placement of a frame relative to another less its target: position [m], then rotation vector [rad]."""
 
     place: Place  # the frame that moves
-    base: Place  # the reference frame; the world by default
-    target: Array  # (3,) target position of the frame's origin in the base
-    undo: Any  # inverse of the target's rotation, as a placement without translation
-    position: bool  # whether the residual has the position
-    orientation: bool  # whether it has the rotation
-
-    @classmethod
-    def build(
-        cls, place: Place, target: Any, base: Place = WORLD, *, position: bool = True, orientation: bool = True
-    ) -> PlacementResidual:
-        """Compare `place` with the pin.SE3 `target` in the base."""
-        undo = pin.SE3(target.rotation.T, np.zeros(3))
-        return cls(place, base, target.translation.copy(), undo, position, orientation)
-
-    @property
-    def placement(self) -> pin.SE3:
-        """The target placement of the frame in the base."""
-        return pin.SE3(self.undo.rotation.T, self.target)
+    placement: Any  # pin.SE3, its target in the base
+    base: Place = WORLD  # the reference frame
+    position: bool = True  # whether the residual has the position
+    orientation: bool = True  # whether it has the rotation
 
     @property
     def angular(self) -> Mask:
@@ -79,13 +65,17 @@ class PlacementResidual(NamedTuple):
         if self.base.frame:
             place = state.frame(self.base.frame).actInv(place)
         if not self.orientation:
-            return np.asarray(place.translation - self.target)
+            return np.asarray(place.translation - self.placement.translation)
         if not self.position:
-            return np.asarray(pin.log3((place * self.undo).rotation))
+            return np.asarray(pin.log3(self._turn(place)))
         result = np.empty(6)
-        np.subtract(place.translation, self.target, out=result[:3])
-        result[3:] = pin.log3((place * self.undo).rotation)
+        np.subtract(place.translation, self.placement.translation, out=result[:3])
+        result[3:] = pin.log3(self._turn(place))
         return result
+
+    def _turn(self, place: Any) -> Array:
+        """(3, 3) from the orientation of the target to that of a placement."""
+        return np.asarray(place.rotation @ self.placement.rotation.T)
 
     def wrench(self, state: State) -> Wrench:
         """Derivative of `value`: m rows between the two joints."""
@@ -98,7 +88,7 @@ class PlacementResidual(NamedTuple):
                 rows[0, 0] = rows[1, 1] = rows[2, 2] = 1.0
                 fill_point_rows(rows, place.translation)
             if self.orientation:
-                rows[-3:, 3:] = pin.Jlog3((place * self.undo).rotation).T
+                rows[-3:, 3:] = pin.Jlog3(self._turn(place)).T
         return Wrench(rows, self.place.joint, self.base.joint)
 
     def _relative_rows(self, place: Any, base: Any) -> Array:
@@ -109,7 +99,7 @@ class PlacementResidual(NamedTuple):
             blocks.append(turn @ point_rows(place.translation))
         if self.orientation:
             rows = np.zeros((3, 6))
-            rows[:, 3:] = pin.Jlog3((base.actInv(place) * self.undo).rotation).T @ turn
+            rows[:, 3:] = pin.Jlog3(self._turn(base.actInv(place))).T @ turn
             blocks.append(rows)
         return np.concatenate(blocks)
 

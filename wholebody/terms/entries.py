@@ -79,12 +79,12 @@ def placement_floats(place: Any) -> Array:
 
 
 def _residual(residual: PlacementResidual) -> list[Entry]:
-    place, base, target, undo, position, orientation = residual
+    place, target, base, position, orientation = residual
     based, floats = base.frame != WORLD.frame, np.zeros(36)
     floats[:12] = placement_floats(place.placement)
     if based:
         floats[12:24] = placement_floats(base.placement)
-    floats[24:27], floats[27:] = target, undo.rotation.T.ravel()
+    floats[24:27], floats[27:] = target.translation, target.rotation.ravel()
     integers = place.joint, base.joint, int(position), int(orientation), int(based)
     return [Entry(RESIDUAL, integers, floats, 3 * (position + orientation))]
 

@@ -161,16 +161,21 @@ def read_path(path: str | os.PathLike[str]) -> Array:
         >>> wholebody.tracking.read_path(folder / "corners.csv")
         array([[0.4, 0. , 1. ]])
     """
+    return read_rows(path, (3,), "x y z in metres")
+
+
+def read_rows(path: str | os.PathLike[str], sizes: Sequence[int], wanted: str) -> Array:
+    """Read rows (k, n) of such a file, each of n numbers, one of some sizes; `wanted` names them in errors."""
     path = checked_path(path, "path")
     text = read_text(path, "path")
     lines = {number: said.partition("#")[0].strip() for number, said in enumerate(text.splitlines(), start=1)}
     told = [(f"{path}, line {number}", said) for number, said in lines.items() if said]
     if told and not any(is_number(word) for word in _words(told[0][1])):
         told = told[1:]
-    places = [_place(*line) for line in told]
-    if not places:
-        raise FileFormatError(f"{path}: it holds no places; give x y z in metres, one place a line")
-    return np.array(places)
+    if not told:
+        raise FileFormatError(f"{path}: it holds no places; give {wanted}, one place a line")
+    first = len(_words(told[0][1]))
+    return np.array([_place(*line, (first,) if first in sizes else sizes, wanted) for line in told])
 
 
 def spread(corners: ArrayLike, frames: int | None = None, dt: float = FRAME) -> Array:
@@ -207,10 +212,10 @@ def _words(text: str) -> list[str]:
     return text.replace(",", " ").replace(";", " ").split()
 
 
-def _place(where: str, text: str) -> list[float]:
+def _place(where: str, text: str, sizes: Sequence[int], wanted: str) -> list[float]:
     words = _words(text)
-    if len(words) != 3 or not all(map(is_number, words)):
-        raise FileFormatError(f"{where}: {shown(text)} is not a place; give x y z in metres")
+    if len(words) not in sizes or not all(map(is_number, words)):
+        raise FileFormatError(f"{where}: {shown(text)} is not a place; give {wanted}")
     values = [float(word) for word in words]
     if not all(abs(value) <= LARGEST for value in values):
         raise FileFormatError(f"{where}: {shown(text)} is not within {LARGEST:g} m of the origin; give metres")

@@ -86,7 +86,7 @@ def test_clearance_is_kept_at_the_speeds_people_move_with(jumping, dt, solver, l
         assert least_distance(case.scene, step.q) >= 0.9 * CLEARANCE
         assert sweep.first_contact(q, step.q) is None
 
-    follow(case.problem, wb.QP(solver), dt, case.targets(100), check)
+    follow(case.problem, wb.QP(solver), dt, case.targets(50), check)
 
 
 def test_a_person_whose_goals_jump_enters_nothing(least_distance):
@@ -262,7 +262,7 @@ def test_a_changed_scene_is_refused_in_the_next_step(planar_arm):
         tracker.step(problem.start)
 
 
-@pytest.mark.parametrize("speed", [0.5, 1.0, 2.0, 3.0])
+@pytest.mark.parametrize("speed", [0.5, 3.0])
 def test_a_limb_gets_out_of_the_way_of_a_thrown_ball(planar_arm, least_distance, speed):
     """The ball is inside when the frame begins, by up to 50 mm: more than a step may go that looks 60 mm far."""
     dt, radius = 1.0 / 60.0, 0.05

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.clip.arguments import JOBS, MOTIONS, ONE_MOTION, PAGE, clip_of, figure_of, jobs_of
+from wholebody.cli.clip.arguments import JOBS, MOTIONS, ONE_MOTION, PAGE, SCENE, clip_of, figure_of, jobs_of, scene_of
 from wholebody.cli.command import command, flag, option
 
 if TYPE_CHECKING:
@@ -103,6 +103,14 @@ it holds are not made again.""",
     option(
         "--ground", choices=("auto", "none"), default="auto", help="find where feet rest, or follow the skeleton alone"
     ),
+    SCENE,
+    option(
+        "--track",
+        action="append",
+        default=[],
+        metavar="THING=FILE",
+        help="where a thing of the scene is in each frame: a line of x y z, or x y z qx qy qz qw; repeated for others",
+    ),
     option("--unit", metavar="UNIT", help="of lengths, such as centimetres (default: recognised)"),
     option("--up", choices=("y", "z"), help="the axis that points up (default: recognised)"),
     PAGE,
@@ -112,6 +120,7 @@ examples:
   wholebody clip retarget walk.bvh --out walk.npz --sex female --stature 1.62
   wholebody clip retarget walk.bvh --to g1.urdf --ground auto --out walk.npz
   wholebody clip retarget walk.bvh --to g1.urdf --rate 50 --bare --out walk.csv --html walk.html
+  wholebody clip retarget lift.bvh --scene room.toml --track box=box.csv --out lift.npz
   wholebody clip retarget walk.bvh run.bvh jump.bvh --out clips --jobs 4""",
 )
 def retarget_motions(arguments: argparse.Namespace) -> int:
@@ -129,24 +138,42 @@ def retarget_motions(arguments: argparse.Namespace) -> int:
     if arguments.html is not None:
         checked_target(arguments.html, "--html", "a page", (".htm", ".html"), arguments.files)
     motion = read_skeleton(arguments.files[0], unit=arguments.unit, up=arguments.up)
-    figure = figure_of(arguments)
+    scene, tracks = scene_of(arguments), _tracks(arguments)
+    figure = scene.figure
     with bar("retargeting") as tell:
         clip = retarget(
-            motion, figure, ground=None if arguments.ground == "none" else "auto", names=arguments.names,
+            motion, figure, None if arguments.scene is None else scene,
+            None if arguments.ground == "none" else "auto", things=tracks, names=arguments.names,
             progress=lambda share: tell(share, "retargeting"),
         )  # fmt: skip
     _print_errors(bone_errors(motion, clip, arguments.names))
     if arguments.html is not None:
-        from wholebody.scene.scene import Scene
         from wholebody.view.motion_curves import motion_curves
 
-        page = motion_curves(motion, {"retargeted": clip}, Scene(figure), arguments.names)
+        page = motion_curves(motion, {"retargeted": clip}, scene, arguments.names)
         print(f"wrote {write(arguments.html, page)}")
     if arguments.rate is not None:
         clip = clip.resampled(1.0 / arguments.rate)
     written = clip.write(arguments.out, bare=arguments.bare)
     print(f"wrote {written}: {len(clip)} frames, {clip.duration:.3f} s, of {figure.name}")
     return 0
+
+
+def _tracks(arguments: argparse.Namespace) -> dict[str, Array] | None:
+    """Placements (n, 3) or (n, 7) of things by name; raises InputError for one that is not named, or has no scene."""
+    from wholebody.base.checks import shown
+    from wholebody.base.errors import InputError
+    from wholebody.tracking.path_following import read_rows
+
+    found = {}
+    for given in arguments.track:
+        name, _, file = given.partition("=")
+        if not (name and file):
+            raise InputError(f"--track is {shown(given)}; give THING=FILE, such as box=box.csv")
+        if arguments.scene is None:
+            raise InputError(f"--track {name}: there is no scene with such a thing; give --scene TASK.toml")
+        found[name] = read_rows(Path(file), (3, 7), "x y z in metres, or x y z qx qy qz qw")
+    return found or None
 
 
 def _aim(arguments: argparse.Namespace) -> None:
@@ -186,8 +213,8 @@ def _many(arguments: argparse.Namespace) -> int:
     from wholebody.cli.tables import bar
     from wholebody.motion.batch import read_many
 
-    for given in ("names", "ground", "unit", "up", "rate", "bare", "html"):
-        if getattr(arguments, given) not in (None, False, "auto"):
+    for given in ("names", "ground", "scene", "track", "unit", "up", "rate", "bare", "html"):
+        if getattr(arguments, given) not in (None, False, "auto", []):
             raise InputError(f"--{given} is for one file, and there are {len(arguments.files)}; give one at a time")
     figure, count = figure_of(arguments), len(arguments.files)
     with bar("retargeting", count) as tell:

@@ -79,7 +79,7 @@ def joint_limits(person: Person, row: Mapping[str, str]) -> tuple[float, float]:
     """Least and greatest angle of a joint, degrees; how far the clavicle rises follows from overhead reach.
 
     From 45 years on scaled by means of 45 to 69 over 20 to 44 (Soucie et al. 2011), or at most the older mean. Where
-    soft parts meet, who is stouter than the median person ends earlier (Park et al. 2010).
+    soft parts meet, who is stouter than the median person bends less (table "girth_ranges").
     """
     limits = {"lower": float(row["lower_deg"]), "upper": float(row["upper_deg"])}
     if row["name"].endswith("_clavicle_elevation"):
@@ -93,12 +93,13 @@ def joint_limits(person: Person, row: Mapping[str, str]) -> tuple[float, float]:
             size = abs(limits[end])
             size = size * float(old) / float(young) if young else min(size, float(old))
             limits[end] = math.copysign(size, limits[end])
+    earlier = 0.0
     for change in table("girth_ranges"):
         if row["name"].endswith(f"_{change['joint']}"):
             usual = make_person(person.sex, age=person.age)
             beyond = person.size(change["dimension"]) - usual.size(change["dimension"])
-            limits[change["limit"]] -= float(change["degrees_per_metre"]) * max(beyond, 0.0)
-    return limits["lower"], limits["upper"]
+            earlier += float(change["degrees_per_metre"]) * beyond
+    return limits["lower"], limits["upper"] - max(earlier, 0.0)
 
 
 def landmarks(size: Dimensions) -> tuple[Landmark, ...]:

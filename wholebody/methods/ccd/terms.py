@@ -132,6 +132,6 @@ def _goal_place(goal: Point | Frame | Orientation) -> GoalPlace:
     if isinstance(goal, Point):
         return GoalPlace(goal.place.frame, three(goal.resolved_offset), three(goal.resolved_target), None, goal.weight)
     asked = goal.residual
-    there = three(asked.target) if asked.position else None
+    there = three(asked.placement.translation) if asked.position else None
     rotation = asked.placement.rotation if asked.orientation else None
     return GoalPlace(asked.place.frame, (0.0, 0.0, 0.0), there, rotation, goal.weight)

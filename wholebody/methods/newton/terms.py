@@ -105,9 +105,9 @@ def _placement(
     base, local = _local(bodies, residual.base.frame), _local(bodies, residual.place.frame)
     a, b = bodies.index(residual.base.joint), bodies.index(residual.place.joint)
     if residual.position:
-        equations.coincide(a, b, label, base.act(residual.target), np.array(local.translation), role)
+        equations.coincide(a, b, label, base.act(residual.placement.translation), np.array(local.translation), role)
     if residual.orientation:
-        wanted = pin.Quaternion(base.rotation @ residual.undo.rotation.T)
+        wanted = pin.Quaternion(base.rotation @ residual.placement.rotation)
         equations.turn(a, b, label, wanted, pin.Quaternion(local.rotation), 3, role)
 
 

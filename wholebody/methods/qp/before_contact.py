@@ -118,7 +118,7 @@ def _places(problem: Problem, term: Any, state: State) -> list[Goal]:
     found: list[Goal] = []
     for place in turned.values():
         at = pin.SE3(state.frame(place.frame))
-        found.append(filled(Frame(names[place.joint], at), residual=PlacementResidual.build(place, at)))
+        found.append(filled(Frame(names[place.joint], at), residual=PlacementResidual(place, at)))
     gap = next(part for part in term.parts if isinstance(part, (Gap, Near)))
     near = nearest(gap.first, gap.second, state)
     for joint in (near.joint,) if turned else (near.joint, near.against):

@@ -127,9 +127,9 @@ _PLACED = frozenset((Point, Frame, Orientation, Relative))
 def _kind(goal: Any) -> Hashable:
     """What goals have in common that differ in numbers alone."""
     if type(goal) is Point:
-        return Point, goal.weight, goal.place
+        return Point, goal.weight, goal.place[:2]
     residual = goal.residual
-    return type(goal), goal.weight, residual.place, residual.base, residual.position, residual.orientation
+    return type(goal), goal.weight, residual.place[:2], residual.base[:2], residual.position, residual.orientation
 
 
 def _tables(problem: Problem, numbers: Numbers) -> Array:
@@ -138,7 +138,7 @@ def _tables(problem: Problem, numbers: Numbers) -> Array:
     tables[:, :, 24:27] = numbers.targets
     for g, goal in enumerate(problem.goals):
         if type(goal) is Point:
-            at = problem.scene.model.frames[goal.place.frame].placement
+            at = goal.place.placement
             tables[:, g, 9:12] = numbers.offsets[:, g] @ at.rotation.T + at.translation
         else:
             tables[:, g, 27:] = numbers.undo[:, g].transpose(0, 2, 1).reshape(-1, 9)

@@ -145,14 +145,14 @@ def still_dofs(problem: Problem) -> list[int]:
     return [int(dof) for dof in np.flatnonzero(still)]
 
 
-def reachable_pairs(problem: Problem, still: Iterable[int], numbers: Indices) -> Mask:
-    """Which pairs (k,), by number, are not proven to stay apart, with the degrees `still` and held frames fixed.
+def reachable_pairs(problem: Problem, kept: set[int], rests: Mask, numbers: Indices) -> Mask:
+    """Which pairs (k,), by number, are not proven to stay apart, with the degrees `kept` and held frames fixed.
 
-    Of two pieces that both move nothing is said.
+    Of two pieces that both move nothing is said; `rests` are the joints that do not move in the world.
     """
     scene, model = problem.scene, problem.scene.model
     table, clearances, own = scene.pair_table, problem.clearances[numbers], scene.figure.geometry.ngeoms
-    joint, pairs, start, kept = table.joint, table.pairs[numbers], problem.start, set(still)
+    joint, pairs, start = table.joint, table.pairs[numbers], problem.start
     within = (start >= model.lowerPositionLimit).all() and (start <= model.upperPositionLimit).all()
     if within and not kept and not joint[own:].any():
         reach = _of_figure(scene.figure)
@@ -160,10 +160,6 @@ def reachable_pairs(problem: Problem, still: Iterable[int], numbers: Indices) ->
         reach = Reach(model, start, _resting(scene.geometry, table.reach), joint, kept)
     # m: largest displacement of a piece by errors of holds; an accepted answer has less
     views = [(reach.seen_from(0), 0.0), *((b, 1e-3) for b in held_balls(scene.figure, reach, problem.constraints))]
-    rests = np.zeros(model.njoints, dtype=bool)
-    for j in range(model.njoints):
-        dofs = range(model.idx_vs[j], model.idx_vs[j] + model.nvs[j]) if j else ()
-        rests[j] = (not j or rests[model.parents[j]]) and kept.issuperset(dofs)
     with borrowed(scene.built, Workspace.refresh) as workspace:
         at = workspace.proximity.placements(workspace.state.update(start).data)
     open_, fixed = np.ones(len(pairs), dtype=bool), rests[joint[pairs]]

@@ -170,7 +170,7 @@ def simplify(problem: Problem) -> Simplified:
         body[joint] = body[model.parents[joint]]
     moves = body[table.joint[table.pairs[:, 0]]] != body[table.joint[table.pairs[:, 1]]]
     numbers = np.flatnonzero(moves)
-    numbers = numbers[reachable_pairs(problem, still, numbers)]
+    numbers = numbers[reachable_pairs(problem, still, body == 0, numbers)]
     made = _without(problem, frozen, numbers) if frozen else None
     if made is None:
         frozen, figure = [], whole.figure
