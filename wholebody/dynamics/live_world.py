@@ -48,7 +48,17 @@ class LiveWorld:
         give_way: who takes an overlap of the figure with a thing that moves by itself, see `World`.
         ways: what `give_way` may be.
         methods, chosen: of the tracker: "qp" alone.
+
+    Examples:
+        >>> from wholebody.dynamics.live_world import LiveWorld
+        >>> live = LiveWorld(wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor"))
+        >>> live.follow({"head_top": live.place("head_top")})
+        >>> live.move().overlap < 1e-4
+        True
     """
+
+    def __repr__(self) -> str:
+        return f"LiveWorld({len(self.handles)} handles, {len(self.things)} things)"
 
     def __init__(self, scene: Scene, start: Array | None = None, *, give_way: str = "figure") -> None:
         """Begin at a start (nq,), with the soles of people held until they are released.

@@ -56,7 +56,18 @@ class LiveDrag:
         methods: what can be chosen: names of methods, and the configured one that was given.
         method: what follows the handles.
         chosen: its name among them.
+
+    Examples:
+        >>> from wholebody.tracking.live import LiveDrag
+        >>> drag = LiveDrag(problem)
+        >>> drag.take("right_palm")
+        >>> frame = drag.move(drag.place("right_palm") + (0.0, 0.0, 0.02))  # metres
+        >>> frame.error < 1e-3
+        True
     """
+
+    def __repr__(self) -> str:
+        return f"LiveDrag({len(self.handles)} handles, {len(self.things)} things, by {self.chosen!r})"
 
     def __init__(self, problem: Problem | Assembly, method: str | Method = "qp") -> None:
         """Begin at the problem's start, or where the assembly's bodies are.
