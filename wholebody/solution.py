@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from wholebody.assessment.posture import Assessment
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.base.charts import Shown, new_chart
 
 SMALLEST = 1e-9  # m or rad: what is drawn of a zero on a logarithmic axis
@@ -15,7 +15,7 @@ FEW = 60  # entries that a chart joins by lines
 Status = Literal["solved", "unreachable", "infeasible", "stalled"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class TraceEntry:
     """One line of a solution's trace.
 
@@ -32,6 +32,8 @@ class TraceEntry:
     measure: float
     step: float
     note: str = ""
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True, repr=False)

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array, Mask, cross
+from wholebody.base.arrays import Array, Mask, brief, cross
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range
 from wholebody.figures.state import State, Wrench
@@ -88,7 +88,7 @@ LARGEST = FieldOfView()
 """Largest eye movement: 35 degrees to each side, 40 up, 20 down (same source, maximum eye rotation)."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Sight:
     """What is known of seeing a point.
 
@@ -107,6 +107,8 @@ class Sight:
     comfortable: bool
     distance: float
     hidden_by: str
+
+    __repr__ = brief
 
     @property
     def seen(self) -> bool:

@@ -15,7 +15,7 @@ import pinocchio as pin
 
 from wholebody.assessment.posture import assess
 from wholebody.base import checks
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, brief
 from wholebody.base.errors import InputError
 from wholebody.base.runner import processor_time
 from wholebody.geometry.continuous.sweep import Sweep
@@ -41,7 +41,7 @@ NEARER = 0.95  # of the length of the best motion: what others are shorter than
 ROUNDS = 50  # of the trees, until they get another end
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Plan:
     """A planned motion and what it is worth.
 
@@ -70,6 +70,8 @@ class Plan:
     velocity: float = 0.0
     acceleration: float = 0.0
     seconds: float = 0.0
+
+    __repr__ = brief
 
 
 def plan(
