@@ -22,12 +22,14 @@ import pytest
 
 import wholebody as wb
 from wholebody import tracking
+from wholebody.dynamics.live_world import LiveWorld
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.figures.state import State
 from wholebody.geometry.compound import Compound
 from wholebody.motion import measures
 from wholebody.motion.sphere_filling import Spheres, fill_with_spheres
 from wholebody.planning.distinct_solutions import Solutions
+from wholebody.tracking.live import LiveDrag
 from wholebody.view import Viewer
 from wholebody.view.motion_curves import timeline
 
@@ -504,6 +506,26 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         "follow_path",
         Call(wb.follow_path, {"problem": ask, "path": places, "method": "qp", "goal": 0, "spacing": 0.05}),
     )
+
+    def taken(live: Any, method: str, /, **arguments: Any) -> Any:
+        live.take("link4")
+        return getattr(live, method)(**arguments)
+
+    fed_live = {"take": {"name": "link4", "turn": False}, "move": {"place": at}, "toggle": {"name": "link4"}}
+    fed_live |= {"choose": {"method": "qp"}, "orientation": {"name": "link4"}, "place": {"name": "link4"}}
+    fed_live |= {"place_at": {"q": q, "name": "link4"}, "report": {}, "stated": {"goals": []}, "undo": {}, "let_go": {}}
+    yield "LiveDrag", Call(LiveDrag, {"problem": ask, "method": "qp"})
+    for name, arguments in fed_live.items():
+        yield f"LiveDrag.{name}", Call(partial(taken, LiveDrag(ask), name), arguments)
+    parts = LiveDrag(assembly())
+    held = next(iter(parts.constraints))
+    yield "LiveDrag.constrain", Call(parts.constrain, {"name": held, "holds": False})
+    ball = wb.Scene(arm).add(wb.Sphere(0.1), name="ball", at=(3.0, 0.0, 0.0), body=wb.Body(mass=1.0))
+    yield "LiveWorld", Call(LiveWorld, {"scene": ball, "start": q, "give_way": "figure"})
+    in_world = {"take": {"name": "link4"}, "move": {"place": at}, "follow": {"places": {"link4": at}}}
+    in_world |= {"toggle": {"name": "link4"}, "choose": {"method": "qp"}, "place": {"name": "ball"}}
+    for name, arguments in (in_world | {"report": {}, "let_go": {}, "undo": {}}).items():
+        yield f"LiveWorld.{name}", Call(partial(taken, LiveWorld(ball), name), arguments)
 
     def solve_parts(made: Any) -> Any:
         return made.solve(iterations=3)

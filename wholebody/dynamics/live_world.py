@@ -163,7 +163,8 @@ class LiveWorld:
     # ---- what is seen
 
     def place(self, name: str) -> Array:
-        """Where (3,) the handle of a frame or a thing is."""
+        """Where (3,) [m] the handle of a frame or a thing is; UnknownNameError where there is none."""
+        known(name, {*self.handles, *self.things}, "handle")
         if name in self.things:
             return np.array(self.scene.objects[name].placement.translation)
         return self._handle_place(self._state, self.q, name)

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, with_values
-from wholebody.base.checks import known, numbers, shown
+from wholebody.base.checks import flag, known, numbers, shown
 from wholebody.base.errors import InputError, WholebodyError
 from wholebody.geometry.continuous.passing_through import GRAZE
 from wholebody.geometry.proximity import Contacts
@@ -97,9 +97,9 @@ class LiveDrag:
     def take(self, name: str, *, turn: bool = False) -> None:
         """Take the handle of a frame or a thing, to move it or, a frame's, to `turn` it.
 
-        Raises UnknownNameError where there is none.
+        Raises UnknownNameError where there is none, InputError if `turn` is neither True nor False.
         """
-        known(name, self.handles if turn else {*self.handles, *self.things}, "handle")
+        known(name, self.handles if flag(turn, "turn") else {*self.handles, *self.things}, "handle")
         self._remember()
         self.taken, self._turns = name, turn
         self._restart()
@@ -140,9 +140,10 @@ class LiveDrag:
     def constrain(self, name: str, holds: bool) -> None:
         """Let one of `constraints` hold, or release it; the next frames close it. `undo` takes it back.
 
-        Raises UnknownNameError where there is none.
+        Raises UnknownNameError where there is none, InputError if `holds` is neither True nor False.
         """
         known(name, self.constraints, "constraint")
+        flag(holds, "holds")
         self._remember()
         self._subject.constrain(name, holds)
         if self.taken:
@@ -186,15 +187,17 @@ class LiveDrag:
         return self._subject.scene
 
     def orientation(self, name: str) -> Array:
-        """How (4,) the handle of a frame is turned, a quaternion (x, y, z, w)."""
+        """How (4,) the handle of a frame is turned, a quaternion (x, y, z, w); UnknownNameError where there is none."""
+        known(name, self.handles, "handle")
         return np.array(pin.SE3ToXYZQUAT(self._placement(self.q, name))[3:])
 
     def place(self, name: str) -> Array:
-        """Where (3,) the handle of a frame or a thing is."""
+        """Where (3,) [m] the handle of a frame or a thing is; UnknownNameError where there is none."""
         return self.place_at(self.q, name)
 
     def place_at(self, q: Array, name: str) -> Array:
-        """The same at a posture (nq,)."""
+        """The same at a posture (nq,); InputError where it is none of the figure."""
+        known(name, {*self.handles, *self.things}, "handle")
         if name in self.things:
             return np.array(self.scene.objects[name].placement.translation)
         return np.array(self._placement(q, name).translation)
