@@ -269,9 +269,14 @@ class Problem(checks.FixedAttributes):
             InputError: q has the wrong shape or a value that is not finite.
         """
         result = copy.copy(self)
+        result._plan = self._plan
         result.start = checks.posture(q, self.scene.model.nq, "with_start: q")
         self.scene.figure.warn_of_angles(result.start, "with_start: q")
         return result
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but what a solve has added: a problem is the same problem before and after it."""
+        return {**vars(self), "_plan": None}
 
     def borrow(self) -> Loan[Workspace]:
         """Borrow a workspace on this problem's scene for one run; see `Scene.borrow`.

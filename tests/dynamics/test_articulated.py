@@ -178,6 +178,40 @@ def test_a_chain_swings_as_its_equations_of_motion_say(tmp_path: Path) -> None:
     assert moving.velocity == pytest.approx(end[3:], abs=2e-2)
 
 
+def test_a_limp_joint_beyond_a_sprung_one_falls_as_its_equations_of_motion_say(tmp_path: Path) -> None:
+    figure = chain(tmp_path, 2, "revolute")
+    start, springs = np.array([0.1, -0.2]), np.array([200.0, 0.0])
+    dampers = np.array([8.0, 0.0])
+    actuated = wb.Actuated(figure, stiffness={"j0": springs[0]}, damping={"j0": dampers[0]})
+    moving = Articulated(wb.Scene(figure), start, actuated, None)
+    for _ in range(24):
+        moving.advance(start, DT, {}, {})
+    model, data = figure.model, figure.model.createData()
+
+    def rate(_: float, state: Any) -> Any:
+        q, v = state[:2], state[2:]
+        borne = np.where(springs > 0.0, pin.computeGeneralizedGravity(model, data, q), 0.0)
+        return np.concatenate([v, pin.aba(model, data, q, v, springs * (start - q) - dampers * v + borne)])
+
+    end = solve_ivp(rate, (0.0, 24 * DT), np.concatenate([start, np.zeros(2)]), rtol=1e-9, atol=1e-9).y[:2, -1]
+    assert abs(end[1] - start[1]) > 0.5  # rad
+    assert moving.q == pytest.approx(end, abs=0.02)
+
+
+def test_joints_that_follow_others_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "twins.urdf"
+    link = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    joint = '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/>'
+    path.write_text(
+        f'<robot name="twins"><link name="a"/><link name="b">{link}</link><link name="c">{link}</link>'
+        f'<joint name="one" type="revolute"><parent link="a"/><child link="b"/>{joint}</joint>'
+        f'<joint name="two" type="revolute"><parent link="b"/><child link="c"/>{joint}<mimic joint="one"/></joint></robot>'
+    )
+    figure = wb.load(path)
+    with pytest.raises(wb.InputError, match="two follow other joints"):
+        wb.World(wb.Scene(figure), spring=wb.Actuated(figure))
+
+
 def test_a_figure_in_the_air_keeps_its_energy_and_momentum() -> None:
     figure = wb.load("hand")
     start = figure.posture("relaxed")

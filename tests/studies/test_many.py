@@ -56,6 +56,31 @@ def test_answers_are_those_of_single_solves_whatever_jobs_is(arm: wb.Figure) -> 
             np.testing.assert_array_equal(record.q, q)
 
 
+@pytest.mark.parametrize("stopped", [1, 2, 20])
+def test_runs_that_were_ended_and_go_on_answer_as_those_that_were_not(
+    arm: wb.Figure, tmp_path: Path, stopped: int
+) -> None:
+    """Among the first cases of three runs, of which the second is out of reach, and in the midst of a run."""
+    places = [(0.4, 0.01 * k - 0.2, 0.5) if k != 16 else (3.0, 0.0, 0.5) for k in range(34)]
+    problems = [problem(arm, place, measures=[wb.Effort()]) for place in places]
+    whole = wb.solve_many(problems, warm_start=True)
+    some = wb.solve_many(problems, warm_start=True, folder=tmp_path, progress=lambda told: told.done >= stopped)
+    assert 0 < sum(one.q is not None for one in some) < len(problems)
+    for one, other in zip(wb.solve_many(problems, warm_start=True, folder=tmp_path), whole, strict=True):
+        np.testing.assert_array_equal(one.q, other.q)
+
+
+def test_a_problem_that_was_solved_is_found_in_its_folder(tmp_path: Path) -> None:
+    scene = wb.Scene(wb.load("human"))
+    given = [wb.Problem(scene, goals=[wb.Point("right_palm", (0.4, side, 1.2))]) for side in (-0.3, -0.2)]
+    wb.solve(given[0])
+    wb.solve_many(given, folder=tmp_path)
+    wb.solve(given[1])
+    done: list[int] = []
+    wb.solve_many(given, folder=tmp_path, progress=lambda told: done.append(told.done))
+    assert done == [2]
+
+
 def test_warm_starts_are_the_same_whatever_jobs_is_and_solve_each_goal(arm: wb.Figure) -> None:
     problems = [problem(arm, (0.4, 0.02 * k - 0.2, 0.5)) for k in range(10)]
     one, two = (wb.solve_many(problems, jobs=jobs, warm_start=True) for jobs in (1, 2))

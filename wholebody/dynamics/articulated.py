@@ -140,9 +140,10 @@ class Articulated:
         after = self.velocity
         motor = self.stiffness * (apart + time * (steady - after)) + self.damping * (steady - after) + borne
         work = np.einsum("ij,ij->i", impulse, (points.figure @ (0.5 * (start + after))).reshape(-1, 3))
-        paid = time * float(motor @ (0.5 * (start + after))) + float(work[points.driven].sum())
         # springs and contacts are implicit; what is free of them moves by the mean of both velocities
-        ways = self._move(time * np.where((self.stiffness > 0.0) | bearing.any(), after, mean), segments)
+        moves = time * np.where((self.stiffness > 0.0) | bearing.any(), after, mean)
+        paid = float(motor @ moves) + float(work[points.driven].sum())
+        ways = self._move(moves, segments)
         ways |= {name: (way[0], pin.SE3.Interpolate(*way, time / planned)) for name, way in moved.items()}
         self._settle(began + paid, 1.0 if impulse.any() or self.stiffness.any() else 1.05)
         if engine is not None:

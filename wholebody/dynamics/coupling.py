@@ -23,7 +23,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import TIME_STEP, a, instance, known, number, posture, time_step
+from wholebody.base.checks import TIME_STEP, a, instance, known, number, posture, some, time_step
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range
 from wholebody.dynamics.rigid_bodies import RigidBodies
@@ -235,6 +235,9 @@ class Actuated:
         return found
 
     def check(self, model: pin.Model) -> None:
-        """Raise InputError for a scene with another model."""
+        """Raise InputError for a scene with another model, and for joints that follow others."""
+        if self.figure.followers:
+            names = some(self.figure.followers)
+            raise InputError(f"Actuated: {names} follow other joints and cannot yield; make them joints of their own")
         if list(model.names) != list(self.figure.model.names):
             raise InputError(f"Actuated: the scene is not one of {a(self.figure.name)}; give scene.figure")

@@ -214,7 +214,7 @@ class Figure(checks.FixedAttributes):
         if name not in self._places:
             frame = self.model.frames[index]
             self._places[name] = Place(index, int(frame.parentJoint), pin.SE3(frame.placement))
-        return self._places[name]
+        return Place(*self._places[name][:2], self._places[name].placement.copy())
 
     def placement(self, q: Array, name: str) -> pin.SE3:
         """Return the placement in the world, at the posture q (nq,), of a frame, a segment or a joint."""

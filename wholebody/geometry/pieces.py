@@ -99,7 +99,7 @@ def swept_points(geometry: Any) -> SweptPoints:
     )
 
 
-@lru_cache(maxsize=1024)  # scenes of one study share the hulls of their things
+@lru_cache(maxsize=64)  # scenes of one study share the hulls of their things; more would hold those of scenes gone
 def _swept_hull(geometry: Any) -> SweptPoints:
     points = np.array(geometry.points())
     faces = _convex_faces(geometry, points)

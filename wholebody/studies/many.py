@@ -179,16 +179,18 @@ def run_cases(
     # The first of each run begin at each other's answers, one after the other, and the rest of a run at its first: so
     # all runs are of one family of postures, whatever `jobs` is.
     linked = [run for run in waiting if len(run) > 1]
-    heads, alone = [[run[0] for run in linked]] if len(linked) > 1 else [], list[Sequence[int]]()
-    tails = [run[1:] if heads else run for run in linked] + [run for run in waiting if len(run) == 1]
+    firsts, alone = [run[0] for run in numbered if len(run) > 1], list[Sequence[int]]()
+    leading = [firsts] if linked and len(firsts) > 1 else []
+    heads = [left for run in leading if (left := [k for k in run if k not in done])]
+    tails = [run[1:] if leading else run for run in linked] + [run for run in waiting if len(run) == 1]
     for work in (heads, tails, alone):  # the cases of a run whose process ended are done again, one by one
         if not over and work:
-            leading = heads[0] if heads and work is tails else []
-            starts = {run[0]: _solved_before(run[0], leading, done) for run in work}
+            led = firsts if leading and work is not alone else []
+            starts = {run[0]: _solved_before(run[0], led, done) for run in work}
             over = _run(work, order, running, keep, alone, {k: done[j].q for k, j in starts.items() if j is not None})
     if not over and waiting:
         family = Family(order, done, partial(_computed, order, running), keep)
-        starts = {k: _solved_before(k, run, done) for run in (*heads, *linked) for k in run[1:]}
+        starts = {k: _solved_before(k, run, done) for run in (*leading, *linked) for k in run[1:]}
         before_it = {k: j for k, j in starts.items() if j is not None}
         _ = solve_from_neighbours(family, before_it) or (linked and lowers and (lower(family) or name_changes(family)))
     return Records([done.get(k, order[k].record) for k in range(len(order))])

@@ -102,7 +102,8 @@ class ReachMap(Shown):
     @property
     def extent(self) -> str:
         """`volume` with its unit."""
-        return f"{self.volume:.3g} {('m', 'm', 'm^2', 'm^3')[sum(size > 1 for size in self.verdict.shape)]}"
+        axes = sum(size > 1 for size in self.verdict.shape)
+        return f"{self.volume:.3g} {('', 'm', 'm^2', 'm^3')[axes]}" if axes else "one place"
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write all arrays into an npz file; returns the path."""

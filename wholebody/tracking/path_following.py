@@ -215,7 +215,7 @@ def _words(text: str) -> list[str]:
 def _place(where: str, text: str, sizes: Sequence[int], wanted: str) -> list[float]:
     words = _words(text)
     if len(words) not in sizes or not all(map(is_number, words)):
-        raise FileFormatError(f"{where}: {shown(text)} is not a place; give {wanted}")
+        raise FileFormatError(f"{where}: {shown(text)} is not a place; give {wanted}, as many numbers in every line")
     values = [float(word) for word in words]
     if not all(abs(value) <= LARGEST for value in values):
         raise FileFormatError(f"{where}: {shown(text)} is not within {LARGEST:g} m of the origin; give metres")

@@ -76,7 +76,7 @@ def scene_of(arguments: argparse.Namespace) -> Scene:
     from wholebody.taskfile import read_task
 
     if arguments.figure != "human" or arguments.root is not None or person_options(arguments):
-        raise InputError("--scene has a figure of its own; leave out --figure and the options of a person")
+        raise InputError("--scene has a figure of its own; leave out --figure, --to and the options of a person")
     return read_task(arguments.scene).problem.scene
 
 

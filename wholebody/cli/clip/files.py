@@ -172,6 +172,8 @@ def _tracks(arguments: argparse.Namespace) -> dict[str, Array] | None:
             raise InputError(f"--track is {shown(given)}; give THING=FILE, such as box=box.csv")
         if arguments.scene is None:
             raise InputError(f"--track {name}: there is no scene with such a thing; give --scene TASK.toml")
+        if name in found:
+            raise InputError(f"--track {name}: it is given twice; give one file a thing")
         found[name] = read_rows(Path(file), (3, 7), "x y z in metres, or x y z qx qy qz qw")
     return found or None
 
