@@ -205,7 +205,8 @@ def test_joints_that_follow_others_are_refused(tmp_path: Path) -> None:
     path.write_text(
         f'<robot name="twins"><link name="a"/><link name="b">{link}</link><link name="c">{link}</link>'
         f'<joint name="one" type="revolute"><parent link="a"/><child link="b"/>{joint}</joint>'
-        f'<joint name="two" type="revolute"><parent link="b"/><child link="c"/>{joint}<mimic joint="one"/></joint></robot>'
+        f'<joint name="two" type="revolute"><parent link="b"/><child link="c"/>{joint}<mimic joint="one"/></joint>'
+        "</robot>"
     )
     figure = wb.load(path)
     with pytest.raises(wb.InputError, match="two follow other joints"):
