@@ -228,7 +228,7 @@ def _loop_type() -> Any:
             return cls._unserialize(codegen, kept)
 
     class Loop(CPUDispatcher):  # type: ignore[misc]
-        library = Library  # of its code
+        code_type = Library
 
         def enable_caching(self) -> None:
             self._cache = Kept(self.py_func)
@@ -246,8 +246,8 @@ def _loop_type() -> Any:
             with global_compiler_lock:
                 codegen = self.targetctx.codegen()
                 outer = codegen.create_library, codegen.unserialize_library
-                codegen.create_library = partial(self.library, codegen)
-                codegen.unserialize_library = partial(self.library.read, codegen)
+                codegen.create_library = partial(self.code_type, codegen)
+                codegen.unserialize_library = partial(self.code_type.read, codegen)
                 try:
                     return super().compile(sig)
                 finally:
@@ -267,7 +267,7 @@ def _inner_type() -> Any:
     Its code is optimised and made the processor's in its callers alone, which takes a seventh less time in all.
     """
 
-    class Unlinked(_loop_type().library):  # type: ignore[misc]
+    class Unlinked(_loop_type().code_type):  # type: ignore[misc]
         """Code for LLVM to put into that of callers."""
 
         codegen = property(lambda self: self)
@@ -292,7 +292,7 @@ def _inner_type() -> Any:
             self._finalized = True
 
     class Inner(_loop_type()):  # type: ignore[misc]
-        library = Unlinked
+        code_type = Unlinked
 
         def __call__(self, *args: Any, **named: Any) -> Any:
             raise TypeError(f"{self.py_func.__name__} is compiled for calls from compiled functions only")
