@@ -933,17 +933,8 @@ DERIVATIVES = (
 """What problems and methods, not people, ask of terms and states; at every posture, which is too often for checks."""
 
 ABSTRACT = (
-    "Shape",
-    "Term",
-    "Goal",
-    "Constraint",
-    "AssemblyConstraint",
-    "Bound",
-    "Measure",
-    "Method",
-    "Tracker",
-    "Figure",
-)
+    "Shape", "Term", "Goal", "Constraint", "AssemblyConstraint", "Bound", "Measure", "Method", "Tracker", "Figure",
+)  # fmt: skip
 """Classes to derive from, protocols, and the figure, which `load` builds."""
 
 BROWSER = ["open", "wait", "wait_until_closed", "sync", "picture", "movie", "close"]
