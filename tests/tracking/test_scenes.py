@@ -12,7 +12,8 @@ import pytest
 import wholebody as wb
 from wholebody.assessment.motion import assess_motion
 from wholebody.tasks import ReachCones
-from wholebody.tracking import InteractionScene, Recording, build_scene, follow, gallery, judge
+from wholebody.tracking import Recording, build_scene, follow, gallery, judge
+from wholebody.tracking.scenes import InteractionScene
 
 BEFORE, AFTER = 7, 19
 
