@@ -54,7 +54,7 @@ def one_start(family: str) -> Adapter:
     """The method of "qp", "newton" or "ccd" that has one start, as methods have that know no other."""
     known: dict[str, tuple[Adapter, Callable[..., Method]]] = {
         "qp": (qp_adapter(""), partial(QP, budget=0, restarts=0)),
-        "newton": (newton_adapter("slack"), partial(wb.Newton, restarts=0)),
+        "newton": (newton_adapter("slack"), partial(wb.methods.Newton, restarts=0)),
         "ccd": (ccd_adapter(), partial(wb.methods.CCD, restarts=0)),
     }
     adapter, kind = known[family]
@@ -78,7 +78,7 @@ def dls_adapter() -> Adapter:
 
 def newton_adapter(way: str) -> Adapter:
     """Sparse Newton in full coordinates, in one of the ways of `NEWTONS`."""
-    make = partial(made, partial(wb.Newton, **NEWTONS[way]), {"restarts": 0})
+    make = partial(made, partial(wb.methods.Newton, **NEWTONS[way]), {"restarts": 0})
     return Adapter(f"newton/{way}", make, (*few(3, 6, 12, 25), *LADDER[1:]))
 
 
@@ -118,11 +118,11 @@ class MovingPoint(Goal):
 def reach_problem(track: Track, goal: Goal) -> wb.Problem:
     """The problem of a reach with its feet and bounds on speed."""
     speed, turn = (SETTING.root_speed, SETTING.root_turn) if track.floating else (np.inf, np.inf)
-    bound = wb.StepLimit(SETTING.joint_speed, root_velocity=speed, root_turn=turn)
+    bound = wb.tasks.StepLimit(SETTING.joint_speed, root_velocity=speed, root_turn=turn)
     kept: list[Any] = [*(wb.Hold(foot) for foot in track.feet), bound]
     # the other tools cannot be told of what a person keeps
     return wb.Problem(
-        track.scene, track.start, goals=[goal], constraints=kept, measures=[wb.Displacement()],
+        track.scene, track.start, goals=[goal], constraints=kept, measures=[wb.tasks.Displacement()],
         clearance=track.clearance, range_of_motion=False, balance=False,
     )  # fmt: skip
 
@@ -136,7 +136,7 @@ class OwnTool(Tool):
         self._moved = None if solver == RETARGET else MovingPoint(track.tip, np.array(track.targets[0]))
         self.problem = reach_problem(track, self._moved or wb.Point(track.tip, track.targets[0]))
         solver = "" if solver == RETARGET else solver
-        self._tracker = wb.QP(**qp_settings(solver)).tracker(self.problem, SETTING.dt)
+        self._tracker = wb.methods.QP(**qp_settings(solver)).tracker(self.problem, SETTING.dt)
         self._q = np.array(track.start)
         self._told: list[QPStep] = []
 
