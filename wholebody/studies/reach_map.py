@@ -86,8 +86,8 @@ def reach_map(
         high: (3,) greatest corner; equal values make a plane or a line.
         step: metres between places, one or for each axis.
         offset: (3,) the point of the frame that reaches, in its axes.
-        method: of the solves, name or settings; None for `wb.QP(measures=False)`, with quicker settings where a
-            neighbour is reached. A method that is given solves all places, so `wb.QP()` minimises the measures too.
+        method: of the solves, name or settings; None for `wb.methods.QP(measures=False)`, with quicker settings where a
+            neighbour is reached. A given method solves all places: `wb.methods.QP()` minimises the measures too.
         jobs: processes.
         cluster: address of a dask scheduler; None for this machine.
         progress: called with the numbers of settled and of all places; if it returns True, the search ends, and the

@@ -77,6 +77,10 @@ class Term(Checked):
 
     Raises:
         InputError: a value of the wrong kind or out of range; it names the term, the argument and what it takes.
+
+    Examples:
+        >>> isinstance(wb.Point("left_palm", (0.4, 0.2, 1.0)), wb.tasks.Term)
+        True
     """
 
     _answered: ClassVar[Mapping[str, answers.Check]] = {}
@@ -199,7 +203,7 @@ class Bound(Term, ABC):
     Examples:
         docs/extending.md describes own terms.
 
-        >>> class Slow(wb.Bound):
+        >>> class Slow(wb.tasks.Bound):
         ...     def bounds(self, state, dt):
         ...         return np.full(state.model.nv, -0.1), np.full(state.model.nv, 0.1)
     """

@@ -94,7 +94,7 @@ def solved(arm: wb.Scene) -> tuple[wb.Problem, list[wb.Goal], wb.Solution]:
 
 def judged(problem: wb.Problem, goals: Sequence[wb.Goal], solution: wb.Solution, *, witness: bool) -> Verdict:
     found = judge(problem, goals, [], solution.q)
-    return verdict(problem, found, solution, tolerance=wb.QP().tolerance, witness=witness, seconds=0.1)
+    return verdict(problem, found, solution, tolerance=wb.methods.QP().tolerance, witness=witness, seconds=0.1)
 
 
 def outcome(solved: tuple[wb.Problem, list[wb.Goal], wb.Solution], **changed: Any) -> tuple[str, str]:

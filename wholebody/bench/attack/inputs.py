@@ -269,7 +269,7 @@ def called(name: str, given: dict[str, str], folder: Path) -> Verdict:
 
 
 def _use(made: Any, problem: wb.Problem) -> None:
-    scene, qp = problem.scene, wb.QP(budget=5)
+    scene, qp = problem.scene, wb.methods.QP(budget=5)
     roles: dict[str, type] = {"goals": wb.Goal, "constraints": wb.Constraint, "measures": wb.Measure}
     role: Any = {name: [made] for name, kind in roles.items() if isinstance(made, kind)}
     if role:

@@ -164,7 +164,7 @@ def judge(problem: Problem, goals: Sequence[Any], constraints: Sequence[Any], q:
     body = _Body(scene.model, start, q)
     held = [value for term in constraints for value in body.constraint(term)]
     for term in problem.constraints:
-        if isinstance(term, (wb.Balance, wb.ReachCones, wb.RangeOfMotion)):
+        if isinstance(term, (wb.Balance, wb.tasks.ReachCones, wb.tasks.RangeOfMotion)):
             value = np.atleast_1d(term.value(scene.state(q)))
             held += list(np.maximum(term.lower - value, value - term.upper))
     return Judged(

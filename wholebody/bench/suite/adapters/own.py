@@ -51,7 +51,7 @@ def one_start(family: str) -> Adapter:
     """The method of "qp", "newton" or "ccd" that has one start, as methods have that know no other."""
     known: dict[str, tuple[Adapter, Callable[..., Method]]] = {
         "qp": (qp_adapter(""), partial(QP, budget=0, restarts=0)),
-        "newton": (newton_adapter("slack"), partial(wb.Newton, restarts=0)),
+        "newton": (newton_adapter("slack"), partial(wb.methods.Newton, restarts=0)),
         "ccd": (ccd_adapter(), partial(wb.methods.CCD, restarts=0)),
     }
     adapter, kind = known[family]
@@ -75,7 +75,7 @@ def dls_adapter() -> Adapter:
 
 def newton_adapter(way: str) -> Adapter:
     """Sparse Newton in full coordinates, in one of the ways of `NEWTONS`."""
-    make = partial(made, partial(wb.Newton, **NEWTONS[way]), {"restarts": 0})
+    make = partial(made, partial(wb.methods.Newton, **NEWTONS[way]), {"restarts": 0})
     return Adapter(f"newton/{way}", make, (*few(3, 6, 12, 25), *LADDER[1:]))
 
 
@@ -116,7 +116,7 @@ def reach_problem(track: Track, **terms: Any) -> tuple[wb.Problem, MovingPoint]:
     """The problem of a reach with its feet and bounds on speed, and its goal, whose target is moved afterwards."""
     goal = MovingPoint(track.tip, np.array(track.targets[0]))
     speed, turn = (SETTING.root_speed, SETTING.root_turn) if track.floating else (np.inf, np.inf)
-    bound = wb.StepLimit(SETTING.joint_speed, root_velocity=speed, root_turn=turn)
+    bound = wb.tasks.StepLimit(SETTING.joint_speed, root_velocity=speed, root_turn=turn)
     kept: list[Any] = [*(wb.Hold(foot) for foot in track.feet), bound]
     stated = wb.Problem(
         track.scene, track.start, goals=[goal], constraints=kept, clearance=track.clearance, **terms
@@ -131,9 +131,11 @@ class OwnTool(Tool):
         """State the problem; the target is moved afterwards. The solver is one of `qp_settings`."""
         self.name = f"wholebody/{solver}" if solver else "wholebody"
         # the other tools cannot be told of what a person keeps
-        self.problem, goal = reach_problem(track, measures=[wb.Displacement()], range_of_motion=False, balance=False)
+        self.problem, goal = reach_problem(
+            track, measures=[wb.tasks.Displacement()], range_of_motion=False, balance=False
+        )
         self._target = goal.target
-        self._tracker = wb.QP(**qp_settings(solver)).tracker(self.problem, SETTING.dt)
+        self._tracker = wb.methods.QP(**qp_settings(solver)).tracker(self.problem, SETTING.dt)
         self._q = np.array(track.start)
         self._told: list[QPStep] = []
 
