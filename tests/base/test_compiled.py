@@ -229,7 +229,7 @@ def signatures():
     return {(name, str(kind)) for name, loop in found.items() for kind in getattr(loop, "signatures", ())}
 
 def steps(problem, count):
-    tracker, q, near = wb.QP().tracker(problem, 0.02), problem.start, set()
+    tracker, q, near = wb.methods.QP().tracker(problem, 0.02), problem.start, set()
     for _ in range(count):
         q = tracker.step(q).q
         near.add(len(problem.scene.contacts(q, 0.02).distance))
@@ -239,7 +239,7 @@ compiled.compile_all()
 print(compiled.compile_seconds(), "scipy.linalg" in sys.modules)
 before = signatures()
 shelf = wb.read_task("examples/tasks/shelf.toml").problem
-for method in (wb.QP(), wb.Newton(iterations=5, restarts=0)):
+for method in (wb.methods.QP(), wb.methods.Newton(iterations=5, restarts=0)):
     wb.solve(shelf, method)
 steps(shelf, 20)
 wb.solve(wb.read_task("examples/tasks/robot_arm_among_obstacles.toml").problem)

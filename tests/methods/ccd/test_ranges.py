@@ -17,7 +17,7 @@ from wholebody.methods.ccd.limbs import Limbs
 
 def _left(scene: wb.Scene, q: Any) -> float:
     """How far joints are out of their ranges of motion, radians, by the constraint itself."""
-    term = wb.RangeOfMotion().resolve(scene, scene.figure.neutral)
+    term = wb.tasks.RangeOfMotion().resolve(scene, scene.figure.neutral)
     return max(0.0, -float(term.value(scene.state(q)).min()))
 
 
@@ -58,7 +58,10 @@ def test_what_left_its_range_is_brought_back(
 def test_answers_keep_to_the_ranges(stated: bool, human: wb.Figure) -> None:
     """Places behind the trunk, most of which an arm meets soonest with more inward rotation than a person has."""
     scene = wb.Scene(human).add(wb.Box((0.3, 0.3, 0.3)), name="box", at=(-0.45, -0.25, 1.0))
-    options: dict[str, Any] = {"constraints": [wb.RangeOfMotion(), wb.ReachCones()], "range_of_motion": False}
+    options: dict[str, Any] = {
+        "constraints": [wb.tasks.RangeOfMotion(), wb.tasks.ReachCones()],
+        "range_of_motion": False,
+    }
     for x, y, z in ((-0.1, -0.4, 0.83), (-0.28, -0.28, 1.4), (0.0, -0.03, 1.3), (-0.15, -0.1, 1.1)):
         goals = [wb.Point("right_index_tip", (x, y, z))]
         problem = wb.Problem(scene, goals=goals, balance=False, **(options if stated else {}))
@@ -70,7 +73,7 @@ def test_a_drag_keeps_to_the_ranges() -> None:
     figure = wb.load("human", sex="male", stature=1.511, detail="spheres")
     scene = wb.Scene(figure)
     height = figure.placement(figure.neutral, "right_hand").translation
-    drag = wb.Drag(wb.Problem(scene, goals=[wb.Point("right_hand", height)]), method="ccd", dt=0.1)
+    drag = wb.tracking.Drag(wb.Problem(scene, goals=[wb.Point("right_hand", height)]), method="ccd", dt=0.1)
     corners = np.array([height, (0.22, -0.13, 1.40), (0.44, -0.12, 1.24)])
     for first, last in pairwise(corners):
         for share in np.linspace(0.0, 1.0, 12):
