@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from math import atan2, ceil, cos, floor, hypot, inf, pi, sin
 from typing import Any
 
-from wholebody.methods.ccd.limbs import SLIDE, Limbs, X, Y, Z
+from wholebody.methods.ccd.limbs import Limbs
 
 TURN = 2.0 * pi
 FLAT = 1e-12  # m^2
@@ -22,58 +22,32 @@ def forward(limbs: Limbs) -> tuple[list[Any], list[Any]]:
         [tuple(line) for line in limbs.lines.tolist()],
         limbs.values.tolist(),
     )
-    for k, (parent, turn, px, py, pz, kind, sign, axis) in enumerate(_nodes(limbs)):
+    for k, (parent, turn, px, py, pz, slides, (u, v, w)) in enumerate(_nodes(limbs)):
         a, b, c, d, e, f, g, h, i, x, y, z = frames[parent]
         x += a * px + b * py + c * pz
         y += d * px + e * py + f * pz
         z += g * px + h * py + i * pz
-        if turn is not None:
-            A, B, C, D, E, F, G, H, J = turn
-            a, b, c = a * A + b * D + c * G, a * B + b * E + c * H, a * C + b * F + c * J
-            d, e, f = d * A + e * D + f * G, d * B + e * E + f * H, d * C + e * F + f * J
-            g, h, i = g * A + h * D + i * G, g * B + h * E + i * H, g * C + h * F + i * J
-        value = sign * values[k]
-        if kind == Y:
-            co, si = cos(value), sin(value)
-            lines[k] = (sign * b, sign * e, sign * h, x, y, z)
-            frames[k] = (
-                co * a - si * c, b, si * a + co * c, co * d - si * f, e, si * d + co * f,
-                co * g - si * i, h, si * g + co * i, x, y, z,
-            )  # fmt: skip
-        elif kind == X:
-            co, si = cos(value), sin(value)
-            lines[k] = (sign * a, sign * d, sign * g, x, y, z)
-            frames[k] = (
-                a, co * b + si * c, co * c - si * b, d, co * e + si * f, co * f - si * e,
-                g, co * h + si * i, co * i - si * h, x, y, z,
-            )  # fmt: skip
-        elif kind == Z:
-            co, si = cos(value), sin(value)
-            lines[k] = (sign * c, sign * f, sign * i, x, y, z)
-            frames[k] = (
-                co * a + si * b, co * b - si * a, c, co * d + si * e, co * e - si * d, f,
-                co * g + si * h, co * h - si * g, i, x, y, z,
-            )  # fmt: skip
+        A, B, C, D, E, F, G, H, J = turn
+        a, b, c = a * A + b * D + c * G, a * B + b * E + c * H, a * C + b * F + c * J
+        d, e, f = d * A + e * D + f * G, d * B + e * E + f * H, d * C + e * F + f * J
+        g, h, i = g * A + h * D + i * G, g * B + h * E + i * H, g * C + h * F + i * J
+        value = values[k]
+        ux, uy, uz = a * u + b * v + c * w, d * u + e * v + f * w, g * u + h * v + i * w
+        if slides:
+            x, y, z = x + value * ux, y + value * uy, z + value * uz
         else:
-            u, v, w = axis
-            ux, uy, uz = a * u + b * v + c * w, d * u + e * v + f * w, g * u + h * v + i * w
-            if kind == SLIDE:
-                x, y, z = x + value * ux, y + value * uy, z + value * uz
-                frames[k] = (a, b, c, d, e, f, g, h, i, x, y, z)
-            else:
-                a, d, g = turned(ux, uy, uz, cos(value), sin(value), a, d, g)
-                b, e, h = turned(ux, uy, uz, cos(value), sin(value), b, e, h)
-                c, f, i = turned(ux, uy, uz, cos(value), sin(value), c, f, i)
-                frames[k] = (a, b, c, d, e, f, g, h, i, x, y, z)
-            lines[k] = (ux, uy, uz, x, y, z)
+            a, d, g = turned(ux, uy, uz, cos(value), sin(value), a, d, g)
+            b, e, h = turned(ux, uy, uz, cos(value), sin(value), b, e, h)
+            c, f, i = turned(ux, uy, uz, cos(value), sin(value), c, f, i)
+        frames[k] = (a, b, c, d, e, f, g, h, i, x, y, z)
+        lines[k] = (ux, uy, uz, x, y, z)
     return frames, lines
 
 
 def _nodes(limbs: Limbs) -> Iterator[tuple[Any, ...]]:
-    """Parent, turn, translation, kind, sign and axis of every node."""
-    rows = zip(limbs.parents, limbs.places, limbs.kinds, limbs.signs, limbs.axes, strict=True)
-    for parent, place, kind, sign, axis in rows:
-        yield (int(parent), place[:9].tolist(), *place[9:].tolist(), int(kind), float(sign), axis.tolist())
+    """Parent, turn, translation, whether it slides and axis of every node."""
+    for parent, place, slides, axis in zip(limbs.parents, limbs.places, limbs.slides, limbs.axes, strict=True):
+        yield (int(parent), place[:9].tolist(), *place[9:].tolist(), bool(slides), axis.tolist())
 
 
 def sweep(
@@ -89,7 +63,7 @@ def sweep(
     largest = 0.0
     for node, mine, points in steps:
         ux, uy, uz, ox, oy, oz = lines[node]
-        if limbs.slides(node):
+        if limbs.slides[node]:
             change = _slide(limbs, values, here, there, weights, node, mine, points)
             largest = max(largest, abs(change))
             continue

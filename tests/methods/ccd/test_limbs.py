@@ -79,7 +79,7 @@ def test_lines_are_the_axes_about_which_joints_turn() -> None:
     for node, joint in enumerate(limbs.joints):
         axis, origin = np.array(limbs.lines[node][:3]), np.array(limbs.lines[node][3:])
         column = jacobian[:, model.joints[joint].idx_v]
-        if limbs.slides(node):
+        if limbs.slides[node]:
             assert column == pytest.approx([*axis, 0.0, 0.0, 0.0], abs=1e-12)
         else:
             assert column == pytest.approx([*np.cross(origin, axis), *axis], abs=1e-12)
