@@ -140,6 +140,8 @@ def test_a_wrong_study_file_is_refused_with_place(
 
 
 def test_what_cannot_vary_is_refused(folder: Path) -> None:
+    with pytest.raises(TypeError, match=r"study\(\) got an unexpected keyword argument 'job'"):
+        wb.study(folder / "task.toml", people=["F5"], job=2)  # type: ignore[call-arg]
     with pytest.raises(wb.InputError, match="nothing varies"):
         wb.study(folder / "task.toml")
     with pytest.raises(wb.errors.UnknownNameError, match="F5"):
