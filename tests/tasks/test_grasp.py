@@ -249,21 +249,6 @@ def test_a_wheel_is_held_by_its_rim_from_outside() -> None:
         assert sign * palm.translation[1] > 0.0
 
 
-@pytest.mark.parametrize(
-    ("values", "sentence"),
-    [
-        ({"opposed": 4.0}, "opposed is 4"),
-        ({"along": 1.5, "kind": "power"}, "along is 1.5"),
-        ({"along": 0.0}, "give its side"),
-        ({"approach": "below"}, "approach"),
-        ({"opposed": np.nan}, "opposed"),
-    ],
-)
-def test_odd_options_are_refused(values: Any, sentence: str) -> None:
-    with pytest.raises(wb.InputError, match=sentence):
-        wb.Grasp("right", "thing", **values)
-
-
 def test_a_wheel_has_no_ends_to_be_along() -> None:
     scene = wb.Scene(wb.load("human")).add(wb.Torus(0.18, 0.015), name="wheel", at=(0.45, 0.0, 1.1))
     with pytest.raises(wb.InputError, match="is a ring"):
