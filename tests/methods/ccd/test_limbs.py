@@ -10,7 +10,6 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from tests.reference.limbs import turned
 from wholebody.methods.ccd.limbs import Limbs, floats, movable, moved, rotated, seen_from
 
 
@@ -91,6 +90,3 @@ def test_vectors_of_frames() -> None:
     assert moved(floats(place), *point) == pytest.approx(place.act(point))
     assert rotated(floats(place), *point) == pytest.approx(place.rotation @ point)
     assert seen_from(floats(place), *point) == pytest.approx(place.rotation.T @ point)
-    axis = point / np.linalg.norm(point)
-    arrow = rng.normal(size=3)
-    assert turned(*axis, np.cos(0.7), np.sin(0.7), *arrow) == pytest.approx(pin.exp3(0.7 * axis) @ arrow)
