@@ -57,13 +57,11 @@ def test_derivative_of_every_contact(scene: wb.Scene, name: str, shift: float) -
         q[2] += shift
         given = term.jacobian(state.update(q))
         kinks = 0
-        for dof in range(model.nv):
-            step = np.zeros(model.nv)
-            step[dof] = HALF
-            ahead = term.value(state.update(pin.integrate(model, q, step)))
-            behind = term.value(state.update(pin.integrate(model, q, -step)))
+        for way in rng.choice([-1.0, 1.0], size=(8, model.nv)):
+            ahead = term.value(state.update(pin.integrate(model, q, HALF * way)))
+            behind = term.value(state.update(pin.integrate(model, q, -HALF * way)))
             slope = (ahead - behind) / (2.0 * HALF)
-            kinks += int(np.abs(slope - given[:, dof]).max() > 3e-3)
+            kinks += int(np.abs(slope - given @ way).max() > 1e-2)
         assert kinks <= 1  # where another piece becomes the nearest one within the difference
 
 

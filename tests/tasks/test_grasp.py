@@ -176,11 +176,10 @@ def test_derivatives(figure: wb.Figure, shape: Any, kind: Any) -> None:
     state, rng, half = scene.state(q), np.random.default_rng(1), 2e-6
     there = pin.integrate(model, q, 0.05 * rng.normal(size=model.nv))
     given, kinks = grasp.jacobian(state.update(there)), 0
-    for dof in range(model.nv):
-        step = half * np.eye(model.nv)[dof]
-        ahead = grasp.value(state.update(pin.integrate(model, there, step)))
-        behind = grasp.value(state.update(pin.integrate(model, there, -step)))
-        kinks += int(np.abs((ahead - behind) / (2.0 * half) - given[:, dof]).max() > 3e-3)
+    for way in rng.choice([-1.0, 1.0], size=(10, model.nv)):
+        ahead = grasp.value(state.update(pin.integrate(model, there, half * way)))
+        behind = grasp.value(state.update(pin.integrate(model, there, -half * way)))
+        kinks += int(np.abs((ahead - behind) / (2.0 * half) - given @ way).max() > 1e-2)
     assert kinks <= 1
 
 
