@@ -7,6 +7,8 @@ import pytest
 
 from tests.methods.qp.test_programs import by_quadprog
 from tests.reference import active_set as reference
+from tests.reference import semismooth_newton
+from tests.reference.active_set import same
 from wholebody.base.arrays import with_values
 from wholebody.methods.qp.active_set import minimise, solve_from
 from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram
@@ -51,6 +53,22 @@ def test_quadprog_agrees():
         x, active, _ = minimise(mild, rng.normal(size=6), 300)
         assert x == pytest.approx(by_quadprog(mild), abs=1e-6)
         assert np.array_equal(active.elastic, mild.elastic @ x < mild.least)
+
+
+@pytest.mark.parametrize("k", [0, 20, 100, 400])
+def test_the_compiled_loop_is_the_array_code(k):
+    """100 random programs of each size, 400 in all, after one, two and five iterations in turn; three to the end."""
+    rng = np.random.default_rng(k)
+    for number in range(100):
+        program = crowded(rng, k=k)
+        start = rng.normal(size=program.size)
+        for iterations in ((1, 2, 5)[number % 3], *((300,) if number < 3 else ())):
+            x, active, used = minimise(program, start, iterations)
+            expected, its_active, its_used = semismooth_newton.minimise(program, start, iterations)
+            assert np.abs(x - expected).max() < 1e-10
+            if iterations < 300:
+                assert used == its_used
+                assert same(active, its_active)
 
 
 def test_correcting_a_set_takes_the_smaller_system():
