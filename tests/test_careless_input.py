@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -99,59 +98,6 @@ def test_frames_a_second_for_a_time_step_are_warned_of(person: wb.Figure) -> Non
         clip = wb.Clip(person, np.tile(person.posture("standing"), (3, 1)), dt=60, name="clip")
     assert len(warned) == 1
     assert clip.duration == 120.0
-
-
-@pytest.mark.parametrize(
-    ("color", "told"),
-    [
-        ("orang", r"did you mean orange"),
-        ("Light Grey", "did you mean lightgrey"),
-        ((255, 128, 0), "divide bytes by 255"),
-        ("#12", "'#rrggbb'"),
-    ],
-)
-def test_colours(person: wb.Figure, color: object, told: str) -> None:
-    with pytest.raises(wb.InputError, match=told):
-        wb.Scene(person).add(wb.Sphere(0.1), name="ball", color=color)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize(
-    ("given", "told"),
-    [
-        ({"goals": [wb.Hold("left_foot")]}, r"give it in constraints=\[\.\.\.\]"),
-        ({"constraints": [wb.Point("left_palm", (0.5, 0.2, 1.0))]}, r"give it in goals=\[\.\.\.\]"),
-        ({"goals": [wb.Effort()]}, r"give it in measures=\[\.\.\.\]"),
-        ({"constraints": [wb.tasks.StepLimit(4.0), wb.Effort()]}, r"constraints\[1\] .*measures"),
-        ({"touching": ("right_hand", "floor")}, r"a list of pairs of names, such as \[\('right_hand', 'table'\)\]"),
-    ],
-)
-def test_terms_in_the_wrong_list(person: wb.Figure, given: dict[str, object], told: str) -> None:
-    with pytest.raises(wb.InputError, match=told):
-        problem(person, **given)
-
-
-@pytest.mark.parametrize(
-    ("call", "told"),
-    [
-        (lambda: wb.load("robots/arm.urdf"), "no such file in /"),
-        (lambda: wb.load("human", percentile=0.95), "percent, such as 95"),
-        (lambda: wb.Mesh("chair.stl"), "no such file in /"),
-        (lambda: wb.Mesh("/chair.stl"), "no such file$"),
-    ],
-)
-def test_messages_name_the_mend(call: Callable[[], object], told: str) -> None:
-    with pytest.raises(wb.WholebodyError, match=told):
-        call()
-
-
-def test_angles_of_a_placement(person: wb.Figure) -> None:
-    with pytest.raises(wb.InputError, match=r"rpyToMatrix"):
-        wb.Scene(person).add(wb.Sphere(0.1), name="ball", at=(0.6, 0.0, 0.7, 0.0, 0.0, 90.0))
-
-
-def test_a_reach_map_of_one_place_by_mistake(person: wb.Figure) -> None:
-    with pytest.raises(wb.InputError, match="step is 10 m"):
-        wb.reach_map(problem(person), "right_palm", (0.2, -0.5, 0.9), (0.6, 0.5, 1.2), step=10)
 
 
 @pytest.mark.parametrize(

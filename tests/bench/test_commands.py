@@ -85,9 +85,3 @@ def test_every_tool_has_a_colour_of_its_own() -> None:
     assert plot_style.method_style("qp") == plot_style.method_style("wholebody")  # the same method in another chart
     colors = [color for color, _ in plot_style.STYLE["methods"].values()]
     assert len(set(colors)) == len(colors)
-
-
-@pytest.mark.parametrize("words", [("step", "--repeats", "0"), ("motion", "--jobs", "0"), ("motion", "--jobs", "-1")])
-def test_counts_below_one_are_refused(words: tuple[str, ...]) -> None:
-    with pytest.raises(ValueError, match="give 1 or more"):
-        bench(*words)

@@ -39,22 +39,6 @@ def test_a_run_prints_a_table_and_writes_numbers_chart_and_animation(
     assert "| arm in corner | paper | 2146 | 20.5 |" in page
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["hand_on_tabel"], "no scene is called 'hand_on_tabel'; did you mean hand_on_table"),
-        (["two_arms", "--overlap", "springs"], "--overlap: no way to remove overlap is called 'springs'"),
-        (["two_arms", "--frames", "0"], "frames is 0; give a whole number between 1"),
-        (["two_arms", "--out", "/dev/null/pictures"], "/dev/null/pictures"),
-    ],
-)
-def test_mistakes_are_said_in_one_sentence(
-    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["interact", *arguments]) == 2
-    assert message in capsys.readouterr().err
-
-
 def test_the_ghost_moves(tmp_path: Path) -> None:
     import wholebody as wb
     from wholebody.view.style import LOOK

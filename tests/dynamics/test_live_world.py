@@ -130,6 +130,7 @@ def test_a_released_handle_moves_with_the_figure_and_the_mouse_takes_one_from_a_
 
 
 def test_the_soles_of_every_one_of_several_people_are_held() -> None:
-    two = wb.figures.join({"one": wb.load("avatar"), "two": wb.load("avatar")})
+    legs = wb.load("avatar").reduced(["root", "left_leg", "right_leg"])  # 25 MB are needed for each state of two people
+    two = wb.figures.join({"one": legs, "two": legs})
     held = {f"{name}/{side}_sole" for name in ("one", "two") for side in ("left", "right")}
     assert LiveWorld(wb.Scene(two)).held == held

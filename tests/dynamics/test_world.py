@@ -12,8 +12,6 @@ from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.scene.matter.body import Surface
 from wholebody.tracking.overlaps import overlaps
 
-DT = 1.0 / 60.0
-
 
 @pytest.mark.parametrize("friction", [0.0, 0.1, 1e6])
 def test_an_impulse_is_that_of_equations_8_to_10(friction: float) -> None:
@@ -183,24 +181,6 @@ def test_a_thing_of_the_figures_name_overlaps_it(planar_arm) -> None:
     figure = planar_arm((0.5, 0.4, 0.3))
     scene = wb.Scene(figure).add(wb.Sphere(0.1), name=figure.name, at=(1.05, 0.11, 0.0), body=wb.Body())
     assert [one.second for one in overlaps(scene, np.zeros(3))] == [figure.name]
-
-
-def test_wrong_worlds_are_one_sentence(planar_arm) -> None:
-    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3)))
-    with pytest.raises(wb.InputError, match="scene"):
-        wb.World(scene.figure)
-    with pytest.raises(
-        wb.InputError, match=r"scene is an Assembly, not a Scene; .*add its bodies as things with wb\.Body\(joints"
-    ):
-        wb.World(wb.Assembly().body("post"))
-    with pytest.raises(wb.errors.UnknownNameError, match="overlap"):
-        wb.World(scene, overlap="pq")
-    with pytest.raises(wb.InputError, match="dt"):
-        wb.World(scene, dt=0.0)
-    with pytest.raises(wb.InputError, match="spring"):
-        wb.World(scene, spring=3.0)
-    with pytest.raises(wb.InputError, match="tracked"):
-        wb.World(scene).step("q")
 
 
 def test_a_world_begins_in_its_start_and_not_in_the_first_posture() -> None:

@@ -112,16 +112,3 @@ def test_who_holds_a_load_brings_it_near(person: wb.Figure) -> None:
     )
     ahead = [person.placement(q, "left_palm").translation[0] for q in (usual, strong)]
     assert ahead[1] < ahead[0] - 0.1
-
-
-def test_odd_forces_are_refused(person: wb.Figure) -> None:
-    with pytest.raises(wb.InputError, match="newtons"):
-        wb.Force("left_palm", (0.0, 0.0, -1e6))
-    with pytest.raises(wb.InputError, match="forces"):
-        Exertion([(0.0, 0.0, -100.0)])  # type: ignore[list-item]
-    with pytest.raises(wb.errors.UnknownNameError, match="left_palm"):
-        wb.Problem(wb.Scene(person), measures=[Exertion([wb.Force("left_plam", (0, 0, -9))])])
-    with pytest.raises(wb.InputError, match="lift the figure"):
-        wb.Problem(wb.Scene(person), constraints=[LoadedBalance([wb.Force("left_palm", (0, 0, 2000))])])
-    with pytest.raises(wb.InputError, match="StrengthLimit"):
-        wb.Problem(wb.Scene(wb.load("hand")), constraints=[StrengthLimit()])

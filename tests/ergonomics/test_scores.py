@@ -298,12 +298,6 @@ def test_colours_are_of_every_segment_and_red_where_it_is_worst(person: wb.Figur
     assert colors["left_upper_arm"][0] > colors["right_upper_arm"][0]
 
 
-def test_a_figure_that_is_no_person_is_refused() -> None:
-    arm = wb.load(Path(__file__).resolve().parents[2] / "examples" / "tasks" / "arm.urdf")
-    with pytest.raises(wb.InputError, match="take a person"):
-        wb.ergonomics.rula(arm, arm.neutral)
-
-
 def test_the_command_prints_a_table_and_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     task = tmp_path / "task.toml"
     task.write_text(

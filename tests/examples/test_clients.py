@@ -39,6 +39,12 @@ def answered(script: Path, folder: Path, tmp_path: Path, python: str = sys.execu
     return judge(read_answers(out, folder), folder)
 
 
+@pytest.fixture(scope="module")
+def small(root: Path, folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Verdict:
+    """Return what the small client of Pinocchio comes to."""
+    return answered(root / "examples" / "clients" / "small_pinocchio.py", folder, tmp_path_factory.mktemp("small"))
+
+
 def outcomes(verdict: Verdict) -> dict[tuple[str, str], Any]:
     return {
         (one.problem.rsplit("/", 1)[0], one.seed): one.solved if one.outcome == "answered" else one.said
@@ -55,28 +61,27 @@ def test_plain_pinocchio(root: Path, folder: Path, tmp_path: Path) -> None:
     assert all(one.seconds > 0.0 for one in verdict.judged if one.outcome == "answered")
 
 
-def test_small_pinocchio(root: Path, folder: Path, tmp_path: Path) -> None:
+def test_small_pinocchio(root: Path, small: Verdict) -> None:
     """It reaches an arm's goal; it does not look at contacts, and says what it does not express."""
     script = root / "examples" / "clients" / "small_pinocchio.py"
     assert len(script.read_text().splitlines()) <= 60
-    verdict = answered(script, folder, tmp_path)
-    found = outcomes(verdict)
+    found = outcomes(small)
     assert len(found) == 2 * len(SETS)
     assert {found[name, "near"] for name in ("balance", "drag")} == {"only places in the world are expressed"}
-    (arm,) = [one for one in verdict.judged if (one.problem.rsplit("/", 1)[0], one.seed) == ("robot_arm", "near")]
+    (arm,) = [one for one in small.judged if (one.problem.rsplit("/", 1)[0], one.seed) == ("robot_arm", "near")]
     assert arm.score.goal_error < 2e-3
 
 
-def test_small_mujoco_answers_as_small_pinocchio_does(root: Path, folder: Path, tmp_path: Path) -> None:
+def test_small_mujoco_answers_as_small_pinocchio_does(root: Path, small: Verdict, folder: Path, tmp_path: Path) -> None:
     """The same steps by two engines: a reader of the one understands the other.
 
     From the start they end in the same place. From the random seed they take many steps along the limits, in which the
     rounding of a processor grows.
     """
     pytest.importorskip("mujoco")
-    scripts = [root / "examples" / "clients" / f"small_{engine}.py" for engine in ("mujoco", "pinocchio")]
-    assert len(scripts[0].read_text().splitlines()) <= 60
-    first, second = (answered(script, folder, tmp_path).judged for script in scripts)
+    script = root / "examples" / "clients" / "small_mujoco.py"
+    assert len(script.read_text().splitlines()) <= 60
+    first, second = answered(script, folder, tmp_path).judged, small.judged
     assert [one.outcome for one in first] == [one.outcome for one in second]
     for one, other in zip(first, second, strict=True):
         if one.outcome == "answered":

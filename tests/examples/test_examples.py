@@ -221,7 +221,7 @@ def test_what_is_tracked_goes_in_and_what_is_shown_does_not(
 
 def test_a_person_is_dragged_down_onto_a_chair(example: Example, tmp_path: Path, capsys: Any) -> None:
     module = example("sit_on_chair")
-    module.FRAMES = 80  # of a drag; the example has more to look at
+    module.FRAMES = 60  # of a drag; the example has more to look at
     drags = module.main(out=tmp_path, pictures=False)
     problem = module.build()
     place = places(problem, problem.start)
@@ -280,7 +280,7 @@ def test_a_four_bar_linkage_turns_as_its_closed_form_says(example: Example, tmp_
 
 def test_a_shelf_is_assembled_part_by_part(example: Example, tmp_path: Path) -> None:
     module = example("assemble_shelf")
-    module.FRAMES = 15  # of a drag; the example has more to look at
+    module.FRAMES = 12  # of a drag; the example has more to look at
     stages, motion = module.main(out=tmp_path, pictures=False)
     order = (*module.LEVELS, "right side")
     for number, (before, after) in enumerate(itertools.pairwise(stages)):
@@ -318,7 +318,7 @@ def test_a_four_bar_among_obstacles_stops_where_geometry_says(example: Example, 
 
 def test_a_scissor_lift_stops_at_its_load_limit_and_at_a_beam(example: Example, tmp_path: Path) -> None:
     module = example("scissor_lift")
-    module.FRAMES = 6  # of a drag; the example has more to look at
+    module.FRAMES = 4  # of a drag; the example has more to look at
     for load, (low, high) in module.main(out=tmp_path, pictures=False).items():
         angle = np.arcsin(low / (module.STAGES * module.BAR))
         assert module.STAGES * load * module.GRAVITY / np.tan(angle) == pytest.approx(module.STRONGEST, rel=1e-3)
@@ -327,7 +327,7 @@ def test_a_scissor_lift_stops_at_its_load_limit_and_at_a_beam(example: Example, 
 
 def test_two_people_carry_a_box_over_a_post(example: Example, tmp_path: Path) -> None:
     module = example("carry_together")
-    module.FRAMES = 8  # of a drag; the example has more to look at
+    module.FRAMES = 6  # of a drag; the example has more to look at
     scene, postures, solution = module.main(out=tmp_path, pictures=False)
     assert solution.status == "solved"
     figure, box = scene.figure, scene.objects["box"].placement

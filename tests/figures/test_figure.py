@@ -75,31 +75,6 @@ def test_clamp_moves_only_what_is_outside():
     )
 
 
-@pytest.mark.parametrize(
-    ("ask", "near"),
-    [
-        (lambda: HUMAN.frame_id("right_index"), "right_index_tip"),
-        (lambda: HUMAN.joint_id("left_elbow"), "left_elbow_flexion"),
-        (lambda: HUMAN.dofs(["uper_body"]), "upper_body"),
-        (lambda: HUMAN.posture("stand"), "standing"),
-        (lambda: HUMAN.with_joints(HUMAN.neutral, {"left_knee": 0.1}), "left_knee_flexion"),
-        (lambda: denavit_hartenberg(HUMAN, "right_harm"), "right_arm"),
-    ],
-)
-def test_wrong_names_come_with_the_nearest(ask, near):
-    with pytest.raises(UnknownNameError, match=near):
-        ask()
-
-
-def test_bad_values_are_refused():
-    with pytest.raises(InputError, match="shape"):
-        HUMAN.joint_values(np.zeros(55))
-    with pytest.raises(InputError, match="finite"):
-        HUMAN.with_joints(HUMAN.neutral, {"left_knee_flexion": np.nan})
-    with pytest.raises(InputError, match="at least one joint"):
-        HUMAN.reduced([])
-
-
 @pytest.mark.parametrize("keep", [("root", "right_arm"), ("upper_body",), ("left_wrist_flexion",), ("root",)])
 @pytest.mark.parametrize("posture", ["standing", "sitting"])
 def test_reduced_figure_moves_as_the_whole_one(keep, posture):

@@ -12,7 +12,6 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures import join
 from wholebody.figures.self_pairs import random_postures
 
@@ -188,39 +187,6 @@ def test_a_hand_on_an_arm(alone: dict[str, wb.Figure]) -> None:
     }
     base = arm.model.frames[arm.geometry.geometryObjects[0].parentFrame].name
     assert all(frozenset((base, f"hand/{segment}")) in tested for segment in hand.segments if "distal" in segment)
-
-
-WRONG = {
-    "nothing": (lambda human: join({}), "several figures are {}"),
-    "no figure": (lambda human: join({"anna": 3}), "figure 'anna' is an int"),
-    "a slash": (lambda human: join({"an/na": human}), "leave the slash out"),
-    "twice": (lambda human: join({"both": join({"anna": human})}), "'both' is several figures already"),
-    "spheres": (lambda human: join({"anna": wb.load("human", detail="spheres")}), "load it with detail='capsules'"),
-    "a place": (lambda human: join({"anna": (human, "here")}), "'anna': at"),
-    "its own name": (lambda human: human.mounted(wb.load("hand"), on="right_palm", name="neck"), "give name="),
-    "a person of several": (
-        lambda human: wb.ergonomics.body_angles(join({"anna": human}), human.neutral),
-        "several figures; give one of them, figure.members\\['anna'\\].figure",
-    ),
-}
-
-
-@pytest.mark.parametrize("what", WRONG)
-def test_mistakes_are_named(what: str, alone: dict[str, wb.Figure]) -> None:
-    make, words = WRONG[what]
-    with pytest.raises(InputError, match=words):
-        make(alone["anna"])
-
-
-def test_unknown_names_come_with_the_nearest(joined: wb.Figure) -> None:
-    with pytest.raises(UnknownNameError, match="anna/right_palm"):
-        joined.frame_id("anna/right_pal")
-    with pytest.raises(UnknownNameError, match="anna/root"):
-        joined.dofs("root")
-    with pytest.raises(UnknownNameError, match="no figure is called 'anne'"):
-        joined.part("anne", joined.neutral)
-    with pytest.raises(UnknownNameError, match="no figure is called 'anne'"):
-        joined.posture({"anne": "sitting"})
 
 
 def test_penetration_between_figures_is_that_of_coal(alone: dict[str, wb.Figure]) -> None:

@@ -27,42 +27,6 @@ def test_every_setting_that_is_a_number_is_checked(method: Any) -> None:
                 method(**{name: wrong})
 
 
-@pytest.mark.parametrize("wrong", [None, 0, 1, "yes", [], math.nan])
-def test_flags_are_true_or_false(wrong: Any) -> None:
-    with pytest.raises(InputError, match=r"measures is .*; give True or False"):
-        wb.methods.QP(measures=wrong)
-    with pytest.raises(InputError, match=r"hot_start is .*; give True or False"):
-        wb.methods.QP(hot_start=wrong)
-
-
-@pytest.mark.parametrize("wrong", [None, 3, [], object(), ("slack",)])
-def test_names_are_texts(wrong: Any) -> None:
-    with pytest.raises(InputError, match="solver is"):
-        wb.methods.QP(solver=wrong)
-    with pytest.raises(InputError, match="is not the name of a linear algebra"):
-        wb.methods.Newton(algebra=wrong)
-    with pytest.raises(InputError, match=r"inequalities is .*'slack' or 'barrier'"):
-        wb.methods.Newton(inequalities=wrong)
-    with pytest.raises(InputError, match=r"holds is .*'hard' or 'soft'"):
-        wb.methods.Placo(holds=wrong)
-
-
-def test_assemblies_are_told_where_they_are_taken() -> None:
-    assembly = wb.Assembly().body("rod")
-    for call in (lambda: wb.tracking.follow_path(assembly, [(0, 0, 0)]), lambda: wb.tracking.Drag(assembly)):
-        with pytest.raises(InputError, match=r"the assembly has no goals; .*point_goal"):
-            call()
-    assembly.frame_goal("rod", (0, 0, 0))
-    with pytest.raises(InputError, match="goal 0 is of the kind 'frame'; use Drag"):
-        wb.tracking.follow_path(assembly, [(0, 0, 0)])
-    with pytest.raises(InputError, match="not by 'ccd'; leave method out"):
-        wb.tracking.Drag(assembly, "ccd")  # type: ignore[call-overload]
-    with pytest.raises(InputError, match=r"scene is an Assembly, not a Scene; .*shape="):
-        wb.Viewer(assembly)
-    with pytest.raises(InputError, match="problem is an Assembly, not a Problem"):
-        wb.solve(assembly)  # type: ignore[arg-type]
-
-
 def test_a_joint_that_was_refused_can_be_added_again() -> None:
     assembly = wb.Assembly().body("rod")
     with pytest.raises(InputError, match="axis"):

@@ -54,23 +54,6 @@ def test_quaternions_are_normalised_and_refused_where_they_are_far_off(human: Fi
         wb.Clip(human, q, 0.1)
 
 
-@pytest.mark.parametrize(
-    ("change", "sentence"),
-    [
-        ({"q": np.zeros((0, 56))}, r"q has shape \(0, 56\); give 1 to"),
-        ({"q": np.zeros((3, 5))}, r"q has shape \(3, 5\)"),
-        ({"dt": 0.0}, "dt is 0"),
-        ({"dt": np.nan}, "dt is nan"),
-        ({"name": ""}, "the name of a clip"),
-        ({"figure": "human"}, r"figure is a str|figure"),
-    ],
-)
-def test_what_is_no_clip_is_one_sentence(human: Figure, change: dict[str, object], sentence: str) -> None:
-    arguments = {"figure": human, "q": [human.neutral], "dt": 0.1, "name": "walk"} | change
-    with pytest.raises(wb.InputError, match=sentence):
-        wb.Clip(**arguments)  # type: ignore[arg-type]
-
-
 def test_a_value_that_is_not_finite_is_named(human: Figure) -> None:
     q = np.array([human.neutral] * 4)
     column = human.model.joints[human.joint_id("left_knee_flexion")].idx_q

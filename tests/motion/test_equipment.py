@@ -113,18 +113,3 @@ def test_bounds_of_a_mesh_are_those_of_its_vertices() -> None:
     low, high = bounds(mesh)
     assert np.allclose(low, 0.0, atol=1e-9)
     assert np.allclose(high, (0.3, 0.2, 0.1), atol=1e-9)
-
-
-def test_mistakes_are_named(capsules: Figure) -> None:
-    with pytest.raises(wb.errors.UnknownNameError, match="pack"):
-        equipment("back_pack", capsules)
-    with pytest.raises(wb.errors.UnknownNameError, match="thorax"):
-        Equipment.worn(wb.Sphere(0.1), capsules, name="ball", to="thoraxx")
-    with pytest.raises(wb.InputError, match="no bounds"):
-        Equipment.worn(wb.HalfSpace(), capsules, name="floor")
-    with pytest.raises(wb.InputError, match="shape"):
-        Equipment("ball", "a ball", "thorax")  # type: ignore[arg-type]
-    with pytest.raises(wb.errors.UnknownNameError):
-        Equipment("ball", wb.Sphere(0.1), "thoraxx").attach(wb.Scene(capsules))
-    with pytest.raises(wb.InputError, match="fits a person"):
-        equipment("pack", wb.load("hand"))

@@ -106,20 +106,6 @@ def test_an_open_mesh_has_no_inside_but_an_envelope() -> None:
     assert fill_with_spheres(mesh, 4, envelope=True).volume == pytest.approx(1e-3, rel=0.05)
 
 
-@pytest.mark.parametrize("count", [0, 501, 2.5, None])
-def test_a_count_out_of_range_is_refused(count: object) -> None:
-    with pytest.raises(wb.InputError, match="count"):
-        fill_with_spheres(wb.Box((0.1, 0.1, 0.1)), count)  # type: ignore[arg-type]
-
-
 def test_a_shape_without_triangles_is_refused() -> None:
     with pytest.raises(wb.InputError, match="HalfSpace cannot be filled"):
         fill_with_spheres(wb.HalfSpace(), 3)
-
-
-@pytest.mark.parametrize(
-    ("centers", "radii"), [(np.zeros((0, 3)), np.zeros(0)), (np.zeros((2, 3)), np.ones(1)), (np.zeros((1, 3)), [-1.0])]
-)
-def test_spheres_refuse_what_is_none(centers: np.ndarray, radii: np.ndarray) -> None:
-    with pytest.raises(wb.InputError):
-        Spheres(centers, radii)

@@ -191,26 +191,3 @@ def test_a_deep_squat_needs_more_of_the_knees_than_standing(human: wb.Figure) ->
     assert bent.largest()["left_knee_flexion"] > straight.largest()["left_knee_flexion"] + 20.0
     knee = human.model.joints[human.joint_id("left_knee_flexion")].idx_v
     assert bent.torque[1, knee] < 0.0  # the extensors work
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"friction": 0.0}, "friction"),
-        ({"cutoff": -1.0}, "cutoff"),
-        ({"strength": 50}, "strength"),
-        ({"feet": "left_foot"}, "feet"),
-        ({"feet": []}, "feet"),
-    ],
-)
-def test_wrong_settings_are_refused(human: wb.Figure, options: dict[str, object], message: str) -> None:
-    clip = wb.Clip(human, human.posture("standing")[None], 0.1)
-    with pytest.raises(wb.InputError, match=message):
-        torques(clip, **options)  # type: ignore[arg-type]
-
-
-def test_wrong_strength_is_refused() -> None:
-    with pytest.raises(wb.InputError, match="percentile"):
-        Strength(percentile=1)
-    with pytest.raises(wb.errors.UnknownNameError, match="sex"):
-        Strength(sex="x")

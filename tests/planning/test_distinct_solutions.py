@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.base.errors import InputError
 from wholebody.bench.suite.problem_sets.robots import known_arm
 
 UPPER, FORE, HIGH = 0.5, 0.4, 0.3  # m: lengths of an arm that turns on a post, lifts and bends
@@ -115,20 +114,3 @@ def test_a_person_has_distinct_answers() -> None:
     assert len(found) >= 1
     assert all(wb.assess(problem, answer.q).holds(1e-4) for answer in found)
     assert found[0].assessment.measure <= wb.solve(problem).assessment.measure * 1.01
-
-
-WRONG = {
-    "most": ({"most": 0}, "most"),
-    "apart": ({"apart": -1.0}, "apart"),
-    "starts": ({"starts": 0}, "starts"),
-    "method": ({"method": "newton"}, "give wb.methods.QP"),
-    "time_limit": ({"time_limit": float("nan")}, "time_limit"),
-}
-
-
-@pytest.mark.parametrize("what", WRONG)
-def test_mistakes_are_named(what: str, arm: wb.Figure) -> None:
-    given, words = WRONG[what]
-    problem = wb.Problem(wb.Scene(arm), goals=[wb.Point("tip", TARGET)])
-    with pytest.raises(InputError, match=words):
-        wb.solutions(problem, **given)

@@ -56,10 +56,3 @@ def test_frames_of_a_path_with_a_corner_keep_the_limits(planar_arm: Callable[...
     speed = np.diff(q, axis=0) / pace.dt
     assert np.abs(speed).max() <= 3.0 * 1.001
     assert np.abs(np.diff(speed, axis=0)).max() / pace.dt <= 8.0 * 1.001
-
-
-def test_a_pace_refuses_what_no_motion_has() -> None:
-    with pytest.raises(wb.InputError, match="Pace: acceleration"):
-        Pace(acceleration=0.0)
-    with pytest.raises(wb.InputError, match="Pace: velocity"):
-        Pace(velocity=float("nan"))

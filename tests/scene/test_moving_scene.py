@@ -103,15 +103,6 @@ def test_things_that_stay_are_where_they_were_moved_to(scene: wb.Scene) -> None:
     assert board.placement.translation == pytest.approx([0.0, 0.0, 0.0])
 
 
-def test_wrong_names_are_one_sentence(scene: wb.Scene) -> None:
-    with pytest.raises(wb.errors.UnknownNameError, match="board"):
-        MovingScene(scene.built, ["bord"])
-    with pytest.raises(wb.InputError, match="named twice"):
-        MovingScene(scene.built, ["board", "board"])
-    with pytest.raises(wb.InputError, match="centre"):
-        MovingScene(scene.built, ["board"], centres={"board": np.array([np.nan, 0.0, 0.0])})
-
-
 def test_a_sweep_in_which_both_sides_move_is_that_of_fine_subdivision() -> None:
     """A moving person and flying plates, balls and rods: pieces placed share by share, coal asked for all pairs."""
     scene, rng = wb.Scene(wb.load("human")), np.random.default_rng(5)

@@ -55,30 +55,6 @@ def test_figures_are_added_to_a_scene(anna: wb.Figure, ben: wb.Figure, pair: wb.
     assert "hand/root" not in scene.figure.roots
 
 
-WRONG = {
-    "no name": (lambda anna: wb.Scene(anna).add_figure(anna, name="ben"), "figure has no name; make it with wb.Scene"),
-    "taken": (lambda anna: wb.Scene({"anna": anna}).add_figure(anna, name="anna"), "has a figure 'anna' already"),
-    "root": (lambda anna: wb.Scene({"anna": anna}).add_figure(anna, name="ben", root="loose"), "add_figure: root"),
-    "a thing": (
-        lambda anna: wb.Scene({"anna": anna}).add(wb.Sphere(0.1), name="ben/head").add_figure(anna, name="ben"),
-        "has a thing 'ben/head' already",
-    ),
-    "feet of two": (
-        lambda anna: wb.Problem(
-            wb.Scene({"anna": anna, "ben": anna}), constraints=[Balance(("anna/left_foot", "ben/left_foot"))]
-        ),
-        "are of several figures; state one Balance for each",
-    ),
-}
-
-
-@pytest.mark.parametrize("what", WRONG)
-def test_mistakes_are_named(what: str, anna: wb.Figure) -> None:
-    make, words = WRONG[what]
-    with pytest.raises(InputError, match=words):
-        make(anna)
-
-
 def test_each_keeps_its_own_defaults(pair: wb.Scene) -> None:
     both = wb.Problem(pair, constraints=feet("anna/", "ben/"))
     assert [term.feet for term in both.defaults if isinstance(term, Balance)] == [

@@ -162,20 +162,3 @@ def test_boundary_manikins_are_people() -> None:
     found = wb.boundary(0.9, ["stature", "mass"], "female")
     assert len(found) == 1 + 4 + 4
     assert all(wb.load("human", **one).model.nv == 55 for one in found.values())
-
-
-def test_odd_populations_are_refused() -> None:
-    with pytest.raises(wb.InputError, match="count"):
-        wb.people(0)
-    with pytest.raises(wb.InputError, match="sex"):
-        wb.people(3, "tall")
-    with pytest.raises(wb.InputError, match="leave one out"):
-        wb.people(3, percentiles=[5])
-    with pytest.raises(wb.InputError, match=r"percentiles is empty; give some, such as \[5, 50, 95\]"):
-        wb.people(percentiles=[])
-    with pytest.raises(wb.errors.UnknownNameError, match="sitting_height"):
-        wb.boundary(0.95, ["siting_height"])
-    with pytest.raises(wb.InputError, match="confidence"):
-        wb.boundary(float("nan"))
-    with pytest.raises(wb.InputError, match="people is"):
-        wb.accommodation(upright, ["F5"])  # type: ignore[arg-type]

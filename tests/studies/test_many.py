@@ -161,11 +161,6 @@ def test_records_are_written_as_a_table(arm: wb.Figure, tmp_path: Path) -> None:
         assert not (tmp_path / "a.parquet").exists()
 
 
-def test_something_else_than_a_problem_is_refused(arm: wb.Figure) -> None:
-    with pytest.raises(wb.InputError, match=r"problems\[1\]"):
-        wb.solve_many([problem(arm, PLACES[0]), "x"])  # type: ignore[list-item]
-
-
 def test_what_is_not_solved_from_its_own_start_is_tried_from_the_answers_of_neighbours(arm: wb.Figure) -> None:
     places = [(0.4 - 0.06 * k, 0.1 * k - 0.2, 0.5) for k in range(8)]
     problems, method = [problem(arm, place) for place in places], wb.methods.DampedLeastSquares(iterations=8)

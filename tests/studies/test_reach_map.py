@@ -136,13 +136,3 @@ def test_the_command_writes_all_files(folder: Path, tmp_path: Path, capsys: pyte
     for wrong in (["--step", "x"], ["--step", "-1"], ["--low", "1,2"], ["--frame", "tap"], ["--low", "9,9,9"]):
         assert main(["reach", str(folder / "task.toml"), *grid, *wrong, "--out", str(tmp_path)]) == 2
         assert capsys.readouterr().err.count("\n") == 1
-
-
-def test_a_wrong_grid_is_refused(planar: wb.Problem) -> None:
-    for low, high, step, said in (
-        ((1, 1, 1), (0, 0, 0), 0.1, "least corner"),
-        ((0, 0, 0), (100, 100, 100), 0.01, "greater step"),
-        ((0, 0, 0), (1, 1, 1), (0.1, 0.0, 0.1), "step"),
-    ):
-        with pytest.raises(wb.InputError, match=said):
-            wb.reach_map(planar, "tip", low, high, step)

@@ -139,17 +139,6 @@ def test_a_wrong_study_file_is_refused_with_place(
     assert error.count("\n") == 1
 
 
-def test_what_cannot_vary_is_refused(folder: Path) -> None:
-    with pytest.raises(TypeError, match=r"study\(\) got an unexpected keyword argument 'job'"):
-        wb.study(folder / "task.toml", people=["F5"], job=2)  # type: ignore[call-arg]
-    with pytest.raises(wb.InputError, match="nothing varies"):
-        wb.study(folder / "task.toml")
-    with pytest.raises(wb.errors.UnknownNameError, match="F5"):
-        wb.study(folder / "task.toml", people=["F6"])
-    with pytest.raises(wb.InputError, match="target"):
-        wb.study(folder / "task.toml", targets=[(0.0, 1.0)])
-
-
 def test_targets_take_the_place_of_a_goal_that_is_to_be_met(folder: Path) -> None:
     task = folder / "task.toml"
     head, found, rest = task.read_text().partition("[[goal]]")

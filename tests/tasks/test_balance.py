@@ -64,21 +64,6 @@ def test_one_foot_is_a_smaller_polygon(humanoid: Any) -> None:
     assert one.min() < both.min()
 
 
-@pytest.mark.parametrize(
-    ("balance", "message"),
-    [
-        (lambda: Balance("lfoot"), "not a list"),
-        (lambda: Balance(()), "give a list of names"),
-        (lambda: Balance(("lfoot",), margin=-0.1), "margin is -0.1; give a number between 0 and 1 m"),
-        (lambda: Balance(("lfoot",), margin=0.2), "leaves nothing of the support polygon"),
-        (lambda: Balance(("head1_body",)), "has no pieces to stand on"),
-    ],
-)
-def test_mistakes_are_named(balance: Any, message: str, humanoid: Any) -> None:
-    with pytest.raises(InputError, match=message):
-        balance().resolve(humanoid, humanoid.figure.neutral)
-
-
 def test_standing_on_corners_is_refused(humanoid: Any, random_posture: Any) -> None:
     q = random_posture(humanoid.model, np.random.default_rng(0))
     with pytest.raises(InputError, match="stand on a line"):

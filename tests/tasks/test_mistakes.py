@@ -51,30 +51,6 @@ def test_values_are_checked_when_a_term_is_written(make: Any, message: str) -> N
         make()
 
 
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda name: tasks.Point(name, (0, 0, 0)),
-        lambda name: tasks.Frame(name, (0, 0, 0)),
-        lambda name: tasks.Orientation(name, np.eye(3)),
-        lambda name: tasks.Axis(name, (1, 0, 0), direction=(1, 0, 0)),
-        lambda name: tasks.Relative("tip", name),
-        lambda name: tasks.Relative(name, "tip"),
-        lambda name: tasks.Hold(name),
-        lambda name: tasks.Hold("tip", relative_to=name),
-        lambda name: tasks.Plane(name, (0, 0, 1)),
-        lambda name: tasks.Balance((name,)),
-        lambda name: tasks.Posture("standing", joints=[name]),
-        lambda name: tasks.StepLimit(joints={name: 1.0}),
-    ],
-)
-def test_unknown_names_come_with_the_nearest(make: Any, humanoid: Any) -> None:
-    with pytest.raises(
-        UnknownNameError, match=r"^[A-Z]\w+: no .* is called 'larm_elbow_join'; did you mean .*larm_elbow_joint"
-    ):
-        make("larm_elbow_join").resolve(humanoid, humanoid.figure.neutral)
-
-
 def test_other_mistakes_are_found_when_the_figure_is_known(humanoid: Any) -> None:
     q = humanoid.figure.neutral
     with pytest.raises(UnknownNameError, match="Posture: no posture is called 'standin'; did you mean standing"):

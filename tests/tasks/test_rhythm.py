@@ -260,8 +260,3 @@ def test_who_squats_bends_the_back_less() -> None:
     bent = {style: sum(lifted(style)[0].joint_values(lifted(style)[1])[f"spine{k}_flexion"] for k in (1, 2, 3))
             for style in ("stoop", "squat")}  # fmt: skip
     assert bent["squat"] < 0.7 * bent["stoop"]
-
-
-def test_unknown_styles_are_refused() -> None:
-    with pytest.raises(InputError, match="style"):
-        wb.tasks.Rhythm(style="bend")  # type: ignore[arg-type]

@@ -126,24 +126,6 @@ def test_newton_needs_few_iterations_a_frame_and_does_not_drift(scene: wb.Scene)
         assert judged.penetration < 1e-4
 
 
-def test_what_cannot_be_moved_is_named(scene: wb.Scene) -> None:
-    problem = _problem(scene)
-    with pytest.raises(wb.InputError, match="the number of the goal is 3; give a whole number between 0 and 0"):
-        wb.tracking.Drag(problem, goal=3)
-    with pytest.raises(wb.InputError, match="budget"):
-        wb.tracking.Drag(problem, budget=0.0)
-    with pytest.raises(wb.errors.UnknownNameError, match="method"):
-        wb.tracking.Drag(problem, "jacobi")
-    with pytest.raises(wb.InputError, match="finite"):
-        wb.tracking.Drag(problem, "newton").to((np.nan, 0, 0))
-    drag = wb.tracking.Drag(problem, "newton")
-    with pytest.raises(wb.InputError, match=r"Drag: q has shape \(56,\), not \(2,\)"):
-        drag.q = np.zeros(2)
-    other = wb.Problem(scene, "standing", goals=[wb.CenterOfMass((0, 0, 1))])
-    with pytest.raises(wb.InputError, match="CenterOfMass"):
-        wb.tracking.Drag(other)
-
-
 def test_a_frame_by_quadratic_programs_is_as_near_as_it_is_asked_for(scene: wb.Scene) -> None:
     """A finer tolerance is kept, takes more programs, and leaves the measures as good."""
     spent, measures = [], []

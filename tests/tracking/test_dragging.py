@@ -104,12 +104,3 @@ def test_a_frame_keeps_its_orientation() -> None:
     root = pin.XYZQUATToSE3(dragged.q[-1][:7])
     np.testing.assert_allclose(root.translation, (0.02, 0.03, 0.86), atol=1.1e-5)
     np.testing.assert_allclose(root.rotation, turn.toRotationMatrix(), atol=1e-5)
-
-
-def test_mistakes_are_named(problem: wb.Problem) -> None:
-    with pytest.raises(wb.InputError, match="places"):
-        drag_along(problem, [(0.0, 0.0)])
-    with pytest.raises(wb.InputError, match="the number of the goal is 4"):
-        present_position(problem, 4)
-    with pytest.raises(wb.errors.UnknownNameError, match="method"):
-        drag_along(problem, [(0.4, -0.25, 0.9)], "jacobi")

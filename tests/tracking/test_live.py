@@ -257,11 +257,6 @@ def test_an_assembly_without_bodies_is_refused_and_one_without_shapes_is_dragged
         drag.choose("ccd")
 
 
-def test_what_cannot_be_dragged_is_refused() -> None:
-    with pytest.raises(wb.InputError, match="is not what can be dragged"):
-        LiveDrag("human")  # type: ignore[arg-type]
-
-
 @pytest.mark.parametrize("method", ["qp", "ccd", "dls", "assembly"])
 def test_what_frames_need_is_made_before_them(drag: LiveDrag, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Sweeps, chains and the scene of what moves take as long as ten frames; of two people, twenty."""

@@ -174,16 +174,6 @@ def test_a_tracked_limb_out_of_its_reach_cone_is_shown_in_it(overlap: str) -> No
     assert after < 0.6 * before
 
 
-def test_settings_are_checked(hand: wb.Figure, scene: wb.Scene) -> None:
-    with pytest.raises(wb.errors.UnknownNameError, match="overlap"):
-        FrameLoop(scene, hand.neutral, overlap="springs")
-    with pytest.raises(wb.InputError, match="dt"):
-        FrameLoop(scene, hand.neutral, dt=0.0)
-    for start in (hand.neutral[:-1], np.full(hand.model.nq, np.nan), np.zeros(hand.model.nq)):
-        with pytest.raises(wb.InputError, match="frame 0"):
-            FrameLoop(scene, start)
-
-
 def test_driven_objects_come_first(hand: wb.Figure, scene: wb.Scene) -> None:
     """In every frame: the tracked posture within limits, then removal of overlap, then the check of the way."""
     loop = FrameLoop(scene, at(hand, 0.0, 0.3), rigid=True)
@@ -234,8 +224,3 @@ def test_a_ball_takes_half_of_an_overlap_where_both_give_way(planar_arm: Any, st
     assert -scene.contacts(frame.q, 0.0).distance.min(initial=0.0) < 1e-4
     wanted = float(np.arctan2(*(place + moved)[1::-1])) - float(np.arcsin(0.12 / np.linalg.norm(place + moved)))
     assert frame.q[0] == pytest.approx(wanted, abs=5e-3)  # the link touches the ball
-
-
-def test_who_gives_way_is_checked(planar_arm: Any) -> None:
-    with pytest.raises(wb.InputError, match="give_way"):
-        FrameLoop(wb.Scene(planar_arm((0.5,))), np.zeros(1), give_way="thing")  # type: ignore[arg-type]

@@ -40,12 +40,3 @@ def test_a_pull_stops_before_a_plate(problem: wb.Problem, method: str, spacing: 
         assert solution.assessment.penetration < 1e-4
     for before, after in itertools.pairwise(solutions):
         assert scene.sweep(before.q, after.q, 2e-3) is None
-
-
-def test_what_is_no_path_is_named(problem: wb.Problem) -> None:
-    with pytest.raises(wb.InputError, match="shape"):
-        wb.tracking.follow_path(problem, [1.0, 2.0, 3.0])
-    with pytest.raises(wb.InputError, match="spacing"):
-        wb.tracking.follow_path(problem, [(0, 0, 0), (1, 0, 0)], spacing=0.0)
-    with pytest.raises(wb.InputError, match="finite"):
-        wb.tracking.follow_path(problem, [(0, 0, 0), (float("nan"), 0, 0)])

@@ -46,11 +46,3 @@ def test_an_assembly_without_a_figure_has_no_segments_to_colour() -> None:
     viewer = wb.Viewer(wb.Assembly().body("board", shape=wb.Box((0.8, 0.3, 0.02))))
     with pytest.raises(wb.InputError, match="no segments to color"):
         viewer.color({"board": BLUE})
-
-
-def test_an_unknown_segment_or_colour_is_refused() -> None:
-    viewer = wb.Viewer(wb.Scene(wb.load(ARM)))
-    with pytest.raises(wb.errors.UnknownNameError, match="forearm"):
-        viewer.color({"forarm": BLUE})
-    with pytest.raises(wb.InputError, match="color"):
-        viewer.color({"forearm": (2.0, 0.0, 0.0)})

@@ -22,14 +22,6 @@ def board_and_pin(x: float = 0.0) -> wb.Assembly:
     return made.body("pin", (0.5, 0.4, 0.2), shape=wb.Capsule(radius=0.02, length=0.3))
 
 
-def test_mistakes_are_named() -> None:
-    shown = board_and_pin()
-    with pytest.raises(wb.InputError, match="at least one posture"):
-        write_filmstrip(wb.Viewer(shown), [], "strip.png")
-    with pytest.raises(wb.InputError, match="2 ghosts for 1 postures; give one for each"):
-        write_filmstrip(wb.Viewer(shown), [shown.q], "strip.png", ghosts=[shown.q, shown.q])
-
-
 @pytest.mark.browser
 def test_bodies_are_drawn_where_pinocchio_says(browser: Browser, as_pinocchio_says: Any, tmp_path: Path) -> None:
     shown = board_and_pin(0.3)

@@ -7,7 +7,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.measure.track import SETTING, VARIANTS, Track, smooth_way, track
 from wholebody.bench.suite.problem_sets.case import numbers
 
@@ -73,10 +72,3 @@ def test_a_smooth_way_is_at_rest_at_both_ends_and_passes_its_places() -> None:
     assert np.linalg.norm(way[:, None] - places, axis=2).min(axis=0).max() < 2e-3
     speed = np.linalg.norm(np.diff(way, axis=0), axis=1)
     assert max(speed[0], speed[-1]) < 1e-4 * speed.max()
-
-
-def test_mistakes_are_named() -> None:
-    with pytest.raises(UnknownNameError, match="free"):
-        track("fre")
-    with pytest.raises(InputError, match="--steps"):
-        track("free", 1)

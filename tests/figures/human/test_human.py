@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.audits.packaged import packaged_files
-from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.base.errors import InputError
 from wholebody.figures import load, urdf_path
 from wholebody.figures.anthropometry import design_cases, make_person
 from wholebody.figures.tables import table
@@ -419,14 +419,6 @@ def test_packaged_urdf_is_the_figure(name):
 def test_impossible_people_are_refused(options, words):
     with pytest.raises(InputError, match=words):
         load("human", **options)
-
-
-@pytest.mark.parametrize(
-    ("spec", "options"), [("human", {"details": "hulls"}), ("humn", {}), ("human", {"detail": "hull"})]
-)
-def test_wrong_names_come_with_the_right_ones(spec, options):
-    with pytest.raises(UnknownNameError, match="did you mean"):
-        load(spec, **options)
 
 
 def test_mass_left_out_is_what_people_of_that_stature_weigh():

@@ -8,7 +8,6 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.base.errors import InputError
 from wholebody.figures import load
 from wholebody.figures.anthropometry import design_cases, dimension_names, make_person
 from wholebody.figures.measuring import measure
@@ -103,20 +102,6 @@ def test_percentiles_in_between_follow_the_normal_deviate():
     # Statures are nearly normal: mean 175.62 cm, standard deviation 6.86 cm (4082 men of ANSUR II).
     for percentile, deviate in ((10, -1.2816), (40, -0.2533), (90, 1.2816)):
         assert make_person(percentile=percentile).stature == pytest.approx(1.7562 + 0.0686 * deviate, abs=0.006)
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"percentile": 0.5}, "percentile is 0.5"),
-        ({"percentile": math.nan}, "percentile is nan"),
-        ({"percentile": "fifth"}, "percentile"),
-        ({"percentile": 5, "stature": 1.7, "mass": 70}, "leaves nothing to percentile"),
-    ],
-)
-def test_impossible_percentiles_are_refused(options, words):
-    with pytest.raises(InputError, match=words):
-        load("human", **options)
 
 
 # ---- feet, and the 39 spheres

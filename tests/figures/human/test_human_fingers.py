@@ -138,19 +138,6 @@ def test_a_task_file_names_the_hands(tmp_path):
     assert wb.read_task(written).problem.scene.figure.model.nv == 95
 
 
-@pytest.mark.parametrize(
-    ("options", "sentence"),
-    [({"hands": "claws"}, "claws"), ({"hands": "fingers", "detail": "spheres"}, "spheres"), ({"hands": 3}, "hands")],
-)
-def test_wrong_hands_are_refused_in_one_sentence(options, sentence):
-    with pytest.raises(wb.WholebodyError, match=sentence):
-        wb.load("human", **options)
-    with pytest.raises(wb.WholebodyError, match="open"):
-        wb.figures.finger_angles("open")
-    with pytest.raises(wb.InputError, match=r"give .left. or .right."):
-        wb.figures.finger_angles("flat", "up")
-
-
 def test_a_flat_hand_closes_around_a_thin_bar(figure):
     """A relaxed hand ends with the thumb between this bar and the palm."""
     scene = wb.Scene(figure).add(wb.Capsule(0.0125, 0.3), name="bar", at=(0.40, -0.2, 1.1))

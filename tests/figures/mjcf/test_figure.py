@@ -10,7 +10,7 @@ import pytest
 
 import wholebody as wb
 from tests.figures.mjcf.random_files import mjcf
-from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
+from wholebody.base.errors import FileFormatError, InputError
 from wholebody.figures.link_pieces import drawn_of
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo, which reads MJCF files, is not installed")
@@ -217,15 +217,6 @@ def test_a_wrong_file_is_one_sentence(what: str, tmp_path: Path) -> None:
         wb.load(path)
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_options_are_checked(arm: Path) -> None:
-    with pytest.raises(InputError, match="'fixed' or 'free'"):
-        wb.load(arm, root="floating")
-    with pytest.raises(UnknownNameError, match=r"'hnd'.*hand"):
-        wb.load(arm, concavity={"hnd": 0.1})
-    with pytest.raises(InputError, match="concavity of link 'hand' is 2"):
-        wb.load(arm, concavity={"hand": 2})
 
 
 def test_a_urdf_may_be_called_xml(tmp_path: Path) -> None:

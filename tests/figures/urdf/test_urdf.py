@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import wholebody as wb
-from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
+from wholebody.base.errors import FileFormatError, InputError
 from wholebody.figures import load
 
 ARM = Path(__file__).resolve().parents[2] / "data" / "arm" / "arm.urdf"
@@ -199,13 +199,6 @@ def test_binary_and_damaged_mesh(tmp_path):
     (tmp_path / "meshes" / "bracket.stl").write_bytes(b"")
     with pytest.raises(FileFormatError, match=r"link 'tool'.*bracket\.stl"):
         load(write(tmp_path, TEXT.replace("package://arm/meshes", "meshes")))
-
-
-def test_options_are_checked():
-    with pytest.raises(InputError, match="'fixed' or 'free'"):
-        load(ARM, root="floating")
-    with pytest.raises(UnknownNameError, match="package_dirs"):
-        load(ARM, package_dir=".")
 
 
 def test_finer_pieces_can_be_asked_for_and_added_volume_is_said():

@@ -137,12 +137,6 @@ def test_what_cannot_be_taken_is_named(human: wb.Figure) -> None:
     assert len(caught.value.terms) == 7
 
 
-@pytest.mark.parametrize("settings", [{"tolerance": 0.0}, {"tolerance": np.nan}, {"iterations": 0}, {"restarts": -1}])
-def test_settings_out_of_range(settings: dict[str, Any]) -> None:
-    with pytest.raises(wb.InputError):
-        wb.methods.CCD(**settings)
-
-
 def test_an_arm_is_pushed_out_of_what_came_onto_it(planar_arm: Callable[..., wb.Figure]) -> None:
     """A ball 15 mm deep in the middle link: the arm turns away from it, and no farther than that takes."""
     scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.08), name="ball", at=(0.7, 0.6, 0.0))

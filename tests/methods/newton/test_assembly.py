@@ -11,7 +11,6 @@ import pytest
 import wholebody as wb
 from tests.methods.newton.test_linear_algebra import jacobian_of
 from wholebody.base.arrays import Array
-from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.linear_algebra import Gram, QuasiDefinite
 from wholebody.tracking.drag import Drag
@@ -164,34 +163,6 @@ def test_points_slide_on_planes_and_along_axes() -> None:
     assert answer.placements["cup"].act(np.array((0, 0, -0.1)))[2] == pytest.approx(0.5, abs=1e-5)
     assert answer.placements["drawer"].translation == pytest.approx([0.5, 0.0, 0.3], abs=2e-3)
     assert answer.placements["drawer"].rotation == pytest.approx(np.eye(3), abs=1e-4)
-
-
-def test_bad_input_names_the_bodies() -> None:
-    made = Assembly().body("a").body("b", (1, 0, 0))
-    with pytest.raises(InputError, match="'a'"):
-        made.body("a")
-    with pytest.raises(InputError, match="body 'c': size is 0"):
-        made.body("c", size=0.0)
-    with pytest.raises(InputError, match=r"'c'.*length"):
-        made.body("c", (0, 0, 0, 0, 0, 0, 2.0))
-    with pytest.raises(InputError, match=r"'c'.*finite"):
-        made.body("c", (0, np.nan, 0))
-    with pytest.raises(UnknownNameError, match="no body is called 'd'"):
-        made.spherical("a", "d", at=(0, 0, 0))
-    made.spherical("a", "b", at=(0.5, 0, 0))
-    with pytest.raises(InputError, match="'b' and 'a' have one already"):
-        made.spherical("b", "a", at=(0.5, 0, 0))
-    made.spherical("a", "b", at=(0.5, 0.2, 0))  # at another place it is another joint
-    with pytest.raises(InputError, match="'a' and 'b' have one already"):
-        made.fixed("a", "b").fixed("a", "b")
-    with pytest.raises(InputError, match="itself"):
-        made.fixed("a", "a")
-    with pytest.raises(InputError, match="no room"):
-        made.revolute("a", "b", at=(0, 0, 0), axis=Y, limits=(1.0, 0.5))
-    with pytest.raises(InputError, match="no bodies"):
-        Assembly().solve()
-    with pytest.raises(InputError, match="tolerance"):
-        made.solve(tolerance=0.0)
 
 
 def test_the_nearest_place_is_found_with_quadratic_convergence() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wholebody.base.errors import UnknownNameError
 from wholebody.methods.newton.linear_algebra import (
     Gram,
     LinearSystem,
@@ -124,8 +123,3 @@ def test_conflicting_rows_are_met_in_the_least_squares_sense() -> None:
     for name in SPARSE:
         step, _ = linear_algebra(pattern, name).solve(system)
         assert step == pytest.approx([0.5], abs=1e-6), name
-
-
-def test_an_unknown_name_is_named() -> None:
-    with pytest.raises(UnknownNameError, match="linear algebra"):
-        linear_algebra(Pattern(np.zeros(1, int), np.zeros(1, int), 1, 1), "cholesky")

@@ -12,7 +12,6 @@ from wholebody.bench.suite.stability.bodies import spatial_arm
 from wholebody.methods.qp.chain_kernel import reach_all
 from wholebody.tasks.base import Goal
 
-START = np.array([-0.4, 0.5, 0.9, 0.0, 0.5, 0.0])
 OFFSET = (0.02, 0.0, 0.01)
 
 

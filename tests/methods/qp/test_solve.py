@@ -264,21 +264,6 @@ def test_every_solver_poses_the_human(solver, honest):
         assert solution.method == method.name
 
 
-@pytest.mark.parametrize(
-    ("settings", "sentence"),
-    [
-        ({"tolerance": 0.0}, "tolerance"),
-        ({"tolerance": np.nan}, "tolerance"),
-        ({"iterations": 0}, "iterations"),
-        ({"budget": -1}, "budget"),
-        ({"restarts": -1}, "restarts"),
-    ],
-)
-def test_settings_out_of_range_are_refused(settings, sentence):
-    with pytest.raises(wb.InputError, match=sentence):
-        wb.methods.QP(**settings)
-
-
 def test_what_is_no_problem_or_method_is_refused(planar_arm):
     problem = wb.Problem(wb.Scene(planar_arm(LENGTHS)))
     with pytest.raises(wb.InputError, match="not a Problem"):

@@ -9,7 +9,6 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State
@@ -190,15 +189,6 @@ def test_what_a_figure_was_asked_before_changes_nothing() -> None:
     found = [pairs(one, case) for case in cases]
     assert found == [pairs(wb.load("human"), case) for case in cases]
     assert len(set(found)) > 2
-
-
-def test_mistakes_are_refused(human: Figure) -> None:
-    problem = standing(human)
-    with pytest.raises(InputError, match="problem is a Scene"):
-        wb.simplify(problem.scene)  # type: ignore[arg-type]
-    problem.scene.add(wb.Sphere(0.1), name="new", at=(2.0, 0.0, 1.0))
-    with pytest.raises(InputError, match="state the problem anew"):
-        wb.simplify(problem)
 
 
 def test_a_measure_counts_for_what_it_is(human: Figure) -> None:

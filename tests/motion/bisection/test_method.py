@@ -386,33 +386,3 @@ def test_a_figure_without_root_and_elbows_is_freed(planar_arm: Callable[..., Fig
     result = freed_by(Bisection(buffer=0.0), clip, scene)
     assert depths(scene, result.q).max() <= DEEP
     assert between(scene, result.q) <= DEEP
-
-
-@pytest.mark.parametrize(
-    ("settings", "named"),
-    [
-        ({"buffer": -1.0}, "buffer"),
-        ({"buffer": float("nan")}, "buffer"),
-        ({"least": 0}, "least"),
-        ({"interpolation": "cubic"}, "interpolation"),
-        ({"evaluation": [-1]}, "evaluation"),
-        ({"evaluation": 3}, "evaluation"),
-        ({"planes": [3]}, "planes"),
-        ({"frozen": "root"}, "frozen"),
-        ({"room": 5.0}, "room"),
-        ({"method": "qqp"}, "method"),
-    ],
-)
-def test_settings_out_of_range_are_refused(settings: dict[str, object], named: str) -> None:
-    with pytest.raises(wb.WholebodyError, match=named):
-        Bisection(**settings)  # type: ignore[arg-type]
-
-
-def test_names_and_frames_that_do_not_fit_are_refused(swing: Clip) -> None:
-    scene = wb.Scene(swing.figure)
-    with pytest.raises(wb.InputError, match="evaluation"):
-        freed_by(Bisection(evaluation=(41,)), swing, scene)
-    with pytest.raises(wb.errors.UnknownNameError, match="left_elbow"):
-        freed_by(Bisection(planes=("left_elbov",)), swing, scene)
-    with pytest.raises(wb.errors.UnknownNameError, match="spine"):
-        freed_by(Bisection(frozen=("spin",)), swing, scene)

@@ -124,9 +124,3 @@ def test_a_small_step_can_be_twice_as_fast_as_was_asked(planar_arm: Callable[...
     assert not found.report.solved
     assert "a speed that was given is exceeded by 100.0% of it" in found.report.message
     assert wb.avoid(clip, method="trajectory", constraints=[wb.tasks.StepLimit(0.2)]).report.solved
-
-
-@pytest.mark.parametrize("stretch", [0.5, float("nan"), "2", 1e9])
-def test_a_wrong_stretch_is_refused(stretch: object) -> None:
-    with pytest.raises(wb.InputError, match="stretch"):
-        wb.motion.Trajectory(stretch=stretch)  # type: ignore[arg-type]

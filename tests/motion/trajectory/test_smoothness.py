@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import pytest
 
 import wholebody as wb
 from wholebody.figures.figure import Figure
@@ -55,8 +54,3 @@ def test_what_would_jerk_stays_as_smooth_as_it_is(planar_arm: Callable[..., Figu
     nearer, rough = found(*case, wb.motion.Trajectory(time=0.04))
     assert jerk <= 1.2 < rough
     assert nearer < angle
-
-
-def test_a_wrong_time_is_refused() -> None:
-    with pytest.raises(wb.InputError, match="time"):
-        wb.motion.Trajectory(time=-1.0)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import pickle
-from typing import Any
 
 import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.base.errors import InputError
 from wholebody.scene.matter.body import MATERIALS, mass_properties, surface
 
 TABLE = {
@@ -77,27 +76,6 @@ def test_hulls_and_meshes_of_a_box_away_from_their_origin_are_the_box() -> None:
         found = mass_properties(shape, wb.Body(mass=48.0))
         assert found.centre == pytest.approx([0.1, 0.2, 0.3])
         assert found.inertia == pytest.approx(np.diag([48 * 0.52 / 12, 48 * 0.40 / 12, 48 * 0.20 / 12]))
-
-
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        ({"mass": 0.0}, "Body: mass is 0.0; give a number between"),
-        ({"density": -1.0}, "Body: density is -1.0; give a number between"),
-        ({"density": 1.0, "mass": 1.0}, "both a density and a mass"),
-        ({"velocity": (1.0, 2.0)}, "Body: velocity has shape"),
-        ({"velocity": (1e9, 0.0, 0.0)}, "Body: velocity is"),
-        ({"material": 3}, "Body: material is 3"),
-    ],
-)
-def test_a_body_that_cannot_be_is_refused_in_one_sentence(values: dict[str, Any], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        wb.Body(**values)
-
-
-def test_an_unknown_material_names_the_nearest() -> None:
-    with pytest.raises(UnknownNameError, match="did you mean wood"):
-        wb.Body(material="woods")
 
 
 def test_a_half_space_cannot_move() -> None:

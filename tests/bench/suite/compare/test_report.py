@@ -10,7 +10,6 @@ from types import ModuleType
 import pytest
 
 from tests.csv_rows import csv_rows
-from wholebody.base.errors import InputError
 from wholebody.bench import plot_style
 from wholebody.bench.suite.compare import report as publishing
 from wholebody.bench.suite.compare.results import ANSWERED, OVERTIME, REFUSED, Chunk, Record, Store
@@ -109,13 +108,6 @@ def test_the_page_of_results_gets_its_part(folder: Path) -> None:
     assert "\nold\n" not in page
     for name in re.findall(r"\]\((assets/bench/[^)]+)\)", page):
         assert (folder / "docs" / name).is_file()
-
-
-def test_settings_are_checked(fakes: ModuleType) -> None:
-    with pytest.raises(InputError, match="cases is 0"):
-        Settings((fakes.SET,), (fakes.adapter("solves"),), cases=0)
-    with pytest.raises(InputError, match="at least one of each"):
-        Settings((), (fakes.adapter("solves"),))
 
 
 @pytest.mark.parametrize("span", [(2.0, 30.0), (1.0, 900.0), (0.01, 20000.0)])

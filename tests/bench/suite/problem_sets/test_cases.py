@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.base.errors import UnknownNameError
 from wholebody.bench.suite.problem_sets.case import Case
 from wholebody.bench.suite.problem_sets.registry import SETS, problem_set
 
@@ -65,11 +64,6 @@ def test_another_process_makes_the_same_problems() -> None:
     code = f"import sys; sys.path.insert(0, {str(__file__).rpartition('/')[0]!r}); import test_cases as t; t.tell(0, 1)"
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert dict(line.split() for line in told.splitlines()) == here
-
-
-def test_an_unknown_set_is_named_with_those_near_it() -> None:
-    with pytest.raises(UnknownNameError, match="clutter"):
-        problem_set("cluter")
 
 
 def tell(number: int, seed: int) -> None:
