@@ -194,7 +194,7 @@ def _answers(problem: Problem, sampler: Sampler) -> Iterator[_End]:
         if number == 0:
             solution = QP().solve(problem)
         else:
-            solution = QP(restarts=0, budget=0).solve(bare.with_start(sampler.near(problem.start, 1.0)))
+            solution = QP(restarts=0, budget=0).solve(bare.with_start(sampler.near(problem.start, number / (ENDS - 1))))
         # Half of the ends are on any side of whole turns: things can block the nearest.
         near = problem.start if number < ENDS // 2 else sampler.anywhere()
         end = sampler.turns.nearest(solution.q, near) if solution.solved else None
