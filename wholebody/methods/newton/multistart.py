@@ -92,17 +92,16 @@ class Search:
     def _beyond_reach(self) -> bool:
         """Whether a goal is out of reach for certain, so that no other start can solve the problem."""
         problem = self.active_system.problem
-        asked = [
-            (goal.frame, goal.resolved_offset, goal.resolved_target)
-            for goal in problem.goals
-            if isinstance(goal, Point)
-        ]
-        asked += [
-            (goal.frame, np.zeros(3), goal.residual.placement.translation)
-            for goal in problem.goals
-            if isinstance(goal, Frame)
-        ]
-        return any(beyond_reach(problem, *of, at[None])[0] > self.settings.assessed_tolerance for *of, at in asked)
+        for goal in problem.goals:
+            if isinstance(goal, Point):
+                offset, at = goal.resolved_offset, goal.resolved_target
+            elif isinstance(goal, Frame):
+                offset, at = np.zeros(3), goal.residual.placement.translation
+            else:
+                continue
+            if beyond_reach(problem, goal.frame, offset, at[None])[0] > self.settings.assessed_tolerance:
+                return True
+        return False
 
     def _from_other_starts(self, q: Array, best: SearchResult) -> SearchResult:
         """The best result of the other starts and the best so far; each start has a trial first."""
