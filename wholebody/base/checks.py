@@ -227,6 +227,13 @@ def settle(record: object, name: str, value: object) -> None:
     object.__setattr__(record, name, value)
 
 
+def keywords(given: Collection[str], options: type, what: str) -> None:
+    """Refuse keyword arguments that a TypedDict of options has not, as Python does."""
+    for name in given:
+        if name not in options.__annotations__:
+            raise TypeError(f"{what}() got an unexpected keyword argument {name!r}")
+
+
 def function(value: _T, what: str) -> _T:
     """Something that can be called, or None."""
     if value is not None and not callable(value):
