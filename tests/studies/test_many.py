@@ -141,7 +141,7 @@ def test_a_folder_keeps_what_is_done(arm: wb.Figure, tmp_path: Path) -> None:
 
 
 def test_a_folder_of_something_else_is_refused(arm: wb.Figure, tmp_path: Path) -> None:
-    (tmp_path / "records.sqlite").write_text("not a database, but long enough to be one" * 50)
+    (tmp_path / "records.jsonl").write_text("{}\n")
     with pytest.raises(wb.errors.FileFormatError, match="another folder"):
         wb.solve_many([problem(arm, PLACES[0])], folder=tmp_path)
 

@@ -57,7 +57,9 @@ class Surroundings(Protocol):
 def filled(term: _T, **values: object) -> _T:
     """Copy of an immutable term with some of its fields set."""
     result: _T = object.__new__(type(term))
-    vars(result).update(vars(term), **values)
+    own = vars(result)
+    own.update(vars(term))
+    own.update(values)
     return result
 
 
