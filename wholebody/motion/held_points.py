@@ -25,7 +25,7 @@ from wholebody.motion.structure import upright
 from wholebody.motion.thing_contacts import ThingContact, Things, thickness
 from wholebody.motion.windows import long_runs, runs
 
-STRONG = 24.0  # s, weight of what rests, over the time step, as that of accelerations; 1 of a bone
+STRONG = 48.0  # s, weight of what rests, over the time step, as that of accelerations; 1 of a bone
 NEARING, SWING = 30.0, 0.3  # weights of what nearly rests, and of a sole between
 TOUCH = 100.0  # of what touches a thing
 LANDING = 3.0  # weight in the frame in which a point comes down, where contact decides
