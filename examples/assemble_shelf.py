@@ -80,7 +80,7 @@ def attach_right_side(assembly: wb.Assembly) -> None:
 def drag(assembly: wb.Assembly, name: str) -> list[Array]:
     """Drag a part to its place; the states of all parts, frame by frame."""
     states, there = [assembly.q], in_place(name)
-    dragged = wb.Drag(assembly.drop_goals().frame_goal(name, there))
+    dragged = wb.tracking.Drag(assembly.drop_goals().frame_goal(name, there))
     for offset in (*WAYS[name], (0.0, 0.0, 0.0)):
         begin, end = assembly.placement(name), pin.SE3(there.rotation, there.translation + np.array(offset))
         for share in np.linspace(0.0, 1.0, FRAMES + 1)[1:]:

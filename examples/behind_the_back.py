@@ -20,8 +20,8 @@ def build() -> wb.Problem:
     return wb.Problem(
         scene,
         goals=[wb.Relative("right_index_tip", "pelvis", BUCKLE, orientation=False)],
-        constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Balance(margin=0.02), wb.ReachCones()],
-        measures=[wb.Effort(), wb.Discomfort(0.1)],
+        constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Balance(margin=0.02), wb.tasks.ReachCones()],
+        measures=[wb.Effort(), wb.tasks.Discomfort(0.1)],
         clearance=0.005,
         touching=[("right_hand", "pouch")],
     )

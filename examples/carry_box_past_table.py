@@ -45,9 +45,9 @@ def build() -> wb.Problem:
             wb.Hold("left_foot"),
             wb.Hold("right_foot"),
             wb.Balance(margin=0.02),
-            wb.ReachCones(),
+            wb.tasks.ReachCones(),
         ],
-        measures=[wb.Effort(), wb.Discomfort(0.1)],
+        measures=[wb.Effort(), wb.tasks.Discomfort(0.1)],
         clearance=0.01,
         touching=[("box", "left_hand")],
     )

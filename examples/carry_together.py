@@ -60,7 +60,7 @@ def carry(scene: wb.Scene, q: Array) -> tuple[list[Array], wb.Solution]:
     held = [wb.Hold(palm, relative_to=LEADER, orientation=False) for palm in PALMS if palm != LEADER]
     palm = figure.placement(q, LEADER)
     problem = wb.Problem(scene, q, goals=[wb.Frame(LEADER, palm)], constraints=[*FEET, *held])
-    drag, postures = wb.Drag(problem), [q]
+    drag, postures = wb.tracking.Drag(problem), [q]
     path = [(-SIDEWAYS, LOW), (-SIDEWAYS, HIGH), (SIDEWAYS, HIGH), (SIDEWAYS, LOW)]
     for begin, end in pairwise(path):
         for share in np.linspace(0.0, 1.0, FRAMES + 1)[1:]:

@@ -58,8 +58,8 @@ def build() -> wb.Problem:
                 wb.Axis(f"{side}_palm", (0, 0, 1), direction=(0, 0, -1), weight=0.1),
             )
         ],
-        constraints=[wb.Hold("pelvis"), wb.Hold("left_foot"), wb.Hold("right_foot"), wb.ReachCones()],
-        measures=[wb.Effort(), wb.Discomfort(0.1)],
+        constraints=[wb.Hold("pelvis"), wb.Hold("left_foot"), wb.Hold("right_foot"), wb.tasks.ReachCones()],
+        measures=[wb.Effort(), wb.tasks.Discomfort(0.1)],
     )
 
 

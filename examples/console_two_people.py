@@ -39,8 +39,8 @@ def build(scene: wb.Scene, control: str) -> wb.Problem:
     return wb.Problem(
         scene,
         goals=[wb.Point(fingertip, place), wb.Axis("gaze", (1, 0, 0), toward=place, weight=0.1)],
-        constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Balance(margin=0.02), wb.ReachCones()],
-        measures=[wb.Effort(), wb.Discomfort(0.1)],
+        constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Balance(margin=0.02), wb.tasks.ReachCones()],
+        measures=[wb.Effort(), wb.tasks.Discomfort(0.1)],
         clearance=0.002,
     )
 
@@ -79,7 +79,7 @@ def draw(problems: dict[tuple[str, str], wb.Problem], solutions: dict[tuple[str,
                 viewer.show(solutions[person, control].q, problem=problems[person, control])
                 try:
                     one = Image.open(viewer.picture(path, size=(width, height), legend=False))
-                except wb.MissingPackageError as error:
+                except wb.errors.MissingPackageError as error:
                     print(f"no picture: {error}")
                     continue
                 whole.paste(one, (width * column, height * row))

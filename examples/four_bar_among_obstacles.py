@@ -61,7 +61,7 @@ def build() -> wb.Assembly:
 
 def turn(assembly: wb.Assembly, angles: Array) -> list[Array]:
     """Drag the crank's tip through angles until something stops it; the states, the first one included."""
-    drag, states = wb.Drag(assembly), [assembly.q]
+    drag, states = wb.tracking.Drag(assembly), [assembly.q]
     for angle in angles:
         frame = drag.to(CRANK * np.array((np.cos(angle), 0.0, np.sin(angle))))
         states.append(frame.q)

@@ -25,8 +25,8 @@ def build() -> wb.Problem:
             wb.Point("left_index_tip", BELOW),
             wb.Axis("gaze", (1, 0, 0), toward=LAMP, weight=0.1),
         ],
-        constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Balance(margin=0.02), wb.ReachCones()],
-        measures=[wb.Effort(), wb.Discomfort(0.1)],
+        constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Balance(margin=0.02), wb.tasks.ReachCones()],
+        measures=[wb.Effort(), wb.tasks.Discomfort(0.1)],
         clearance=0.005,
         touching=[("left_hand", "lamp")],
     )

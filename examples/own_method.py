@@ -61,7 +61,7 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> None:
         scene, "standing", goals=[wb.Point("right_palm", (0.5, -0.3, 1.1))],
         constraints=[wb.Freeze("root")], range_of_motion=False,
     )  # fmt: skip
-    for method in (JacobianTranspose(tolerance=1e-5), wb.QP()):
+    for method in (JacobianTranspose(tolerance=1e-5), wb.methods.QP()):
         solution = wb.solve(problem, method)
         print(f"{solution.method}: {solution.message}, {solution.iterations} iterations")
         if pictures and solution.method == "transpose":

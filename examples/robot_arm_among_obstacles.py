@@ -26,7 +26,7 @@ def build() -> wb.Problem:
     return wb.Problem(
         scene,
         goals=[wb.Frame("grip", GRIP)],
-        measures=[wb.Displacement()],
+        measures=[wb.tasks.Displacement()],
         clearance=0.01,
         touching=[("left_finger", "part"), ("right_finger", "part")],
     )

@@ -101,7 +101,7 @@ def build(load: float) -> wb.Assembly:
 
 def drive(made: wb.Assembly, height: float) -> list[Array]:
     """Drag the platform to a height, or as far as it goes; the states."""
-    begin, drag = made.placement("platform").translation[2], wb.Drag(made)
+    begin, drag = made.placement("platform").translation[2], wb.tracking.Drag(made)
     states = [drag.to((0.0, 0.0, z)).q for z in np.linspace(begin, height, FRAMES + 1)[1:]]
     drag.finish()
     return [*states, drag.q]

@@ -28,7 +28,7 @@ def build() -> wb.Problem:
             wb.Axis("gaze", (1, 0, 0), toward=PLACE, weight=0.1),
         ],
         constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Balance(margin=0.01)],
-        measures=[wb.Effort(), wb.Discomfort(0.1)],
+        measures=[wb.Effort(), wb.tasks.Discomfort(0.1)],
         clearance=0.005,
     )
 

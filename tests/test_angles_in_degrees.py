@@ -41,8 +41,8 @@ def shown(scene: wb.Scene) -> wb.Viewer:
         lambda scene, q: wb.Clip(scene.figure, np.array([scene.figure.neutral, q]), 0.02),
         lambda scene, q: FrameLoop(scene, scene.figure.neutral).frame(q),
         lambda scene, q: scene.figure.reduced("left_arm", q),
-        lambda scene, q: wb.QP().tracker(wb.Problem(scene), 0.02).step(q),
-        lambda scene, q: wb.Newton().tracker(wb.Problem(scene), 0.02).step(q),
+        lambda scene, q: wb.methods.QP().tracker(wb.Problem(scene), 0.02).step(q),
+        lambda scene, q: wb.methods.Newton().tracker(wb.Problem(scene), 0.02).step(q),
         lambda scene, q: wb.methods.CCD().tracker(wb.Problem(scene), 0.02).step(q),
         lambda scene, q: wb.ergonomics.lift_between(scene.figure, scene.figure.neutral, q),
         lambda scene, q: wb.ergonomics.body_angles(scene.figure, q),
@@ -85,9 +85,9 @@ def test_degrees_are_said_where_postures_come_in(scene, wrong, enter):
 @pytest.mark.parametrize(
     ("setting", "said"),
     [
-        (lambda: wb.StepLimit(180.0), r"velocity is 180 rad/s; 180 degrees/s are 3.142"),
-        (lambda: wb.StepLimit(joints={"left_arm": 90.0}), r"left_arm is 90 rad/s"),
-        (lambda: wb.StepLimit(root_turn=90.0), r"root_turn is 90 rad/s"),
+        (lambda: wb.tasks.StepLimit(180.0), r"velocity is 180 rad/s; 180 degrees/s are 3.142"),
+        (lambda: wb.tasks.StepLimit(joints={"left_arm": 90.0}), r"left_arm is 90 rad/s"),
+        (lambda: wb.tasks.StepLimit(root_turn=90.0), r"root_turn is 90 rad/s"),
         (lambda: wb.motion.MotionBounds(deviation=30.0), r"deviation is 30 rad; 30 degrees are 0.5236"),
     ],
 )

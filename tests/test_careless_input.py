@@ -121,7 +121,7 @@ def test_colours(person: wb.Figure, color: object, told: str) -> None:
         ({"goals": [wb.Hold("left_foot")]}, r"give it in constraints=\[\.\.\.\]"),
         ({"constraints": [wb.Point("left_palm", (0.5, 0.2, 1.0))]}, r"give it in goals=\[\.\.\.\]"),
         ({"goals": [wb.Effort()]}, r"give it in measures=\[\.\.\.\]"),
-        ({"constraints": [wb.StepLimit(4.0), wb.Effort()]}, r"constraints\[1\] .*measures"),
+        ({"constraints": [wb.tasks.StepLimit(4.0), wb.Effort()]}, r"constraints\[1\] .*measures"),
         ({"touching": ("right_hand", "floor")}, r"a list of pairs of names, such as \[\('right_hand', 'table'\)\]"),
     ],
 )
@@ -186,7 +186,7 @@ def test_warnings_are_of_the_line_that_called(person: wb.Figure) -> None:
         lambda: scene.move("huge", at=(0.0, 9e5, 0.0)),
         lambda: person.with_joints(q, {"left_elbow_flexion": 90.0}),
         lambda: wb.Clip(person, np.tile(q, (3, 1)), 30.0),
-        lambda: wb.QP().tracker(problem(person), 30.0),
+        lambda: wb.methods.QP().tracker(problem(person), 30.0),
     )
     for call in calls:
         with pytest.warns(UserWarning, match="metres|degrees|frames a second") as told:

@@ -112,9 +112,9 @@ def everything(scene: wb.Scene) -> wb.Problem:
         ],
         constraints=[
             wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Plane("pelvis", (0, 0, 1)), wb.Balance(),
-            wb.ReachCones(), wb.Freeze("left_toe_extension"), wb.StepLimit(2.0),
+            wb.tasks.ReachCones(), wb.Freeze("left_toe_extension"), wb.tasks.StepLimit(2.0),
         ],
-        measures=[wb.Effort(), wb.Discomfort(), wb.Displacement(), wb.PotentialEnergy()],
+        measures=[wb.Effort(), wb.tasks.Discomfort(), wb.tasks.Displacement(), wb.tasks.PotentialEnergy()],
         clearance=0.004,
         touching=[("left_hand", "thing0")],
     )  # fmt: skip
@@ -138,13 +138,13 @@ def test_a_problem_with_every_kind_of_term(scene: wb.Scene, way: Callable[[wb.Pr
 
 
 def solved(problem: wb.Problem) -> wb.Solution:
-    return wb.QP(budget=0).solve(problem)
+    return wb.methods.QP(budget=0).solve(problem)
 
 
 def test_a_simplified_problem_and_its_scene(scene: wb.Scene) -> None:
     whole = wb.Problem(
         scene, goals=[wb.Point("right_index_tip", (0.4, -0.2, 1.1))], constraints=[wb.Hold("left_foot")],
-        measures=[wb.PotentialEnergy()],
+        measures=[wb.tasks.PotentialEnergy()],
     )  # fmt: skip
     small = wb.simplify(whole)
     made = pickled(small)
@@ -157,9 +157,9 @@ def test_a_simplified_problem_and_its_scene(scene: wb.Scene) -> None:
 @pytest.mark.parametrize(
     "method",
     [
-        wb.QP(solver="daqp", seed=3),
+        wb.methods.QP(solver="daqp", seed=3),
         wb.methods.CCD(),
-        wb.Newton(seed=1),
+        wb.methods.Newton(seed=1),
         wb.methods.Placo(),
         wb.methods.DampedLeastSquares(),
     ],
@@ -194,14 +194,14 @@ def test_an_assembly_and_its_copy_do_not_share_bodies(way: Callable[[wb.Assembly
 
 
 @pytest.mark.parametrize("way", [pickled, copy.deepcopy, copy.copy], ids=["pickle", "deepcopy", "copy"])
-@pytest.mark.parametrize("method", [wb.QP(), wb.Newton(), None], ids=["qp", "newton", "world"])
+@pytest.mark.parametrize("method", [wb.methods.QP(), wb.methods.Newton(), None], ids=["qp", "newton", "world"])
 def test_what_belongs_to_a_run_is_neither_pickled_nor_copied(way: Callable[[Any], Any], method: Any) -> None:
     scene = wb.Scene(loaded("hand"))
     problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.0, 0.0, 0.1))])
     if method is None:
         held = [wb.World(scene, dt=0.01), FrameLoop(scene, scene.figure.neutral)]
     else:
-        held = [method.tracker(problem, 0.01), wb.Drag(problem)]
+        held = [method.tracker(problem, 0.01), wb.tracking.Drag(problem)]
     for thing in held:
         with pytest.raises(wb.InputError, match="cannot be pickled or copied"):
             way(thing)

@@ -23,10 +23,10 @@ JOINT = """<joint name="joint" type="{kind}"><parent link="base"/><child link="t
 <limit lower="-2" upper="2" effort="1" velocity="1"/></joint>"""
 AXES = {"revolute": "0 0 1", "continuous": "0 0 1", "prismatic": "0 1 0"}
 METHODS = {
-    "qp": wb.QP(budget=60, restarts=2),
-    "qp/daqp": wb.QP(solver="daqp", budget=60, restarts=2),
+    "qp": wb.methods.QP(budget=60, restarts=2),
+    "qp/daqp": wb.methods.QP(solver="daqp", budget=60, restarts=2),
     "ccd": wb.methods.CCD(restarts=1),
-    "newton": wb.Newton(restarts=1),
+    "newton": wb.methods.Newton(restarts=1),
     "placo": wb.methods.Placo(iterations=60),
     "dls": wb.methods.DampedLeastSquares(),
 }
@@ -78,8 +78,8 @@ def test_one_joint_follows_goals_and_is_followed(load: Callable[[str], wb.Figure
     scene = wb.Scene(figure).add(wb.Box((0.1, 0.1, 0.3)), name="left", at=(0.4, 0.6, 0.0))
     place = (0.6, 0.1, 0.0) if kind == "prismatic" else (0.6 * np.cos(0.2), 0.6 * np.sin(0.2), 0.0)
     goal = wb.Point("tip", place, offset=(0.6, 0.0, 0.0))
-    problem = wb.Problem(scene, goals=[goal], constraints=[wb.StepLimit(1.0)])
-    for method in (wb.QP(), wb.Newton()):
+    problem = wb.Problem(scene, goals=[goal], constraints=[wb.tasks.StepLimit(1.0)])
+    for method in (wb.methods.QP(), wb.methods.Newton()):
         tracker, q = method.tracker(problem, 0.02), problem.start
         for _ in range(30):
             q = tracker.step(q).q
@@ -88,7 +88,7 @@ def test_one_joint_follows_goals_and_is_followed(load: Callable[[str], wb.Figure
         free = wb.Problem(scene, goals=[goal])
         if name == "ccd" and kind == "prismatic":
             continue
-        drag = wb.Drag(free, name)
+        drag = wb.tracking.Drag(free, name)
         for _ in range(20):
             frame = drag.to(place)
         assert frame.error < 2e-3, name
@@ -105,8 +105,8 @@ TERMS = {
     "posture": {"goals": [wb.Posture("neutral")]},
     "hold": {"constraints": [wb.Hold("base")]},
     "plane": {"constraints": [wb.Plane("base", (0, 0, 1))]},
-    "limit": {"constraints": [wb.StepLimit(1.0)]},
-    "measures": {"measures": [wb.Effort(), wb.Displacement(), wb.Discomfort(), wb.PotentialEnergy()]},
+    "limit": {"constraints": [wb.tasks.StepLimit(1.0)]},
+    "measures": {"measures": [wb.Effort(), wb.tasks.Displacement(), wb.tasks.Discomfort(), wb.tasks.PotentialEnergy()]},
 }
 REFUSED = {
     **dict.fromkeys(("point", "frame", "axis", "posture", "plane"), ("ccd",)),
@@ -131,7 +131,7 @@ def test_a_figure_without_joints_is_solved_judged_and_followed(load: Callable[[s
         solution = method.solve(problem)
         assert solution.status == ("solved" if reached else "unreachable"), method.name
         assert solution.q.shape == (0,)
-    for method in (wb.QP(), wb.Newton()):
+    for method in (wb.methods.QP(), wb.methods.Newton()):
         assert method.tracker(problem, 0.02).step(problem.start).q.shape == (0,)
     assert wb.solve(wb.simplify(problem).problem).q.shape == (0,)
 

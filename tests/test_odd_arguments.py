@@ -156,7 +156,7 @@ def solvable(path: Path, term: Any) -> None:
     """State and solve a problem with a term."""
     kind = {wb.Goal: "goals", wb.Measure: "measures"}
     key = next((key for base, key in kind.items() if isinstance(term, base)), "constraints")
-    wb.solve(problem(path, **{key: [term]}), wb.QP(budget=0, restarts=0))
+    wb.solve(problem(path, **{key: [term]}), wb.methods.QP(budget=0, restarts=0))
 
 
 class Level(wb.methods.AssemblyConstraint):
@@ -360,8 +360,8 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Look", Call(wb.ergonomics.Look, look, on_a_person)
     settings = {"parts": {"seat": wb.Sphere(0.1)}, "slide": (0.0, 0.1), "height": (0.0, 0.1), "tilt": (0.0, 0.1)}
     yield "adjustable", Call(wb.figures.adjustable, settings)
-    yield "ReachCones", Call(wb.ReachCones, {"names": ["left_shoulder"]}, on_a_person)
-    yield "RangeOfMotion", Call(wb.RangeOfMotion, {"names": ["neck"]}, on_a_person)
+    yield "ReachCones", Call(wb.tasks.ReachCones, {"names": ["left_shoulder"]}, on_a_person)
+    yield "RangeOfMotion", Call(wb.tasks.RangeOfMotion, {"names": ["neck"]}, on_a_person)
     yield "Cylinder", Call(wb.Cylinder, {"radius": 0.1, "length": 0.2}, lambda shape: shape.pieces())
     parts = ((wb.Sphere(0.1), pin.SE3.Identity()),)
     yield "Compound", Call(Compound, {"parts": parts}, lambda shape: shape.pieces())
@@ -378,21 +378,27 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     touch = {"part": "link4", "thing": "ball", "weight": 1.0}
     yield "Touch", Call(wb.Touch, touch, solve_it)
     lean = {"on": "crate", "part": "thorax", "side": at, "weight": 1.0}
-    yield "Lean", Call(wb.Lean, lean, on_a_person)
+    yield "Lean", Call(wb.tasks.Lean, lean, on_a_person)
     sit = {"on": "crate", "pelvis": "pelvis", "trunk": "thorax", "weight": 1.0}
     yield "Sit", Call(wb.Sit, sit, on_a_person)
     yield "Sit(back)", Call(lambda back: wb.Sit("crate", back), {"back": "post"}, on_a_person)
-    yield "Stance", Call(wb.Stance, {"feet": ["left_foot", "right_foot"], "weight": 1.0}, on_a_person)
+    yield "Stance", Call(wb.tasks.Stance, {"feet": ["left_foot", "right_foot"], "weight": 1.0}, on_a_person)
     yield "Stand", Call(wb.Stand, {"on": "crate", "feet": ["left_foot"], "balance": True, "margin": 0.0}, on_a_person)
     grasp = {"hand": "left", "thing": "crate", "kind": "palm", "side": at, "weight": 1.0}
     yield "Grasp", Call(wb.Grasp, grasp, on_a_person)
     yield "Figure.grounded", Call(person.figure.grounded, {"q": person.figure.neutral, "scene": person})
     yield "Freeze", Call(lambda name: wb.Freeze(name), {"name": "joint1"}, solve_it)
     limit = {"velocity": 1.0, "joints": {"joint1": 1.0}, "root_velocity": math.inf, "root_turn": math.inf}
-    yield "StepLimit", Call(wb.StepLimit, limit, solve_it)
-    yield "StepLimit(joint)", Call(lambda v: wb.StepLimit(joints={"joint1": v}), {"v": 1.0}, solve_it)
-    yield "Rhythm", Call(wb.Rhythm, {"weight": 1.0}, on_a_person)
-    for kind in (wb.Effort, wb.RotationEffort, wb.Discomfort, wb.Displacement, wb.PotentialEnergy):
+    yield "StepLimit", Call(wb.tasks.StepLimit, limit, solve_it)
+    yield "StepLimit(joint)", Call(lambda v: wb.tasks.StepLimit(joints={"joint1": v}), {"v": 1.0}, solve_it)
+    yield "Rhythm", Call(wb.tasks.Rhythm, {"weight": 1.0}, on_a_person)
+    for kind in (
+        wb.Effort,
+        wb.tasks.RotationEffort,
+        wb.tasks.Discomfort,
+        wb.tasks.Displacement,
+        wb.tasks.PotentialEnergy,
+    ):
         yield kind.__name__, Call(kind, {"weight": 1.0}, solve_it)
     soft = {"goal": wb.Point("link4", (0.5, 0.2, 0.0)), "weight": 1.0}
     yield "Soft", Call(wb.Soft, soft, solve_it)
@@ -450,14 +456,14 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         "measures": True,
         "time_limit": 4.0,
     }
-    yield "QP", Call(wb.QP, {"solver": "osqp", **settings}, used)
-    yield "QP.solve", Call(wb.QP().solve, {"problem": ask, "progress": print})
-    yield "QP.tracker", Call(wb.QP().tracker, {"problem": ask, "dt": 0.1}, lambda made: made.step(q))
-    yield "QPTracker.step", Call(wb.QP().tracker(ask, 0.1).step, {"q": q, "measures": True})
+    yield "QP", Call(wb.methods.QP, {"solver": "osqp", **settings}, used)
+    yield "QP.solve", Call(wb.methods.QP().solve, {"problem": ask, "progress": print})
+    yield "QP.tracker", Call(wb.methods.QP().tracker, {"problem": ask, "dt": 0.1}, lambda made: made.step(q))
+    yield "QPTracker.step", Call(wb.methods.QP().tracker(ask, 0.1).step, {"q": q, "measures": True})
     for name, made in {
-        "QP": wb.QP(budget=0),
+        "QP": wb.methods.QP(budget=0),
         "CCD": wb.methods.CCD(),
-        "Newton": wb.Newton(restarts=0),
+        "Newton": wb.methods.Newton(restarts=0),
         "Placo": wb.methods.Placo(),
         "DampedLeastSquares": wb.methods.DampedLeastSquares(),
     }.items():
@@ -465,8 +471,8 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         if name in ("CCD", "Placo", "DampedLeastSquares"):
             yield f"{name}.tracker", Call(made.tracker, {"problem": ask, "dt": 0.1}, lambda made: made.step(q))
     for name, made in {
-        "QPTracker": wb.QP(budget=0).tracker(ask, 0.1),
-        "NewtonTracker": wb.Newton(restarts=0).tracker(ask, 0.1),
+        "QPTracker": wb.methods.QP(budget=0).tracker(ask, 0.1),
+        "NewtonTracker": wb.methods.Newton(restarts=0).tracker(ask, 0.1),
         "SolvingTracker": wb.methods.DampedLeastSquares().tracker(ask, 0.1),
     }.items():
         yield f"{name}.frame", Call(made.frame, {"q": q, "tolerance": 1e-4})
@@ -482,11 +488,11 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "CCD.solve", Call(wb.methods.CCD().solve, {"problem": ask, "progress": print})
     yield "CCD.pushed_out", Call(wb.methods.CCD().pushed_out, {"problem": ask, "q": q})
     newton = {"algebra": "auto", "inequalities": "slack", "restarts": 1, "seed": 0, "time_limit": 1.0}
-    yield "Newton", Call(wb.Newton, {"tolerance": 1e-4, "iterations": 5, **newton}, used)
-    yield "Newton.solve", Call(wb.Newton().solve, {"problem": ask, "progress": print})
-    yield "Newton.tracker", Call(wb.Newton().tracker, {"problem": ask, "dt": 0.1}, lambda made: made.step(q))
-    yield "NewtonTracker.step", Call(wb.Newton().tracker(ask).step, {"q": q})
-    yield "NewtonTracker.solve", Call(wb.Newton().tracker(ask).solve, {"q": q})
+    yield "Newton", Call(wb.methods.Newton, {"tolerance": 1e-4, "iterations": 5, **newton}, used)
+    yield "Newton.solve", Call(wb.methods.Newton().solve, {"problem": ask, "progress": print})
+    yield "Newton.tracker", Call(wb.methods.Newton().tracker, {"problem": ask, "dt": 0.1}, lambda made: made.step(q))
+    yield "NewtonTracker.step", Call(wb.methods.Newton().tracker(ask).step, {"q": q})
+    yield "NewtonTracker.solve", Call(wb.methods.Newton().tracker(ask).solve, {"q": q})
     yield (
         "Placo",
         Call(wb.methods.Placo, {"tolerance": 1e-4, "iterations": 5, "time_limit": 1.0, "holds": "soft"}, used),
@@ -499,12 +505,12 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "DampedLeastSquares.solve", Call(wb.methods.DampedLeastSquares().solve, {"problem": ask, "progress": print})
 
     dragged = {"problem": ask, "method": "qp", "goal": 0, "dt": 0.1}
-    yield "Drag", Call(wb.Drag, dragged, lambda drag: drag.to(at))
-    yield "Drag.to", Call(wb.Drag(ask).to, {"target": at})
-    yield "Drag.finish", Call(wb.Drag(ask).finish, {})
+    yield "Drag", Call(wb.tracking.Drag, dragged, lambda drag: drag.to(at))
+    yield "Drag.to", Call(wb.tracking.Drag(ask).to, {"target": at})
+    yield "Drag.finish", Call(wb.tracking.Drag(ask).finish, {})
     yield (
         "follow_path",
-        Call(wb.follow_path, {"problem": ask, "path": places, "method": "qp", "goal": 0, "spacing": 0.05}),
+        Call(wb.tracking.follow_path, {"problem": ask, "path": places, "method": "qp", "goal": 0, "spacing": 0.05}),
     )
 
     def taken(live: Any, method: str, /, **arguments: Any) -> Any:
@@ -702,11 +708,11 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     at_once: dict[str, Any] = {"method": "qp", "jobs": 1, "seconds": 9.0, "warm_start": True}
     at_once |= {"folder": path / "records", "progress": lambda told: True}
     yield "solve_many", Call(wb.solve_many, {"problems": [], **at_once})
-    several = {"most": 2, "apart": 0.2, "method": wb.QP(), "starts": 2, "seed": 0, "time_limit": 1.0}
+    several = {"most": 2, "apart": 0.2, "method": wb.methods.QP(), "starts": 2, "seed": 0, "time_limit": 1.0}
     yield "solutions", Call(wb.solutions, {"problem": ask, **several}, str)
     listed = {"answers": (), "found": 0, "descents": 0, "starts": 0, "complete": False}
     yield "Solutions", Call(Solutions, listed)
-    yield "QP.minima", Call(wb.QP().minima, {"problem": ask, "starts": [ask.start]}, list)
+    yield "QP.minima", Call(wb.methods.QP().minima, {"problem": ask, "starts": [ask.start]}, list)
     varied = {"task": path / "task.toml", "layouts": {"as it is": {}}}
     yield "study", Call(partial(wb.study, progress=lambda told: True), varied)
     anything = {"people": [arm], "targets": [places[0]], "layouts": [None], **at_once}
@@ -926,7 +932,9 @@ DERIVATIVES = (
 )
 """What problems and methods, not people, ask of terms and states; at every posture, which is too often for checks."""
 
-ABSTRACT = ("Shape", "Goal", "Constraint", "AssemblyConstraint", "Bound", "Measure", "Method", "Tracker", "Figure")
+ABSTRACT = (
+    "Shape", "Term", "Goal", "Constraint", "AssemblyConstraint", "Bound", "Measure", "Method", "Tracker", "Figure",
+)  # fmt: skip
 """Classes to derive from, protocols, and the figure, which `load` builds."""
 
 BROWSER = ["open", "wait", "wait_until_closed", "sync", "picture", "movie", "close"]

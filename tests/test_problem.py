@@ -24,11 +24,15 @@ GOAL = wb.Point("right_index_tip", (0.5, -0.2, 1.0))
         ({"start": np.zeros(55)}, wb.InputError, r"start has shape \(56,\), not \(55,\)"),
         ({"start": np.full(56, np.nan)}, wb.InputError, "start entry 0 is not finite"),
         ({"start": np.ones(56)}, wb.InputError, "quaternion is not of unit length"),
-        ({"start": "stading"}, wb.UnknownNameError, "did you mean standing"),
+        ({"start": "stading"}, wb.errors.UnknownNameError, "did you mean standing"),
         ({"goals": GOAL}, wb.InputError, "goals is Point.*not a list"),
         ({"goals": [GOAL, wb.Hold("left_foot")]}, wb.InputError, r"goals\[1\] is a Hold, not a Goal"),
         ({"goals": ["right_hand"]}, wb.InputError, r"goals\[0\] is a str, not a Goal"),
-        ({"goals": [wb.Point("rigth_index_tip", (0, 0, 0))]}, wb.UnknownNameError, "did you mean right_index_tip"),
+        (
+            {"goals": [wb.Point("rigth_index_tip", (0, 0, 0))]},
+            wb.errors.UnknownNameError,
+            "did you mean right_index_tip",
+        ),
         ({"constraints": [GOAL]}, wb.InputError, r"constraints\[0\] is a Point, not a Constraint or Bound"),
         ({"constraints": None}, wb.InputError, "constraints is None, not a list"),
         ({"measures": [wb.Freeze("neck")]}, wb.InputError, r"measures\[0\] is a Freeze, not a Measure"),
@@ -39,7 +43,7 @@ GOAL = wb.Point("right_index_tip", (0.5, -0.2, 1.0))
         ({"clearance": None}, wb.InputError, "clearance is None;"),
         ({"touching": [("right_hand",)]}, wb.InputError, "touching takes a list of pairs of names"),
         ({"touching": ["floor"]}, wb.InputError, "touching takes a list of pairs of names"),
-        ({"touching": [("right_hand", "flor")]}, wb.UnknownNameError, "did you mean floor"),
+        ({"touching": [("right_hand", "flor")]}, wb.errors.UnknownNameError, "did you mean floor"),
     ],
 )
 def test_mistakes_are_answered_with_a_sentence(scene, given, error, sentence):
@@ -64,14 +68,14 @@ def test_nearly_unit_quaternions_are_made_unit(scene):
 
 
 def test_effort_is_minimised_unless_something_else_is_said(scene):
-    assert [type(term) for term in wb.Problem(scene).measures] == [wb.Effort, wb.Rhythm]
+    assert [type(term) for term in wb.Problem(scene).measures] == [wb.Effort, wb.tasks.Rhythm]
     assert wb.Problem(scene, measures=[]).measures == ()
 
 
 def test_bounds_and_constraints_are_told_apart(scene):
-    problem = wb.Problem(scene, constraints=[wb.Freeze("neck"), wb.Hold("left_foot"), wb.StepLimit(1.0)])
-    assert [type(term) for term in problem.bounds] == [wb.Freeze, wb.StepLimit]
-    assert [type(term) for term in problem.constraints] == [wb.Hold, wb.RangeOfMotion, wb.ReachCones]
+    problem = wb.Problem(scene, constraints=[wb.Freeze("neck"), wb.Hold("left_foot"), wb.tasks.StepLimit(1.0)])
+    assert [type(term) for term in problem.bounds] == [wb.Freeze, wb.tasks.StepLimit]
+    assert [type(term) for term in problem.constraints] == [wb.Hold, wb.tasks.RangeOfMotion, wb.tasks.ReachCones]
     assert [type(term) for term in problem.stated] == [wb.Hold]
 
 
@@ -109,7 +113,7 @@ def test_goals_are_replaced_and_the_rest_stays(scene):
     assert len(problem.goals) == 2
     assert problem.constraints is constraints
     assert problem.clearances is clearances
-    with pytest.raises(wb.UnknownNameError):
+    with pytest.raises(wb.errors.UnknownNameError):
         problem.retarget([wb.Point("left_index", (0.5, 0.2, 1.0))])
     assert len(problem.goals) == 2
     with pytest.raises(wb.InputError):
@@ -178,13 +182,19 @@ def test_clearances_that_none_can_keep_are_refused_by_every_run(value: float) ->
     scene = wb.Scene(wb.load("hand"))
     problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.0, 0.0, 0.1))])
     problem.clearances[3] = value
-    for run in (wb.solve, lambda asked: wb.assess(asked, asked.start), lambda asked: wb.QP().tracker(asked, 0.01)):
+    for run in (
+        wb.solve,
+        lambda asked: wb.assess(asked, asked.start),
+        lambda asked: wb.methods.QP().tracker(asked, 0.01),
+    ):
         with pytest.raises(wb.InputError, match=r"clearances\[3\] is"):
             run(problem)
 
 
 @pytest.mark.parametrize(
-    "method", [wb.QP(), wb.Newton(), wb.methods.CCD(), wb.methods.DampedLeastSquares()], ids=lambda one: one.name
+    "method",
+    [wb.methods.QP(), wb.methods.Newton(), wb.methods.CCD(), wb.methods.DampedLeastSquares()],
+    ids=lambda one: one.name,
 )
 @pytest.mark.parametrize("shape", [(3,), (1,), (0, 1)], ids=str)
 def test_clearances_of_another_shape_are_refused_by_every_method(method, shape):

@@ -36,8 +36,8 @@ PLACES = {"within reach": (0.4, -0.25, 1.15), "out of reach": (1.1, 0.3, 1.5), "
 @pytest.mark.parametrize(
     "method",
     [
-        wb.QP(budget=60, restarts=3, time_limit=None),
-        wb.QP(solver="daqp", budget=60, restarts=3, time_limit=None),
+        wb.methods.QP(budget=60, restarts=3, time_limit=None),
+        wb.methods.QP(solver="daqp", budget=60, restarts=3, time_limit=None),
         wb.methods.DampedLeastSquares(iterations=30, time_limit=None),
     ],
     ids=lambda method: method.name,
@@ -86,7 +86,7 @@ def test_contacts_and_sweeps_do_not_depend_on_those_before(scene: wb.Scene) -> N
 
 
 def test_a_new_tracker_steps_as_the_first_one_did(scene: wb.Scene) -> None:
-    asked, method = problem(scene, PLACES["within reach"]), wb.QP(time_limit=None)
+    asked, method = problem(scene, PLACES["within reach"]), wb.methods.QP(time_limit=None)
 
     def way() -> list[np.ndarray]:
         tracker, q, found = method.tracker(asked, 0.02), asked.start, []
@@ -108,7 +108,7 @@ def test_a_drag_goes_as_the_first_one_did(scene: wb.Scene) -> None:
     for method in ("qp", "newton"):
         ways = []
         for _ in range(2):
-            drag = wb.Drag(problem(scene, PLACES["within reach"]), method)
+            drag = wb.tracking.Drag(problem(scene, PLACES["within reach"]), method)
             ways.append([drag.to((0.4 - 0.01 * k, -0.3, 1.15)).q for k in range(4)])
         np.testing.assert_array_equal(*ways)
 

@@ -42,7 +42,7 @@ def test_scene_problem_and_solution_in_three_lines() -> None:
 def test_a_frame_of_a_drag_in_one_line() -> None:
     scene = wb.Scene(wb.load("hand"))
     place = scene.figure.placement(scene.figure.neutral, "right_index_tip").translation
-    frame = wb.Drag(wb.Problem(scene, goals=[wb.Point("right_index_tip", place)])).to(place)
+    frame = wb.tracking.Drag(wb.Problem(scene, goals=[wb.Point("right_index_tip", place)])).to(place)
     assert repr(frame).startswith("DragFrame: error ")
     assert "array" not in repr(frame)
     assert f"{frame.iterations} iterations" in repr(frame)

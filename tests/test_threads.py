@@ -74,9 +74,9 @@ def same(one: wb.Solution, other: wb.Solution) -> bool:
 
 
 METHODS = {  # and how often the problems are solved again
-    "qp/osqp": (wb.QP(budget=20, restarts=1, time_limit=None), 1),
+    "qp/osqp": (wb.methods.QP(budget=20, restarts=1, time_limit=None), 1),
     "dls": (wb.methods.DampedLeastSquares(iterations=40, time_limit=None), 3),
-    "newton": (wb.Newton(restarts=0, iterations=2, time_limit=None), 0),
+    "newton": (wb.methods.Newton(restarts=0, iterations=2, time_limit=None), 0),
     "placo": (wb.methods.Placo(iterations=20, time_limit=None), 0),
     "ccd": (wb.methods.CCD(restarts=0, iterations=40, time_limit=None), 1),
 }
@@ -100,7 +100,7 @@ def test_threads_with_one_method_problem_and_scene_answer_as_one_alone(scene: wb
 
 
 def test_trackers_of_one_method_and_problem_step_as_one_alone(scene: wb.Scene) -> None:
-    problem, method = problems(scene)[0], wb.QP(time_limit=None)
+    problem, method = problems(scene)[0], wb.methods.QP(time_limit=None)
 
     def way(wait: Callable[[], object] = lambda: None) -> list[np.ndarray]:
         tracker, q, found = method.tracker(problem, 0.02), problem.start, []
@@ -145,9 +145,9 @@ def test_questions_to_one_scene_are_answered_as_to_one_thread(scene: wb.Scene) -
 def test_a_simplified_problem_is_solved_by_threads_as_by_one(scene: wb.Scene) -> None:
     whole = wb.Problem(
         scene, goals=[wb.Point("right_index_tip", (0.45, -0.25, 1.15))], constraints=[wb.Hold(foot) for foot in FEET],
-        measures=[wb.PotentialEnergy(), wb.Displacement()],
+        measures=[wb.tasks.PotentialEnergy(), wb.tasks.Displacement()],
     )  # fmt: skip
-    small, method = wb.simplify(whole).problem, wb.QP(budget=0, time_limit=None)
+    small, method = wb.simplify(whole).problem, wb.methods.QP(budget=0, time_limit=None)
     alone = method.solve(small)
 
     def work(number: int) -> None:
@@ -160,7 +160,7 @@ def test_a_solve_sees_things_where_they_were_when_it_began(scene: wb.Scene) -> N
     """A board is moved to and fro all the time: every posture is one of two, as if nobody had moved it meanwhile."""
     moving = wb.Scene(scene.figure).add(wb.Box((0.3, 0.8, 0.03)), name="board", at=(0.45, -0.2, 1.05))
     places = ((0.45, -0.2, 1.05), (0.45, -0.2, 1.3))
-    problem, method = reaching(moving, (0.45, -0.25, 1.15)), wb.QP(budget=0, time_limit=None)
+    problem, method = reaching(moving, (0.45, -0.25, 1.15)), wb.methods.QP(budget=0, time_limit=None)
     alone = []
     for place in places:
         moving.move("board", at=place)
@@ -206,9 +206,9 @@ def test_things_that_come_during_a_solve_are_refused_by_one_sentence(scene: wb.S
 def test_a_tracker_refuses_a_second_thread(scene: wb.Scene) -> None:
     """A goal that asks the tracker for a step, within a step of it: what a second thread would do."""
     problem = problems(scene)[0]
-    tracker = wb.QP(time_limit=None).tracker(problem, 0.02)
+    tracker = wb.methods.QP(time_limit=None).tracker(problem, 0.02)
 
-    class Asking(wb.Displacement):
+    class Asking(wb.tasks.Displacement):
         def value(self, state: State) -> float:
             tracker.step(problem.start)
             return 0.0
@@ -216,7 +216,7 @@ def test_a_tracker_refuses_a_second_thread(scene: wb.Scene) -> None:
     problem.measures = (Asking().resolve(scene, problem.start),)
     with pytest.raises(wb.InputError, match="one tracker for each thread"):
         tracker.step(problem.start)
-    problem.measures = (wb.Displacement().resolve(scene, problem.start),)
+    problem.measures = (wb.tasks.Displacement().resolve(scene, problem.start),)
     tracker.step(problem.start)  # and is free again
 
 
@@ -259,9 +259,9 @@ def test_a_pool_keeps_no_more_than_it_is_allowed() -> None:
 @pytest.mark.parametrize(
     "method",
     [
-        wb.QP(time_limit=None),
+        wb.methods.QP(time_limit=None),
         wb.methods.CCD(time_limit=None),
-        wb.Newton(time_limit=None),
+        wb.methods.Newton(time_limit=None),
         wb.methods.Placo(time_limit=None),
         wb.methods.DampedLeastSquares(time_limit=None),
     ],

@@ -7,13 +7,13 @@ from wholebody import (
     planning as planning,
     studies as studies,
     taskfile as taskfile,
+    tasks as tasks,
+    tracking as tracking,
 )
 from wholebody.assessment.posture import Assessment as Assessment, assess as assess
+from wholebody.base import errors as errors
 from wholebody.base.errors import (
-    FileFormatError as FileFormatError,
     InputError as InputError,
-    MissingPackageError as MissingPackageError,
-    UnknownNameError as UnknownNameError,
     WholebodyError as WholebodyError,
 )
 from wholebody.dynamics.coupling import Actuated as Actuated
@@ -33,8 +33,6 @@ from wholebody.geometry.shapes import (
 )
 from wholebody.methods.base import Method as Method, Tracker as Tracker
 from wholebody.methods.newton.assembly import Assembly as Assembly
-from wholebody.methods.newton.method import Newton as Newton
-from wholebody.methods.qp.method import QP as QP
 from wholebody.methods.simplification.simplify import simplify as simplify
 from wholebody.methods.solve import solve as solve
 from wholebody.motion.avoidance import avoid as avoid
@@ -57,11 +55,8 @@ from wholebody.taskfile import read_task as read_task
 from wholebody.tasks import (
     Axis as Axis,
     Balance as Balance,
-    Bound as Bound,
     CenterOfMass as CenterOfMass,
     Constraint as Constraint,
-    Discomfort as Discomfort,
-    Displacement as Displacement,
     Effort as Effort,
     Force as Force,
     Frame as Frame,
@@ -69,27 +64,17 @@ from wholebody.tasks import (
     Goal as Goal,
     Grasp as Grasp,
     Hold as Hold,
-    Lean as Lean,
     Measure as Measure,
     Orientation as Orientation,
     Plane as Plane,
     Point as Point,
     Posture as Posture,
-    PotentialEnergy as PotentialEnergy,
-    RangeOfMotion as RangeOfMotion,
-    ReachCones as ReachCones,
     Relative as Relative,
-    Rhythm as Rhythm,
-    RotationEffort as RotationEffort,
     Sit as Sit,
     Soft as Soft,
-    Stance as Stance,
     Stand as Stand,
-    StepLimit as StepLimit,
     Touch as Touch,
 )
 from wholebody.terms.derivatives import check_derivatives as check_derivatives
-from wholebody.tracking.drag import Drag as Drag
-from wholebody.tracking.path_following import follow_path as follow_path
 from wholebody.version import __version__ as __version__
 from wholebody.view import Viewer as Viewer

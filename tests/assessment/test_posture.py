@@ -73,7 +73,7 @@ def test_constraints_and_measures(free_bodies):
     problem = wb.Problem(
         scene, q,
         constraints=[wb.Hold("body0"), wb.Plane("body1", (0.0, 0.0, 1.0), side="above")],
-        measures=[wb.Displacement(2.0), wb.Effort(3.0)],
+        measures=[wb.tasks.Displacement(2.0), wb.Effort(3.0)],
     )  # fmt: skip
     moved = q.copy()
     moved[7:10] = 1.0, 0.2, 0.1

@@ -117,7 +117,7 @@ def ranges(figure: Figure) -> list[RangeRow]:
     from wholebody.figures.state import State
 
     scene = wb.Scene(figure)
-    kept = wb.RangeOfMotion().resolve(scene, figure.posture("standing"))
+    kept = wb.tasks.RangeOfMotion().resolve(scene, figure.posture("standing"))
     state = State(figure.model)
     rows = []
     for motion, names, sign, others, published, source in MOTIONS:

@@ -227,7 +227,7 @@ def solve_task(name: str, problem: Problem, pictures: Path | None) -> tuple[Task
     seconds = time.process_time() - began
     scene, q = problem.scene, solution.q
     state = State(scene.model).update(q)
-    ranges = wb.RangeOfMotion().resolve(scene, problem.start).value(state)
+    ranges = wb.tasks.RangeOfMotion().resolve(scene, problem.start).value(state)
     balance = 1e3 * _margin(scene, q)
     figure: Any = scene.figure
     angles: Mapping[str, float] = figure.joint_values(q)

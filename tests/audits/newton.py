@@ -231,7 +231,7 @@ def agreement_rows(repeats: int) -> list[AgreementRow]:
     """Problems whose least effort is unique, by both methods, the loop being an equality in either."""
     rows = []
     for case, problem in _hands_problems():
-        ours, theirs = wb.Newton(tolerance=FINE), wb.QP(tolerance=FINE)
+        ours, theirs = wb.methods.Newton(tolerance=FINE), wb.methods.QP(tolerance=FINE)
         ends = [method.solve(problem) for method in (ours, theirs)]
         times = [1e-3 * median_us(partial(method.solve, problem), max(3, repeats // 30)) for method in (ours, theirs)]
         apart = float(np.abs(pin.difference(problem.scene.model, ends[0].q, ends[1].q)).max())
@@ -283,7 +283,7 @@ def drag_row(frames: int, contacts: bool) -> DragRow:
     start = np.array((0.45, -0.25, 0.9))
     holds = [wb.Hold("left_foot"), wb.Hold("right_foot")]
     problem = wb.Problem(scene, "standing", goals=[wb.Point("right_index_tip", start)], constraints=holds)
-    drag = wb.Drag(problem, wb.Newton())
+    drag = wb.tracking.Drag(problem, wb.methods.Newton())
     for _ in range(20):  # to the circle, which is not measured
         drag.to(start)
     low = TABLE_TOP - 0.02 if contacts else 0.8

@@ -92,7 +92,7 @@ def test_a_term_keeps_what_it_was_given_and_not_the_callers_array() -> None:
 
 def test_every_field_of_the_package_can_be_read() -> None:
     """An annotation that does not resolve would ask for nothing."""
-    classes = [getattr(tasks, name) for name in tasks.__all__] + [Body, wb.Box, wb.HalfSpace, wb.Mesh, wb.QP]
+    classes = [getattr(tasks, name) for name in tasks.__all__] + [Body, wb.Box, wb.HalfSpace, wb.Mesh, wb.methods.QP]
     classes += [wb.methods.CCD, wb.methods.Newton, wb.methods.Placo, wb.methods.DampedLeastSquares]
     checked = [kind for kind in classes if isinstance(kind, type) and issubclass(kind, Checked)]
     assert len(checked) > 25

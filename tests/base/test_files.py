@@ -15,8 +15,8 @@ from pathlib import Path
 
 import pytest
 
-from wholebody import FileFormatError, InputError
 from wholebody.base import files
+from wholebody.base.errors import FileFormatError, InputError
 
 
 def fifo(folder: Path) -> Path:

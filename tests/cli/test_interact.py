@@ -10,7 +10,7 @@ import pytest
 from tests.csv_rows import csv_rows
 from tests.saved_page import unpacked
 from wholebody.cli import main
-from wholebody.tracking import SCENES
+from wholebody.tracking.scenes import SCENES
 
 
 def test_lists_the_scenes(capsys: pytest.CaptureFixture[str]) -> None:

@@ -21,10 +21,10 @@ FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 def public() -> Iterator[tuple[str, Any]]:
     """Public classes and functions by name, each once."""
     seen = set[int]()
-    for name in (*wb.__all__, "tracking"):
-        found = wholebody.tracking if name == "tracking" else getattr(wb, name)
+    for name in wb.__all__:
+        found = getattr(wb, name)
         room = isinstance(found, ModuleType)
-        for inner in dir(found) if room else [""]:
+        for inner in found.__all__ if room else [""]:
             each = getattr(found, inner) if room else found
             if callable(each) and not inner.startswith("_") and id(each) not in seen:
                 seen.add(id(each))

@@ -193,7 +193,7 @@ def test_wrong_worlds_are_one_sentence(planar_arm) -> None:
         wb.InputError, match=r"scene is an Assembly, not a Scene; .*add its bodies as things with wb\.Body\(joints"
     ):
         wb.World(wb.Assembly().body("post"))
-    with pytest.raises(wb.UnknownNameError, match="overlap"):
+    with pytest.raises(wb.errors.UnknownNameError, match="overlap"):
         wb.World(scene, overlap="pq")
     with pytest.raises(wb.InputError, match="dt"):
         wb.World(scene, dt=0.0)

@@ -63,7 +63,7 @@ def test_torques_of_one_of_several_are_those_of_the_person_alone(person: wb.Figu
     np.testing.assert_allclose(found, alone.value(wb.Scene(person).state(bent)), atol=1e-9)
     with pytest.raises(wb.InputError, match="several figures"):
         StrengthLimit(forces).resolve(scene, q)
-    with pytest.raises(wb.UnknownNameError, match="anna"):
+    with pytest.raises(wb.errors.UnknownNameError, match="anna"):
         Exertion(CARRIED, person="ana").resolve(scene, q)
 
 
@@ -119,7 +119,7 @@ def test_odd_forces_are_refused(person: wb.Figure) -> None:
         wb.Force("left_palm", (0.0, 0.0, -1e6))
     with pytest.raises(wb.InputError, match="forces"):
         Exertion([(0.0, 0.0, -100.0)])  # type: ignore[list-item]
-    with pytest.raises(wb.UnknownNameError, match="left_palm"):
+    with pytest.raises(wb.errors.UnknownNameError, match="left_palm"):
         wb.Problem(wb.Scene(person), measures=[Exertion([wb.Force("left_plam", (0, 0, -9))])])
     with pytest.raises(wb.InputError, match="lift the figure"):
         wb.Problem(wb.Scene(person), constraints=[LoadedBalance([wb.Force("left_palm", (0, 0, 2000))])])

@@ -512,7 +512,7 @@ def test_every_domino_falls(example: Example, tmp_path: Path) -> None:
 @pytest.mark.parametrize(("name", "measures"), [("driver", True), ("hold_a_pole", False)])
 def test_hands_hold_what_they_are_told(name: str, measures: bool, example: Example) -> None:
     problem = example(name).build()
-    solution = wb.solve(problem, wb.QP(measures=measures))
+    solution = wb.solve(problem, wb.methods.QP(measures=measures))
     assert solution.solved
     least, where = deepest(problem, solution.q)
     assert least > -1e-5, where

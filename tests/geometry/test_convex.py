@@ -16,8 +16,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from wholebody import FileFormatError, InputError
 from wholebody.base.arrays import Array
+from wholebody.base.errors import FileFormatError, InputError
 from wholebody.geometry import convex
 from wholebody.geometry.components import split_components
 from wholebody.geometry.convex import convex_pieces

@@ -14,9 +14,9 @@ from wholebody.methods.contradictions import contradictions
 from wholebody.tasks.range_of_motion import Coordinate, CoupledRow
 
 METHODS = {
-    "qp": lambda: wb.QP(restarts=0),
+    "qp": lambda: wb.methods.QP(restarts=0),
     "ccd": wb.methods.CCD,
-    "newton": lambda: wb.Newton(restarts=0, iterations=4),
+    "newton": lambda: wb.methods.Newton(restarts=0, iterations=4),
     "placo": wb.methods.Placo,
     "dls": wb.methods.DampedLeastSquares,
 }
@@ -84,7 +84,7 @@ def test_unreachable_says_that_everything_holds(standing):
     goals = [wb.Point("right_index_tip", (0.3, -0.2, 1.6)), wb.Point("right_index_tip", (0.3, -0.2, 1.7))]
     problem = standing(goals=goals, constraints=[foot])
     assert [entry.status for entry in found(problem)] == ["unreachable"]
-    answer = wb.QP(iterations=1, budget=0, restarts=0).solve(problem)
+    answer = wb.methods.QP(iterations=1, budget=0, restarts=0).solve(problem)
     assert not answer.assessment.holds(1e-4)
     assert answer.status in ("stalled", "infeasible")
 
@@ -131,7 +131,7 @@ def test_a_tip_asked_into_a_wall_misses_by_its_depth_and_the_clearance(standing,
     (only,) = entries
     assert only.least == pytest.approx(deep + 0.005, abs=1e-5)
     assert "goals[0], Point('right_index_tip'), is in wall" in only.text
-    answer = wb.QP().solve(problem)
+    answer = wb.methods.QP().solve(problem)
     assert answer.status == "unreachable"
     assert only.least - 1e-5 < answer.assessment.goal_error < 1.02 * only.least
     assert answer.iterations < 300
@@ -210,7 +210,7 @@ def test_a_frozen_neck_beyond_its_ellipse(standing):
 
 def test_the_largest_value_of_a_range_is_that_of_the_best_posture(standing):
     scene = standing().scene
-    term = next(term for term in standing().constraints if isinstance(term, wb.RangeOfMotion))
+    term = next(term for term in standing().constraints if isinstance(term, wb.tasks.RangeOfMotion))
     row, state, rng = term.rows[term.row_names.index("neck")], State(scene.model), np.random.default_rng(1)
     for _ in range(6):
         ends = np.sort(rng.uniform(-1.5, 1.5, (2, scene.model.nq)), axis=0)
@@ -225,7 +225,7 @@ def test_a_frozen_arm_out_of_its_reach_cone(standing):
     scene = standing().scene
     figure, rng, state = scene.figure, np.random.default_rng(3), State(scene.model)
     joints = [name for name in figure.model.names if name.startswith(("right_clavicle", "right_shoulder"))]
-    cones = next(term for term in standing().constraints if isinstance(term, wb.ReachCones))
+    cones = next(term for term in standing().constraints if isinstance(term, wb.tasks.ReachCones))
     row, seen = list(figure.cones).index("right_shoulder"), set()
     for _ in range(30):
         ends = [(-upper_limit(scene, name, -1.0), upper_limit(scene, name)) for name in joints]

@@ -17,9 +17,9 @@ from wholebody.bench.suite.stability.bodies import spatial_arm
 from wholebody.methods.control import Control
 
 METHODS = {
-    "qp": wb.QP,
+    "qp": wb.methods.QP,
     "ccd": wb.methods.CCD,
-    "newton": wb.Newton,
+    "newton": wb.methods.Newton,
     "placo": wb.methods.Placo,
     "dls": wb.methods.DampedLeastSquares,
 }
@@ -133,7 +133,7 @@ def test_progress_is_a_function(reach):
 
 
 def test_a_solve_that_is_let_alone_is_the_same(reach):
-    one, other = wb.QP(time_limit=1000.0).solve(reach), wb.QP().solve(reach)
+    one, other = wb.methods.QP(time_limit=1000.0).solve(reach), wb.methods.QP().solve(reach)
     assert np.array_equal(one.q, other.q)
 
 
@@ -148,7 +148,7 @@ def test_compiling_is_no_time_of_a_solve(reach):
             compiled.append(time.monotonic() - began)
 
     began = time.monotonic()
-    answer = wb.QP(time_limit=1000.0).solve(reach, progress)
+    answer = wb.methods.QP(time_limit=1000.0).solve(reach, progress)
     assert compiled
     assert answer.seconds <= time.monotonic() - began - sum(compiled)
 

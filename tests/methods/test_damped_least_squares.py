@@ -118,7 +118,7 @@ def test_every_goal_and_frozen_joints(human: wb.Figure) -> None:
 
 @pytest.mark.parametrize(
     "term",
-    [wb.Balance(), wb.Plane("right_hand", (0, 0, 1), side="above"), wb.ReachCones()],
+    [wb.Balance(), wb.Plane("right_hand", (0, 0, 1), side="above"), wb.tasks.ReachCones()],
     ids=lambda term: type(term).__name__,
 )
 def test_inequalities_are_refused_by_name(human: wb.Figure, term: wb.Constraint) -> None:

@@ -89,7 +89,7 @@ class Upright(wb.Constraint):
         return Wrench(np.array([[0.0, 0.0, 0.0, y, -x, 0.0]]), int(state.model.frames[index].parentJoint))
 
 
-METHODS = [wb.QP(), wb.Newton()]
+METHODS = [wb.methods.QP(), wb.methods.Newton()]
 
 
 @pytest.mark.parametrize("method", METHODS, ids=["qp", "newton"])
@@ -184,7 +184,7 @@ def test_own_terms_of_joints_that_slide_are_kept(free_bodies: Callable[..., wb.F
         start,
         goals=[wb.Frame("body1", pin.SE3(tilted.toRotationMatrix(), np.array((0.4, 0.3, 0.2))))],
         constraints=[Upright("body1", 0.8)],
-        measures=[wb.Displacement()],
+        measures=[wb.tasks.Displacement()],
     )
     solution = wb.solve(problem, method)
     up = scene.state(solution.q).frame(scene.frame_id("body1")).rotation[2, 2]
@@ -194,7 +194,7 @@ def test_own_terms_of_joints_that_slide_are_kept(free_bodies: Callable[..., wb.F
 
 def test_a_measure_of_the_roots_place_is_named(planar_arm: Callable[..., wb.Figure]) -> None:
     human = wb.Scene(wb.load("human", detail="capsules"))
-    problem = wb.Problem(human, "standing", measures=[wb.PotentialEnergy()])
-    assert "PotentialEnergy is reported, not minimised" in wb.Newton().solve(problem).message
+    problem = wb.Problem(human, "standing", measures=[wb.tasks.PotentialEnergy()])
+    assert "PotentialEnergy is reported, not minimised" in wb.methods.Newton().solve(problem).message
     bodies = FigureBodies(wb.Scene(planar_arm((0.3, 0.2))).figure)
     assert goal_rows(bodies, Sum(0.0), "sum").size == 1

@@ -84,7 +84,7 @@ def test_a_drag_uses_a_method_by_its_protocol_alone(name: str, scene: wb.Scene) 
     there = scene.state(np.array([0.3, 0.4, 0.5])).frame(scene.frame_id("tip")).translation
     found = []
     for one in (method, Wrapped()):
-        drag = wb.Drag(wb.Problem(scene, [0.1, 0.2, 0.3], goals=[wb.Point("tip", there)]), one)
+        drag = wb.tracking.Drag(wb.Problem(scene, [0.1, 0.2, 0.3], goals=[wb.Point("tip", there)]), one)
         found.append([drag.to(there + (0.0, 0.01 * k, 0.0)).q for k in range(3)])
     assert np.array_equal(found[0], found[1])
 

@@ -11,7 +11,7 @@ import pytest
 import wholebody as wb
 from wholebody import InputError
 
-METHODS = (wb.QP, wb.methods.CCD, wb.Newton, wb.methods.Placo, wb.methods.DampedLeastSquares)
+METHODS = (wb.methods.QP, wb.methods.CCD, wb.methods.Newton, wb.methods.Placo, wb.methods.DampedLeastSquares)
 NO_NUMBER = (None, "x", "1", math.nan, math.inf, -math.inf, True, 1j, [], [1], {}, object(), 10**400, 10**5000, -1)
 WHOLE = ("iterations", "budget", "restarts", "restarts_for_measure", "seed")
 REAL = ("tolerance", "damping")
@@ -30,33 +30,33 @@ def test_every_setting_that_is_a_number_is_checked(method: Any) -> None:
 @pytest.mark.parametrize("wrong", [None, 0, 1, "yes", [], math.nan])
 def test_flags_are_true_or_false(wrong: Any) -> None:
     with pytest.raises(InputError, match=r"measures is .*; give True or False"):
-        wb.QP(measures=wrong)
+        wb.methods.QP(measures=wrong)
     with pytest.raises(InputError, match=r"hot_start is .*; give True or False"):
-        wb.QP(hot_start=wrong)
+        wb.methods.QP(hot_start=wrong)
 
 
 @pytest.mark.parametrize("wrong", [None, 3, [], object(), ("slack",)])
 def test_names_are_texts(wrong: Any) -> None:
     with pytest.raises(InputError, match="solver is"):
-        wb.QP(solver=wrong)
+        wb.methods.QP(solver=wrong)
     with pytest.raises(InputError, match="is not the name of a linear algebra"):
-        wb.Newton(algebra=wrong)
+        wb.methods.Newton(algebra=wrong)
     with pytest.raises(InputError, match=r"inequalities is .*'slack' or 'barrier'"):
-        wb.Newton(inequalities=wrong)
+        wb.methods.Newton(inequalities=wrong)
     with pytest.raises(InputError, match=r"holds is .*'hard' or 'soft'"):
         wb.methods.Placo(holds=wrong)
 
 
 def test_assemblies_are_told_where_they_are_taken() -> None:
     assembly = wb.Assembly().body("rod")
-    for call in (lambda: wb.follow_path(assembly, [(0, 0, 0)]), lambda: wb.Drag(assembly)):
+    for call in (lambda: wb.tracking.follow_path(assembly, [(0, 0, 0)]), lambda: wb.tracking.Drag(assembly)):
         with pytest.raises(InputError, match=r"the assembly has no goals; .*point_goal"):
             call()
     assembly.frame_goal("rod", (0, 0, 0))
     with pytest.raises(InputError, match="goal 0 is of the kind 'frame'; use Drag"):
-        wb.follow_path(assembly, [(0, 0, 0)])
+        wb.tracking.follow_path(assembly, [(0, 0, 0)])
     with pytest.raises(InputError, match="not by 'ccd'; leave method out"):
-        wb.Drag(assembly, "ccd")  # type: ignore[call-overload]
+        wb.tracking.Drag(assembly, "ccd")  # type: ignore[call-overload]
     with pytest.raises(InputError, match=r"scene is an Assembly, not a Scene; .*shape="):
         wb.Viewer(assembly)
     with pytest.raises(InputError, match="problem is an Assembly, not a Problem"):

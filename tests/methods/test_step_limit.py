@@ -17,7 +17,7 @@ ROUNDING = 1.0 + 1e-9
 
 def excess(problem: wb.Problem, q0: np.ndarray, q1: np.ndarray) -> float:
     """Largest share of a bound that the way from q0 to q1 takes."""
-    (bound,) = (term for term in problem.bounds if isinstance(term, wb.StepLimit))
+    (bound,) = (term for term in problem.bounds if isinstance(term, wb.tasks.StepLimit))
     most = bound.bounds(problem.scene.state(q0), DT)[1]
     return float((np.abs(pin.difference(problem.scene.model, q0, q1)) / most).max())
 
@@ -25,7 +25,7 @@ def excess(problem: wb.Problem, q0: np.ndarray, q1: np.ndarray) -> float:
 @pytest.mark.parametrize("method", installed_methods())
 def test_whole_solves_are_shortened_to_the_limit(method: str) -> None:
     scene = wb.Scene(wb.load("human"))
-    limits = wb.StepLimit(2.0, joints={"right_elbow_flexion": 1.0}, root_velocity=0.5, root_turn=0.7)
+    limits = wb.tasks.StepLimit(2.0, joints={"right_elbow_flexion": 1.0}, root_velocity=0.5, root_turn=0.7)
     asked = wb.Problem(
         scene, "standing", goals=[wb.Point("right_index_tip", (0.5, -0.3, 1.2))], constraints=[limits], balance=False
     )
@@ -40,7 +40,7 @@ def test_whole_solves_are_shortened_to_the_limit(method: str) -> None:
 
 
 def test_the_root_keeps_its_limits_where_it_gives_way_to_a_thing() -> None:
-    limits = wb.StepLimit(12.0, root_velocity=4.0, root_turn=6.0)
+    limits = wb.tasks.StepLimit(12.0, root_velocity=4.0, root_turn=6.0)
     turned = 0
     for seed in range(3):
         throw = Throw(np.random.default_rng(seed), SHAPES["board"], 2.5, 3.0)
@@ -48,7 +48,7 @@ def test_the_root_keeps_its_limits_where_it_gives_way_to_a_thing() -> None:
         tip = throw.scene.state(start).frame(throw.scene.frame_id("right_index_tip")).translation.copy()
         goals = [wb.Point("right_index_tip", tip)]
         asked = wb.Problem(throw.scene, start, goals=goals, constraints=[limits], clearance=0.001)
-        tracker, q = wb.QP().tracker(asked, DT), asked.start
+        tracker, q = wb.methods.QP().tracker(asked, DT), asked.start
         for _ in range(throw.frames):
             throw.next()
             step = tracker.step(q)

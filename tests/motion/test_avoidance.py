@@ -184,7 +184,7 @@ def test_joints_become_no_faster_than_their_limit_or_the_original(planar_arm: Ca
     clip, scene = arm_and_ball(planar_arm, 30)
     free = wb.avoid(clip, scene)
     limit = 0.85 * float(np.abs(np.diff(free.clip.q, axis=0)).max()) / DT
-    found = wb.avoid(clip, scene, constraints=[wb.StepLimit(limit)])
+    found = wb.avoid(clip, scene, constraints=[wb.tasks.StepLimit(limit)])
     assert found.report.solved, found.report.message
     assert np.abs(np.diff(found.clip.q, axis=0)).max() <= limit * DT + 1e-6
 
@@ -300,7 +300,7 @@ def test_a_free_clip_that_misses_what_is_held_is_not_solved(
 def test_names_of_methods(planar_arm: Callable[..., Figure]) -> None:
     clip, scene = arm_and_ball(planar_arm, 5)
     assert set(METHODS) >= {"trajectory", "frames", "bisection"}
-    with pytest.raises(wb.UnknownNameError, match="trajectory"):
+    with pytest.raises(wb.errors.UnknownNameError, match="trajectory"):
         wb.avoid(clip, scene, method="trajectry")
     with pytest.raises(wb.InputError, match="other joints"):
         wb.avoid(clip, wb.Scene(wb.load("hand")))

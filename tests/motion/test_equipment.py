@@ -116,15 +116,15 @@ def test_bounds_of_a_mesh_are_those_of_its_vertices() -> None:
 
 
 def test_mistakes_are_named(capsules: Figure) -> None:
-    with pytest.raises(wb.UnknownNameError, match="pack"):
+    with pytest.raises(wb.errors.UnknownNameError, match="pack"):
         equipment("back_pack", capsules)
-    with pytest.raises(wb.UnknownNameError, match="thorax"):
+    with pytest.raises(wb.errors.UnknownNameError, match="thorax"):
         Equipment.worn(wb.Sphere(0.1), capsules, name="ball", to="thoraxx")
     with pytest.raises(wb.InputError, match="no bounds"):
         Equipment.worn(wb.HalfSpace(), capsules, name="floor")
     with pytest.raises(wb.InputError, match="shape"):
         Equipment("ball", "a ball", "thorax")  # type: ignore[arg-type]
-    with pytest.raises(wb.UnknownNameError):
+    with pytest.raises(wb.errors.UnknownNameError):
         Equipment("ball", wb.Sphere(0.1), "thoraxx").attach(wb.Scene(capsules))
     with pytest.raises(wb.InputError, match="fits a person"):
         equipment("pack", wb.load("hand"))

@@ -193,7 +193,7 @@ def test_arms_that_were_recorded_inside_the_trunk_are_outside(human: wb.Figure) 
 def test_speed_limits_hold() -> None:
     """Feet that go twice as fast, of a person whose knees turn at 3 rad/s at most."""
     motion, _ = walker(flat, 1.0)
-    slow = wb.load("human")
+    slow = wb.load("human", stature=1.75)
     limit = np.array(slow.model.velocityLimit)
     limit[6:] = 3.0
     slow.model.velocityLimit = limit
@@ -281,7 +281,7 @@ def nowhere(count: int) -> dict[str, np.ndarray]:
 )
 def test_a_changed_ground_is_checked(change: dict[str, Any], sentence: str) -> None:
     found = wb.motion.ground(walker(flat, 2.0)[0])
-    with pytest.raises((wb.InputError, wb.UnknownNameError), match=f"Ground: .*{sentence}") as told:
+    with pytest.raises((wb.InputError, wb.errors.UnknownNameError), match=f"Ground: .*{sentence}") as told:
         dataclasses.replace(found, **change)
     assert "\n" not in str(told.value)
 

@@ -212,5 +212,5 @@ def test_wrong_settings_are_refused(human: wb.Figure, options: dict[str, object]
 def test_wrong_strength_is_refused() -> None:
     with pytest.raises(wb.InputError, match="percentile"):
         Strength(percentile=1)
-    with pytest.raises(wb.UnknownNameError, match="sex"):
+    with pytest.raises(wb.errors.UnknownNameError, match="sex"):
         Strength(sex="x")

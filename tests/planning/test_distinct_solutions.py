@@ -121,7 +121,7 @@ WRONG = {
     "most": ({"most": 0}, "most"),
     "apart": ({"apart": -1.0}, "apart"),
     "starts": ({"starts": 0}, "starts"),
-    "method": ({"method": "newton"}, "give wb.QP"),
+    "method": ({"method": "newton"}, "give wb.methods.QP"),
     "time_limit": ({"time_limit": float("nan")}, "time_limit"),
 }
 

@@ -104,7 +104,7 @@ def test_things_that_stay_are_where_they_were_moved_to(scene: wb.Scene) -> None:
 
 
 def test_wrong_names_are_one_sentence(scene: wb.Scene) -> None:
-    with pytest.raises(wb.UnknownNameError, match="board"):
+    with pytest.raises(wb.errors.UnknownNameError, match="board"):
         MovingScene(scene.built, ["bord"])
     with pytest.raises(wb.InputError, match="named twice"):
         MovingScene(scene.built, ["board", "board"])

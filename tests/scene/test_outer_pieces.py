@@ -69,7 +69,7 @@ def test_solved_reaches_are_free_by_the_hulls(spheres, hulls, method):
 
 def test_a_tracker_keeps_the_hulls_out(spheres, hulls):
     problem = shelf(spheres, 2)
-    tracker, q, inside = wb.QP().tracker(problem, 0.02), problem.start.copy(), 0.0
+    tracker, q, inside = wb.methods.QP().tracker(problem, 0.02), problem.start.copy(), 0.0
     for _ in range(20):
         q = tracker.step(q).q
         inside = max(inside, deepest(hulls, problem.scene.objects.values(), q))

@@ -100,14 +100,21 @@ def test_measures_and_ranges_are_sums_and_rows_of_each(anna: wb.Figure) -> None:
     figure, rng = pair.figure, np.random.default_rng(3)
     q = figure.clamp(pin.integrate(figure.model, figure.neutral, 0.2 * rng.normal(size=figure.model.nv)))
     scenes = {"anna": wb.Scene(anna), "ben": wb.Scene(ben)}
-    for kind in (wb.Effort, wb.Displacement, wb.Discomfort, wb.Rhythm, wb.PotentialEnergy, wb.RotationEffort):
+    for kind in (
+        wb.Effort,
+        wb.tasks.Displacement,
+        wb.tasks.Discomfort,
+        wb.tasks.Rhythm,
+        wb.tasks.PotentialEnergy,
+        wb.tasks.RotationEffort,
+    ):
         together = kind().resolve(pair, figure.neutral)
         apart = 0.0
         for name, scene in scenes.items():
             term = kind().resolve(scene, figure.part(name, figure.neutral))
             apart += term.value(scene.state(figure.part(name, q)))
         assert together.value(pair.state(q)) == pytest.approx(apart, rel=1e-9), kind
-    for kind in (wb.RangeOfMotion, wb.ReachCones):
+    for kind in (wb.tasks.RangeOfMotion, wb.tasks.ReachCones):
         rows = kind().resolve(pair, q).value(pair.state(q))
         own = [
             kind().resolve(scene, figure.part(name, q)).value(scene.state(figure.part(name, q)))
@@ -119,7 +126,13 @@ def test_measures_and_ranges_are_sums_and_rows_of_each(anna: wb.Figure) -> None:
 
 def test_compiled_rows_of_one_figure_are_those_of_its_terms(pair: wb.Scene) -> None:
     goals = [wb.CenterOfMass((1.4, 0.1, 0.9), figure="ben"), wb.CenterOfMass((0.6, 0.0, 0.9))]
-    measures = [wb.Rhythm(), wb.Displacement(), wb.RotationEffort(), wb.PotentialEnergy(), wb.Discomfort()]
+    measures = [
+        wb.tasks.Rhythm(),
+        wb.tasks.Displacement(),
+        wb.tasks.RotationEffort(),
+        wb.tasks.PotentialEnergy(),
+        wb.tasks.Discomfort(),
+    ]
     problem = wb.Problem(pair, goals=goals, constraints=feet("anna/", "ben/"), measures=measures)
     assert sum(isinstance(term, Balance) for term in problem.constraints) == 2
     rng = np.random.default_rng(7)
@@ -186,7 +199,7 @@ def test_a_closed_chain_of_two_is_kept_by_a_tracker(pair: wb.Scene) -> None:
         constraints=[*feet("anna/", "ben/"), *loop],
         goals=[wb.Frame("anna/right_palm", figure.placement(start.q, "anna/right_palm"))],
     )
-    tracker, q = wb.QP().tracker(problem, dt=0.02), start.q
+    tracker, q = wb.methods.QP().tracker(problem, dt=0.02), start.q
     place = figure.placement(start.q, "anna/right_palm")
     for step in range(1, 26):
         moved = pin.SE3(place.rotation, place.translation + (0.0, 0.004 * step, 0.006 * step))

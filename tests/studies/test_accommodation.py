@@ -173,7 +173,7 @@ def test_odd_populations_are_refused() -> None:
         wb.people(3, percentiles=[5])
     with pytest.raises(wb.InputError, match=r"percentiles is empty; give some, such as \[5, 50, 95\]"):
         wb.people(percentiles=[])
-    with pytest.raises(wb.UnknownNameError, match="sitting_height"):
+    with pytest.raises(wb.errors.UnknownNameError, match="sitting_height"):
         wb.boundary(0.95, ["siting_height"])
     with pytest.raises(wb.InputError, match="confidence"):
         wb.boundary(float("nan"))

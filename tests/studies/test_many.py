@@ -141,8 +141,8 @@ def test_a_folder_keeps_what_is_done(arm: wb.Figure, tmp_path: Path) -> None:
 
 
 def test_a_folder_of_something_else_is_refused(arm: wb.Figure, tmp_path: Path) -> None:
-    (tmp_path / "records.sqlite").write_text("not a database, but long enough to be one" * 50)
-    with pytest.raises(wb.FileFormatError, match="another folder"):
+    (tmp_path / "records.jsonl").write_text("{}\n")
+    with pytest.raises(wb.errors.FileFormatError, match="another folder"):
         wb.solve_many([problem(arm, PLACES[0])], folder=tmp_path)
 
 
@@ -156,7 +156,7 @@ def test_records_are_written_as_a_table(arm: wb.Figure, tmp_path: Path) -> None:
     try:
         import pyarrow  # noqa: F401
     except ImportError:
-        with pytest.raises(wb.MissingPackageError, match="pyarrow"):
+        with pytest.raises(wb.errors.MissingPackageError, match="pyarrow"):
             records.to_parquet(tmp_path / "a.parquet")
         assert not (tmp_path / "a.parquet").exists()
 
@@ -210,7 +210,7 @@ class Tries:
         return wb.solve(problem, progress=progress)
 
     def tracker(self, problem: wb.Problem, dt: float) -> Any:
-        return wb.QP().tracker(problem, dt)
+        return wb.methods.QP().tracker(problem, dt)
 
 
 @dataclass(frozen=True)
@@ -228,7 +228,7 @@ def test_a_method_of_a_user_keeps_its_settings_where_it_has_to(arm: wb.Figure, m
 def test_a_method_derived_from_qp_solves_each_problem(arm: wb.Figure) -> None:
     solved = []
 
-    class Counted(wb.QP):
+    class Counted(wb.methods.QP):
         def solve(self, problem: wb.Problem, progress: Any = None) -> wb.Solution:
             solved.append(problem)
             return super().solve(problem, progress)
@@ -240,7 +240,7 @@ def test_a_method_derived_from_qp_solves_each_problem(arm: wb.Figure) -> None:
 def test_after_a_miss_the_last_solved_answer_is_the_start(arm: wb.Figure) -> None:
     begun = []
 
-    class Noted(wb.QP):
+    class Noted(wb.methods.QP):
         def solve(self, problem: wb.Problem, progress: Any = None) -> wb.Solution:
             begun.append(problem.start)
             return super().solve(problem, progress)

@@ -79,7 +79,7 @@ def test_the_joint_that_turns_most_is_named_and_what_shifts_is_not() -> None:
     other[:3] += 1.0  # the root shifts
     knee = figure.joints.index("right_knee_flexion")
     other[len(other) - len(figure.joints) + knee] += 2.0 * JUMP
-    ((name, angle),) = most_turned([(lambda: wb.Problem(scene), one, other)], wb.QP())
+    ((name, angle),) = most_turned([(lambda: wb.Problem(scene), one, other)], wb.methods.QP())
     assert name == "right_knee_flexion"
     assert angle == pytest.approx(2.0 * JUMP)
 

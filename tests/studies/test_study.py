@@ -104,7 +104,7 @@ def test_people_of_a_study_have_proportions_of_their_own(folder: Path) -> None:
         targets=[(3.0, 0.0, 1.0)],
     )  # fmt: skip
     assert near.goal_error > far.goal_error + 0.02
-    with pytest.raises(wb.UnknownNameError, match="no dimension is called 'spam'"):
+    with pytest.raises(wb.errors.UnknownNameError, match="no dimension is called 'spam'"):
         wb.study(folder / "task.toml", people=[{"proportions": {"spam": 1.75}}])
 
 
@@ -142,7 +142,7 @@ def test_a_wrong_study_file_is_refused_with_place(
 def test_what_cannot_vary_is_refused(folder: Path) -> None:
     with pytest.raises(wb.InputError, match="nothing varies"):
         wb.study(folder / "task.toml")
-    with pytest.raises(wb.UnknownNameError, match="F5"):
+    with pytest.raises(wb.errors.UnknownNameError, match="F5"):
         wb.study(folder / "task.toml", people=["F6"])
     with pytest.raises(wb.InputError, match="target"):
         wb.study(folder / "task.toml", targets=[(0.0, 1.0)])

@@ -71,7 +71,7 @@ def test_terms_are_those_that_python_makes(everything: wb.taskfile.Task) -> None
             wb.Relative("left_palm", "right_palm", (0, 0.3, 0), orientation=False),
             wb.Posture("sitting", joints=["left_leg"]),
             wb.Touch("right_index_tip", "box"),
-            wb.Lean("rod", side=(1, 0, 0)),
+            wb.tasks.Lean("rod", side=(1, 0, 0)),
             wb.Sit("box", "rod"),
             wb.Grasp("left", "box", side=(0, 1, 0)),
         ],
@@ -80,8 +80,8 @@ def test_terms_are_those_that_python_makes(everything: wb.taskfile.Task) -> None
             wb.Plane("left_elbow", (0, 1, 0), side="above"),
             wb.Balance(("left_foot", "right_foot"), margin=0.01),
             wb.Freeze("lower_body", "root"),
-            wb.ReachCones(["right_shoulder"]),
-            wb.RangeOfMotion(["neck", "left_hamstrings"]),
+            wb.tasks.ReachCones(["right_shoulder"]),
+            wb.tasks.RangeOfMotion(["neck", "left_hamstrings"]),
             wb.Stand("ground", feet=["left_foot"], balance=False),
             wb.Grasp("right", "rod", "power"),
             wb.ergonomics.LoadedBalance(held, margin=0.02),
@@ -90,12 +90,12 @@ def test_terms_are_those_that_python_makes(everything: wb.taskfile.Task) -> None
         ],
         measures=[
             wb.Effort(),
-            wb.Discomfort(0.1),
-            wb.Displacement(),
-            wb.PotentialEnergy(0.01),
-            wb.Rhythm(2.0),
-            wb.RotationEffort(3.0),
-            wb.Stance(weight=4.0),
+            wb.tasks.Discomfort(0.1),
+            wb.tasks.Displacement(),
+            wb.tasks.PotentialEnergy(0.01),
+            wb.tasks.Rhythm(2.0),
+            wb.tasks.RotationEffort(3.0),
+            wb.tasks.Stance(weight=4.0),
             wb.ergonomics.Exertion(strength=wb.motion.Strength(sex="female"), weight=5.0),
         ],
     )
@@ -130,7 +130,7 @@ def test_a_soft_goal_is_read_beside_the_default_measures_and_written(tmp_path: P
 
 def test_method_has_its_settings(everything: wb.taskfile.Task) -> None:
     method = everything.method
-    assert isinstance(method, wb.QP)
+    assert isinstance(method, wb.methods.QP)
     assert (method.solver, method.tolerance, method.iterations) == ("daqp", 1e-7, 50)
     assert (method.budget, method.restarts, method.seed) == (50, 2, 3)
 
@@ -140,8 +140,8 @@ def test_what_is_left_out_is_what_python_leaves_out(tmp_path: Path) -> None:
     task = wb.read_task(tmp_path / "least.toml")
     assert task.title == "least"
     np.testing.assert_array_equal(task.problem.start, wb.load("human").posture("standing"))
-    assert [type(measure) for measure in task.problem.measures] == [wb.Effort, wb.Rhythm]
-    assert [type(term) for term in task.problem.defaults] == [wb.RangeOfMotion, wb.ReachCones]
+    assert [type(measure) for measure in task.problem.measures] == [wb.Effort, wb.tasks.Rhythm]
+    assert [type(term) for term in task.problem.defaults] == [wb.tasks.RangeOfMotion, wb.tasks.ReachCones]
     assert task.problem.goals == ()
     assert task.problem.clearance == 0.0
 

@@ -71,7 +71,7 @@ def test_what_a_person_keeps_by_default_goes_round(tmp_path: Path, asked: dict[s
     again = wb.read_task(wb.taskfile.write_task(problem, tmp_path / "task.toml")).problem
     same(problem, again)
     assert [type(term) for term in again.defaults] == [type(term) for term in problem.defaults]
-    assert (wb.RangeOfMotion in map(type, again.defaults)) == asked.get("range_of_motion", True)
+    assert (wb.tasks.RangeOfMotion in map(type, again.defaults)) == asked.get("range_of_motion", True)
 
 
 def test_joints_of_things_go_round(tmp_path: Path) -> None:
@@ -110,7 +110,7 @@ def test_whose_strength_it_is_goes_round(tmp_path: Path) -> None:
     path = wb.taskfile.write_task(problem, tmp_path / "two.toml")
     same(problem, wb.read_task(path).problem)
     path.write_text(path.read_text().replace('person = "ben"', 'person = "bne"'))
-    with pytest.raises(wb.UnknownNameError, match="did you mean ben"):
+    with pytest.raises(wb.errors.UnknownNameError, match="did you mean ben"):
         wb.read_task(path)
 
 
@@ -141,7 +141,7 @@ def test_what_a_task_file_cannot_say_is_named(tmp_path: Path) -> None:
     figure = wb.load("human")
     with pytest.raises(wb.InputError, match="reduced"):
         wb.taskfile.write_task(wb.Scene(figure.reduced(["right_arm"])), tmp_path / "a.toml")
-    problem = wb.Problem(wb.Scene(figure), constraints=[wb.StepLimit()])
+    problem = wb.Problem(wb.Scene(figure), constraints=[wb.tasks.StepLimit()])
     with pytest.raises(wb.InputError, match=r"constraints\[0\] is a StepLimit"):
         wb.taskfile.write_task(problem, tmp_path / "a.toml")
     assert not list(tmp_path.iterdir())
@@ -173,5 +173,5 @@ def test_millimetres_are_thought_of(told: Any, tmp_path: Path) -> None:
         wb.load("human", stature=1750)
     file = tmp_path / "t.toml"
     file.write_text('[figure]\nname = "human"\n[[goal]]\ntype = "point"\nframe = "gaze"\ntarget = [800, 0, 1]\n')
-    with pytest.raises(wb.FileFormatError, match=r"0\.8 if it is in millimetres"):
+    with pytest.raises(wb.errors.FileFormatError, match=r"0\.8 if it is in millimetres"):
         wb.read_task(file)

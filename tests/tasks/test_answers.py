@@ -134,8 +134,8 @@ def test_the_assessment_names_a_term_that_is_not_finite(scene, kind, part, bad):
 def test_methods_step_back_and_end_with_the_name(scene, kind, part, bad, method):
     problem = stated(scene, kind(part, bad))
     chosen = {
-        "qp": wb.QP(restarts=1, budget=40),
-        "newton": wb.Newton(restarts=0, iterations=12),
+        "qp": wb.methods.QP(restarts=1, budget=40),
+        "newton": wb.methods.Newton(restarts=0, iterations=12),
         "dls": wb.methods.DampedLeastSquares(),
     }
     if chosen[method].accepts(problem) is not None:
@@ -149,7 +149,9 @@ def test_methods_step_back_and_end_with_the_name(scene, kind, part, bad, method)
     assert re.search(rf"{place[kind]}: its {part} has \S+ at a posture of iteration \d+", solution.message)
 
 
-@pytest.mark.parametrize("method", [wb.QP(), wb.Newton(), wb.methods.DampedLeastSquares()], ids=lambda one: one.name)
+@pytest.mark.parametrize(
+    "method", [wb.methods.QP(), wb.methods.Newton(), wb.methods.DampedLeastSquares()], ids=lambda one: one.name
+)
 @pytest.mark.parametrize(
     "term", [Reach("error", np.full(3, np.nan)), Bend("gradient", np.full(55, np.nan))], ids=["goal", "measure"]
 )
@@ -167,7 +169,7 @@ def test_trackers_stay_where_terms_are_finite(scene, method, term):
     if method.name == "qp":
         assert any(f"{type(term).__name__}): its {term.part} has nan" in note for note in notes)
     with pytest.raises(UndefinedTermError, match=type(term).__name__):
-        wb.QP().tracker(problem, 0.05).step(reached(scene))
+        wb.methods.QP().tracker(problem, 0.05).step(reached(scene))
 
 
 def test_an_assessment_with_nan_meets_and_holds_nothing(scene):
@@ -209,7 +211,7 @@ def test_odd_answers_are_one_sentence(scene, part, bad):
             judged.optimality, judged.blockers  # noqa: B018
 
     def track(problem):
-        tracker = wb.QP().tracker(problem, 0.05)
+        tracker = wb.methods.QP().tracker(problem, 0.05)
         for _ in range(6):
             tracker.step(problem.start)
 
@@ -233,7 +235,7 @@ def test_fractions_are_numbers(scene):
     third = wb.motion.torques(clip, friction=Fraction(1, 3))
     assert np.array_equal(third.torque, wb.motion.torques(clip, friction=1 / 3).torque)
     problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (Fraction(2, 5), Fraction(-1, 5), 1))])
-    assert wb.QP(tolerance=Fraction(1, 10**5), time_limit=Fraction(3)).solve(problem).status == "solved"
+    assert wb.methods.QP(tolerance=Fraction(1, 10**5), time_limit=Fraction(3)).solve(problem).status == "solved"
 
 
 def test_a_figure_is_no_scene_to_stand_on(scene):

@@ -36,7 +36,7 @@ def arms(scene: wb.Scene) -> Array:
     """(400, nq) standing people whose left arm is anywhere in its ranges of motion."""
     figure, rng = scene.figure, np.random.default_rng(0)
     start, state, found = figure.posture("standing"), State(scene.model), []
-    kept = [term.resolve(scene, start) for term in (wb.RangeOfMotion(), wb.ReachCones())]
+    kept = [term.resolve(scene, start) for term in (wb.tasks.RangeOfMotion(), wb.tasks.ReachCones())]
     places = [figure.model.joints[figure.joint_id(f"left_shoulder_{name}")].idx_q for name in FIRST]
     lower, upper = figure.model.lowerPositionLimit[places], figure.model.upperPositionLimit[places]
     while len(found) < 400:
@@ -101,7 +101,7 @@ def test_rotation_effort_is_the_weighted_square_of_the_rotation_vectors(scene: w
     """Of the nine ball joints; of the other joints and the root it is what `Effort` counts."""
     figure, start, state = scene.figure, scene.figure.posture("sitting"), State(scene.model)
     rng = np.random.default_rng(1)
-    term, angles = wb.RotationEffort().resolve(scene, start), wb.Effort().resolve(scene, start)
+    term, angles = wb.tasks.RotationEffort().resolve(scene, start), wb.Effort().resolve(scene, start)
     assert len(term.balls) == len(BALLS)
     for arm in arms[:20]:
         q = figure.clamp(pin.integrate(figure.model, arm, 0.2 * rng.normal(size=figure.model.nv)))
@@ -117,7 +117,7 @@ def test_rotation_effort_is_the_weighted_square_of_the_rotation_vectors(scene: w
 def test_figures_without_ball_joints_count_angles() -> None:
     scene = wb.Scene(wb.load("hand"))
     rng, figure = np.random.default_rng(0), scene.figure
-    terms = [kind().resolve(scene, figure.neutral) for kind in (wb.RotationEffort, wb.Effort)]
+    terms = [kind().resolve(scene, figure.neutral) for kind in (wb.tasks.RotationEffort, wb.Effort)]
     state = State(scene.model).update(pin.integrate(figure.model, figure.neutral, rng.normal(size=figure.model.nv)))
     assert terms[0].balls == ()
     assert terms[0].value(state) == pytest.approx(terms[1].value(state))
@@ -133,7 +133,7 @@ def test_an_arm_swings_forward_from_the_t_pose_with_little_twist(scene: wb.Scene
     free = [f"left_shoulder_{name}" for name in FIRST]
     still = wb.Freeze(*[name for name in figure.joints if name not in free], "root")
     twists = []
-    for measure in (wb.RotationEffort(), wb.Effort()):
+    for measure in (wb.tasks.RotationEffort(), wb.Effort()):
         made = [goal], [still], [measure]
         problem = wb.Problem(scene, start, goals=made[0], constraints=made[1], measures=made[2], range_of_motion=False)
         q = wb.solve(problem).q

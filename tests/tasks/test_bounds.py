@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wholebody import QP, InputError, Posture, Problem, Scene, UnknownNameError
+from wholebody import InputError, Posture, Problem, Scene
+from wholebody.base.errors import UnknownNameError
 from wholebody.figures.state import State
+from wholebody.methods import QP
 from wholebody.tasks import Freeze, StepLimit
 
 

@@ -16,7 +16,7 @@ from wholebody.tasks.kinks import MOST_FACES
 
 AS_CHEAP = 1.02  # times the effort at the place
 STATIONARY = 1e-2  # rad, m
-ONE_START = wb.QP(restarts=0, budget=0)
+ONE_START = wb.methods.QP(restarts=0, budget=0)
 CASES = {
     "frame on an edge": (wb.Touch("right_index_tip", "thing"), 10),
     "piece on an edge": (wb.Touch("right_hand:2", "thing"), 2),

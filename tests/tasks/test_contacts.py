@@ -35,7 +35,7 @@ TERMS = {
     "touch_point": wb.Touch("right_index_tip", "ball"),
     "touch_frames": wb.Touch("right_palm", "left_palm"),
     "touch_itself": wb.Touch("right_hand", "left_thigh"),
-    "lean": wb.Lean("backrest"),
+    "lean": wb.tasks.Lean("backrest"),
     "sit": wb.Sit("seat"),
     "sit_back": wb.Sit("seat", "backrest"),
     "stand": wb.Stand("floor"),
@@ -214,7 +214,7 @@ def test_both_palms_on_a_box_as_constraints(scene: wb.Scene) -> None:
     problem = wb.Problem(
         scene, goals=[wb.Axis("gaze", (1, 0, 0), toward=(0.45, 0, 0.92))], constraints=[*palms, wb.Stand("floor")]
     )
-    solution = wb.solve(problem, wb.QP(measures=False))
+    solution = wb.solve(problem, wb.methods.QP(measures=False))
     assert solution.status == "solved"
     for side, sign in (("left", 1.0), ("right", -1.0)):
         palm = scene.figure.placement(solution.q, f"{side}_palm")
@@ -282,7 +282,7 @@ def test_other_methods_refuse_by_name(scene: wb.Scene, method: str) -> None:
         (lambda: wb.Grasp("left", "floor", "power"), "endless"),
         (lambda: wb.Grasp("left", "box", "claw"), "palm"),
         (lambda: wb.Grasp("left", "bar", "pinch"), "one piece; load the person with hands='fingers'"),
-        (lambda: wb.Lean("backrest", side=(0, 0, 0)), "no direction"),
+        (lambda: wb.tasks.Lean("backrest", side=(0, 0, 0)), "no direction"),
     ],
 )
 def test_mistakes_are_named(scene: wb.Scene, term: Any, sentence: str) -> None:

@@ -53,7 +53,7 @@ def test_defaults_are_switched_off_and_on(scene: wb.Scene) -> None:
 
 
 def test_what_is_stated_takes_the_place_of_a_default(scene: wb.Scene) -> None:
-    stated = [wb.RangeOfMotion(["neck"]), wb.ReachCones(["left_shoulder"])]
+    stated = [wb.tasks.RangeOfMotion(["neck"]), wb.tasks.ReachCones(["left_shoulder"])]
     assert kinds(wb.Problem(scene, constraints=stated)) == set()
 
 
@@ -92,7 +92,7 @@ def test_who_leans_keeps_the_centre_of_mass_away_from_the_edge_of_the_feet(scene
 def test_a_reach_that_the_margin_ends_is_told_what_to_state(scene: wb.Scene) -> None:
     """1.25 m to the side, 1.2 m high, is about 20 mm too far with the margin, and not without it."""
     goals, feet = [wb.Point("right_index_tip", (0.0, -1.25, 1.2))], [wb.Hold("left_foot"), wb.Hold("right_foot")]
-    kept = wb.solve(wb.Problem(scene, goals=goals, constraints=feet), wb.QP(restarts=0))
+    kept = wb.solve(wb.Problem(scene, goals=goals, constraints=feet), wb.methods.QP(restarts=0))
     assert kept.status == "unreachable"
     assert "Balance (by default)" in kept.message
     assert "state Balance() to let the centre of mass come nearer to the feet's edges than 41 mm" in kept.message

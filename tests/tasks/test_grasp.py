@@ -63,7 +63,9 @@ def _apart(a: Any, b: Any) -> float:
 def test_thumb_and_fingers_oppose(figure: wb.Figure, kind: Any, shape: Any) -> None:
     scene = wb.Scene(figure).add(shape, name="thing", at=AT)
     grasp = wb.Grasp("right", "thing", kind)
-    solution = wb.solve(wb.Problem(scene, start=_start(figure), goals=[grasp], constraints=FEET), wb.QP(measures=False))
+    solution = wb.solve(
+        wb.Problem(scene, start=_start(figure), goals=[grasp], constraints=FEET), wb.methods.QP(measures=False)
+    )
     assert solution.status == "solved", solution.message
     fingers = ("index",) if kind == "pinch" else FOUR
     thumb, *others = (_nearest(scene, solution.q, f"right_{finger}_distal") for finger in ("thumb", *fingers))
@@ -103,7 +105,7 @@ def test_in_a_power_grip_the_thumb_opposes_the_fingers(figure: wb.Figure, shape:
     quaternion = np.array(at[3:] or (0.0, 0.0, 0.0, 1.0))
     scene = wb.Scene(figure).add(shape, name="thing", at=(*at[:3], *(quaternion / np.linalg.norm(quaternion))))
     problem = wb.Problem(scene, start=_start(figure), goals=[wb.Grasp("right", "thing", "power")], constraints=FEET)
-    solution = wb.solve(problem, wb.QP(measures=False))
+    solution = wb.solve(problem, wb.methods.QP(measures=False))
     assert solution.status == "solved", solution.message
     mean = np.sum([_normal(scene, solution.q, _outer(finger)) for finger in FOUR], axis=0)
     assert _apart(_normal(scene, solution.q, _outer("thumb")), mean) > 135.0 - 0.1
@@ -115,7 +117,7 @@ def test_a_mug_is_taken_from_a_table() -> None:
     scene.add(wb.Box((0.5, 1.2, 0.03)), name="table", at=(0.50, 0.0, 0.835))
     scene.add(wb.Cylinder(0.04, 0.12), name="thing", at=(0.40, 0.10, 0.9101))
     grasp = wb.Grasp("left", "thing", "power", approach="side")
-    solution = wb.solve(wb.Problem(scene, goals=[grasp], constraints=FEET), wb.QP(measures=False))
+    solution = wb.solve(wb.Problem(scene, goals=[grasp], constraints=FEET), wb.methods.QP(measures=False))
     assert solution.status == "solved", solution.message
     palm = scene.figure.placement(solution.q, "left_palm")
     assert 0.85 < palm.translation[2] < 0.97
@@ -141,7 +143,7 @@ def test_derivative_of_a_hand_about_to_close(figure: wb.Figure) -> None:
 def test_around_a_thin_bar_the_fingers_oppose_the_palm(figure: wb.Figure) -> None:
     scene = wb.Scene(figure).add(wb.Capsule(0.01, 0.3), name="thing", at=AT)
     problem = wb.Problem(scene, start=_start(figure), goals=[wb.Grasp("right", "thing", "power")], constraints=FEET)
-    solution = wb.solve(problem, wb.QP(measures=False))
+    solution = wb.solve(problem, wb.methods.QP(measures=False))
     assert solution.status == "solved", solution.message
     palm = _normal(scene, solution.q, "right_hand")
     mean = np.sum([_normal(scene, solution.q, _outer(finger)) for finger in FOUR], axis=0)
@@ -273,4 +275,4 @@ def test_a_crate_that_no_hand_spans_is_not_grasped():
     scene = wb.Scene(wb.load("human", hands="fingers"))
     scene.add(wb.Box((0.3, 0.3, 0.3)), name="crate", at=(0.45, -0.25, 1.1))
     problem = wb.Problem(scene, goals=[wb.Grasp("right", "crate", "pinch")])
-    assert not wb.solve(problem, wb.QP(restarts=1, budget=80)).solved
+    assert not wb.solve(problem, wb.methods.QP(restarts=1, budget=80)).solved

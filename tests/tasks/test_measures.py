@@ -114,14 +114,14 @@ def test_a_soft_goal_gives_way_to_goals_and_is_weighed_against_effort(planar_arm
     for method in ("qp", "newton"):
         left = []
         for weight in (0.1, 10.0, 1e5):
-            measures = [wb.Displacement(), wb.Soft(far, weight)]
+            measures = [wb.tasks.Displacement(), wb.Soft(far, weight)]
             solution = wb.solve(wb.Problem(scene, np.full(3, 0.2), goals=[goal], measures=measures), method)
             assert solution.solved
             left.append(np.linalg.norm(scene.figure.placement(solution.q, "tip").translation - (0.6, 0.4, 0.0)))
         assert left[0] > 0.05
         assert left[0] > left[1] > left[2]
         assert left[2] < 1e-3
-    problem = wb.Problem(scene, np.full(3, 0.2), goals=[goal], measures=[wb.Displacement(), wb.Soft(wrong)])
+    problem = wb.Problem(scene, np.full(3, 0.2), goals=[goal], measures=[wb.tasks.Displacement(), wb.Soft(wrong)])
     assert wb.solve(problem).solved
     assert wb.solve(wb.Problem(scene, np.full(3, 0.2), goals=[goal, wrong])).status == "unreachable"
     soft = wb.Problem(
@@ -171,7 +171,7 @@ def test_squared_changes_are_those_of_the_potential_energies_of_the_segments(
 
 def test_stance_counts_what_the_feet_are_off_side_by_side() -> None:
     person = wb.load("human")
-    stance = wb.Stance().resolve(wb.Scene(person), person.posture("standing"))
+    stance = wb.tasks.Stance().resolve(wb.Scene(person), person.posture("standing"))
     apart = person.placement(person.posture("standing"), "left_foot").translation[1] * 2.0
 
     def value(**degrees: float) -> tuple[float, Array, Array]:
@@ -192,6 +192,6 @@ def test_stance_counts_what_the_feet_are_off_side_by_side() -> None:
 
 def test_stance_has_derivatives_and_two_feet() -> None:
     scene = wb.Scene(wb.load("human"))
-    wb.check_derivatives(wb.Stance(), scene)
+    wb.check_derivatives(wb.tasks.Stance(), scene)
     with pytest.raises(wb.InputError, match="feet has 1 names; give two"):
-        wb.Problem(scene, measures=[wb.Stance(["left_foot"])])
+        wb.Problem(scene, measures=[wb.tasks.Stance(["left_foot"])])

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wholebody import InputError, UnknownNameError, tasks
+from wholebody import InputError, tasks
+from wholebody.base.errors import UnknownNameError
 
 NAN = float("nan")
 

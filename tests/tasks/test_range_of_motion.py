@@ -17,7 +17,7 @@ def room(figure: wb.Figure, name: str, degrees: Mapping[str, float]) -> float:
     """Degrees to the end of a range where some joints have these angles and the others are at zero."""
     scene = wb.Scene(figure)
     q = figure.with_joints(pin.neutral(figure.model), {joint: math.radians(value) for joint, value in degrees.items()})
-    term = wb.RangeOfMotion([name]).resolve(scene, q)
+    term = wb.tasks.RangeOfMotion([name]).resolve(scene, q)
     return math.degrees(float(term.value(State(figure.model).update(q))[0]))
 
 
@@ -90,7 +90,7 @@ def test_twist_is_that_of_the_swing_and_twist_of_the_rotation(man: wb.Figure) ->
         lowest, highest = math.cos(math.radians(80.0)), math.cos(math.radians(120.0))
         at_80, at_120 = math.radians(70.0 + 40.85), math.radians(57.67)  # see the next test
         bound = at_80 + (at_120 - at_80) * (height + lowest) / (lowest - highest)
-        value = wb.RangeOfMotion(["right_shoulder_twist"]).resolve(scene, q).value(state)[0]
+        value = wb.tasks.RangeOfMotion(["right_shoulder_twist"]).resolve(scene, q).value(state)[0]
         assert value == pytest.approx(bound - twist, abs=2e-4)
 
 
@@ -116,7 +116,7 @@ def test_neck_has_all_of_its_range_in_one_direction_and_no_more_in_three(man: wb
 def test_named_postures_are_within_all_ranges(sex: str, posture: str) -> None:
     figure = wb.load("human", sex=sex)
     q = figure.posture(posture)
-    term = wb.RangeOfMotion().resolve(wb.Scene(figure), q)
+    term = wb.tasks.RangeOfMotion().resolve(wb.Scene(figure), q)
     assert term.value(State(figure.model).update(q)).min() > 0.0
 
 
@@ -136,14 +136,14 @@ def test_judge_sees_straight_knees(man: wb.Figure) -> None:
     assert wb.assess(wb.Problem(scene, q, range_of_motion=False), q).constraint_violation == 0.0
 
 
-@pytest.mark.parametrize("method", [wb.QP(), wb.Newton()], ids=["qp", "newton"])
-def test_methods_bend_the_knees_to_reach_the_floor(man: wb.Figure, method: wb.QP | wb.Newton) -> None:
+@pytest.mark.parametrize("method", [wb.methods.QP(), wb.methods.Newton()], ids=["qp", "newton"])
+def test_methods_bend_the_knees_to_reach_the_floor(man: wb.Figure, method: wb.methods.QP | wb.methods.Newton) -> None:
     goals = [wb.Point(f"{side}_palm", (0.25, y, 0.12)) for side, y in (("left", 0.15), ("right", -0.15))]
     feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]
     problem = wb.Problem(wb.Scene(man), goals=goals, constraints=feet)
     solution = wb.solve(problem, method)
     assert solution.status == "solved"
-    term = wb.RangeOfMotion().resolve(problem.scene, problem.start)
+    term = wb.tasks.RangeOfMotion().resolve(problem.scene, problem.start)
     assert term.value(State(man.model).update(solution.q)).min() >= -1e-5
     without = wb.solve(wb.Problem(problem.scene, goals=goals, constraints=feet, range_of_motion=False))
     assert term.value(State(man.model).update(without.q)).min() < -math.radians(5.0)

@@ -30,9 +30,9 @@ def value(scene: wb.Scene, degrees: dict[str, float], tilt: float = 0.0) -> floa
 
 
 @lru_cache(maxsize=1)
-def prepared(scene: wb.Scene) -> tuple[wb.Rhythm, State]:
+def prepared(scene: wb.Scene) -> tuple[wb.tasks.Rhythm, State]:
     """The measure from a neutral start, and a state."""
-    return wb.Rhythm().resolve(scene, pin.neutral(scene.model)), State(scene.model)
+    return wb.tasks.Rhythm().resolve(scene, pin.neutral(scene.model)), State(scene.model)
 
 
 @pytest.mark.parametrize("joint", ["shoulder_flexion", "shoulder_abduction"])
@@ -60,7 +60,7 @@ def test_a_start_that_bends_is_what_counts(scene: wb.Scene) -> None:
     figure = scene.figure
     for name in ("prone", "sitting", "squatting"):
         q = figure.posture(name)
-        term = wb.Rhythm().resolve(scene, q)
+        term = wb.tasks.Rhythm().resolve(scene, q)
         assert term.lumbar
         turned = pin.SE3(pin.utils.rotate("z", 1.0), np.zeros(3)) * pin.XYZQUATToSE3(q[:7])
         q[:7] = pin.SE3ToXYZQUAT(turned)  # which way it faces does not count
@@ -71,14 +71,14 @@ def test_a_start_that_bends_is_what_counts(scene: wb.Scene) -> None:
 
 def test_figures_without_clavicles_are_told(scene: wb.Scene) -> None:
     with pytest.raises(InputError, match="no clavicles and no lumbar spine"):
-        wb.Rhythm().resolve(wb.Scene(wb.load("hand")), wb.load("hand").neutral)
+        wb.tasks.Rhythm().resolve(wb.Scene(wb.load("hand")), wb.load("hand").neutral)
     assert [type(term) for term in wb.Problem(wb.Scene(wb.load("avatar"))).measures] == [wb.Effort]
 
 
 def test_curvature_bounds_the_second_derivative(scene: wb.Scene) -> None:
     """The diagonal less the Hessian of the squares has no negative eigenvalue where the rhythm is kept."""
     figure = scene.figure
-    term = wb.Rhythm().resolve(scene, figure.neutral)
+    term = wb.tasks.Rhythm().resolve(scene, figure.neutral)
     q = figure.neutral
     state = State(figure.model)
     size = 1e-5
@@ -116,7 +116,7 @@ def test_knees_stay_straight_where_hips_do_not_flex(scene: wb.Scene, abduction: 
 
 def test_knees_stay_where_the_start_has_them(scene: wb.Scene) -> None:
     sitting = scene.figure.posture("sitting")
-    knees = wb.Rhythm().resolve(scene, sitting).squares(scene.state(sitting))[0][2:4]
+    knees = wb.tasks.Rhythm().resolve(scene, sitting).squares(scene.state(sitting))[0][2:4]
     assert knees == pytest.approx([0.0, 0.0], abs=1e-12)
 
 
@@ -125,7 +125,7 @@ def test_gradient_is_that_of_finite_differences(scene: wb.Scene, posture: str) -
     figure = scene.figure
     rng = np.random.default_rng(5)
     q = figure.clamp(pin.integrate(figure.model, figure.posture(posture), 0.05 * rng.normal(size=figure.model.nv)))
-    term = wb.Rhythm().resolve(scene, figure.posture(posture))
+    term = wb.tasks.Rhythm().resolve(scene, figure.posture(posture))
     state, size = State(figure.model), 1e-6
     gradient = term.gradient(state.update(q)).copy()
     for place, step in enumerate(size * np.eye(figure.model.nv)):
@@ -192,7 +192,7 @@ def test_both_arms_overhead_extend_the_thorax_as_people_do(scene: wb.Scene) -> N
 
 def test_its_squares_are_its_value_and_their_rows_their_derivatives(scene: wb.Scene) -> None:
     figure, rng, step = scene.figure, np.random.default_rng(5), 1e-6
-    term, state = wb.Rhythm(2.0).resolve(scene, figure.posture("standing")), State(figure.model)
+    term, state = wb.tasks.Rhythm(2.0).resolve(scene, figure.posture("standing")), State(figure.model)
     for _ in range(3):
         q = pin.integrate(figure.model, figure.posture("sitting"), 0.5 * rng.normal(size=figure.model.nv))
         residuals, rows = term.squares(state.update(q))
@@ -228,7 +228,7 @@ def lifted(style: str) -> tuple[wb.Figure, np.ndarray]:
     figure = wb.load("human")
     scene = wb.Scene(figure).add(wb.HalfSpace(), name="floor")
     goals = [wb.Point(f"{side}_palm", (0.45, 0.2 * sign, 0.16)) for side, sign in (("left", 1.0), ("right", -1.0))]
-    measures = [wb.Effort(), wb.Rhythm(style=style), wb.Stance()]  # type: ignore[arg-type]
+    measures = [wb.Effort(), wb.tasks.Rhythm(style=style), wb.tasks.Stance()]  # type: ignore[arg-type]
     solution = wb.solve(wb.Problem(scene, goals=goals, constraints=[wb.Stand("floor")], measures=measures))
     assert solution.solved
     return figure, solution.q
@@ -264,4 +264,4 @@ def test_who_squats_bends_the_back_less() -> None:
 
 def test_unknown_styles_are_refused() -> None:
     with pytest.raises(InputError, match="style"):
-        wb.Rhythm(style="bend")  # type: ignore[arg-type]
+        wb.tasks.Rhythm(style="bend")  # type: ignore[arg-type]

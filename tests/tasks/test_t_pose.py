@@ -30,7 +30,14 @@ def arms(scene: wb.Scene, flexion: float, abduction: float, rotation: float) -> 
 
 def terms(scene: wb.Scene) -> dict[str, object]:
     start = scene.figure.posture("t_pose")
-    made = (wb.RangeOfMotion(), wb.ReachCones(), wb.Rhythm(), wb.Effort(), wb.RotationEffort(), wb.Discomfort())
+    made = (
+        wb.tasks.RangeOfMotion(),
+        wb.tasks.ReachCones(),
+        wb.tasks.Rhythm(),
+        wb.Effort(),
+        wb.tasks.RotationEffort(),
+        wb.tasks.Discomfort(),
+    )
     return {type(term).__name__: term.resolve(scene, start) for term in made}
 
 

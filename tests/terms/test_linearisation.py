@@ -69,9 +69,9 @@ def problem():
             wb.Balance(),
             wb.Plane("right_elbow", (0.0, 1.0, 0.2)),
             wb.Freeze("neck"),
-            wb.StepLimit(2.0),
+            wb.tasks.StepLimit(2.0),
         ],
-        measures=[wb.Effort(2.0), wb.Displacement(), wb.PotentialEnergy(0.01), wb.Discomfort(0.1)],
+        measures=[wb.Effort(2.0), wb.tasks.Displacement(), wb.tasks.PotentialEnergy(0.01), wb.tasks.Discomfort(0.1)],
         clearance=0.004,
     )
 
@@ -249,7 +249,7 @@ def random_term(rng, scene):
         lambda: wb.Hold(one, relative_to=other),
         lambda: wb.Plane(one, axis, side=str(rng.choice(["on", "above"]))),
         lambda: wb.Balance(),
-        lambda: wb.ReachCones(),
+        lambda: wb.tasks.ReachCones(),
     )
     return makers[int(rng.integers(len(makers)))]()
 
@@ -265,8 +265,13 @@ def test_the_compiled_pass_is_the_plain_one_entry_by_entry(problem):
             scene,
             goals=[term for term in terms if isinstance(term, Goal)],
             constraints=[term for term in terms if not isinstance(term, Goal)]
-            + [wb.Freeze("neck"), wb.StepLimit(1.0, root_velocity=0.5)][: int(rng.integers(3))],
-            measures=[wb.Effort(2.0), wb.Displacement(), wb.PotentialEnergy(0.01), wb.Discomfort(0.1)][: number % 5],
+            + [wb.Freeze("neck"), wb.tasks.StepLimit(1.0, root_velocity=0.5)][: int(rng.integers(3))],
+            measures=[
+                wb.Effort(2.0),
+                wb.tasks.Displacement(),
+                wb.tasks.PotentialEnergy(0.01),
+                wb.tasks.Discomfort(0.1),
+            ][: number % 5],
             clearance=float(rng.choice([0.0, 0.01])),
         )
         dt = None if number % 2 else 0.02
@@ -283,7 +288,9 @@ def test_the_compiled_pass_is_the_plain_one_entry_by_entry(problem):
 def test_reach_cones_roots_and_heights_are_in_the_plan(problem):
     """No term of the package is evaluated by its own methods, and near the target of a root its series are exact."""
     goal = wb.Posture("sitting")
-    asked = wb.Problem(problem.scene, goals=[goal], constraints=[wb.ReachCones()], measures=[wb.PotentialEnergy(0.01)])
+    asked = wb.Problem(
+        problem.scene, goals=[goal], constraints=[wb.tasks.ReachCones()], measures=[wb.tasks.PotentialEnergy(0.01)]
+    )
     workspace = asked.workspace()
     terms = Terms(asked.goals, asked.constraints, asked.bounds, asked.measures)
     plan = make_plan(problem.scene.figure.limits, terms, None, workspace.state)
@@ -319,7 +326,7 @@ class Sway(Measure):
         return row
 
 
-@pytest.mark.parametrize("measures", [[wb.Rhythm(2.0)], [wb.Rhythm(2.0), Sway()], [Sway()]])
+@pytest.mark.parametrize("measures", [[wb.tasks.Rhythm(2.0)], [wb.tasks.Rhythm(2.0), Sway()], [Sway()]])
 def test_squares_are_the_second_derivative_where_they_vanish(problem, measures):
     """Where all angles are zero; beside the squares nothing is left of the curvature."""
     scene = problem.scene
@@ -337,14 +344,14 @@ def test_squares_are_the_second_derivative_where_they_vanish(problem, measures):
     np.testing.assert_allclose(at.curvature - at.squared, 0.0, atol=1.01 * least)
 
 
-class OwnEffort(wb.RotationEffort):
+class OwnEffort(wb.tasks.RotationEffort):
     """The same measure as a class that the compiled pass does not know."""
 
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_ball_joints_are_compiled_as_their_class_says(problem, seed):
     scene, q = problem.scene, posture(problem, seed)
-    made = [wb.Problem(scene, measures=[kind(2.0), wb.Rhythm()]) for kind in (wb.RotationEffort, OwnEffort)]
+    made = [wb.Problem(scene, measures=[kind(2.0), wb.tasks.Rhythm()]) for kind in (wb.tasks.RotationEffort, OwnEffort)]
     known, own = (each.lineariser(each.workspace()).at(q, 0.0) for each in made)
     assert known.measure == pytest.approx(own.measure)
     np.testing.assert_allclose(known.gradient, own.gradient, atol=1e-9)
@@ -376,7 +383,9 @@ def test_the_plan_of_a_problem_is_made_once_and_follows_what_is_set(problem, mon
     """Later solves make no plan; terms that were replaced are evaluated as they are now."""
     scene, q = problem.scene, posture(problem, 5)
     asked = wb.Problem(scene, goals=[wb.Point("left_palm", (0.4, 0.2, 1.0))], constraints=[wb.Hold("left_foot")])
-    other = wb.Problem(scene, constraints=[wb.Hold("right_foot"), wb.Freeze("neck")], measures=[wb.Displacement(3.0)])
+    other = wb.Problem(
+        scene, constraints=[wb.Hold("right_foot"), wb.Freeze("neck")], measures=[wb.tasks.Displacement(3.0)]
+    )
     copies = [asked.with_start(q) for _ in range(3)]
     copies[0].constraints, copies[1].bounds, copies[2].measures = other.constraints, other.bounds, other.measures
     for each in (asked, *copies):
@@ -415,7 +424,7 @@ def test_joints_that_follow_others_and_round_joints(tmp_path):
             scene,
             goals=[wb.Frame("l4", (0.1, 0.2, 0.8)), wb.CenterOfMass((0.1, 0.0, 0.4)), wb.Posture(wanted)]
             + [Apart("l4", "l2")],
-            measures=[wb.Effort(), wb.Displacement(), wb.Discomfort(), wb.PotentialEnergy(0.3)],
+            measures=[wb.Effort(), wb.tasks.Displacement(), wb.tasks.Discomfort(), wb.tasks.PotentialEnergy(0.3)],
         )
         lineariser, plain = asked.lineariser(asked.workspace()), reference(asked, asked.workspace())
         rng = np.random.default_rng(1)
@@ -439,3 +448,16 @@ def test_clearances_that_change_where_they_are_count_from_the_next_take(problem)
     clearances += 0.05
     lineariser.take(lineariser.goals, clearances)
     assert len(lineariser.at(problem.start, 0.3).contacts.number) > len(before)
+
+
+def test_goals_that_move_are_written_where_nobody_else_reads(problem):
+    """A relaxed lineariser, and the problem's own plan, keep the goals that they were made with."""
+    scene, places = problem.scene, ((0.4, -0.2, 1.0), (0.5, 0.1, 0.8))
+    first, second = (wb.Problem(scene, goals=[wb.Point("right_palm", at, offset=(0.0, 0.0, 0.1))]) for at in places)
+    q = first.start
+    lineariser = first.lineariser(first.workspace())
+    relaxed, kept = lineariser.relaxed(0.01), lineariser.at(q, 0.0).goal_error
+    lineariser.take(second.goals, first.clearances)
+    assert np.allclose(lineariser.at(q, 0.0).goal_error, kept + np.subtract(places[0], places[1]))
+    assert np.array_equal(relaxed.at(q, 0.0).goal_error, kept)
+    assert np.array_equal(first.lineariser(first.workspace()).at(q, 0.0).goal_error, kept)

@@ -30,7 +30,7 @@ def _circle(angle: float) -> tuple[float, float, float]:
 @pytest.mark.parametrize("method", ["newton", "qp", "ccd"])
 def test_a_drag_follows_and_ends_exactly(scene: wb.Scene, method: str) -> None:
     problem = _problem(scene)
-    drag = wb.Drag(problem, method)
+    drag = wb.tracking.Drag(problem, method)
     for _ in range(12):
         drag.to(_circle(0.0))
     frames = [drag.to(_circle(0.05 * k)) for k in range(30)]
@@ -48,7 +48,7 @@ def test_a_hand_is_not_dragged_through_a_plate(method: str, before_plate: Callab
     """The goal goes through a plate of 6 mm in steps of 40 mm, and the hand stays on its side."""
     problem = before_plate((0.8, 0.8), 0.55, 1.2)
     scene = problem.scene
-    drag = wb.Drag(problem, method)
+    drag = wb.tracking.Drag(problem, method)
     postures = [drag.to((0.4, -0.2, 1.2)).q for _ in range(12)]
     assert drag.to((0.4, -0.2, 1.2)).error < 2e-3
     postures += [drag.to((0.4, y, 1.2)).q for y in np.arange(-0.2, 0.2, 0.04)]
@@ -74,8 +74,8 @@ def test_frames_whose_time_is_spent_are_free_and_arrive(
     arms = {f"{side}_shoulder_abduction": 0.6 for side in ("left", "right")}  # dls sees no trunk, and stops at it
     start = scene.figure.with_joints(problem.start, arms)
     problem = wb.Problem(problem.scene, start, goals=problem.goals, constraints=problem.constraints[:2])
-    drag = wb.Drag(problem, method, budget=0.01)
-    wb.Drag(problem, method).to((0.3, -0.25, 1.0))  # compiles, which reads clocks too
+    drag = wb.tracking.Drag(problem, method, budget=0.01)
+    wb.tracking.Drag(problem, method).to((0.3, -0.25, 1.0))  # compiles, which reads clocks too
     ticks = itertools.count()
     monkeypatch.setattr(
         control.time, "thread_time", lambda: {"ccd": 0.0001, "placo": 0.0005}.get(method, 0.001) * next(ticks)
@@ -99,7 +99,7 @@ def test_a_thing_goes_the_rest_of_its_way_when_the_time_is_spent_and_what_it_mee
     frames = []
     for budget in (1e-9, np.inf):
         scene.move("ball", at=(0.7, 0.6, 0.0))
-        drag = wb.Drag(problem, "qp", budget=budget)
+        drag = wb.tracking.Drag(problem, "qp", budget=budget)
         drag.to(tip)
         scene.move("ball", at=(0.7, 0.2, 0.0), over=1.0 / 60.0)
         frames.append(drag.to(tip))
@@ -115,7 +115,7 @@ def test_a_thing_goes_the_rest_of_its_way_when_the_time_is_spent_and_what_it_mee
 
 def test_newton_needs_few_iterations_a_frame_and_does_not_drift(scene: wb.Scene) -> None:
     problem = _problem(scene)
-    drag = wb.Drag(problem, "newton")
+    drag = wb.tracking.Drag(problem, "newton")
     drag.to(_circle(0.0))
     frames = [drag.to(_circle(0.1 * k)) for k in range(32)]
     assert np.mean([frame.iterations for frame in frames]) < 3.0
@@ -129,19 +129,19 @@ def test_newton_needs_few_iterations_a_frame_and_does_not_drift(scene: wb.Scene)
 def test_what_cannot_be_moved_is_named(scene: wb.Scene) -> None:
     problem = _problem(scene)
     with pytest.raises(wb.InputError, match="the number of the goal is 3; give a whole number between 0 and 0"):
-        wb.Drag(problem, goal=3)
+        wb.tracking.Drag(problem, goal=3)
     with pytest.raises(wb.InputError, match="budget"):
-        wb.Drag(problem, budget=0.0)
-    with pytest.raises(wb.UnknownNameError, match="method"):
-        wb.Drag(problem, "jacobi")
+        wb.tracking.Drag(problem, budget=0.0)
+    with pytest.raises(wb.errors.UnknownNameError, match="method"):
+        wb.tracking.Drag(problem, "jacobi")
     with pytest.raises(wb.InputError, match="finite"):
-        wb.Drag(problem, "newton").to((np.nan, 0, 0))
-    drag = wb.Drag(problem, "newton")
+        wb.tracking.Drag(problem, "newton").to((np.nan, 0, 0))
+    drag = wb.tracking.Drag(problem, "newton")
     with pytest.raises(wb.InputError, match=r"Drag: q has shape \(56,\), not \(2,\)"):
         drag.q = np.zeros(2)
     other = wb.Problem(scene, "standing", goals=[wb.CenterOfMass((0, 0, 1))])
     with pytest.raises(wb.InputError, match="CenterOfMass"):
-        wb.Drag(other)
+        wb.tracking.Drag(other)
 
 
 def test_a_frame_by_quadratic_programs_is_as_near_as_it_is_asked_for(scene: wb.Scene) -> None:
@@ -149,7 +149,7 @@ def test_a_frame_by_quadratic_programs_is_as_near_as_it_is_asked_for(scene: wb.S
     spent, measures = [], []
     for tolerance in (1e-3, 1e-5, 1e-7):
         problem = _problem(scene)
-        tracker = wb.QP().tracker(problem, 1.0 / 60.0)
+        tracker = wb.methods.QP().tracker(problem, 1.0 / 60.0)
         q, programs = problem.start, 0
         for frame in range(70):
             problem.retarget([wb.Point("right_index_tip", _circle(0.2 * max(frame - 40, 0)))])
@@ -170,7 +170,7 @@ def test_an_arm_gives_way_to_what_comes_into_it_and_comes_back(planar_arm, metho
     start = np.array([0.1, 0.2, 0.2])
     tip = scene.state(start).frame(scene.frame_id("tip")).translation.copy()
     problem = wb.Problem(scene, start, goals=[wb.Point("tip", tip)])
-    drag = wb.Drag(problem, method)
+    drag = wb.tracking.Drag(problem, method)
     down = np.arange(0.6, 0.0, -speed / 60.0)
     before, errors = drag.q, []
     for y in [*down, *down[::-1], *[0.6] * 20]:

@@ -111,5 +111,5 @@ def test_mistakes_are_named(problem: wb.Problem) -> None:
         drag_along(problem, [(0.0, 0.0)])
     with pytest.raises(wb.InputError, match="the number of the goal is 4"):
         present_position(problem, 4)
-    with pytest.raises(wb.UnknownNameError, match="method"):
+    with pytest.raises(wb.errors.UnknownNameError, match="method"):
         drag_along(problem, [(0.4, -0.25, 0.9)], "jacobi")

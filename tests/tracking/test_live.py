@@ -115,14 +115,14 @@ def test_a_figure_that_need_not_keep_its_ranges_is_dragged_without_them() -> Non
 
 
 def test_mistakes_are_named(drag: LiveDrag) -> None:
-    with pytest.raises(wb.UnknownNameError, match="right_palm"):
+    with pytest.raises(wb.errors.UnknownNameError, match="right_palm"):
         drag.take("right_plam")
     with pytest.raises(wb.InputError, match="take one first"):
         drag.move((0.0, 0.0, 0.0))
     drag.choose("ccd")
     drag.problem.scene.figure  # noqa: B018
     frame_with_trouble = LiveDrag(
-        wb.Problem(drag.scene, goals=[wb.Lean("table")], constraints=[wb.Hold("left_foot")]), "ccd"
+        wb.Problem(drag.scene, goals=[wb.tasks.Lean("table")], constraints=[wb.Hold("left_foot")]), "ccd"
     )
     frame_with_trouble.take("right_palm")
     assert "cannot take" in frame_with_trouble.move(frame_with_trouble.place("right_palm")).status

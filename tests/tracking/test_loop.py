@@ -175,7 +175,7 @@ def test_a_tracked_limb_out_of_its_reach_cone_is_shown_in_it(overlap: str) -> No
 
 
 def test_settings_are_checked(hand: wb.Figure, scene: wb.Scene) -> None:
-    with pytest.raises(wb.UnknownNameError, match="overlap"):
+    with pytest.raises(wb.errors.UnknownNameError, match="overlap"):
         FrameLoop(scene, hand.neutral, overlap="springs")
     with pytest.raises(wb.InputError, match="dt"):
         FrameLoop(scene, hand.neutral, dt=0.0)

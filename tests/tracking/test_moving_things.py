@@ -59,9 +59,9 @@ def problem_of(scene: wb.Scene, **more: object) -> wb.Problem:
 def test_whoever_is_fast_enough_gets_out_of_the_way(kind: str, speed: float, turn: float) -> None:
     """The body may move by 4 m/s along any axis, so a free posture exists in every frame: it may go with the thing."""
     throw = Thrown(hash_of(kind, speed), kind, speed, turn)
-    limits = wb.StepLimit(12.0, root_velocity=4.0, root_turn=6.0)
+    limits = wb.tasks.StepLimit(12.0, root_velocity=4.0, root_turn=6.0)
     problem = problem_of(throw.scene, constraints=[limits])
-    tracker, q, touched = wb.QP().tracker(problem, DT), problem.start, 0
+    tracker, q, touched = wb.methods.QP().tracker(problem, DT), problem.start, 0
     for _ in range(throw.frames):
         way = throw.next()
         step = tracker.step(q)
@@ -79,13 +79,13 @@ def test_whoever_is_fast_enough_gets_out_of_the_way(kind: str, speed: float, tur
 
 def test_nobody_ends_inside_where_the_root_could_have_gone_somewhere_free() -> None:
     """At 20 m/s nobody can go along: but to stay, or to go aside as far as speeds allow, is often free at the end."""
-    limits = wb.StepLimit(12.0, root_velocity=4.0, root_turn=6.0)
+    limits = wb.tasks.StepLimit(12.0, root_velocity=4.0, root_turn=6.0)
     aside = [4.0 * DT * sign * axis for axis in np.eye(3) for sign in (-1.0, 1.0)]
     could = 0
     for seed, kind in enumerate(("board", "plate", "rod")):
         throw = Thrown(seed, kind, 20.0, 3.0)
         problem = problem_of(throw.scene, constraints=[limits])
-        tracker, q = wb.QP().tracker(problem, DT), problem.start
+        tracker, q = wb.methods.QP().tracker(problem, DT), problem.start
         for _ in range(throw.frames):
             throw.next()
             step = tracker.step(q)
@@ -113,7 +113,7 @@ def test_what_passes_through_a_dragged_person_is_named(method: str, kind: str) -
     named = free = through = 0
     for seed, speed in enumerate((4.0, 45.0)):
         throw = Thrown(hash_of(kind, 5.0) + seed, kind, speed, turn=2.0)
-        drag = wb.Drag(problem_of(throw.scene), method)
+        drag = wb.tracking.Drag(problem_of(throw.scene), method)
         target, before = np.array(drag.problem.goals[0].target), drag.q
         for frame in range(throw.frames):
             way = throw.next()
@@ -173,8 +173,8 @@ def test_the_frame_loop_names_what_it_cannot_avoid(overlap: str) -> None:
 def test_what_was_put_somewhere_did_not_move(planar_arm) -> None:
     """A thing that is put on the other side of an arm passed through nothing; one that moved there did."""
     scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.02), name="ball", at=(0.7, 0.3, 0.0))
-    problem = wb.Problem(scene, np.array([0.1, 0.2, 0.2]), constraints=[wb.StepLimit(0.1)])
-    tracker = wb.QP().tracker(problem, DT)
+    problem = wb.Problem(scene, np.array([0.1, 0.2, 0.2]), constraints=[wb.tasks.StepLimit(0.1)])
+    tracker = wb.methods.QP().tracker(problem, DT)
     q = tracker.step(problem.start).q
     scene.move("ball", at=(0.7, -0.3, 0.0))
     assert tracker.step(q).collisions == ()
@@ -203,8 +203,8 @@ def test_room_that_is_made_in_a_scene_leaves_others_as_they_are() -> None:
 def test_what_stays_inside_is_named_until_it_is_out(planar_arm) -> None:
     scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.05), name="ball", at=(0.7, 0.6, 0.0))
     start = np.array([0.1, 0.2, 0.2])
-    problem = wb.Problem(scene, start, constraints=[wb.StepLimit(0.5)])
-    tracker = wb.QP().tracker(problem, DT)
+    problem = wb.Problem(scene, start, constraints=[wb.tasks.StepLimit(0.5)])
+    tracker = wb.methods.QP().tracker(problem, DT)
     q = start
     elbow = scene.state(start).frame(scene.frame_id("tip")).translation
     scene.move("ball", at=elbow + (-0.05, 0.02, 0.0), over=DT)
@@ -248,7 +248,7 @@ def test_wrong_motions_are_one_sentence(planar_arm) -> None:
     assert scene.objects["ball"].motion.start.translation == pytest.approx([0.7, 0.3, 0.0])
     assert scene.move("ball", at=(0.0, 2.0, 0.0)).objects["ball"].motion is None
     q = np.zeros(3)
-    with pytest.raises(wb.UnknownNameError, match="ball"):
+    with pytest.raises(wb.errors.UnknownNameError, match="ball"):
         scene.sweep(q, q, moves={"bal": ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))})
     with pytest.raises(wb.InputError, match="two placements"):
         scene.sweep(q, q, moves={"ball": (0.0, 0.0, 0.0)})
@@ -281,7 +281,7 @@ def test_a_whole_track_with_a_thing_that_moves_is_judged_with_it(planar_arm) -> 
     for wrong in ({"ball": places[1:]}, {"ball": 3}, 4):
         with pytest.raises(wb.InputError, match="moves"):
             tracking.follow(scene, track, moves=wrong)
-    with pytest.raises(wb.UnknownNameError, match="ball"):
+    with pytest.raises(wb.errors.UnknownNameError, match="ball"):
         tracking.follow(scene, track, moves={"bell": places})
 
 
@@ -290,7 +290,7 @@ def test_the_steps_of_every_tracker_name_what_passed(planar_arm, method: str) ->
     scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.02), name="ball", at=(0.7, 0.8, 0.0))
     q = np.array([0.1, 0.2, 0.2])
     tip = scene.state(q).frame(scene.frame_id("tip")).translation.copy()
-    problem = wb.Problem(scene, q, goals=[wb.Point("tip", tip)], constraints=[wb.StepLimit(0.5)])
+    problem = wb.Problem(scene, q, goals=[wb.Point("tip", tip)], constraints=[wb.tasks.StepLimit(0.5)])
     tracker = as_method(method).tracker(problem, DT)
     q = tracker.step(q).q
     assert tracker.step(q).collisions == ()
@@ -341,8 +341,8 @@ def test_a_step_names_what_was_put_into_the_figure(planar_arm, method: str) -> N
     scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.1), name="ball", at=(0.7, 2.0, 0.0))
     start = np.array([0.1, 0.2, 0.2])
     tip = scene.state(start).frame(scene.frame_id("tip")).translation.copy()
-    problem = wb.Problem(scene, start, goals=[wb.Point("tip", tip)], constraints=[wb.StepLimit(0.05)])
-    for moved in (as_method(method).tracker(problem, DT).step, wb.Drag(problem, method, dt=DT).to):
+    problem = wb.Problem(scene, start, goals=[wb.Point("tip", tip)], constraints=[wb.tasks.StepLimit(0.05)])
+    for moved in (as_method(method).tracker(problem, DT).step, wb.tracking.Drag(problem, method, dt=DT).to):
         scene.move("ball", at=(0.7, 2.0, 0.0))
         drags = moved.__name__ == "to"
         assert not moved(tip if drags else start).collisions
@@ -358,9 +358,9 @@ def test_a_frame_of_a_drag_shows_the_way_that_was_found_free() -> None:
     straight = inner = 0.0
     for seed in range(1):
         throw = Thrown(seed, "board", 2.5, 3.0)
-        limits = wb.StepLimit(12.0, root_velocity=4.0, root_turn=6.0)
+        limits = wb.tasks.StepLimit(12.0, root_velocity=4.0, root_turn=6.0)
         problem = problem_of(throw.scene, constraints=[limits])
-        drag = wb.Drag(problem, "qp", dt=DT)
+        drag = wb.tracking.Drag(problem, "qp", dt=DT)
         for _ in range(throw.frames):
             before, way = drag.q, throw.next()
             frame = drag.to(problem.goals[0].target)
@@ -378,7 +378,7 @@ def test_drags_by_all_methods_have_paths_where_things_moved(planar_arm, method: 
     scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.1), name="ball", at=(0.7, 2.0, 0.0))
     start = np.array([0.1, 0.2, 0.2])
     tip = scene.state(start).frame(scene.frame_id("tip")).translation.copy()
-    drag = wb.Drag(wb.Problem(scene, start, goals=[wb.Point("tip", tip)]), method, dt=DT)
+    drag = wb.tracking.Drag(wb.Problem(scene, start, goals=[wb.Point("tip", tip)]), method, dt=DT)
     assert drag.to(tip).path == ()
     before = drag.q
     scene.move("ball", at=(0.7, 1.5, 0.0), over=DT)

@@ -20,7 +20,7 @@ def problem(planar_arm: Callable[..., wb.Figure]) -> wb.Problem:
 
 @pytest.mark.parametrize("method", ["newton", "qp", "ccd"])
 def test_a_pull_stops_where_the_arm_ends(problem: wb.Problem, method: str) -> None:
-    solutions = wb.follow_path(problem, [(0.6, -0.4, 0.0), (2.0, -0.4, 0.0)], method, spacing=0.1)
+    solutions = wb.tracking.follow_path(problem, [(0.6, -0.4, 0.0), (2.0, -0.4, 0.0)], method, spacing=0.1)
     assert [solution.solved for solution in solutions] == [True] * 6 + [False]  # 1.131 m along the path is its length
     assert all(solution.assessment.goal_error < 1.1e-5 for solution in solutions[:-1])
 
@@ -32,7 +32,7 @@ def test_a_pull_stops_before_a_plate(problem: wb.Problem, method: str, spacing: 
     problem = wb.Problem(scene, problem.start, goals=problem.goals)
     behind = wb.Problem(scene, np.array([0.9, -0.7, -0.7]), goals=[wb.Point("tip", (0.7, 0.2, 0.0))])
     assert wb.solve(behind).solved
-    solutions = wb.follow_path(problem, [(0.7, -0.2, 0.0), (0.7, 0.2, 0.0)], method, spacing=spacing)
+    solutions = wb.tracking.follow_path(problem, [(0.7, -0.2, 0.0), (0.7, 0.2, 0.0)], method, spacing=spacing)
     assert [solution.solved for solution in solutions[:-1]] == [True] * (len(solutions) - 1)
     assert not solutions[-1].solved
     assert 2 * most // 3 <= len(solutions) <= most
@@ -44,8 +44,8 @@ def test_a_pull_stops_before_a_plate(problem: wb.Problem, method: str, spacing: 
 
 def test_what_is_no_path_is_named(problem: wb.Problem) -> None:
     with pytest.raises(wb.InputError, match="shape"):
-        wb.follow_path(problem, [1.0, 2.0, 3.0])
+        wb.tracking.follow_path(problem, [1.0, 2.0, 3.0])
     with pytest.raises(wb.InputError, match="spacing"):
-        wb.follow_path(problem, [(0, 0, 0), (1, 0, 0)], spacing=0.0)
+        wb.tracking.follow_path(problem, [(0, 0, 0), (1, 0, 0)], spacing=0.0)
     with pytest.raises(wb.InputError, match="finite"):
-        wb.follow_path(problem, [(0, 0, 0), (float("nan"), 0, 0)])
+        wb.tracking.follow_path(problem, [(0, 0, 0), (float("nan"), 0, 0)])

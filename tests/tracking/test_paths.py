@@ -52,16 +52,16 @@ def test_a_file_of_places(tmp_path: Path) -> None:
 def test_a_bad_file_is_named_with_its_line(text: str, message: str, tmp_path: Path) -> None:
     file = tmp_path / "way.csv"
     file.write_text(text)
-    with pytest.raises(wb.FileFormatError, match="way") as caught:
+    with pytest.raises(wb.errors.FileFormatError, match="way") as caught:
         read_path(file)
     assert message in str(caught.value)
 
 
 def test_other_mistakes_are_named(tmp_path: Path) -> None:
-    with pytest.raises(wb.FileFormatError, match=r"there is no such file|not UTF-8 text"):
+    with pytest.raises(wb.errors.FileFormatError, match=r"there is no such file|not UTF-8 text"):
         read_path(tmp_path / "none.csv")
     (tmp_path / "binary").write_bytes(bytes(range(256)))
-    with pytest.raises(wb.FileFormatError, match=r"there is no such file|not UTF-8 text"):
+    with pytest.raises(wb.errors.FileFormatError, match=r"there is no such file|not UTF-8 text"):
         read_path(tmp_path / "binary")
     with pytest.raises(wb.InputError, match="radius"):
         circle((0, 0, 0), 0.0)

@@ -50,7 +50,7 @@ def test_an_assembly_without_a_figure_has_no_segments_to_colour() -> None:
 
 def test_an_unknown_segment_or_colour_is_refused() -> None:
     viewer = wb.Viewer(wb.Scene(wb.load(ARM)))
-    with pytest.raises(wb.UnknownNameError, match="forearm"):
+    with pytest.raises(wb.errors.UnknownNameError, match="forearm"):
         viewer.color({"forarm": BLUE})
     with pytest.raises(wb.InputError, match="color"):
         viewer.color({"forearm": (2.0, 0.0, 0.0)})

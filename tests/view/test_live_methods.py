@@ -23,8 +23,10 @@ def problem() -> wb.Problem:
     return wb.Problem(wb.Scene(wb.load("avatar")), constraints=[wb.Hold("left_foot")])
 
 
-@pytest.mark.parametrize("method", ["ccd", wb.Newton(algebra="kkt")], ids=str)
-def test_the_page_opens_with_every_method_and_changes_to_every_other(method: str | wb.QP, tmp_path: Path) -> None:
+@pytest.mark.parametrize("method", ["ccd", wb.methods.Newton(algebra="kkt")], ids=str)
+def test_the_page_opens_with_every_method_and_changes_to_every_other(
+    method: str | wb.methods.QP, tmp_path: Path
+) -> None:
     drag = LiveDrag(problem(), method)
     page = opened(drag, tmp_path)
     try:

@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from multiprocessing.connection import wait
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypedDict, TypeVar
 
 from wholebody.base import checks
 from wholebody.base.arrays import with_values
@@ -21,6 +21,7 @@ from wholebody.base.runner import ONE_THREAD, Child, EndedError, Job, Outcome, e
 from wholebody.version import __version__
 
 T = TypeVar("T")
+MOST_JOBS = 4096
 
 _Sent = tuple[int, Callable[..., Any], tuple[Any, ...], float]
 """A job as it is sent: its number, its function with the arguments, and its seconds."""
@@ -209,6 +210,31 @@ def _client(address: str) -> AbstractContextManager[Any]:
         return connect(address, timeout=10.0)  # s: for which a scheduler is waited for
     except (OSError, ValueError) as error:
         raise WholebodyError(f"no dask scheduler answers at {address} ({error}); start one: dask scheduler") from None
+
+
+class JobOptions(TypedDict, total=False):
+    """How the jobs of a call are run, as its keyword arguments; `Jobs.checked` checks them."""
+
+    jobs: int
+    cluster: str | None
+    progress: Callable[..., Any] | bool | None
+
+
+class Jobs(NamedTuple):
+    """How many jobs at a time, on which cluster, and who is told how many are done."""
+
+    jobs: int
+    cluster: str | None
+    tell: Callable[..., Any] | None
+
+    @classmethod
+    def checked(cls, what: str, jobs: object = 1, cluster: object = None, progress: Any = None) -> Jobs:
+        """Check the keyword arguments of a function `what`."""
+        return cls(
+            checks.whole(jobs, f"{what}: jobs", 1, MOST_JOBS),
+            None if cluster is None else checks.text(cluster, f"{what}: cluster"),
+            reporter(progress, f"{what}: progress"),
+        )
 
 
 def reporter(value: Callable[..., Any] | bool | None, what: str) -> Callable[..., Any] | None:

@@ -227,6 +227,13 @@ def settle(record: object, name: str, value: object) -> None:
     object.__setattr__(record, name, value)
 
 
+def keywords(given: Collection[str], options: type, what: str) -> None:
+    """Refuse keyword arguments that a TypedDict of options has not, as Python does."""
+    for name in given:
+        if name not in options.__annotations__:
+            raise TypeError(f"{what}() got an unexpected keyword argument {name!r}")
+
+
 def function(value: _T, what: str) -> _T:
     """Something that can be called, or None."""
     if value is not None and not callable(value):
@@ -264,12 +271,15 @@ def array(value: object, what: str, wanted: str) -> Array:
 
 def numbers(value: object, shape: tuple[int, ...], what: str) -> Array:
     """Read-only copy with finite numbers of this shape."""
-    found: Array = array(value, what, f"numbers of shape {shape}" if shape else "one number").copy()
+    if type(value) is np.ndarray and value.dtype == np.float64:  # a third of the time is that of the words below
+        found: Array = value.copy()
+    else:
+        found = array(value, what, f"numbers of shape {shape}" if shape else "one number").copy()
     if found.shape != shape:
         raise InputError(f"{what} has shape {shape}, not {found.shape}; give {math.prod(shape)} numbers")
     if not math.isfinite(np.vdot(found, found)) and not np.isfinite(found).all():  # the first takes a fifth of the time
         raise InputError(f"{what} is {shown(found.tolist())}; give finite numbers")
-    found.flags.writeable = False
+    found.setflags(write=False)
     return found
 
 

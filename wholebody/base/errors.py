@@ -7,6 +7,8 @@ from collections.abc import Collection, Iterable
 from difflib import SequenceMatcher
 from typing import Any
 
+__all__ = ["FileFormatError", "InputError", "MissingPackageError", "UnknownNameError", "WholebodyError"]
+
 SHOWN = 80  # characters of a name in a message
 
 OFFERED = 4  # names that a message offers; of a few more, all, if none is similar
@@ -153,6 +155,6 @@ class MissingPackageError(WholebodyError, ImportError):
     """An optional package that the call needs, with the command that installs it.
 
     Examples:
-        >>> issubclass(wb.MissingPackageError, wb.WholebodyError)
+        >>> issubclass(wb.errors.MissingPackageError, wb.WholebodyError)
         True
     """

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import fcntl
+import io
 import math
 import os
 import re
@@ -81,6 +82,18 @@ def packaged_table(path: Path) -> tuple[dict[str, str], ...]:
     """The rows of a CSV file of the package, each a mapping from column to text; a line that begins with # is none."""
     with path.open(encoding="utf-8", newline="") as file:
         return tuple(csv.DictReader(line for line in file if not line.startswith("#")))
+
+
+def csv_text(rows: Iterable[Mapping[str, Any]]) -> str:
+    """Rows as CSV with a column for each name in one of them; cells with line breaks of any kind are quoted."""
+    listed, text = list(rows), io.StringIO(newline="")
+    names = list(dict.fromkeys(name for row in listed for name in row))
+    lines: list[list[Any]] = [names, *([row.get(name) for name in names] for row in listed)]
+    for cells in lines:
+        line = io.StringIO(newline="")
+        csv.writer(line, lineterminator="\r\n").writerow(cells)  # it quotes only what its own lines end with
+        text.write(line.getvalue().removesuffix("\r\n") + "\n")
+    return text.getvalue()
 
 
 @cache

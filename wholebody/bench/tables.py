@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import dataclasses
-import io
 import os
 import platform
 import re
@@ -17,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wholebody.base.errors import FileFormatError
-from wholebody.base.files import make_folder, templates, write
+from wholebody.base.files import csv_text, make_folder, templates, write
 from wholebody.bench.statistics import Interval
 from wholebody.version import __version__
 
@@ -86,16 +84,8 @@ def write_text(path: Path, text: str) -> None:
 
 def write_rows(path: Path, facts: Mapping[str, str], rows: Sequence[Any]) -> None:
     """Write dataclass instances, one a line, an interval in three columns; the facts stand above as comments."""
-    text = io.StringIO()
-    for name, value in facts.items():
-        text.write(f"# {name}: {value}\n")
-    cells = [flat(row) for row in rows]
-    names = list(dict.fromkeys(name for each in cells for name in each))
-    text.write(_line(names))
-    for each in cells:
-        values = [each.get(name, "") for name in names]
-        text.write(_line([repr(value) if isinstance(value, float) else str(value) for value in values]))
-    write_text(path, text.getvalue())
+    head = "".join(f"# {name}: {value}\n" for name, value in facts.items())
+    write_text(path, head + csv_text(map(flat, rows)))
 
 
 def flat(row: Any) -> dict[str, Any]:
@@ -150,13 +140,6 @@ def replace_section(path: Path, name: str, text: str) -> None:
             f"{path}: the markers {first} and {last} are not in it; put them where the result belongs"
         )
     write_text(path, f"{head}{first}\n\n{text.strip()}\n\n{last}{tail}")
-
-
-def _line(cells: Iterable[str]) -> str:
-    """A line of CSV; cells with line breaks of any kind are quoted."""
-    line = io.StringIO(newline="")
-    csv.writer(line, lineterminator="\r\n").writerow(cells)  # it quotes only what its own lines end with
-    return line.getvalue().removesuffix("\r\n") + "\n"
 
 
 TEMPLATES = Path(__file__).parent / "templates"

@@ -11,7 +11,8 @@ from wholebody.cli.command import command
 
 if TYPE_CHECKING:
     from wholebody.bench.rows import Row
-    from wholebody.tracking import InteractionScene, Judgement, Recording
+    from wholebody.tracking import Judgement, Recording
+    from wholebody.tracking.scenes import InteractionScene
 
 
 @command(
@@ -37,8 +38,8 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.tables import machine, write_text
     from wholebody.cli.frames import is_held, paper_report
     from wholebody.cli.tables import print_rows
-    from wholebody.tracking import SCENES, build_scene
     from wholebody.tracking.loop import OVERLAPS
+    from wholebody.tracking.scenes import SCENES, build_scene
 
     names = scene_names(arguments, SCENES, "interact", files=False)
     if not names:

@@ -16,7 +16,7 @@ from wholebody.cli.command import command, flag, option
 Solve the task of a study file for each person, with each target, in each layout, and write into a folder:
 
   cases.csv         one row a case
-  records.sqlite    the same with the postures; an interrupted run continues from it""",
+  records.jsonl     the same with the postures; an interrupted run continues from it""",
     option("study", type=Path, metavar="FILE.toml", help="the study file"),
     option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-FILE)"),
     option("--jobs", type=int, default=1, metavar="N", help="cases at a time (default: 1)"),

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from wholebody.base.arrays import Array
     from wholebody.bench.rows import Row
     from wholebody.dynamics.world import WorldFrame
-    from wholebody.tracking import InteractionScene
     from wholebody.tracking.overlaps import Overlap
+    from wholebody.tracking.scenes import InteractionScene
 
 
 @command(

@@ -210,11 +210,11 @@ class Figure(checks.FixedAttributes):
 
     def place_of(self, name: str) -> Place:
         """Return where a frame, a segment or a joint is fixed to the model; found once."""
-        index = self.frame_id(name)
-        if name not in self._places:
-            frame = self.model.frames[index]
+        if not isinstance(name, str) or name not in self._places:
+            frame = self.model.frames[index := self.frame_id(name)]
             self._places[name] = Place(index, int(frame.parentJoint), pin.SE3(frame.placement))
-        return Place(*self._places[name][:2], self._places[name].placement.copy())
+        frame, joint, placement = self._places[name]
+        return Place(frame, joint, placement.copy())
 
     def placement(self, q: Array, name: str) -> pin.SE3:
         """Return the placement in the world, at the posture q (nq,), of a frame, a segment or a joint."""

@@ -36,7 +36,7 @@ class Tracker(Protocol):
     """Follows the goals of one problem, which may move from call to call. It serves one thread at a time.
 
     Examples:
-        >>> tracker = wb.QP().tracker(problem, dt=0.02)
+        >>> tracker = wb.methods.QP().tracker(problem, dt=0.02)
         >>> tracker.step(problem.start).q.shape == problem.start.shape
         True
     """
@@ -87,7 +87,7 @@ class Method(Protocol):
     Examples:
         examples/own_method.py is a whole method in forty lines; an object or "module:Class" names it.
 
-        >>> wb.QP().accepts(problem)
+        >>> wb.methods.QP().accepts(problem)
     """
 
     @property

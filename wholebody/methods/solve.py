@@ -62,7 +62,7 @@ def as_method(given: object) -> Method:
         return method_named(given)
     parts = (getattr(given, name, None) for name in PROTOCOL)
     if isinstance(given, type) or not all(map(callable, parts)) or not hasattr(given, "name"):
-        raise InputError(f"method is {shown(given)}; give a name such as 'qp', or a method such as wb.QP()")
+        raise InputError(f"method is {shown(given)}; give a name such as 'qp', or a method such as wb.methods.QP()")
     return given  # type: ignore[return-value]
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array
-from wholebody.base.batches import fingerprint, reporter, run_batch
+from wholebody.base.batches import Jobs, fingerprint, run_batch
 from wholebody.base.errors import InputError, WholebodyError
 from wholebody.base.files import is_file, read_bytes
 from wholebody.base.runner import Job
@@ -75,8 +75,8 @@ def avoid_many(
 ) -> tuple[AvoidedCase, ...]:
     """Free clips of collisions: each clip, with each equipment, by each method.
 
-    The folder gets a clip for each case, the clips as they were (`originals`), and a table of all cases as `cases.json`
-    and `cases.csv`. What it holds already, of the same clip, figure, equipment, method and constraints, is not done
+    The folder gets a clip for each case, the clips as they were (`originals`), and all cases as `cases.jsonl` and
+    `cases.csv`. What it holds already, of the same clip, figure, equipment, method and constraints, is not done
     again: a run that was ended goes on. Files are written whole. Each case runs in a process of its own, so that one
     that fails ends no other.
 
@@ -108,8 +108,7 @@ def avoid_many(
         'free'
     """
     what = "avoid_many"
-    if unknown := options.keys() - AvoidOptions.__annotations__.keys():
-        raise TypeError(f"{what}() has no argument {min(unknown)!r}")
+    checks.keywords(options, AvoidOptions, what)
     sources = _sources(checks.listed(clips, f"{what}: clips", "['walk.bvh']"), figure, what)
     given = tuple(checks.listed(options.get("constraints", ()), f"{what}: constraints", "[wb.motion.StanceFeet()]"))
     pieces = checks.listed(equipment, f"{what}: equipment", "['nothing', 'pack']")
@@ -122,15 +121,12 @@ def avoid_many(
     held: AvoidOptions = {"constraints": given, "hold_feet": feet}
     if checks.flag(options.get("keep_ends", False), f"{what}: keep_ends"):
         held["keep_ends"] = True
-    jobs = checks.whole(jobs, f"{what}: jobs", 1, 4096)
-    if cluster is not None:
-        checks.text(cluster, f"{what}: cluster")
-    told = reporter(progress, f"{what}: progress")
+    running = Jobs.checked(what, jobs, cluster, progress)
     owners = [source.figure if isinstance(source, Clip) else figure for source in sources.values()]
     for owner in {id(owner): owner for owner in owners if owner is not None}.values():
         for one in pieces:  # what does not fit is said before anything is computed
             frame_terms(dressed(owner, one), owner.neutral[None], 1.0 / 30.0, given)
-    batch = _Batch(sources, figure, BatchTable(checks.path(folder, f"{what}: folder")), jobs, cluster)
+    batch = _Batch(sources, figure, BatchTable(checks.path(folder, f"{what}: folder")), running)
     marks, faults = batch.originals()
     asked = [
         _Asked(AvoidedCase(name, wears, way, asked=_fingerprint(marks[name], one, method, held)), one, method)
@@ -138,19 +134,18 @@ def avoid_many(
         for wears, one in worn.items()
         for way, method in ways.items()
     ]
-    return batch.freed(asked, faults, held, told)
+    return batch.freed(asked, faults, held)
 
 
 class _Batch(NamedTuple):
-    """Clips and files by name, the figure of the files, the folder, and where jobs run."""
+    """Clips and files by name, the figure of the files, the folder, and how jobs are run."""
 
     sources: Mapping[str, Clip | Path]
     figure: Figure | None
     table: BatchTable
-    jobs: int
-    cluster: str | None
+    running: Jobs
 
-    def originals(self, progress: Callable[[int, str], Any] | None = None) -> tuple[dict[str, str], dict[str, str]]:
+    def originals(self, tell: Callable[[int, str], Any] | None = None) -> tuple[dict[str, str], dict[str, str]]:
         """Make the clips of files; fingerprints of all clips, and the sentences with which files were refused."""
         marks = {name: _mark(source, self.figure) for name, source in self.sources.items()}
         waiting = [
@@ -160,10 +155,10 @@ class _Batch(NamedTuple):
         ]
         faults, done = {}, len(self.sources) - len(waiting)
         work = (Job(name, _read, (str(source.absolute()), self.figure), 0.0) for name, source in waiting)  # no deadline
-        for outcome in run_batch(work, self.jobs, self.cluster) if waiting else ():
+        for outcome in run_batch(work, self.running.jobs, self.running.cluster) if waiting else ():
             name, done = outcome.job.name, done + 1
-            if progress is not None:
-                progress(done, name)
+            if tell is not None:
+                tell(done, name)
             if outcome.error is not None or isinstance(outcome.answer, str):
                 faults[name] = outcome.answer or str(outcome.error)
                 continue
@@ -172,20 +167,19 @@ class _Batch(NamedTuple):
             self.table.add_original(name, Clip(self.figure, q, dt, name), marks[name])
         return marks, faults
 
-    def freed(
-        self, asked: Sequence[_Asked], faults: Mapping[str, str], held: AvoidOptions,
-        progress: Callable[[BatchProgress], Any] | None,
-    ) -> tuple[AvoidedCase, ...]:  # fmt: skip
+    def freed(self, asked: Sequence[_Asked], faults: Mapping[str, str], held: AvoidOptions) -> tuple[AvoidedCase, ...]:
         """The rows of the cases that were asked; those that the folder has not are done, if their file was read."""
-        rows = {each.row.stem: row for each in asked if (row := self.table.done(each.row.asked)) is not None}
+        rows = {each.row.stem: row for each in asked if (row := self.table.done(each.row)) is not None}
 
         def keep(row: AvoidedCase, clip: Clip | None) -> None:
             rows[row.stem] = self.table.add(row, clip)
-            if progress is not None:
-                progress(BatchProgress(len(rows), len(asked), row))
+            tell(row)
 
-        if progress is not None:
-            progress(BatchProgress(len(rows), len(asked), None))
+        def tell(row: AvoidedCase | None) -> None:
+            if self.running.tell is not None:
+                self.running.tell(BatchProgress(len(rows), len(asked), row))
+
+        tell(None)
         missing = [each for each in asked if each.row.stem not in rows]
         for each in missing:
             if each.row.clip in faults:
@@ -200,7 +194,7 @@ class _Batch(NamedTuple):
                     clip = read_clip(self.table.original(each.row.clip), self.figure)
                 yield Job(each, _case, (clip, each.worn, each.method, held), 0.0)
 
-        for outcome in run_batch(work(), self.jobs, self.cluster) if waiting else ():
+        for outcome in run_batch(work(), self.running.jobs, self.running.cluster) if waiting else ():
             each = outcome.job.name
             if outcome.error is not None:
                 keep(replace(each.row, message=str(outcome.error)), None)
@@ -271,11 +265,9 @@ def read_many(
     check_figure(figure, what)
     sources = _sources(checks.listed(files, f"{what}: files", "['walk.bvh']"), figure, what)
     table = BatchTable(checks.path(folder, f"{what}: folder"))
-    jobs = checks.whole(jobs, f"{what}: jobs", 1, 4096)
     checks.function(progress, f"{what}: progress")
-    if cluster is not None:
-        checks.text(cluster, f"{what}: cluster")
-    faults = _Batch(sources, figure, table, jobs, cluster).originals(progress)[1]
+    running = Jobs.checked(what, jobs, cluster)
+    faults = _Batch(sources, figure, table, running).originals(progress)[1]
     return {name: faults.get(name) or table.original(name) for name in sources}
 
 

@@ -1,22 +1,18 @@
-"""What a batch has made so far: its table as JSON and CSV, and one clip a case, in a folder."""
+"""What a batch has made so far: its rows, the same as CSV, and one clip a case, in a folder."""
 
 from __future__ import annotations
 
-import csv
-import io
-import json
 import re
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from wholebody.base.arrays import brief
-from wholebody.base.errors import FileFormatError
-from wholebody.base.files import make_folder, read_text, write
+from wholebody.base.files import csv_text, write
+from wholebody.base.records import RecordFile
 from wholebody.motion.clip import Clip
 
-TABLE = "cases.json"
-SHEET = "cases.csv"
+TABLE, SHEET, ORIGINALS = "cases.jsonl", "cases.csv", "originals"
 
 
 @dataclass(frozen=True)
@@ -83,67 +79,42 @@ class AvoidedCase:
 
 
 class BatchTable:
-    """The folder of a batch. Each file is written whole; a clip is there before its row is."""
+    """The folder of a batch. A clip is there before its row is."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._cases: dict[str, AvoidedCase] = {}
-        self._originals: dict[str, str] = {}
-        make_folder(folder)
-        if (folder / TABLE).exists():
-            self._read()
+        of = "cases of wb.motion.avoid_many"
+        self._cases = RecordFile(folder / TABLE, of, lambda row: AvoidedCase(**row))  # by the names of the clips' files
+        self._originals = RecordFile(folder / ORIGINALS / "clips.jsonl", "clips of wb.motion.read_many", str)
 
-    def done(self, asked: str) -> AvoidedCase | None:
+    def done(self, asked: AvoidedCase) -> AvoidedCase | None:
         """The row of a case that need not be done again; None if there is none, or its clip was taken away."""
-        row = self._cases.get(asked)
-        if row is None or row.outcome == "ended" or (row.file and not (self.folder / row.file).is_file()):
+        row = self._cases.kept.get(asked.stem)
+        if row is None or row.asked != asked.asked or row.outcome == "ended":
             return None
-        return row
+        return None if row.file and not (self.folder / row.file).is_file() else row
 
     def add(self, row: AvoidedCase, clip: Clip | None) -> AvoidedCase:
         """Keep a case with its clip; returns the row with the clip's file."""
         if clip is not None:
             row = replace(row, file=f"{row.stem}.npz")
             clip.write(self.folder / row.file)
-        self._cases = {asked: other for asked, other in self._cases.items() if other.stem != row.stem}
-        self._cases[row.asked] = row
-        self._write()
+        self._cases.add(row.stem, row)
+        write(self.folder / SHEET, csv_text(map(asdict, self._cases.kept.values())))
         return row
 
     def original(self, name: str) -> Path:
         """The file of a clip as it was before."""
-        return self.folder / "originals" / f"{file_name(name)}.npz"
+        return self.folder / ORIGINALS / f"{file_name(name)}.npz"
 
     def has_original(self, name: str, asked: str) -> bool:
         """Whether the clip of a recording was made before, of the same file and figure."""
-        return self._originals.get(name) == asked and self.original(name).is_file()
+        return self._originals.kept.get(name) == asked and self.original(name).is_file()
 
     def add_original(self, name: str, clip: Clip, asked: str) -> None:
         """Keep the clip of a recording."""
-        make_folder(self.original(name).parent)
         clip.write(self.original(name))
-        self._originals[name] = asked
-        self._write()
-
-    def _write(self) -> None:
-        rows = [asdict(row) for row in self._cases.values()]
-        names = [field.name for field in fields(AvoidedCase)]
-        sheet = io.StringIO()
-        made = csv.DictWriter(sheet, names, lineterminator="\n")
-        made.writeheader()
-        made.writerows(rows)
-        write(self.folder / TABLE, json.dumps({"cases": rows, "originals": self._originals}, indent=1))
-        write(self.folder / SHEET, sheet.getvalue())  # nobody reads it back: it may be older by a row after a crash
-
-    def _read(self) -> None:
-        path = self.folder / TABLE
-        try:
-            found = json.loads(read_text(path, "table"))
-            rows = [AvoidedCase(**row) for row in found["cases"]]
-            self._originals = {str(name): str(asked) for name, asked in found["originals"].items()}
-        except (ValueError, TypeError, KeyError, AttributeError):
-            raise FileFormatError(f"{path}: is no table of a batch of clips; give another folder") from None
-        self._cases = {row.asked: row for row in rows}
+        self._originals.add(name, asked)
 
 
 def file_name(text: str) -> str:

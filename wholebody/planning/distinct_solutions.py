@@ -102,7 +102,7 @@ def solutions(
     starts = checks.whole(starts, "solutions: starts", 1, 100_000)
     apart = checks.number(apart, "solutions: apart", 1e-6, 100.0, "rad or m")
     seed = checks.whole(seed, "solutions: seed", 0, 2**32 - 1)
-    method = QP() if method is None else checks.instance(method, QP, "solutions: method", "give wb.QP(...)")
+    method = QP() if method is None else checks.instance(method, QP, "solutions: method", "give wb.methods.QP(...)")
     ends = np.inf if time_limit is None else time.perf_counter() + TIME_LIMIT(time_limit, "solutions: time_limit")
     known: list[Solution] = []
     begun = descents = 0

@@ -258,7 +258,7 @@ def accommodation(
     variants = [Variant(make, person, None, None) for person in population.values()]
     if method is None and callable(task):
         method = QP(budget=BUDGET, measures=point is not None or _may_have_settings(variants[0]))
-    run = partial(Running.checked, "accommodation", jobs=jobs, cluster=None, seconds=None, progress=progress)
+    run = partial(Running.checked, "accommodation", jobs=jobs, progress=progress)
     # Who reaches and fits does not depend on how low the measure is: jumps between people are no reason to solve again.
     varied = {"people": population, "targets": None, "layouts": None}
     records = run_cases(*planned(task, varied, method, run, True, folder), lowers=False)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from wholebody.base import checks
 from wholebody.base.arrays import brief
-from wholebody.base.batches import fingerprint, reporter, run_batch, shared
+from wholebody.base.batches import JobOptions, Jobs, fingerprint, run_batch, shared
 from wholebody.base.runner import EndedError, Job
 from wholebody.methods.base import Method
 from wholebody.methods.control import ctrl_c_ends_all
@@ -19,11 +19,10 @@ from wholebody.methods.inputs import check_problem
 from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
 from wholebody.studies.neighbours import Family, Work, lower, name_changes, solve_from_neighbours
-from wholebody.studies.records import ENDED, Records, RecordStore, SolveRecord
+from wholebody.studies.records import ENDED, KeptRecords, Records, SolveRecord
 from wholebody.studies.solving import Case, Run, Sender, at_once, sent_to, solve_runs
 from wholebody.tasks.answers import is_own
 
-MOST_JOBS = 4096
 LONGEST = 1e7  # s: a greater deadline of a solve is a mistake
 TOGETHER = 16  # cases of a job. More: fewer scenes are sent, and processes end less together
 RUN = 16  # problems that warm-start one from the other: longer = fewer cold starts, fewer processes busy at the end
@@ -60,17 +59,18 @@ class Running:
     progress: Callable[[SolveProgress], Any] | None = None
 
     @classmethod
-    def checked(
-        cls, what: str, method: object, jobs: object, cluster: object, seconds: object, progress: Any
-    ) -> Running:
-        """Check the arguments of a function that runs cases."""
-        return cls(
-            as_method(method),
-            checks.whole(jobs, f"{what}: jobs", 1, MOST_JOBS),
-            None if cluster is None else checks.text(cluster, f"{what}: cluster"),
-            None if seconds is None else checks.number(seconds, f"{what}: seconds", 1e-3, LONGEST, "s"),
-            reporter(progress, f"{what}: progress"),
-        )
+    def checked(cls, what: str, method: object, seconds: object = None, **running: Any) -> Running:
+        """Check the arguments of a function that runs cases; `running` are `JobOptions`."""
+        jobs, cluster, tell = Jobs.checked(what, **running)
+        deadline = None if seconds is None else checks.number(seconds, f"{what}: seconds", 1e-3, LONGEST, "s")
+        return cls(as_method(method), jobs, cluster, deadline, tell)
+
+
+class RunOptions(JobOptions, total=False):
+    """How cases are run and where records are kept, as keyword arguments; see `solve_many`."""
+
+    seconds: float | None
+    folder: str | os.PathLike[str] | None
 
 
 def solve_many(
@@ -105,7 +105,7 @@ def solve_many(
             four more solves of a problem. `SolveRecord.change` names the jumps that are left. An answer may be another
             local solution than without.
         seconds: deadline of each problem, by the clock; its record's outcome is then "ended". None for none.
-        folder: keeps the records (`records.sqlite`). What it holds already of the same problem and method is not solved
+        folder: keeps the records (`records.jsonl`). What it holds already of the same problem and method is not solved
             again: a run that was ended goes on. Made if it does not exist.
         progress: called with a `SolveProgress` after each problem; if it returns True, the run ends, and the
             remaining problems are "cancelled". True in place of a function prints a line that counts.
@@ -127,9 +127,9 @@ def solve_many(
     """
     what = "solve_many"
     named = _named(problems, what)
-    running = Running.checked(what, method, jobs, cluster, seconds, progress)
+    running = Running.checked(what, method, seconds, jobs=jobs, cluster=cluster, progress=progress)
     warm_start = checks.flag(warm_start, f"{what}: warm_start")
-    store = None if folder is None else RecordStore(checks.path(folder, f"{what}: folder"))
+    store = None if folder is None else KeptRecords(checks.path(folder, f"{what}: folder"))
     cases = []
     for number, (name, problem) in enumerate(named):
         asked = "" if store is None else fingerprint(problem, running.method, warm_start)
@@ -144,16 +144,16 @@ def runs_of(cases: Sequence[Case], length: int) -> list[list[Case]]:
 
 @ctrl_c_ends_all()
 def run_cases(
-    runs: Sequence[Sequence[Case]], running: Running, store: RecordStore | None = None, *, lowers: bool = True
+    runs: Sequence[Sequence[Case]], running: Running, store: KeptRecords | None = None, *, lowers: bool = True
 ) -> Records:
     """Solve cases; those of one run warm-start one from the other. The store has what was done before.
 
     `lowers`: whether neighbours whose postures jump are solved again for a lower measure, see `neighbours.lower`.
     """
     order = [case for run in runs for case in run]
-    before = {} if store is None else store.read()
-    done = {k: replace(before[case.asked], name=case.record.name, factors=case.record.factors)
-            for k, case in enumerate(order) if case.asked and case.asked in before}  # fmt: skip
+    found = {} if store is None else {k: store.done(case.asked) for k, case in enumerate(order)}
+    done = {k: replace(record, name=order[k].record.name, factors=order[k].record.factors)
+            for k, record in found.items() if record is not None}  # fmt: skip
     tell = running.progress
     numbered, first = [], 0
     for run in runs:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from hashlib import sha256
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.base.batches import reporter, spread
+from wholebody.base.batches import JobOptions, Jobs, spread
 from wholebody.base.errors import InputError
 from wholebody.base.runner import packed
 from wholebody.geometry.placement import FARTHEST
@@ -19,7 +19,6 @@ from wholebody.methods.inputs import check_problem
 from wholebody.methods.qp.method import QP
 from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
-from wholebody.studies.many import MOST_JOBS
 from wholebody.studies.reach_result import BEYOND, EXCLUDED, INSIDE, MISSED, NOT_TRIED, REACHED, ReachMap
 from wholebody.studies.reach_search import (
     SLACK,
@@ -33,6 +32,9 @@ from wholebody.studies.reach_search import (
     search_places,
 )
 from wholebody.tasks import inputs
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 MOST_PLACES = 1_000_000
 LEAST_EDGE, MOST_EDGE = 2, 6  # places along an edge of a brick
@@ -67,9 +69,7 @@ def reach_map(
     *,
     offset: Any = (0.0, 0.0, 0.0),
     method: str | Method | None = None,
-    jobs: int = 1,
-    cluster: str | None = None,
-    progress: Callable[[int, int], Any] | bool | None = None,
+    **running: Unpack[JobOptions],
 ) -> ReachMap:
     """Find which places of a grid a point of a frame can reach, with everything that a problem asks.
 
@@ -86,12 +86,11 @@ def reach_map(
         high: (3,) greatest corner; equal values make a plane or a line.
         step: metres between places, one or for each axis.
         offset: (3,) the point of the frame that reaches, in its axes.
-        method: of the solves, name or settings; None for `wb.QP(measures=False)`, with quicker settings where a
-            neighbour is reached. A method that is given solves all places, so `wb.QP()` minimises the measures too.
-        jobs: processes.
-        cluster: address of a dask scheduler; None for this machine.
-        progress: called with the numbers of settled and of all places; if it returns True, the search ends, and the
-            other places are not tried. True in place of a function prints a line that counts.
+        method: of the solves, name or settings; None for `wb.methods.QP(measures=False)`, with quicker settings where a
+            neighbour is reached. A given method solves all places: `wb.methods.QP()` minimises the measures too.
+        running: `jobs`: processes; `cluster`: address of a dask scheduler, None for this machine; `progress`: called
+            with the numbers of settled and of all places; if it returns True, the search ends, and the other places
+            are not tried. True in place of a function prints a line that counts.
 
     Raises:
         InputError: a value of the wrong kind or range, or more than a million places.
@@ -114,12 +113,9 @@ def reach_map(
         quick: Method = QP(measures=False, restarts=0, budget=0, iterations=30)  # from a neighbour's posture
     else:
         whole = quick = as_method(method)
-    jobs = checks.whole(jobs, f"{what}: jobs", 1, MOST_JOBS)
-    if cluster is not None:
-        checks.text(cluster, f"{what}: cluster")
-    told = reporter(progress, f"{what}: progress")
+    checks.keywords(running, JobOptions, what)
     asked = Asked(problem, frame, point, whole, quick)
-    search = _Search(asked, grid, jobs, cluster, told)
+    search = _Search(asked, grid, Jobs.checked(what, **running))
     search.run()
     return search.answer()
 
@@ -127,10 +123,9 @@ def reach_map(
 class _Search:
     """The waves of one map, and what is known of each place: places beside reached ones are searched from these."""
 
-    def __init__(
-        self, asked: Asked, grid: _Grid, jobs: int, cluster: str | None, progress: Callable[[int, int], Any] | None
-    ) -> None:
-        self._asked, self._grid, self._jobs, self._cluster, self._progress = asked, grid, jobs, cluster, progress
+    def __init__(self, asked: Asked, grid: _Grid, running: Jobs) -> None:
+        self._asked, self._grid = asked, grid
+        self._jobs, self._cluster, self._progress = running
         count = len(grid.places)
         center, radius = reach_balls(asked.problem, asked.frame, asked.offset)
         least = distance_beyond(grid.places, center, radius)

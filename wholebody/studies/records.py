@@ -1,16 +1,11 @@
-"""What a run of many solves found: one record a case, the table of all, and the records on disk."""
+"""What a run of many solves found: one record a case, the table of all, and the records of a folder."""
 
 from __future__ import annotations
 
-import csv
-import io
-import json
 import os
-import sqlite3
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from contextlib import closing
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +14,9 @@ import numpy as np
 from wholebody.base import checks
 from wholebody.base.arrays import Array, brief
 from wholebody.base.charts import Shown, png
-from wholebody.base.errors import FileFormatError, InputError, MissingPackageError
-from wholebody.base.files import checked_target, make_folder, write
+from wholebody.base.errors import MissingPackageError
+from wholebody.base.files import checked_target, csv_text, write
+from wholebody.base.records import RecordFile
 from wholebody.solution import Solution
 
 REFUSED, ENDED, CANCELLED = "refused", "ended", "cancelled"
@@ -84,16 +80,9 @@ class SolveRecord:
         plain = {field.name: getattr(self, field.name) for field in fields(self) if field.name not in ("q", "factors")}
         return {"name": plain.pop("name"), **(self.factors or {}), **plain}
 
-    def as_json(self) -> str:
-        """The record as JSON; `from_json` reads it."""
-        plain = asdict(self)
-        plain["q"] = None if self.q is None else self.q.tolist()
-        return json.dumps(plain)
-
     @classmethod
-    def from_json(cls, text: str) -> SolveRecord:
-        """Read what `as_json` wrote."""
-        plain = json.loads(text)
+    def of(cls, plain: dict[str, Any]) -> SolveRecord:
+        """The record of the plain values that `dataclasses.asdict` gave, its posture as a list."""
         q = plain.pop("q")
         return cls(q=None if q is None else np.array(q, dtype=float), **plain)
 
@@ -205,12 +194,7 @@ class Records(Shown, Sequence[SolveRecord]):
     def to_csv(self, path: str | os.PathLike[str]) -> Path:
         """Write the rows as CSV; returns the path."""
         file = checked_target(path, "to_csv: path", "a table", (".csv",))
-        rows = self.rows()
-        sheet = io.StringIO()
-        made = csv.DictWriter(sheet, list(dict.fromkeys(key for row in rows for key in row)), lineterminator="\n")
-        made.writeheader()
-        made.writerows(rows)
-        return write(file, sheet.getvalue())
+        return write(file, csv_text(self.rows()))
 
     def to_parquet(self, path: str | os.PathLike[str]) -> Path:
         """Write the rows as Parquet; returns the path; a MissingPackageError without pyarrow."""
@@ -227,40 +211,13 @@ class Records(Shown, Sequence[SolveRecord]):
         return write(file, sink.getvalue().to_pybytes())
 
 
-NAME = "records.sqlite"
-
-
-class RecordStore:
-    """Records by the fingerprint of what was asked; a record is there whole or not at all."""
+class KeptRecords(RecordFile[SolveRecord]):
+    """Records in a folder, by the fingerprint of what was asked."""
 
     def __init__(self, folder: Path) -> None:
-        make_folder(folder)
-        self.path = folder / NAME
-        try:
-            with closing(self._connection()) as connection, connection:
-                connection.execute("CREATE TABLE IF NOT EXISTS records (asked TEXT PRIMARY KEY, record TEXT NOT NULL)")
-        except sqlite3.OperationalError as error:
-            raise InputError(f"{self.path} cannot be written ({error}); give another folder") from None
-        except sqlite3.DatabaseError:
-            raise self._foreign() from None
+        super().__init__(folder / "records.jsonl", "records of wb.solve_many", SolveRecord.of)
 
-    def read(self) -> dict[str, SolveRecord]:
-        """All records by fingerprint, without those whose process ended, which are done again."""
-        try:
-            with closing(self._connection()) as connection:
-                rows = connection.execute("SELECT asked, record FROM records").fetchall()
-            found = {str(asked): SolveRecord.from_json(record) for asked, record in rows}
-        except (sqlite3.DatabaseError, ValueError, TypeError, KeyError, AttributeError):
-            raise self._foreign() from None
-        return {asked: record for asked, record in found.items() if record.outcome not in (ENDED, CANCELLED)}
-
-    def add(self, asked: str, record: SolveRecord) -> None:
-        """Keep a record."""
-        with closing(self._connection()) as connection, connection:
-            connection.execute("INSERT OR REPLACE INTO records VALUES (?, ?)", (asked, record.as_json()))
-
-    def _connection(self) -> sqlite3.Connection:
-        return sqlite3.connect(self.path, timeout=60.0)  # s: that another process may hold the file
-
-    def _foreign(self) -> FileFormatError:
-        return FileFormatError(f"{self.path}: holds no records of wb.solve_many; give another folder")
+    def done(self, asked: str) -> SolveRecord | None:
+        """The record of a case; None where there is none, or its process ended, and it is done again."""
+        found = self.kept.get(asked)
+        return None if found is None or found.outcome in (ENDED, CANCELLED) else found

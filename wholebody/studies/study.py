@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 from itertools import product
 from math import prod
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from wholebody.base import checks
 from wholebody.base.batches import fingerprint
@@ -20,10 +20,13 @@ from wholebody.figures import Figure, load
 from wholebody.figures.anthropometry import Person, design_cases, make_person
 from wholebody.methods.base import Method
 from wholebody.problem import Problem
-from wholebody.studies.many import RUN, Running, SolveProgress, run_cases, runs_of
-from wholebody.studies.records import Records, RecordStore, SolveRecord
+from wholebody.studies.many import RUN, Running, RunOptions, run_cases, runs_of
+from wholebody.studies.records import KeptRecords, Records, SolveRecord
 from wholebody.studies.solving import Case
 from wholebody.studies.study_files import SIZE, TaskFile
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 MOST_CASES = 1_000_000
 
@@ -38,12 +41,8 @@ def study(
     targets: Any = None,
     layouts: Any = None,
     method: str | Method | None = None,
-    jobs: int = 1,
-    cluster: str | None = None,
     warm_start: bool = False,
-    seconds: float | None = None,
-    folder: str | os.PathLike[str] | None = None,
-    progress: Callable[[SolveProgress], Any] | bool | None = None,
+    **running: Unpack[RunOptions],
 ) -> Records:
     """Solve one task for every person, with every target, in every layout.
 
@@ -61,14 +60,9 @@ def study(
         targets: likewise; for functions any values.
         layouts: likewise.
         method: name or settings; None for the file's, and for "qp" with functions.
-        jobs: problems at a time.
-        cluster: address of a dask scheduler that runs them; None for this machine.
         warm_start: begin each target at the answer of the one before it, and the first of a person at that of the
             person before, see `solve_many`.
-        seconds: deadline of each problem, by the clock; None for none.
-        folder: keeps the records, so that a run that was ended goes on; see `solve_many`.
-        progress: called with a `SolveProgress` after each case; if it returns True, the run ends. True in place of a
-            function prints a line that counts.
+        running: `jobs`, `cluster`, `seconds`, `folder` and `progress`, as of `solve_many`.
 
     Returns:
         One record for each combination, the targets varying fastest. Its columns `person`, `target` and `layout` are
@@ -88,7 +82,9 @@ def study(
         >>> [record.outcome for record in records]
         ['solved', 'solved']
     """
-    run = partial(Running.checked, "study", jobs=jobs, cluster=cluster, seconds=seconds, progress=progress)
+    checks.keywords(running, RunOptions, "study")
+    folder = running.pop("folder", None)
+    run = partial(Running.checked, "study", **running)
     varied = {"people": people, "targets": targets, "layouts": layouts}
     return run_cases(*planned(task, varied, method, run, warm_start, folder))
 
@@ -96,7 +92,7 @@ def study(
 def planned(
     task: TaskFunction | str | os.PathLike[str], varied: Mapping[str, Any], method: str | Method | None,
     run: Callable[..., Running], warm_start: bool, folder: str | os.PathLike[str] | None,
-) -> tuple[list[list[Case]], Running, RecordStore | None]:  # fmt: skip
+) -> tuple[list[list[Case]], Running, KeptRecords | None]:  # fmt: skip
     """What `run_cases` takes of the arguments of `study`; `run` makes of a method how cases are run."""
     what = "study"
     make: TaskFile | TaskFunction
@@ -120,7 +116,7 @@ def planned(
     factors[0] = {name: _person(person) for name, person in factors[0].items()}
     if file is not None:
         file.check(*(values.values() for values in factors))
-    store = None if folder is None else RecordStore(checks.path(folder, f"{what}: folder"))
+    store = None if folder is None else KeptRecords(checks.path(folder, f"{what}: folder"))
     cases = []
     # a figure has a megabyte: it is hashed once, and not for each case
     marks = {who: fingerprint(mark, person) for who, person in (factors[0] or {"": None}).items()} if store else {}

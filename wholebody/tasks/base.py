@@ -57,7 +57,9 @@ class Surroundings(Protocol):
 def filled(term: _T, **values: object) -> _T:
     """Copy of an immutable term with some of its fields set."""
     result: _T = object.__new__(type(term))
-    vars(result).update(vars(term), **values)
+    own = vars(result)
+    own.update(vars(term))
+    own.update(values)
     return result
 
 
@@ -77,6 +79,10 @@ class Term(Checked):
 
     Raises:
         InputError: a value of the wrong kind or out of range; it names the term, the argument and what it takes.
+
+    Examples:
+        >>> isinstance(wb.Point("left_palm", (0.4, 0.2, 1.0)), wb.tasks.Term)
+        True
     """
 
     _answered: ClassVar[Mapping[str, answers.Check]] = {}
@@ -199,7 +205,7 @@ class Bound(Term, ABC):
     Examples:
         docs/extending.md describes own terms.
 
-        >>> class Slow(wb.Bound):
+        >>> class Slow(wb.tasks.Bound):
         ...     def bounds(self, state, dt):
         ...         return np.full(state.model.nv, -0.1), np.full(state.model.nv, 0.1)
     """

@@ -79,7 +79,7 @@ class StepLimit(Bound):
         UnknownNameError: in a problem, a joint or group that the figure does not have.
 
     Examples:
-        >>> slow = wb.StepLimit(2.0, joints={"right_arm": 1.0}, root_velocity=0.5)
+        >>> slow = wb.tasks.StepLimit(2.0, joints={"right_arm": 1.0}, root_velocity=0.5)
     """
 
     velocity: Speed = np.inf

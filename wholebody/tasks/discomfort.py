@@ -51,7 +51,7 @@ class Discomfort(Measure):
         InputError: a value of the wrong kind, shape or range.
 
     Examples:
-        >>> relaxed = wb.Discomfort(weight=0.1)
+        >>> relaxed = wb.tasks.Discomfort(weight=0.1)
     """
 
     weight: inputs.Weight = 1.0

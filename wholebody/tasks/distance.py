@@ -150,7 +150,7 @@ class Displacement(DistanceMeasure):
         InputError: a value of the wrong kind, shape or range.
 
     Examples:
-        >>> upright = wb.Displacement(weight=0.1)
+        >>> upright = wb.tasks.Displacement(weight=0.1)
     """
 
     weight: inputs.Weight = 1.0
@@ -211,7 +211,7 @@ class RotationEffort(SumOfSquares):
         InputError: a value of the wrong kind, shape or range.
 
     Examples:
-        >>> least = wb.RotationEffort()
+        >>> least = wb.tasks.RotationEffort()
     """
 
     weight: inputs.Weight = 1.0

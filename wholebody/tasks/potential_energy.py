@@ -41,7 +41,7 @@ class PotentialEnergy(Measure):
         InputError: a value of the wrong kind, shape or range.
 
     Examples:
-        >>> lazy = wb.PotentialEnergy(weight=1e-3)
+        >>> lazy = wb.tasks.PotentialEnergy(weight=1e-3)
     """
 
     weight: inputs.Weight = 1.0

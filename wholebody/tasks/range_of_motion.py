@@ -45,7 +45,7 @@ class ReachCones(Constraint):
         UnknownNameError: in a problem, a cone that the figure does not have.
 
     Examples:
-        >>> shoulder = wb.ReachCones(["left_shoulder"])
+        >>> shoulder = wb.tasks.ReachCones(["left_shoulder"])
     """
 
     angular = np.ones((), dtype=bool)  # of all rows
@@ -215,7 +215,7 @@ class RangeOfMotion(Constraint):
         UnknownNameError: in a problem, a range that the figure does not have.
 
     Examples:
-        >>> neck = wb.RangeOfMotion(["neck"])
+        >>> neck = wb.tasks.RangeOfMotion(["neck"])
     """
 
     angular = np.ones((), dtype=bool)  # of all rows

@@ -99,8 +99,8 @@ class Rhythm(SumOfSquares):
       l_0 the same at the start (lumbar-pelvic rhythm).
 
     A problem of a person has this measure by default, beside `Effort`. Another style is a choice of how to bend:
-    ``measures=[wb.Effort(), wb.Rhythm(style="stoop")]`` keeps the knees as they are, "squat" bends them by 1.5 times as
-    much as "free" and keeps the back straighter.
+    ``measures=[wb.Effort(), wb.tasks.Rhythm(style="stoop")]`` keeps the knees as they are, "squat" bends them by 1.5
+    times as much as "free" and keeps the back straighter.
 
     Attributes:
         weight: factor on the measure.
@@ -113,7 +113,7 @@ class Rhythm(SumOfSquares):
         InputError: a weight out of range, or in a problem a figure that is no person.
 
     Examples:
-        >>> upright_back = wb.Rhythm(style="squat")
+        >>> upright_back = wb.tasks.Rhythm(style="squat")
     """
 
     weight: inputs.Weight = 1.0

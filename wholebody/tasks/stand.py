@@ -139,7 +139,7 @@ class Stance(SumOfSquares):
         UnknownNameError: in a problem, a segment that the figure does not have.
 
     Examples:
-        >>> side_by_side = wb.Stance()
+        >>> side_by_side = wb.tasks.Stance()
     """
 
     feet: Feet = ("left_foot", "right_foot")

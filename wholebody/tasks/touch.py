@@ -92,7 +92,7 @@ class Lean(ContactTerm):
         UnknownNameError: in a problem, a name that the scene does not have.
 
     Examples:
-        >>> back = wb.Lean("wall", part="thorax")
+        >>> back = wb.tasks.Lean("wall", part="thorax")
     """
 
     on: inputs.Name

@@ -90,10 +90,12 @@ def _residual(residual: PlacementResidual) -> list[Entry]:
 
 
 def _point(term: tasks.Point, model: pin.Model) -> list[Entry]:
-    frame, floats = term.place.placement, np.zeros(36)
-    floats[:9], floats[9:12] = frame.rotation.T.ravel(), frame.act(term.resolved_offset)
-    floats[24:27] = term.resolved_target
-    return [Entry(RESIDUAL, (term.place.joint, 0, 1, 0, 0), floats, 3)]
+    _, joint, frame = term.place
+    floats = np.zeros((12, 3))
+    floats[:4], floats[8] = frame.homogeneous.T[:, :3], term.resolved_target
+    if term.offset is not tasks.Point.offset:  # the default is none
+        floats[3] = frame.act(term.resolved_offset)
+    return [Entry(RESIDUAL, (joint, 0, 1, 0, 0), floats.reshape(36), 3)]
 
 
 def _plane(term: tasks.Plane, model: pin.Model) -> list[Entry]:

@@ -150,7 +150,7 @@ class Lineariser:
             count = len(self.workspace.table.pairs)
             raise InputError(f"clearances have shape {clearances.shape}; give one for each of the {count} pairs")
         others = None if constraints is self.constraints else constraints
-        if goals is not self.goals or others is not None:
+        if others is not None or (goals is not self.goals and not self._plan.put(goals, self.state.model)):
             self.constraints = self.constraints if others is None else others
             before, self._plan = self._plan, self._again(self._plan, goals, others)
             if before.others or self._plan.others:
@@ -174,6 +174,7 @@ class Lineariser:
     def relaxed(self, depth: float) -> Lineariser:
         """The same, with less distance asked of every pair by `depth` metres; both move one workspace."""
         other = copy(self)
+        other._plan = self._plan.copied()  # `take` writes into it
         other._clearances, other._given = np.empty_like(self._clearances), b"none"
         other.take(self.goals, self.clearances - depth)
         return other
@@ -362,3 +363,9 @@ class ConstraintValues:
             checked_count(term, len(part), rows)
             value[row : row + rows] = part
         return value
+
+    def rows(self, state: State) -> Array:
+        """The derivatives (c, nv) at the state of the last `at`, which the next one overwrites."""
+        for term, _, row, rows in self._plan.others:
+            self._jacobian[row : row + rows] = state.dense_jacobian(term.jacobian(state))
+        return self._jacobian

@@ -1,7 +1,8 @@
 """Built-in goals, constraints, bounds and measures as arrays, so that one compiled pass evaluates all of them.
 
-A plan is made for a problem and never changed. Terms of other classes are evaluated by their own methods: a plan only
-says in which rows they stand. `kernel` evaluates a plan.
+A plan is made for a problem and not changed, but for a lineariser's own copy, into which it writes goals that move.
+Terms of other classes are evaluated by their own methods: a plan only says in which rows they stand. `kernel` evaluates
+a plan.
 """
 
 from __future__ import annotations
@@ -72,33 +73,50 @@ class TermPlan(NamedTuple):
         old = self.goals if constraints is None else (*self.goals, *self.constraints)
         if len(goals) != len(self.goals) or len(terms) != len(old):
             return None
-        floats = self.floats.copy()
-        places = dict[int, int]()  # in each table, of the next row
-        found: list[list[Entry] | None] = []
+        again = self.copied()
+        places = dict[int, int]()
         others = list(self.others)
         number = 0
         for term, known in zip(terms, old, strict=True):
-            entries = entries_of(term, model)
-            found.append(entries)
-            if entries is None or known is None:
-                if entries is not known or type(term) is not type(others[number].term):
+            if known is None:
+                if entries_of(term, model) is not None or type(term) is not type(others[number].term):
                     return None
                 value = term.error if isinstance(term, Goal) else term.value
                 others[number] = with_values(others[number], term=term, value=value)
                 number += 1
-                continue
-            if len(entries) != len(known):
+            elif not again._put(term, model, known, places):
                 return None
-            for entry, before in zip(entries, known, strict=True):
-                edges = before.edges
-                if entry[:2] != before[:2] or (entry.edges is not edges and not np.array_equal(entry.edges, edges)):
-                    return None
-                columns = len(entry.floats)
-                place = places.get(entry.table, int(self.layout[entry.table, 0]))
-                floats[place : place + columns] = entry.floats
-                places[entry.table] = place + columns
-        kept = self.constraints if constraints is None else tuple(found[len(goals) :])
-        return self._replace(floats=floats, goals=tuple(found[: len(goals)]), constraints=kept, others=tuple(others))
+        return again._replace(others=tuple(others))
+
+    def copied(self) -> TermPlan:
+        """A plan into which goals may be put."""
+        return self._replace(floats=self.floats.copy())
+
+    def put(self, goals: Sequence[Goal], model: pin.Model) -> bool:
+        """Write other resolved goals in the place of these; False where `with_terms` has to look at them."""
+        if len(goals) != len(self.goals):
+            return False
+        places = dict[int, int]()
+        for goal, known in zip(goals, self.goals, strict=True):
+            if known is None or not self._put(goal, model, known, places):
+                return False
+        return True
+
+    def _put(self, term: Goal | Constraint, model: pin.Model, known: list[Entry], places: dict[int, int]) -> bool:
+        """Write a term in the place of one with these entries; whether it has such. `places`: next row by table."""
+        entries = entries_of(term, model)
+        if entries is None or len(entries) != len(known):
+            return False
+        for entry, before in zip(entries, known, strict=True):
+            table, integers, floats, _, edges = entry
+            if table != before.table or integers != before.integers:
+                return False
+            if edges is not before.edges and not np.array_equal(edges, before.edges):
+                return False
+            place = places.get(table) or int(self.layout[table, 0])
+            places[table] = end = place + len(floats)
+            self.floats[place:end] = floats
+        return True
 
 
 def make_plan(limits: Limits, terms: Terms, dt: float | None, state: State) -> TermPlan:

@@ -1,3 +1,4 @@
+from wholebody.tracking.drag import Drag as Drag
 from wholebody.tracking.dragging import (
     Dragged as Dragged,
     DragJudgement as DragJudgement,
@@ -7,11 +8,14 @@ from wholebody.tracking.dragging import (
 from wholebody.tracking.frame import Frame as Frame
 from wholebody.tracking.inner_paths import resampled as resampled
 from wholebody.tracking.loop import FrameLoop as FrameLoop, follow as follow
-from wholebody.tracking.path_following import circle as circle, read_path as read_path, spread as spread
+from wholebody.tracking.path_following import (
+    circle as circle,
+    follow_path as follow_path,
+    read_path as read_path,
+    spread as spread,
+)
 from wholebody.tracking.recording import Judgement as Judgement, Recording as Recording, judge as judge
 from wholebody.tracking.scenes import (
-    SCENES as SCENES,
-    InteractionScene as InteractionScene,
     build_scene as build_scene,
     gallery as gallery,
 )

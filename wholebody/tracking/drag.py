@@ -253,7 +253,7 @@ class Drag(NotCopyable, Generic[Answer]):
         UnknownNameError: there is no such method.
 
     Examples:
-        >>> drag = wb.Drag(problem.with_start(solution.q))
+        >>> drag = wb.tracking.Drag(problem.with_start(solution.q))
         >>> drag.to((0.55, -0.25, 0.96)).error < 0.01
         True
     """

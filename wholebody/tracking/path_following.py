@@ -68,7 +68,7 @@ def follow_path(
         UnknownNameError: there is no such method.
 
     Examples:
-        >>> answers = wb.follow_path(problem, [(0.50, -0.25, 0.95), (0.55, -0.20, 0.95)], "qp")
+        >>> answers = wb.tracking.follow_path(problem, [(0.50, -0.25, 0.95), (0.55, -0.20, 0.95)], "qp")
         >>> all(answer.solved for answer in answers)
         True
     """

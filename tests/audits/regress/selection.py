@@ -27,7 +27,7 @@ from wholebody.problem import Problem
 
 Counted = dict[str, int | str]
 
-METHODS: dict[str, Callable[[], Method]] = {"qp": wb.QP, "ccd": wb.methods.CCD, "newton": wb.Newton}
+METHODS: dict[str, Callable[[], Method]] = {"qp": wb.methods.QP, "ccd": wb.methods.CCD, "newton": wb.methods.Newton}
 
 PROBLEMS = (
     ("free_reach", 1),

@@ -157,7 +157,7 @@ def test_a_flat_hand_closes_around_a_thin_bar(figure):
     flat = {"right_elbow_flexion": np.radians(80.0), **wb.figures.finger_angles("flat", "right")}
     start = figure.with_joints(figure.posture("standing"), flat)
     grasp = wb.Grasp("right", "bar", "power")
-    solution = wb.solve(wb.Problem(scene, start=start, goals=[grasp], constraints=FEET), wb.QP(measures=False))
+    solution = wb.solve(wb.Problem(scene, start=start, goals=[grasp], constraints=FEET), wb.methods.QP(measures=False))
     assert solution.status == "solved"
     found = gaps(scene.model, scene.geometry, solution.q)
     assert min(found)[0] > -1e-5

@@ -44,7 +44,7 @@ def test_what_is_read_back_is_what_was_written(name: str) -> None:
     scenes = wb.Scene(read), wb.Scene(built)
     for part in built.ranges:  # the same values and slopes where every joint has moved
         q = pin.integrate(built.model, built.neutral, np.full(built.model.nv, 0.2))
-        terms = [wb.RangeOfMotion([part]).resolve(scene, q) for scene in scenes]
+        terms = [wb.tasks.RangeOfMotion([part]).resolve(scene, q) for scene in scenes]
         states = [State(scene.model).update(q) for scene in scenes]
         mine, theirs = (
             [*term.value(state), *term.jacobian(state).ravel()] for term, state in zip(terms, states, strict=True)

@@ -75,7 +75,9 @@ def test_rows_that_a_step_leaves_out_cannot_be_missed() -> None:
     scene = wb.Scene(wb.load("hand"))
     speed, dt, model = 4.0, 0.01, scene.model
     limit = (
-        wb.StepLimit(speed, root_velocity=1.0, root_turn=2.0) if scene.figure.root == "free" else wb.StepLimit(speed)
+        wb.tasks.StepLimit(speed, root_velocity=1.0, root_turn=2.0)
+        if scene.figure.root == "free"
+        else wb.tasks.StepLimit(speed)
     )
     problem = wb.Problem(scene, constraints=[limit], clearance=0.001)
     lineariser = problem.lineariser(problem.workspace(), dt)

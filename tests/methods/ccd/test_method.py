@@ -35,7 +35,9 @@ def test_reachable_targets_are_reached(
             continue
         place = _target(human, "right_index_tip", q)
         goal = wb.Frame("right_index_tip", place) if kind == "frame" else wb.Point("right_index_tip", place.translation)
-        problem = wb.Problem(scene, goals=[goal], constraints=[wb.ReachCones()] if coned else [], range_of_motion=False)
+        problem = wb.Problem(
+            scene, goals=[goal], constraints=[wb.tasks.ReachCones()] if coned else [], range_of_motion=False
+        )
         solution = wb.methods.CCD().solve(problem)
         assert human.within_limits(solution.q)
         assert deepest(scene, solution.q) <= 1.1e-4
@@ -108,7 +110,7 @@ def test_frozen_joints_and_held_feet_stay(human: wb.Figure) -> None:
     problem = wb.Problem(
         wb.Scene(human),
         goals=[wb.Point("right_index_tip", (0.4, -0.3, 1.2))],
-        constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Freeze(*fixed), wb.StepLimit(1.0)],
+        constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Freeze(*fixed), wb.tasks.StepLimit(1.0)],
     )
     solution = wb.methods.CCD().solve(problem)
     assert solution.solved
@@ -125,7 +127,7 @@ def test_what_cannot_be_taken_is_named(human: wb.Figure) -> None:
             wb.Point("pelvis", (0, 0, 1)),
         ],
         constraints=[wb.Balance(), wb.Hold("right_hand"), wb.Hold("left_foot", (0.0, 0.0, 0.0))],
-        measures=[wb.Effort(), wb.Discomfort()],
+        measures=[wb.Effort(), wb.tasks.Discomfort()],
     )
     with pytest.raises(UnsupportedTermError) as caught:
         wb.methods.CCD().solve(problem)

@@ -11,13 +11,13 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.methods.ccd.guards import Kept, guards
+from wholebody.methods.ccd.guards import Guard, Kept
 from wholebody.methods.ccd.limbs import Limbs
 
 
 def _left(scene: wb.Scene, q: Any) -> float:
     """How far joints are out of their ranges of motion, radians, by the constraint itself."""
-    term = wb.RangeOfMotion().resolve(scene, scene.figure.neutral)
+    term = wb.tasks.RangeOfMotion().resolve(scene, scene.figure.neutral)
     return max(0.0, -float(term.value(scene.state(q)).min()))
 
 
@@ -32,7 +32,7 @@ def test_what_left_its_range_is_brought_back(
     scene = wb.Scene(human)
     names = human.chains[chain].joints if moving is None else moving
     limbs = Limbs(human.model, map(human.joint_id, names))
-    made = guards(human, limbs, Kept(ranges=tuple(human.ranges)))
+    guard = Guard(scene, limbs, Kept(ranges=tuple(human.ranges)))
     data, rng, out = human.model.createData(), np.random.default_rng(5), 0
     for _ in range(60):
         start = human.neutral
@@ -40,13 +40,12 @@ def test_what_left_its_range_is_brought_back(
         pin.forwardKinematics(human.model, data, start)
         limbs.read(start, data)
         limbs.forward()
-        for guard in made:
-            guard.read(start, data)
+        guard.read(start)
         pin.forwardKinematics(human.model, data, q)
         limbs.read(q, data)
         limbs.forward()
         out += _left(scene, q) > 1e-6
-        assert all(guard.keep() for guard in made)
+        guard.keep()
         limbs.write(q)
         assert _left(scene, q) <= 1e-9
         assert outside(human, q) <= 1e-9
@@ -58,7 +57,10 @@ def test_what_left_its_range_is_brought_back(
 def test_answers_keep_to_the_ranges(stated: bool, human: wb.Figure) -> None:
     """Places behind the trunk, most of which an arm meets soonest with more inward rotation than a person has."""
     scene = wb.Scene(human).add(wb.Box((0.3, 0.3, 0.3)), name="box", at=(-0.45, -0.25, 1.0))
-    options: dict[str, Any] = {"constraints": [wb.RangeOfMotion(), wb.ReachCones()], "range_of_motion": False}
+    options: dict[str, Any] = {
+        "constraints": [wb.tasks.RangeOfMotion(), wb.tasks.ReachCones()],
+        "range_of_motion": False,
+    }
     for x, y, z in ((-0.1, -0.4, 0.83), (-0.28, -0.28, 1.4), (0.0, -0.03, 1.3), (-0.15, -0.1, 1.1)):
         goals = [wb.Point("right_index_tip", (x, y, z))]
         problem = wb.Problem(scene, goals=goals, balance=False, **(options if stated else {}))
@@ -70,7 +72,7 @@ def test_a_drag_keeps_to_the_ranges() -> None:
     figure = wb.load("human", sex="male", stature=1.511, detail="spheres")
     scene = wb.Scene(figure)
     height = figure.placement(figure.neutral, "right_hand").translation
-    drag = wb.Drag(wb.Problem(scene, goals=[wb.Point("right_hand", height)]), method="ccd", dt=0.1)
+    drag = wb.tracking.Drag(wb.Problem(scene, goals=[wb.Point("right_hand", height)]), method="ccd", dt=0.1)
     corners = np.array([height, (0.22, -0.13, 1.40), (0.44, -0.12, 1.24)])
     for first, last in pairwise(corners):
         for share in np.linspace(0.0, 1.0, 12):

@@ -486,7 +486,7 @@ def test_a_figure_behind_other_bodies_keeps_its_balance_and_its_ranges() -> None
     human = wb.load("human")
     scene = wb.Scene(human).add(wb.HalfSpace(), name="floor")
     start = human.grounded(human.posture("standing"), scene)
-    kept = [wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Balance(), wb.ReachCones(), wb.RangeOfMotion()]
+    kept = [wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Balance(), wb.tasks.ReachCones(), wb.tasks.RangeOfMotion()]
     made = Assembly().body("ball", (3.0, 0.0, 1.0)).body("post", (4.0, 0.0, 1.0))
     made.figure("anna", human, start, constraints=kept).point_goal("anna/right_palm", (0.6, -0.3, 0.6))
     assert made.solve().status == "solved"

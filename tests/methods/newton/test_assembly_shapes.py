@@ -115,7 +115,7 @@ def test_a_goal_that_moves_is_not_analysed_anew_in_contact(monkeypatch: pytest.M
 
     monkeypatch.setattr(Gram, "__init__", init)
     made = wb.Assembly().body("ball", (0, 0, 0.11), shape=wb.Sphere(0.1)).add(wb.HalfSpace(), name="floor")
-    drag = wb.Drag(made.point_goal("ball", (0, 0, 0.11)))
+    drag = wb.tracking.Drag(made.point_goal("ball", (0, 0, 0.11)))
     drag.to((0, 0, 0.11))
     first, structures = len(analyses), made.structures
     for k in range(20):
@@ -289,7 +289,7 @@ def test_bad_shapes_and_things_are_named() -> None:
     with pytest.raises(InputError, match="no goals"):
         made.retarget(0, (0, 0, 0))
     with pytest.raises(InputError, match="no goals"):
-        wb.Drag(made)
+        wb.tracking.Drag(made)
     with pytest.raises(InputError, match="of its own body"):
         made.on_surface("a", (0, 0, 0), of="a")
     assert made.body("c", (2, 0, 0)).bodies == ("a", "b", "c")

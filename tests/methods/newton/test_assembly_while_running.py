@@ -62,7 +62,7 @@ def test_a_chain_that_was_opened_and_closed_ends_where_a_fresh_one_ends() -> Non
     made = _four_bar()
     made.solve()
     made.point_goal("rocker", (1, 0, 0.7), place=(0, 0, 0.7))
-    drag = wb.Drag(made)
+    drag = wb.tracking.Drag(made)
     made.release(CLOSING)  # while the drag runs
     assert not made.constraints[CLOSING]
     for turn in np.linspace(0.0, 0.6, 20):
@@ -85,13 +85,13 @@ def test_a_joint_that_was_released_lets_shapes_touch_and_makes_room_for_another(
     with pytest.raises(wb.InputError, match="already"):
         made.fixed("a", "b")
     assert list(made.constraints) == ["fixed joint of 'a' and 'b'", "fixed joint of 'world' and 'a'"]
-    with pytest.raises(wb.UnknownNameError, match="fixed joint"):
+    with pytest.raises(wb.errors.UnknownNameError, match="fixed joint"):
         made.release("fixed joint of 'a' and 'c'")
 
 
 def test_a_lever_that_is_turned_is_where_its_angle_says() -> None:
     made = wb.Assembly().body("lever", (0.5, 0, 0)).revolute("world", "lever", at=(0, 0, 0), axis=Y)
-    drag = wb.Drag(made.orientation_goal("lever", (0, 0, 0, 1)))
+    drag = wb.tracking.Drag(made.orientation_goal("lever", (0, 0, 0, 1)))
     for turn in np.linspace(0.0, 1.2, 30):
         frame = drag.to((0, np.sin(0.5 * turn), 0, np.cos(0.5 * turn)))
     assert frame.error < 1e-3
@@ -109,7 +109,7 @@ def test_a_measure_of_ones_own_is_least_where_scipy_finds_it() -> None:
     assert np.sum((middle - (0.3, 0, 1)) ** 2) == pytest.approx(least.fun, abs=1e-7)
     made.drop_measures().minimise(Near("coupler", (0.45, 0, 0), (1.0, 0, 1.0)))
     before = made.variables()
-    drag = wb.Drag(made.point_goal("rocker", (1, 0, 0)))  # which always holds: frames lower the measure
+    drag = wb.tracking.Drag(made.point_goal("rocker", (1, 0, 0)))  # which always holds: frames lower the measure
     assert np.abs([drag.to((1, 0, 0)).q for _ in range(3)][-1] - before).max() > 0.01
 
 

@@ -54,7 +54,7 @@ def test_every_joint_of_the_human_holds_at_any_posture(human: wb.Figure) -> None
 
 def test_it_finds_what_the_qp_method_finds(human: wb.Figure) -> None:
     problem = _standing(wb.Scene(human), wb.Point("right_index_tip", (0.3, -0.3, 1.9)))
-    ours, theirs = wb.Newton().solve(problem), wb.QP().solve(problem)
+    ours, theirs = wb.methods.Newton().solve(problem), wb.methods.QP().solve(problem)
     _honest(problem, ours)
     assert ours.status == theirs.status == "solved"
     # two methods that share no code end at the same effort, which is the global one or the same local one
@@ -80,7 +80,7 @@ def test_two_hands_on_one_box_close_a_loop(human: wb.Figure) -> None:
         constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Hold("right_palm", relative_to="left_palm")],
         measures=[wb.Effort()],
     )
-    ours, theirs = wb.Newton(tolerance=1e-8).solve(problem), wb.QP(tolerance=1e-8).solve(problem)
+    ours, theirs = wb.methods.Newton(tolerance=1e-8).solve(problem), wb.methods.QP(tolerance=1e-8).solve(problem)
     assert ours.status == theirs.status == "solved"
     assert ours.assessment.constraint_violation < 1e-6
     assert ours.assessment.measure == pytest.approx(theirs.assessment.measure, rel=1e-8)
@@ -89,10 +89,10 @@ def test_two_hands_on_one_box_close_a_loop(human: wb.Figure) -> None:
 
 def test_a_goal_out_of_reach_is_approached_and_said_to_be(human: wb.Figure) -> None:
     problem = _standing(wb.Scene(human), wb.Point("right_index_tip", (3.0, 0.0, 1.0)))
-    solution = wb.Newton(restarts=0, iterations=40).solve(problem)
+    solution = wb.methods.Newton(restarts=0, iterations=40).solve(problem)
     assert solution.status in ("unreachable", "stalled")
     assert solution.assessment.holds(1.2e-5)
-    reached = wb.QP(restarts=0).solve(problem).assessment.goal_error
+    reached = wb.methods.QP(restarts=0).solve(problem).assessment.goal_error
     assert solution.assessment.goal_error < reached + 0.1
 
 
@@ -103,7 +103,7 @@ def test_frozen_joints_stay(human: wb.Figure) -> None:
         goals=[wb.Point("right_index_tip", (0.4, -0.3, 1.1))],
         constraints=[wb.Freeze("root", "left_leg", "right_leg")],
     )
-    solution = wb.Newton().solve(problem)
+    solution = wb.methods.Newton().solve(problem)
     assert solution.solved
     still = human.dofs(["root", "left_leg", "right_leg"])
     assert np.abs(pin.difference(human.model, problem.start, solution.q)[still]).max() < 1e-5
@@ -119,16 +119,18 @@ class _Leash(Bound):
 def test_what_it_has_no_equations_for_is_refused_by_name(human: wb.Figure) -> None:
     bounded = wb.Problem(wb.Scene(human), "standing", constraints=[_Leash()])
     with pytest.raises(wb.InputError, match=r"bounds\[0\], _Leash"):
-        wb.Newton().solve(bounded)
-    assert "_Leash" in str(wb.Newton().accepts(bounded))
+        wb.methods.Newton().solve(bounded)
+    assert "_Leash" in str(wb.methods.Newton().accepts(bounded))
     with pytest.raises(wb.InputError, match="tolerance"):
-        wb.Newton(tolerance=0.0)
+        wb.methods.Newton(tolerance=0.0)
     with pytest.raises(wb.InputError, match="restarts"):
-        wb.Newton(restarts=-1)
-    with pytest.raises(wb.UnknownNameError):
-        wb.Newton(algebra="cholesky")
-    problem = _standing(wb.Scene(human), wb.Point("right_palm", (0.3, -0.3, 1.0)), measures=[wb.PotentialEnergy()])
-    assert "PotentialEnergy is reported, not minimised" in wb.Newton().solve(problem).message
+        wb.methods.Newton(restarts=-1)
+    with pytest.raises(wb.errors.UnknownNameError):
+        wb.methods.Newton(algebra="cholesky")
+    problem = _standing(
+        wb.Scene(human), wb.Point("right_palm", (0.3, -0.3, 1.0)), measures=[wb.tasks.PotentialEnergy()]
+    )
+    assert "PotentialEnergy is reported, not minimised" in wb.methods.Newton().solve(problem).message
 
 
 def test_nothing_is_jumped_over(human: wb.Figure, least_distance: Callable[..., float]) -> None:
@@ -159,7 +161,7 @@ def test_constraints_that_cannot_all_hold_end_near_all_of_them_and_in_nothing(hu
         "standing",
         constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Hold("head", at=(0.0, 0.0, 2.5))],
     )
-    solution = wb.Newton(restarts=0, iterations=12).solve(impossible)
+    solution = wb.methods.Newton(restarts=0, iterations=12).solve(impossible)
     assert solution.status in ("infeasible", "stalled")
     assert "Hold" in solution.message
     assert solution.assessment.penetration < 1e-4
@@ -167,13 +169,13 @@ def test_constraints_that_cannot_all_hold_end_near_all_of_them_and_in_nothing(hu
 
 
 def test_speeds_hold_in_every_frame(human: wb.Figure) -> None:
-    limit = wb.StepLimit(1.0, root_velocity=0.5, root_turn=0.5)
+    limit = wb.tasks.StepLimit(1.0, root_velocity=0.5, root_turn=0.5)
     goal = wb.Point("right_index_tip", (0.4, -0.2, 1.2))
     problem = wb.Problem(
         wb.Scene(human), "standing", goals=[goal], constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), limit]
     )
     q, dt = problem.start, 0.05
-    tracker = wb.Newton().tracker(problem, dt)
+    tracker = wb.methods.Newton().tracker(problem, dt)
     lower, upper = problem.bounds[0].bounds(problem.scene.state(q), dt)
     for _ in range(40):
         after = tracker.step(q).q
@@ -186,7 +188,7 @@ def test_speeds_hold_in_every_frame(human: wb.Figure) -> None:
 
 def test_a_barrier_goes_where_slacks_go(human: wb.Figure) -> None:
     problem = _standing(wb.Scene(human), wb.Point("right_index_tip", (0.6, -0.2, 0.3)))
-    slack, barrier = (wb.Newton(inequalities=kind).solve(problem) for kind in ("slack", "barrier"))
+    slack, barrier = (wb.methods.Newton(inequalities=kind).solve(problem) for kind in ("slack", "barrier"))
     for solution in (slack, barrier):
         _honest(problem, solution)
         assert solution.solved
@@ -213,7 +215,7 @@ def test_a_touch_reaches_the_least_measure_in_few_iterations() -> None:
     scene.add(wb.Sphere(0.2), name="ball", at=(0.1, -0.9, 1.3))
     feet = [wb.Hold("left_sole"), wb.Hold("right_sole")]
     problem = wb.Problem(scene, goals=[wb.Touch("right_hand", "ball")], constraints=feet, measures=[wb.Effort()])
-    solution = wb.solve(problem, method=wb.Newton(time_limit=math.inf))
+    solution = wb.solve(problem, method=wb.methods.Newton(time_limit=math.inf))
     assert solution.status == "solved"
     assert solution.iterations < 62  # 74 unaccelerated
     assert solution.assessment.measure < 1.0001 * wb.solve(problem).assessment.measure
@@ -226,8 +228,8 @@ def test_joints_that_move_together_take_few_iterations() -> None:
     palm = scene.state(start).frame(scene.frame_id("left_palm")).translation
     holds = [wb.Hold("left_foot"), wb.Hold("right_foot")]
     problem = wb.Problem(scene, start, goals=[wb.Point("left_palm", palm + (0.0, 0.0, 0.1))], constraints=holds)
-    assert any(isinstance(measure, wb.Rhythm) for measure in problem.measures)
-    found = [wb.solve(problem, method=method) for method in (wb.Newton(tolerance=1e-8), wb.QP())]
+    assert any(isinstance(measure, wb.tasks.Rhythm) for measure in problem.measures)
+    found = [wb.solve(problem, method=method) for method in (wb.methods.Newton(tolerance=1e-8), wb.methods.QP())]
     assert [solution.status for solution in found] == ["solved", "solved"]
     assert found[0].iterations < 60
     assert found[1].iterations < 10

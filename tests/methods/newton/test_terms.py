@@ -61,7 +61,7 @@ def test_a_posture_goal_is_each_joints_distance(human: wb.Figure) -> None:
 
 
 def test_the_objective_has_the_measures_gradient(human: wb.Figure) -> None:
-    measures = [wb.Effort(0.5), wb.Displacement(), wb.Discomfort(2.0)]
+    measures = [wb.Effort(0.5), wb.tasks.Displacement(), wb.tasks.Discomfort(2.0)]
     problem = wb.Problem(wb.Scene(human), "standing", measures=measures)
     bodies = FigureBodies(human)
     objective = FigureObjective(problem, bodies, problem.workspace().state)
@@ -87,11 +87,11 @@ CASES: dict[str, tuple[list[Any], list[Any], list[Any] | None]] = {
         None,
     ),
     "balance": ([wb.Point("right_index_tip", (0.75, -0.2, 0.7))], [wb.Balance(margin=0.02)], None),
-    "cones": ([wb.Point("right_index_tip", (-0.2, -0.4, 1.2))], [wb.ReachCones()], None),
+    "cones": ([wb.Point("right_index_tip", (-0.2, -0.4, 1.2))], [wb.tasks.ReachCones()], None),
     "gaze": ([wb.Axis("head", (1, 0, 0), toward=(0.5, 0.8, 0.8))], [], None),
     "posture": ([wb.Posture("arms_forward", joints=["left_arm"])], [], None),
-    "displacement": ([wb.Point("right_index_tip", (0.4, -0.3, 1.2))], [], [wb.Displacement()]),
-    "discomfort": ([wb.Point("right_index_tip", (0.4, -0.3, 1.2))], [], [wb.Effort(), wb.Discomfort(0.5)]),
+    "displacement": ([wb.Point("right_index_tip", (0.4, -0.3, 1.2))], [], [wb.tasks.Displacement()]),
+    "discomfort": ([wb.Point("right_index_tip", (0.4, -0.3, 1.2))], [], [wb.Effort(), wb.tasks.Discomfort(0.5)]),
 }
 
 
@@ -102,7 +102,7 @@ def test_it_finds_no_worse_than_the_qp_method(human: wb.Figure, name: str) -> No
     problem = wb.Problem(
         wb.Scene(human), "standing", goals=goals, constraints=[*holds, *constraints], measures=measures
     )
-    ours, theirs = wb.Newton().solve(problem), wb.QP().solve(problem)
+    ours, theirs = wb.methods.Newton().solve(problem), wb.methods.QP().solve(problem)
     assert ours.status == theirs.status == "solved"
     judged = wb.assess(problem, ours.q)
     assert judged.holds(1.2e-5)

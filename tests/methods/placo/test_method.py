@@ -32,7 +32,7 @@ def test_a_reach_over_a_table_is_solved_with_feet_held_and_the_floor_kept(human:
         scene,
         goals=[wb.Point("right_index_tip", (0.45, -0.2, 0.85))],
         constraints=feet(),
-        measures=[wb.Displacement()],  # placo's tasks for joints leave out the root
+        measures=[wb.tasks.Displacement()],  # placo's tasks for joints leave out the root
         clearance=0.003,
     )
     solution = wb.solve(problem, "placo")
@@ -40,7 +40,7 @@ def test_a_reach_over_a_table_is_solved_with_feet_held_and_the_floor_kept(human:
     assert solution.method == "placo"
     assert honest(problem, solution).least_distance > -1e-5
     assert len(solution.trace) == solution.iterations + 1
-    best = wb.QP().solve(problem).assessment.measure
+    best = wb.methods.QP().solve(problem).assessment.measure
     assert solution.assessment.measure == pytest.approx(best, rel=1e-2)
 
 
@@ -63,7 +63,7 @@ def test_every_term_that_it_takes_means_what_ours_means(human: wb.Figure) -> Non
         constraints=[
             *feet(), wb.Balance(margin=0.01), wb.Plane("pelvis", (0.0, 1.0, 0.3)), wb.Freeze("right_hip_rotation"),
         ],
-        measures=[wb.Effort(), wb.Displacement(0.1)],
+        measures=[wb.Effort(), wb.tasks.Displacement(0.1)],
     )  # fmt: skip
     solution = wb.methods.Placo().solve(problem)
     assert solution.solved, solution.message
@@ -164,11 +164,11 @@ def test_an_object_that_moved_is_avoided_where_it_is_now(planar_arm: Callable[..
 @pytest.mark.parametrize(
     ("terms", "word"),
     [
-        ({"constraints": [wb.ReachCones()]}, "ReachCones.*circular"),
+        ({"constraints": [wb.tasks.ReachCones()]}, "ReachCones.*circular"),
         ({"constraints": [wb.Plane("right_hand", (0, 0, 1), side="above")]}, "Plane"),
         ({"goals": [wb.Axis("head", (1, 0, 0), toward=(2, 0, 1))]}, "Axis"),
-        ({"measures": [wb.PotentialEnergy()]}, "PotentialEnergy"),
-        ({"measures": [wb.Effort(), wb.Discomfort()]}, r"measures\[1\], Discomfort"),
+        ({"measures": [wb.tasks.PotentialEnergy()]}, "PotentialEnergy"),
+        ({"measures": [wb.Effort(), wb.tasks.Discomfort()]}, r"measures\[1\], Discomfort"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )

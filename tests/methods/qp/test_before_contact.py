@@ -14,7 +14,7 @@ from wholebody.methods.qp.method import QP
 def test_feet_get_onto_a_board_that_they_begin_under() -> None:
     scene = wb.Scene(wb.load("human")).add(wb.Box((0.8, 0.8, 0.02)), name="board", at=(0.0, 0.0, 0.29))
     problem = wb.Problem(scene, "standing", constraints=[wb.Stand("board")])
-    solution = wb.solve(problem, wb.QP(measures=False, time_limit=30.0))
+    solution = wb.solve(problem, wb.methods.QP(measures=False, time_limit=30.0))
     assert solution.solved, solution
     assert scene.figure.placement(solution.q, "left_sole").translation[2] == pytest.approx(0.30, abs=1e-3)
 
@@ -22,14 +22,14 @@ def test_feet_get_onto_a_board_that_they_begin_under() -> None:
 @pytest.mark.parametrize("number", [15, 25])
 def test_toes_come_to_rest_at_the_edge_of_a_pedal(number: int) -> None:
     """At an edge the distance has a kink, at which the last tenth of a millimetre was not gone."""
-    solution = wb.solve(problem_set("drivers").make(number, 0).problem, wb.QP(measures=False, time_limit=30.0))
+    solution = wb.solve(problem_set("drivers").make(number, 0).problem, wb.methods.QP(measures=False, time_limit=30.0))
     assert solution.solved, solution
 
 
 @pytest.mark.parametrize("number", [8, 13])
 def test_contacts_are_met_from_an_end_in_front_of_all_faces(number: int) -> None:
     """The first descents end 0.2 m away, or in front of the faces, whence feasibility alone stalls at 1 cm."""
-    solution = wb.solve(problem_set("drivers").make(number, 0).problem, wb.QP(measures=False, time_limit=30.0))
+    solution = wb.solve(problem_set("drivers").make(number, 0).problem, wb.methods.QP(measures=False, time_limit=30.0))
     assert solution.solved, solution
 
 
@@ -45,11 +45,11 @@ def test_goals_out_of_reach_are_not_tried_from_all_starts() -> None:
 def test_the_clock_does_not_change_the_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     """A machine on which half of the processor time that a solve may take passes at once finds what another finds."""
     problem = problem_set("drivers").make(15, 0).problem
-    quick = wb.solve(problem, wb.QP(measures=False))
+    quick = wb.solve(problem, wb.methods.QP(measures=False))
     clock = iter([0.0])
     monkeypatch.setattr(control.time, "thread_time", lambda: next(clock, 0.9 * QP.longest))
     monkeypatch.setattr(control.time, "monotonic", lambda: 0.0)
-    slow = wb.solve(problem, wb.QP(measures=False))
+    slow = wb.solve(problem, wb.methods.QP(measures=False))
     assert quick.solved
     assert "before contact" in quick.message
     np.testing.assert_array_equal(quick.q, slow.q)

@@ -157,7 +157,7 @@ def test_an_end_inside_of_something_is_rejected(arm):
     measured = found(problem, measures=True)
     if measured.blocked is not None:
         assert wb.assess(problem, measured.blocked).penetration > 1e-4
-    solution = wb.QP().solve(problem)
+    solution = wb.methods.QP().solve(problem)
     assert solution.solved, solution.message
     assert solution.assessment.penetration < 1e-5
     assert solution.assessment.measure <= wb.assess(problem, measured.q).measure + 1e-6
@@ -174,7 +174,7 @@ def test_a_clearance_that_is_missed_counts_as_something_in_the_way(arm):
 def test_goals_out_of_reach_are_left_to_the_search(arm):
     problem = wb.Problem(wb.Scene(arm), START, goals=[wb.Point("tip", (3.0, 0.0, 0.5))])
     assert found(problem) is None
-    assert wb.QP().solve(problem).status == "unreachable"
+    assert wb.methods.QP().solve(problem).status == "unreachable"
 
 
 def test_what_it_does_not_know_it_does_not_take(arm):
@@ -216,7 +216,7 @@ def test_the_effort_is_as_little_as_scipy_finds_from_many_starts(arm, turned):
             judged = wb.assess(problem, np.clip(answer.x, lower, upper))
             if judged.met(1e-5) and judged.holds(1e-5):
                 least = min(least, judged.measure)
-        solution = wb.QP(restarts_for_measure=9).solve(problem)
+        solution = wb.methods.QP(restarts_for_measure=9).solve(problem)
         assert solution.assessment.measure <= 1.001 * least
         assert solution.assessment.optimality < 1e-4
 
@@ -312,24 +312,24 @@ def test_joints_that_slide_without_limits(tmp_path, far):
     scene = wb.Scene(wb.load(path))
     for measures in (True, False):
         problem = wb.Problem(scene, goals=[wb.Point("arm", (far, 0.0, 0.5), offset=(0.0, 0.0, 0.4))])
-        assert wb.QP(measures=measures).solve(problem).solved
+        assert wb.methods.QP(measures=measures).solve(problem).solved
 
 
 def test_every_descent_is_told_and_counted(arm):
     goal = place_of(arm, np.array([0.4, 0.8, 0.9, 0.0, 0.5, 0.0]), "tip").translation
     problem, told = wb.Problem(wb.Scene(arm), START, goals=[wb.Point("tip", goal)]), []
-    solution = wb.QP(measures=False).solve(problem, told.append)
+    solution = wb.methods.QP(measures=False).solve(problem, told.append)
     assert solution.solved
     assert solution.programs == {}
     assert solution.iterations == len(solution.trace) == len(told) > 0
-    with_measures = wb.QP().solve(problem)
+    with_measures = wb.methods.QP().solve(problem)
     assert with_measures.assessment.measure <= solution.assessment.measure + 1e-9
 
 
 def test_progress_that_ends_is_not_called_again(arm):
     problem = wb.Problem(wb.Scene(arm), START, goals=[wb.Point("tip", place_of(arm, START + 0.1, "tip").translation)])
     told = []
-    solution = wb.solve(problem, wb.QP(measures=False), progress=lambda entry: told.append(entry) or True)
+    solution = wb.solve(problem, wb.methods.QP(measures=False), progress=lambda entry: told.append(entry) or True)
     assert len(told) == 1
     assert solution.solved
 
@@ -340,7 +340,7 @@ def test_an_end_that_the_assessment_refuses_is_searched_again(arm, monkeypatch, 
     problem, met = blocked_by_a_ball(arm)
     assert wb.assess(problem, met.q).penetration > 0.01
     monkeypatch.setattr("wholebody.methods.qp.method.from_seeds", lambda *_: met)
-    solution = wb.QP(measures=measures).solve(problem)
+    solution = wb.methods.QP(measures=measures).solve(problem)
     assert solution.solved, solution.message
     assert wb.assess(problem, solution.q).penetration < 1e-5
     assert solution.iterations > len(met.trace)

@@ -44,7 +44,7 @@ def posed(scene: wb.Scene, count: int, kind: str = "frame", **stated) -> list[wb
 @pytest.mark.parametrize("kind", ["frame", "point", "turned"])
 def test_answers_are_those_of_solves_one_by_one(scene, kind):
     problems = posed(scene, 28, kind, clearance=0.01)
-    batch = wb.QP().batches(problems, 64)[0].run()
+    batch = wb.methods.QP().batches(problems, 64)[0].run()
     assert 10 < batch.solved.sum() < 28, "some are left to a solve of their own"
     for problem, record in zip(problems, wb.solve_many(problems), strict=True):
         alone = wb.solve(problem)
@@ -56,7 +56,7 @@ def test_answers_are_those_of_solves_one_by_one(scene, kind):
 
 def test_answers_are_where_pinocchio_has_the_tool(scene, arm):
     problems = posed(scene, 30)
-    answers = wb.QP().batches(problems, 64)[0].run()
+    answers = wb.methods.QP().batches(problems, 64)[0].run()
     data = arm.model.createData()
     for place in answers.solved.nonzero()[0]:
         pin.framesForwardKinematics(arm.model, data, answers.q[place])
@@ -73,7 +73,7 @@ def test_the_judge_of_many_says_what_the_judge_of_one_says(scene, two_arms):
         wb.Problem(
             alone, rng.uniform(-1.0, 1.0, 7),
             goals=[wb.Point("right", rng.uniform(-1.0, 1.0, 3), offset=OFFSET), wb.Relative("left", "right", place)],
-            measures=[wb.Displacement(weight=0.3)],
+            measures=[wb.tasks.Displacement(weight=0.3)],
         )
         for place in rng.uniform(-0.5, 0.5, (12, 3))
     ]  # fmt: skip
@@ -93,10 +93,10 @@ def test_what_is_not_alike_is_left_out_or_apart(scene, arm):
     free = wb.Scene(arm)
     given = posed(scene, 2) + posed(free, 2) + posed(scene, 2, "point") + posed(scene, 1, measures=[])
     given += posed(scene, 1, constraints=[wb.Freeze("base")])
-    places = [batch.places for batch in wb.QP().batches(given, 64)]
+    places = [batch.places for batch in wb.methods.QP().batches(given, 64)]
     assert places == [[0, 1], [2, 3], [4, 5]]
-    assert [len(batch.places) for batch in wb.QP().batches(posed(free, 5), 2)] == [2, 2, 1]
-    assert not wb.QP(time_limit=1.0).batches(given, 64)
+    assert [len(batch.places) for batch in wb.methods.QP().batches(posed(free, 5), 2)] == [2, 2, 1]
+    assert not wb.methods.QP(time_limit=1.0).batches(given, 64)
 
 
 def test_the_loop_lets_other_threads_run():

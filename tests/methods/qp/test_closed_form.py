@@ -121,7 +121,7 @@ def test_the_answer_of_six_joints_is_the_least_of_all_branches():
     rng, scene, free = np.random.default_rng(3), wb.Scene(figure), 0
     for _ in range(8):
         place = figure.placement(rng.uniform(-2.0, 2.0, 6), "tool")
-        problem = wb.Problem(scene, start, goals=[wb.Frame("tool", place)], measures=[wb.Displacement()])
+        problem = wb.Problem(scene, start, goals=[wb.Frame("tool", place)], measures=[wb.tasks.Displacement()])
         judged = [wb.assess(problem, q) for q in branches(figure, "tool", place, figure.neutral)]
         if holding := [each.measure for each in judged if each.holds(1e-6)]:
             free += 1

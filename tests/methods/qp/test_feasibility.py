@@ -12,7 +12,7 @@ from wholebody.bench.suite.stability.catalogue import cases
 
 def test_a_goal_beyond_a_limit_is_reached_from_the_other_side(honest):
     problem = cases(["long-way-round"])[0].question().problem
-    solution = honest(problem, wb.QP(budget=0, restarts=0).solve(problem))
+    solution = honest(problem, wb.methods.QP(budget=0, restarts=0).solve(problem))
     assert solution.status == "solved"
     assert solution.q[0] < 0.0 < problem.start[0]
 
@@ -22,7 +22,7 @@ def test_a_frozen_joint_is_not_turned_on(honest):
     problem = wb.Problem(
         whole.scene, whole.start, goals=whole.goals, constraints=[wb.Freeze(whole.scene.figure.joints[0])]
     )
-    solution = honest(problem, wb.QP(budget=0, restarts=0).solve(problem))
+    solution = honest(problem, wb.methods.QP(budget=0, restarts=0).solve(problem))
     assert solution.status == "unreachable"
     assert solution.q[0] == problem.start[0]
 
@@ -31,12 +31,12 @@ def test_a_frozen_joint_is_not_turned_on(honest):
 def test_arms_cross_from_one_start(honest, number, measures):
     """Two of places alone, and one with directions, for which places come first."""
     problem = SETS["self_contact"].make(number, 0).problem
-    assert honest(problem, wb.QP(budget=0, restarts=0, measures=measures).solve(problem)).status == "solved"
+    assert honest(problem, wb.methods.QP(budget=0, restarts=0, measures=measures).solve(problem)).status == "solved"
 
 
 def test_what_fits_is_kept_where_measures_lead_away(honest):
     problem = SETS["self_contact"].make(45, 0).problem
-    assert honest(problem, wb.QP(budget=0, restarts=0).solve(problem)).status == "solved"
+    assert honest(problem, wb.methods.QP(budget=0, restarts=0).solve(problem)).status == "solved"
 
 
 def test_whole_steps_stay_in_their_box(planar_arm):

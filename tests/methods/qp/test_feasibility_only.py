@@ -16,8 +16,8 @@ def test_the_first_posture_that_fits_meets_the_goals_sooner_and_costs_more(hones
     scene = wb.Scene(human).add(wb.Box((0.6, 1.2, 0.03)), name="table", at=(0.75, 0.0, 0.75))
     goals = [wb.Point("right_index_tip", (0.55, 0.1, 0.85)), wb.Point("left_index_tip", (0.5, 0.3, 1.1))]
     problem = wb.Problem(scene, "standing", goals=goals, constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")])
-    best = honest(problem, wb.QP(tolerance=tolerance).solve(problem), tolerance)
-    first = honest(problem, wb.QP(tolerance=tolerance, measures=False).solve(problem), tolerance)
+    best = honest(problem, wb.methods.QP(tolerance=tolerance).solve(problem), tolerance)
+    first = honest(problem, wb.methods.QP(tolerance=tolerance, measures=False).solve(problem), tolerance)
     assert best.status == first.status == "solved"
     assert first.iterations < best.iterations
     assert first.assessment.measure > best.assessment.measure
@@ -48,7 +48,7 @@ def test_feasibility_only_damps_more_after_two_steps_that_are_rejected():
     goals = [wb.Point("right_hand", (0.5, -0.2, 0.95), offset=(0.0, 0.0, -0.05))]
     feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]
     problem = wb.Problem(scene, goals=goals, constraints=feet, clearance=0.003)
-    solution = wb.QP(tolerance=1e-4, measures=False).solve(problem)
+    solution = wb.methods.QP(tolerance=1e-4, measures=False).solve(problem)
     first, second, third = solution.trace[:3]
     assert [first.note, second.note] == ["blocked", "blocked"]
     assert second.step < first.step
@@ -58,7 +58,7 @@ def test_feasibility_only_damps_more_after_two_steps_that_are_rejected():
 
 def test_feasibility_only_far_away_does_not_crawl():
     problem = wb.Problem(wb.Scene(wb.load("human")), goals=[wb.Point("right_hand", (40.0, 0.0, 1.0))])
-    solution = wb.QP(measures=False).solve(problem)
+    solution = wb.methods.QP(measures=False).solve(problem)
     assert solution.status == "solved"
     assert solution.message == "solved directly"
 
@@ -66,7 +66,7 @@ def test_feasibility_only_far_away_does_not_crawl():
 def test_feasibility_only_of_a_goal_out_of_reach_comes_as_near_as_goes(planar_arm):
     scene = wb.Scene(planar_arm((0.4, 0.3, 0.3)))
     problem = wb.Problem(scene, start=np.array([0.1, 0.4, 0.3]), goals=[wb.Point("tip", (1.2, 0.9, 0.0))])
-    solution = wb.QP(measures=False).solve(problem)
+    solution = wb.methods.QP(measures=False).solve(problem)
     assert solution.status == "unreachable"
     assert solution.assessment.goal_error == pytest.approx(0.5, abs=1e-5)
 
@@ -75,7 +75,7 @@ def test_a_start_that_fits_is_the_first_that_does(planar_arm):
     scene = wb.Scene(planar_arm((0.4, 0.3, 0.3)))
     start = np.array([0.1, 0.4, 0.3])
     tip = scene.state(start).frame(scene.frame_id("tip")).translation
-    problem = wb.Problem(scene, start=start, goals=[wb.Point("tip", tip)], measures=[wb.Discomfort()])
-    solution = wb.QP(measures=False).solve(problem)
+    problem = wb.Problem(scene, start=start, goals=[wb.Point("tip", tip)], measures=[wb.tasks.Discomfort()])
+    solution = wb.methods.QP(measures=False).solve(problem)
     assert solution.iterations == 0
     assert solution.q == pytest.approx(start, abs=1e-12)

@@ -44,7 +44,7 @@ def errors(problem: wb.Problem, q: np.ndarray) -> np.ndarray:
 
 
 def frames_until_met(problem: wb.Problem, most: int) -> int:
-    tracker, q = wb.QP().tracker(problem, DT), problem.start
+    tracker, q = wb.methods.QP().tracker(problem, DT), problem.start
     for frame in range(1, most + 1):
         q = tracker.frame(q).q
         if errors(problem, q).max() < MET:
@@ -65,7 +65,7 @@ def test_where_goals_conflict_their_weights_decide(scene: wb.Scene) -> None:
     left = {}
     for weights in ((1.0, 1.0), (1000.0, 1.0), (1.0, 1000.0)):
         asked = problem(scene, 5, *weights, away=1.2)
-        tracker, q = wb.QP().tracker(asked, DT), asked.start
+        tracker, q = wb.methods.QP().tracker(asked, DT), asked.start
         for _ in range(120):
             q = tracker.frame(q).q
         left[weights] = errors(asked, q)

@@ -76,7 +76,7 @@ def test_what_a_step_to_a_bound_is_to_bring_counts_the_way_there():
 
 def test_a_descent_does_not_stop_at_the_first_limit():
     """From a straight arm the last joint comes to its limit. Its way there counts, so no step there is rejected."""
-    solution = wb.QP().solve(cases(["collinear-start"])[0].question().problem)
+    solution = wb.methods.QP().solve(cases(["collinear-start"])[0].question().problem)
     assert solution.solved
     assert not any("rejected" in entry.note for entry in solution.trace)
 
@@ -93,6 +93,6 @@ def test_elastic_rows_count_by_their_names():
 def test_steps_do_not_swing_across_a_curved_constraint():
     """Judged by the measures alone, steps of this reach grew from one to the next until one was rejected, 88 in all."""
     problem, _ = reach_among("clutter", wb.load("human"), TIPS[0], np.random.default_rng(26))
-    solution = wb.QP(restarts=0).solve(problem)
+    solution = wb.methods.QP(restarts=0).solve(problem)
     assert solution.solved
     assert solution.iterations < 60

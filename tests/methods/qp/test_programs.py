@@ -9,8 +9,8 @@ import pytest
 
 from tests.reference import active_set as reference
 from tests.reference.active_set import guess_active_set, objective, same
-from wholebody import UnknownNameError
 from wholebody.base.arrays import with_values
+from wholebody.base.errors import UnknownNameError
 from wholebody.methods.qp.active_set import solve_from
 from wholebody.methods.qp.face_kernel import Face, minimise_on_face
 from wholebody.methods.qp.quadratic_program import ActiveSet

@@ -30,7 +30,7 @@ def least_distance_while_pushed(free_bodies, push, solver="osqp"):
     q = scene.figure.neutral
     q[:3] = -0.05, 0.0, 0.1
     problem = wb.Problem(scene, start=q, goals=[push], clearance=CLEARANCE)
-    tracker = wb.QP(solver).tracker(problem, 0.01)
+    tracker = wb.methods.QP(solver).tracker(problem, 0.01)
     least = np.inf
     for _ in range(200):
         q = tracker.step(q).q

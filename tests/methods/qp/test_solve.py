@@ -42,7 +42,7 @@ def test_two_link_arm_against_the_law_of_cosines(planar_arm, honest, distance, a
 def test_tolerance_asked_for_is_reached(planar_arm, honest, tolerance, solver):
     scene = wb.Scene(planar_arm((0.4, 0.3, 0.3)))
     problem = wb.Problem(scene, start=np.array([0.1, 0.2, 0.3]), goals=[wb.Point("tip", (0.3, 0.5, 0.0))])
-    solution = honest(problem, wb.QP(solver, tolerance=tolerance).solve(problem), tolerance)
+    solution = honest(problem, wb.methods.QP(solver, tolerance=tolerance).solve(problem), tolerance)
     assert solution.status == "solved"
     assert solution.assessment.goal_error <= tolerance
 
@@ -52,7 +52,7 @@ def test_what_is_left_free_minimises_the_measures(planar_arm):
     scene = wb.Scene(planar_arm((0.4, 0.3, 0.3)))
     start, target = np.array([0.1, 0.4, 0.3]), np.array([0.3, 0.5])
     problem = wb.Problem(scene, start=start, goals=[wb.Point("tip", (*target, 0.0))])
-    solution = wb.QP(tolerance=1e-8).solve(problem)
+    solution = wb.methods.QP(tolerance=1e-8).solve(problem)
     best = np.inf
     for last in np.linspace(-3.0, 3.0, 8001):  # direction of the last link in the plane
         wrist = target - 0.3 * np.array([np.cos(last), np.sin(last)])
@@ -145,7 +145,7 @@ def test_reachable_targets_in_clutter_are_all_solved(planar_arm, honest, solver,
         pin.framesForwardKinematics(scene.model, data, q)
         target = data.oMf[scene.frame_id("tip")].translation
         problem = wb.Problem(scene, start=start, goals=[wb.Point("tip", target)], clearance=0.002)
-        solution = honest(problem, wb.QP(solver, budget=10_000, restarts=20).solve(problem))
+        solution = honest(problem, wb.methods.QP(solver, budget=10_000, restarts=20).solve(problem))
         assert solution.status == "solved", (done, q)
         done += 1
 
@@ -240,7 +240,7 @@ def test_the_same_question_has_the_same_answer(planar_arm):
     for _ in range(3):
         scene = wb.Scene(planar_arm((0.4, 0.3, 0.3))).add(wb.Sphere(0.1), name="ball", at=(0.5, 0.3, 0.0))
         problem = wb.Problem(scene, goals=[wb.Point("tip", (0.5, 0.5, 0.0))], clearance=0.002)
-        answers.append(wb.QP(seed=3).solve(problem))
+        answers.append(wb.methods.QP(seed=3).solve(problem))
     assert np.array_equal(answers[0].q, answers[1].q)
     assert np.array_equal(answers[0].q, answers[2].q)
     assert len({(answer.status, answer.iterations) for answer in answers}) == 1
@@ -258,7 +258,7 @@ def test_every_solver_poses_the_human(solver, honest):
         clearance=0.002,
     )  # fmt: skip
     for hot_start in (True, False):
-        method = wb.QP(solver, hot_start=hot_start)
+        method = wb.methods.QP(solver, hot_start=hot_start)
         solution = honest(problem, method.solve(problem))
         assert solution.status == "solved"
         assert solution.method == method.name
@@ -276,14 +276,14 @@ def test_every_solver_poses_the_human(solver, honest):
 )
 def test_settings_out_of_range_are_refused(settings, sentence):
     with pytest.raises(wb.InputError, match=sentence):
-        wb.QP(**settings)
+        wb.methods.QP(**settings)
 
 
 def test_what_is_no_problem_or_method_is_refused(planar_arm):
     problem = wb.Problem(wb.Scene(planar_arm(LENGTHS)))
     with pytest.raises(wb.InputError, match="not a Problem"):
         wb.solve("reach")
-    with pytest.raises(wb.UnknownNameError, match="did you mean qp"):
+    with pytest.raises(wb.errors.UnknownNameError, match="did you mean qp"):
         wb.solve(problem, "qpp")
     problem.scene.add(wb.Sphere(0.1), name="late", at=(3.0, 0.0, 0.0))
     with pytest.raises(wb.InputError, match="state the problem anew"):
@@ -293,7 +293,7 @@ def test_what_is_no_problem_or_method_is_refused(planar_arm):
 def test_one_degree_of_freedom_is_enough(planar_arm):
     goal = (0.4 * np.cos(0.3), 0.4 * np.sin(0.3), 0.0)
     problem = wb.Problem(wb.Scene(planar_arm((0.4,))), goals=[wb.Point("tip", goal)])
-    for method in (wb.QP(), wb.QP(measures=False), wb.Newton(), wb.methods.CCD()):
+    for method in (wb.methods.QP(), wb.methods.QP(measures=False), wb.methods.Newton(), wb.methods.CCD()):
         assert method.solve(problem).q == pytest.approx([0.3], abs=1e-4)
 
 
@@ -314,7 +314,7 @@ def test_an_arm_that_another_configuration_frees_is_not_called_out_of_reach(hone
     proof = wb.assess(case.problem, case.witness)
     assert proof.holds(1e-6)
     assert proof.goal_error < 1e-6
-    solution = wb.QP(tolerance=1e-4, time_limit=inf).solve(case.problem)
+    solution = wb.methods.QP(tolerance=1e-4, time_limit=inf).solve(case.problem)
     assert honest(case.problem, solution, 1e-4).status == "solved"
 
 
@@ -325,7 +325,7 @@ def test_a_descent_goes_on_to_what_will_stop_it():
     begin = np.array([-1.021, -1.666, 3.871, 1.093, -1.124, -0.426, -0.757])
     goal = wb.Frame("tool", figure.placement(begin, "tool"))
     problem = wb.Problem(wb.Scene(figure), home, goals=[goal]).with_start(begin)
-    answer = wb.QP(restarts=0).solve(problem)
+    answer = wb.methods.QP(restarts=0).solve(problem)
     assert answer.solved
     assert answer.assessment.measure < wb.assess(problem, begin).measure - 0.1
     assert answer.assessment.optimality < 1e-3

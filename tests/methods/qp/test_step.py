@@ -56,9 +56,9 @@ def jumping(request, free_bodies, planar_arm):
 
     def make(bounded=False):
         if body:
-            limits = [wb.StepLimit(root_velocity=0.7, root_turn=1.0)] if bounded else []
+            limits = [wb.tasks.StepLimit(root_velocity=0.7, root_turn=1.0)] if bounded else []
             return Jumping(free_bodies(wb.Capsule(0.05, 0.2)), limits)
-        return Jumping(planar_arm((0.4, 0.4, 0.3)), [wb.StepLimit(2.0)] if bounded else [])
+        return Jumping(planar_arm((0.4, 0.4, 0.3)), [wb.tasks.StepLimit(2.0)] if bounded else [])
 
     return make
 
@@ -73,7 +73,7 @@ def test_nothing_is_jumped_over_or_entered_at_any_length_of_a_step(jumping, dt, 
         assert case.figure.within_limits(step.q)
         assert least_distance(case.scene, step.q) >= 0.0
 
-    follow(case.problem, wb.QP(solver), dt, case.targets(STEPS[dt]), check)
+    follow(case.problem, wb.methods.QP(solver), dt, case.targets(STEPS[dt]), check)
 
 
 @pytest.mark.parametrize("solver", ["osqp", "daqp"])
@@ -86,7 +86,7 @@ def test_clearance_is_kept_at_the_speeds_people_move_with(jumping, dt, solver, l
         assert least_distance(case.scene, step.q) >= 0.9 * CLEARANCE
         assert sweep.first_contact(q, step.q) is None
 
-    follow(case.problem, wb.QP(solver), dt, case.targets(50), check)
+    follow(case.problem, wb.methods.QP(solver), dt, case.targets(50), check)
 
 
 def test_a_person_whose_goals_jump_enters_nothing(least_distance):
@@ -98,11 +98,11 @@ def test_a_person_whose_goals_jump_enters_nothing(least_distance):
     scene.add(wb.Sphere(0.1), name="ball", at=(0.3, -0.3, 1.1))
     scene.add(wb.Capsule(0.03, 1.0), name="bar", at=(0.4, 0.45, 1.0))
     holds = [wb.Hold("left_foot"), wb.Hold("right_foot")]
-    for dt, bounds in ((0.1, [wb.StepLimit(2.0, root_velocity=0.5, root_turn=1.0)]), (0.01, []), (1.0, [])):
+    for dt, bounds in ((0.1, [wb.tasks.StepLimit(2.0, root_velocity=0.5, root_turn=1.0)]), (0.01, []), (1.0, [])):
         problem = wb.Problem(scene, constraints=[*holds, *bounds], clearance=CLEARANCE)
         assert least_distance(scene, problem.start) > 0.0
         places = [rng.uniform([-0.2, -0.6, 0.2], [1.0, 0.6, 1.8], (2, 3)) for _ in range(5)]
-        q, tracker = problem.start, wb.QP("daqp").tracker(problem, dt)
+        q, tracker = problem.start, wb.methods.QP("daqp").tracker(problem, dt)
         for k in range(100):
             right, left = places[k // 20]
             problem.retarget([wb.Point("right_index_tip", right), wb.Point("left_index_tip", left)])
@@ -114,11 +114,11 @@ def test_a_person_whose_goals_jump_enters_nothing(least_distance):
 @pytest.mark.parametrize("dt", STEPS)
 def test_step_limit_is_velocity_times_dt(free_bodies, planar_arm, dt):
     arm = planar_arm((0.4, 0.4, 0.3))
-    limit = wb.StepLimit(0.7, joints={"turn1": 0.2})
+    limit = wb.tasks.StepLimit(0.7, joints={"turn1": 0.2})
     problem = wb.Problem(
         wb.Scene(arm), start=np.array([0.5, 1.6, 0.3]), goals=[wb.Point("tip", (-0.9, 0.0, 0.0))], constraints=[limit]
     )
-    tracker, q, fastest = wb.QP().tracker(problem, dt), problem.start, np.zeros(3)
+    tracker, q, fastest = wb.methods.QP().tracker(problem, dt), problem.start, np.zeros(3)
     for _ in range(30):
         step = tracker.step(q)
         assert (np.abs(step.displacement) <= np.array([0.7, 0.2, 0.7]) * dt + 1e-12).all()
@@ -129,9 +129,9 @@ def test_step_limit_is_velocity_times_dt(free_bodies, planar_arm, dt):
     body = wb.Problem(
         wb.Scene(free_bodies(wb.Sphere(0.1))),
         goals=[wb.Point("body0", (5.0, 3.0, -2.0))],
-        constraints=[wb.StepLimit(root_velocity=0.3, root_turn=0.1)],
+        constraints=[wb.tasks.StepLimit(root_velocity=0.3, root_turn=0.1)],
     )
-    q, tracker = body.start, wb.QP().tracker(body, dt)
+    q, tracker = body.start, wb.methods.QP().tracker(body, dt)
     for _ in range(10):
         step = tracker.step(q)
         assert (np.abs(step.displacement[:3]) <= 0.3 * dt + 1e-12).all()
@@ -143,9 +143,9 @@ def test_step_limit_holds_near_joint_limits_and_contacts(planar_arm, least_dista
     scene = wb.Scene(planar_arm((0.4, 0.4, 0.3), limit=1.0)).add(wb.Sphere(0.2), name="ball", at=(0.6, 0.6, 0.0))
     problem = wb.Problem(
         scene, start=np.array([-0.9, 0.9, 0.9]), goals=[wb.Point("tip", (0.6, 0.6, 0.0))],
-        constraints=[wb.StepLimit(1.0)], clearance=CLEARANCE,
+        constraints=[wb.tasks.StepLimit(1.0)], clearance=CLEARANCE,
     )  # fmt: skip
-    tracker, q = wb.QP().tracker(problem, 0.02), problem.start
+    tracker, q = wb.methods.QP().tracker(problem, 0.02), problem.start
     for _ in range(150):
         step = tracker.step(q)
         assert np.abs(step.displacement).max() <= 0.02 + 1e-12
@@ -158,7 +158,7 @@ def test_a_goal_within_reach_is_reached_and_kept(planar_arm):
     problem = wb.Problem(
         wb.Scene(planar_arm((0.4, 0.4, 0.3))), start=np.array([0.5, 1.0, 0.3]), goals=[wb.Point("tip", (0.5, 0.6, 0.0))]
     )
-    tracker, q = wb.QP().tracker(problem, 0.01), problem.start
+    tracker, q = wb.methods.QP().tracker(problem, 0.01), problem.start
     for _ in range(100):
         q = tracker.step(q).q
     assert wb.assess(problem, q).goal_error < 1e-4
@@ -169,7 +169,7 @@ def test_a_goal_within_reach_is_reached_and_kept(planar_arm):
 def test_goals_may_come_and_go_between_steps(planar_arm):
     """One method for goals that change in number and kind, and for two problems on one scene in turn."""
     figure = planar_arm((0.4, 0.4, 0.3))
-    scene, method = wb.Scene(figure), wb.QP()
+    scene, method = wb.Scene(figure), wb.methods.QP()
     problems = [wb.Problem(scene, start=np.array([0.5, 1.0, 0.3])) for _ in range(2)]
     trackers = [method.tracker(problem, 0.01) for problem in problems]
     choices = [
@@ -193,7 +193,7 @@ def test_a_tracker_is_kept_from_step_to_step(planar_arm):
     problem = wb.Problem(
         wb.Scene(planar_arm((0.4, 0.4, 0.3))), start=np.array([0.5, 1.0, 0.3]), goals=[wb.Point("tip", (0.5, 0.6, 0.0))]
     )
-    tracker, q = wb.QP().tracker(problem, 0.01), problem.start
+    tracker, q = wb.methods.QP().tracker(problem, 0.01), problem.start
     closed = []
     for _ in range(10):
         step = tracker.step(q)
@@ -205,7 +205,7 @@ def test_a_tracker_is_kept_from_step_to_step(planar_arm):
 def test_answers_of_steps_are_kept_when_the_next_step_comes(planar_arm):
     scene = wb.Scene(planar_arm((0.4, 0.4, 0.3))).add(wb.Sphere(0.1), name="ball", at=(0.3, 0.5, 0.0))
     problem = wb.Problem(scene, goals=[wb.Point("tip", (0.3, 0.4, 0.0))])
-    tracker, q = wb.QP().tracker(problem, 0.01), problem.start
+    tracker, q = wb.methods.QP().tracker(problem, 0.01), problem.start
     steps, copies = [], []
     for _ in range(5):
         steps.append(tracker.step(q))
@@ -220,7 +220,7 @@ def test_moved_objects_count_in_the_next_step(free_bodies, least_distance):
     """A wall that comes nearer pushes the body before it."""
     scene = wb.Scene(free_bodies(wb.Sphere(0.1))).add(wb.Box((0.1, 1.0, 1.0)), name="wall", at=(-0.3, 0.0, 0.0))
     problem = wb.Problem(scene, clearance=CLEARANCE)
-    tracker, q = wb.QP().tracker(problem, 0.01), problem.start
+    tracker, q = wb.methods.QP().tracker(problem, 0.01), problem.start
     for k in range(100):
         scene.move("wall", at=(-0.3 + 0.004 * k, 0.0, 0.0))
         q = tracker.step(q).q
@@ -233,7 +233,7 @@ def test_a_start_inside_gets_out_step_by_step(free_bodies, least_distance):
     q = scene.figure.neutral
     q[:3] = 0.2, 0.01, 0.02
     problem = wb.Problem(scene, start=q, clearance=CLEARANCE)
-    tracker = wb.QP().tracker(problem, 0.01)
+    tracker = wb.methods.QP().tracker(problem, 0.01)
     for _ in range(100):
         q = tracker.step(q).q
     assert least_distance(scene, q) >= 0.99 * CLEARANCE
@@ -243,19 +243,19 @@ def test_a_start_inside_gets_out_step_by_step(free_bodies, least_distance):
 def test_dt_that_is_no_step_is_refused(planar_arm, dt):
     problem = wb.Problem(wb.Scene(planar_arm((0.4, 0.4))))
     with pytest.raises(wb.InputError, match="dt is"):
-        wb.QP().tracker(problem, dt)
+        wb.methods.QP().tracker(problem, dt)
 
 
 @pytest.mark.parametrize("q", [np.zeros(3), np.array([0.0, np.nan]), np.array([np.inf, 0.0])])
 def test_postures_that_are_none_are_refused(planar_arm, q):
     problem = wb.Problem(wb.Scene(planar_arm((0.4, 0.4))))
     with pytest.raises(wb.InputError, match="posture"):
-        wb.QP().tracker(problem, 0.01).step(q)
+        wb.methods.QP().tracker(problem, 0.01).step(q)
 
 
 def test_a_changed_scene_is_refused_in_the_next_step(planar_arm):
     problem = wb.Problem(wb.Scene(planar_arm((0.4, 0.4))))
-    tracker = wb.QP().tracker(problem, 0.01)
+    tracker = wb.methods.QP().tracker(problem, 0.01)
     tracker.step(problem.start)
     problem.scene.add(wb.Sphere(0.1), name="late", at=(0.6, 0.0, 0.0))
     with pytest.raises(wb.InputError, match="state the problem anew"):
@@ -268,7 +268,7 @@ def test_a_limb_gets_out_of_the_way_of_a_thrown_ball(planar_arm, least_distance,
     dt, radius = 1.0 / 60.0, 0.05
     scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(radius), name="ball", at=(0.7, -0.6, 0.0))
     problem = wb.Problem(scene, start=np.array([0.0, 0.4, 0.4]), goals=[wb.Point("tip", (0.9, 0.5, 0.0))])
-    tracker, q = wb.QP().tracker(problem, dt), problem.start
+    tracker, q = wb.methods.QP().tracker(problem, dt), problem.start
     for frame in range(int(0.8 / (speed * dt))):
         scene.move("ball", at=(0.7, -0.6 + speed * dt * frame, 0.0))
         q = tracker.step(q).q
@@ -280,8 +280,8 @@ def test_steps_without_measures_converge_quadratically_and_stay_where_goals_are_
     scene = wb.Scene(planar_arm((0.4, 0.3, 0.3)))
     start = np.array([0.4, 0.9, 0.3])
     place = scene.state(start).frame(scene.frame_id("tip")).translation + np.array([-0.02, 0.01, 0.0])
-    problem = wb.Problem(scene, start, goals=[wb.Point("tip", place)], measures=[wb.Discomfort()])
-    tracker, errors = wb.QP().tracker(problem, 0.02), []
+    problem = wb.Problem(scene, start, goals=[wb.Point("tip", place)], measures=[wb.tasks.Discomfort()])
+    tracker, errors = wb.methods.QP().tracker(problem, 0.02), []
     q = tracker.step(problem.start).q
     for _ in range(4):
         errors.append(float(np.linalg.norm(problem.goals[0].error(scene.state(q)))))

@@ -107,14 +107,14 @@ PROBLEMS = {
         "constraints": [
             wb.Hold("left_foot"),
             wb.Hold("right_foot"),
-            wb.StepLimit(4.0, root_velocity=1.0, root_turn=2.0),
+            wb.tasks.StepLimit(4.0, root_velocity=1.0, root_turn=2.0),
         ],
-        "measures": [wb.Displacement()],
+        "measures": [wb.tasks.Displacement()],
     },
     "inequalities": {
         "goals": [wb.Point("left_index_tip", (0.3, 0.3, 1.1)), wb.Axis("head", (0, 0, 1.0), direction=(0.2, 0, 1.0))],
         "constraints": [wb.Hold("left_foot"), wb.Balance(), wb.Plane("right_elbow", (0.0, 1.0, 0.2))],
-        "measures": [wb.Discomfort(0.1), wb.Displacement()],
+        "measures": [wb.tasks.Discomfort(0.1), wb.tasks.Displacement()],
     },
     "no goals": {"constraints": [wb.Hold("left_foot")], "measures": [wb.Effort()]},
 }
@@ -156,7 +156,7 @@ def test_it_is_the_plain_one_entry_by_entry(scene: wb.Scene, name: str) -> None:
 
 def follow(problem: wb.Problem, targets: np.ndarray, frame: str = "right_index_tip") -> np.ndarray:
     """Postures (steps, nq) of a frame that is asked from place to place."""
-    tracker, q, postures = wb.QP().tracker(problem, DT), problem.start, []
+    tracker, q, postures = wb.methods.QP().tracker(problem, DT), problem.start, []
     for place in targets:
         problem.retarget([wb.Point(frame, place)])
         q = tracker.step(q).q
@@ -166,8 +166,8 @@ def follow(problem: wb.Problem, targets: np.ndarray, frame: str = "right_index_t
 
 def test_a_body_that_meets_an_obstacle_keeps_its_feet_and_the_order_of_its_speed(scene: wb.Scene) -> None:
     """The goal goes on into the block; limbs do not jump, and feet stay within 2 micrometres."""
-    holds = [wb.Hold("left_foot"), wb.Hold("right_foot"), wb.StepLimit(4.0, root_velocity=1.0, root_turn=2.0)]
-    problem = wb.Problem(scene, constraints=holds, measures=[wb.Displacement()], clearance=0.01)
+    holds = [wb.Hold("left_foot"), wb.Hold("right_foot"), wb.tasks.StepLimit(4.0, root_velocity=1.0, root_turn=2.0)]
+    problem = wb.Problem(scene, constraints=holds, measures=[wb.tasks.Displacement()], clearance=0.01)
     tip = scene.state(problem.start).frame(scene.frame_id("right_index_tip")).translation.copy()
     share = np.linspace(0.0, 1.0, 70)[1:, None]
     targets = tip + share * (np.array([0.42, -0.44, 1.05]) - tip)
@@ -213,7 +213,10 @@ def test_a_fast_goal_within_reach_is_followed_without_lag(planar_arm: Callable[.
 def test_a_goal_that_rests_is_met_while_the_body_settles(scene: wb.Scene) -> None:
     """The measures still move the body; the fingertip stays where it is to 0.1 micrometres."""
     problem = wb.Problem(
-        scene, constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")], measures=[wb.Displacement()], clearance=0.01
+        scene,
+        constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")],
+        measures=[wb.tasks.Displacement()],
+        clearance=0.01,
     )
     place = np.array([0.3, -0.25, 1.25])
     postures = follow(problem, np.array([place] * 60))

@@ -16,7 +16,7 @@ from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.step_program import StepProgram
 from wholebody.tasks.base import Goal
 
-SLOW = wb.StepLimit(0.2, root_velocity=0.1, root_turn=0.1)  # steps so short that none is cut
+SLOW = wb.tasks.StepLimit(0.2, root_velocity=0.1, root_turn=0.1)  # steps so short that none is cut
 FEET = (wb.Hold("left_foot"), wb.Hold("right_foot"), SLOW)
 
 
@@ -27,7 +27,7 @@ def scene() -> wb.Scene:
 
 def fresh(problem: wb.Problem, q: np.ndarray) -> np.ndarray:
     """What a tracker does that never knew other goals."""
-    step = wb.QP().tracker(problem, 0.02).step(q)
+    step = wb.methods.QP().tracker(problem, 0.02).step(q)
     assert step.share == 1.0
     return step.displacement
 
@@ -45,7 +45,7 @@ CHANGES = {
 
 
 def test_a_later_posture_is_checked_as_the_first(scene: wb.Scene) -> None:
-    tracker = wb.QP().tracker(wb.Problem(scene), 0.02)
+    tracker = wb.methods.QP().tracker(wb.Problem(scene), 0.02)
     q = tracker.step(scene.figure.neutral).q
     assert np.isfinite(tracker.step(q.tolist()).q).all()
     for bad in (np.full_like(q, np.nan), q[:5], "x", q.astype(complex)):
@@ -58,7 +58,7 @@ def test_other_goals_are_followed_as_by_a_new_tracker(scene: wb.Scene, change: s
     """Without this the weights of the old goals stayed: a held foot moved by centimetres, or the step broke off."""
     first, second = CHANGES[change]
     problem = wb.Problem(scene, goals=first, constraints=FEET)
-    tracker, q = wb.QP().tracker(problem, 0.02), problem.start
+    tracker, q = wb.methods.QP().tracker(problem, 0.02), problem.start
     for goals in (first, second, first, second):
         problem.retarget(goals)
         step = tracker.step(q)
@@ -70,8 +70,8 @@ def test_other_goals_are_followed_as_by_a_new_tracker(scene: wb.Scene, change: s
 
 def test_other_terms_are_followed_as_by_a_new_tracker(scene: wb.Scene) -> None:
     problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.3, -0.3, 1.0))], constraints=FEET)
-    other = wb.Problem(scene, goals=problem.goals, constraints=[FEET[0], SLOW], measures=[wb.Displacement()])
-    tracker, q = wb.QP().tracker(problem, 0.02), problem.start
+    other = wb.Problem(scene, goals=problem.goals, constraints=[FEET[0], SLOW], measures=[wb.tasks.Displacement()])
+    tracker, q = wb.methods.QP().tracker(problem, 0.02), problem.start
     tracker.step(q)
     problem.constraints, problem.measures = other.constraints, other.measures
     assert tracker.step(q).displacement == pytest.approx(fresh(problem, q), abs=1e-7)
@@ -89,7 +89,7 @@ def test_holds_that_moved_are_followed_as_by_a_new_tracker_and_nothing_is_set_up
 ) -> None:
     goals = [wb.Point("right_index_tip", (0.3, -0.3, 1.0))]
     problem, made = wb.Problem(scene, goals=goals, constraints=FEET), list[object]()
-    tracker, q, first = wb.QP().tracker(problem, 0.02), problem.start, problem.constraints
+    tracker, q, first = wb.methods.QP().tracker(problem, 0.02), problem.start, problem.constraints
     at = np.array(scene.state(q).frame(scene.figure.frame_id("left_foot")).translation)
     turned = scene.state(q).frame(scene.figure.frame_id("left_foot")).rotation
     monkeypatch.setattr(tracking, "StepProgram", lambda *given: made.append(given) or StepProgram(*given))
@@ -121,7 +121,7 @@ class _Growing(Goal):
 
 def test_a_goal_that_changes_its_rows_is_refused(scene: wb.Scene) -> None:
     problem = wb.Problem(scene, goals=[_Growing()])
-    tracker = wb.QP().tracker(problem, 0.02)
+    tracker = wb.methods.QP().tracker(problem, 0.02)
     tracker.step(problem.start)
     problem.goals[0].rows = 3
     with pytest.raises(wb.InputError, match="one number of rows at all postures"):
@@ -137,7 +137,7 @@ def test_a_goal_with_other_numbers_of_values_and_rows_is_refused(scene: wb.Scene
     problem = wb.Problem(scene, goals=[_Uneven()])
     problem.goals[0].rows = 2
     with pytest.raises(wb.InputError, match=r"goals\[0\] \(_Uneven\): it has 2 values and a jacobian of 1 rows"):
-        wb.QP().tracker(problem, 0.02).step(problem.start)
+        wb.methods.QP().tracker(problem, 0.02).step(problem.start)
 
 
 def program() -> QuadraticProgram:
@@ -165,7 +165,7 @@ def test_a_hold_comes_back_in_the_step_after_a_jump(jump: tuple[float, float, fl
     place, there = "left_middle_proximal", wb.Hold("left_little_distal")
     at = wb.Scene(hand).state(hand.posture("relaxed")).frame(hand.frame_id(place)).translation
     problem = wb.Problem(wb.Scene(hand), "relaxed", goals=[wb.Point(place, at)], constraints=[there])
-    tracker, q, missed = wb.QP().tracker(problem, 1.0), problem.start, [0.0]
+    tracker, q, missed = wb.methods.QP().tracker(problem, 1.0), problem.start, [0.0]
     held = there.resolve(problem.scene, problem.start)
     for target in (at, at + jump, None):
         if target is None:
@@ -185,13 +185,13 @@ SLIDER = """<robot name="slider">
 </robot>"""
 
 
-@pytest.mark.parametrize("method", [wb.QP(), wb.QP(hot_start=False)])
-def test_a_joint_does_not_brake_where_it_has_to_leave_something(method: wb.QP, tmp_path: Path) -> None:
+@pytest.mark.parametrize("method", [wb.methods.QP(), wb.methods.QP(hot_start=False)])
+def test_a_joint_does_not_brake_where_it_has_to_leave_something(method: wb.methods.QP, tmp_path: Path) -> None:
     """Five millimetres before its limit, and four inside of a wall behind it: one step leads out."""
     path = tmp_path / "slider.urdf"
     path.write_text(SLIDER)
     scene = wb.Scene(wb.load(path)).add(wb.Box((1.0, 1.0, 1.0)), name="wall", at=(0.449, 0.0, 0.0))
-    start, limit = np.array([0.995]), wb.StepLimit(1.0)
+    start, limit = np.array([0.995]), wb.tasks.StepLimit(1.0)
     assert scene.contacts(start, 0.1).distance == pytest.approx(-0.004, abs=1e-6)
     step = method.tracker(wb.Problem(scene, start, constraints=[limit]), 0.01).step(start)
     assert step.q == pytest.approx(0.999, abs=1e-6)
@@ -207,7 +207,7 @@ def test_a_frame_that_is_asked_for_exactly_is_held_exactly(two_arms: wb.Figure) 
     worst = {}
     for tolerance in (None, 1e-8):
         problem = wb.Problem(scene, start, constraints=[wb.Hold("left", orientation=False)])
-        tracker, q, missed = wb.QP().tracker(problem, 1 / 60), start, []
+        tracker, q, missed = wb.methods.QP().tracker(problem, 1 / 60), start, []
         for angle in np.linspace(0.0, 2.0, 60):
             goal = centre + 0.05 * np.array([np.cos(angle) - 1.0, np.sin(angle), 0.0])
             problem.retarget([wb.Point("right", goal)])

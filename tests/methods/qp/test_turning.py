@@ -55,7 +55,7 @@ def beside_a_plate(figure: wb.Figure, seed: int) -> wb.Problem:
 
 def followed(problem: wb.Problem, least_distance: Any, steps: int) -> tuple[float, list[int]]:
     """Least distance at the end of any step, metres, and numbers of the steps that pass through something."""
-    scene, q, tracker = problem.scene, problem.start, wb.QP().tracker(problem, DT)
+    scene, q, tracker = problem.scene, problem.start, wb.methods.QP().tracker(problem, DT)
     sweep, ends, through = Sweep(scene.model, scene.geometry), [], []
     for number in range(steps):
         step = tracker.step(q)
@@ -93,7 +93,7 @@ def test_what_turns_far_from_everything_is_not_looked_at(free_bodies, monkeypatc
     start[:3], start[7:10] = (0.0, 0.0, 0.06001), (5.0, 0.0, 0.0)
     still = [wb.Point("body0", start[:3]), wb.Point("body1", start[7:10])]
     problem = wb.Problem(scene, start=start, goals=[*still, wb.Axis("body1", (0, 0, 1.0), direction=(0, 0, 1.0))])
-    tracker, q = wb.QP().tracker(problem, DT), problem.start
+    tracker, q = wb.methods.QP().tracker(problem, DT), problem.start
     q = tracker.step(q).q
     looked, near = [], tracker.workspace.near
     monkeypatch.setattr(tracker.workspace, "near", lambda *room: looked.append(room) or near(*room))
@@ -110,7 +110,7 @@ def test_the_bound_holds_for_random_displacements(planar_arm, least_distance):
     """A capsule of an arm and a box: where the bound says so, a pair ends no nearer than its rows say."""
     scene = wb.Scene(planar_arm((0.4, 0.3, 0.3))).add(wb.Box((0.3, THIN, 0.6)), name="plate", at=(0.9, 0.25, 0.0))
     problem = wb.Problem(scene, start=np.array([0.1, 0.2, 0.1]), clearance=TRACKING.unseen)  # all of it may go unseen
-    tracker, rng, trusted = wb.QP().tracker(problem, DT), np.random.default_rng(0), 0
+    tracker, rng, trusted = wb.methods.QP().tracker(problem, DT), np.random.default_rng(0), 0
     workspace, lineariser = tracker.workspace, problem.lineariser(tracker.workspace, DT)
     program = tracker._program  # the rows that the bound is about
     turning = Turning(workspace)

@@ -18,7 +18,9 @@ def over_a_table(spatial_arm) -> wb.Problem:
     scene = wb.Scene(spatial_arm()).add(wb.Box((0.5, 0.8, 0.1)), name="table", at=(0.55, 0.0, 0.35))
     start = np.array([-0.9, 0.5, 0.9, 0.0, 0.5, 0.0])
     goals = [wb.Point("tip", (0.55, 0.35, 0.45))]
-    return wb.Problem(scene, start, goals=goals, measures=[wb.Effort(), wb.Discomfort(1e-3)])  # no projection alone
+    return wb.Problem(
+        scene, start, goals=goals, measures=[wb.Effort(), wb.tasks.Discomfort(1e-3)]
+    )  # no projection alone
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +52,7 @@ def asked(monkeypatch):
 
 
 def test_as_it_comes_the_solver_is_asked_where_no_active_set_settles(over_a_table, asked):
-    solution = wb.QP().solve(over_a_table)
+    solution = wb.methods.QP().solve(over_a_table)
     assert solution.method == "qp"
     assert solution.programs["active set"] > 0.9 * sum(solution.programs.values())
     assert len(asked) <= sum(count for by, count in solution.programs.items() if by != "active set")
@@ -58,7 +60,7 @@ def test_as_it_comes_the_solver_is_asked_where_no_active_set_settles(over_a_tabl
 
 @pytest.mark.parametrize("name", NAMED)
 def test_without_a_hot_start_every_program_is_the_named_solvers(over_a_table, asked, name):
-    solution = wb.QP(solver=name, hot_start=False).solve(over_a_table)
+    solution = wb.methods.QP(solver=name, hot_start=False).solve(over_a_table)
     assert solution.solved
     assert solution.method == f"qp/{name}"
     assert set(solution.programs) <= {name, "semismooth newton"}
@@ -69,13 +71,13 @@ def test_without_a_hot_start_every_program_is_the_named_solvers(over_a_table, as
 @pytest.mark.parametrize(("solver", "hot_start"), [("osqp", True), ("active_set", False)])
 def test_counts_add_up_to_the_programs(over_a_table, solver, hot_start):
     for measures in (True, False):
-        solution = wb.QP(solver=solver, hot_start=hot_start, measures=measures).solve(over_a_table)
+        solution = wb.methods.QP(solver=solver, hot_start=hot_start, measures=measures).solve(over_a_table)
         without = sum(entry.note == "seed" for entry in solution.trace)
         assert sum(solution.programs.values()) + without == solution.iterations
 
 
 def test_active_sets_throughout(over_a_table):
-    method = wb.QP(solver="active_set")
+    method = wb.methods.QP(solver="active_set")
     solution = method.solve(over_a_table)
     assert solution.method == "qp/active_set"
     assert max(solution.programs, key=solution.programs.__getitem__) == "active set"
@@ -83,10 +85,12 @@ def test_active_sets_throughout(over_a_table):
 
 
 def test_other_methods_have_no_programs(over_a_table):
-    assert wb.Newton().solve(over_a_table).programs == {}
+    assert wb.methods.Newton().solve(over_a_table).programs == {}
 
 
-@pytest.mark.parametrize("method", [wb.QP(), wb.QP(hot_start=False), wb.QP(solver="active_set")])
+@pytest.mark.parametrize(
+    "method", [wb.methods.QP(), wb.methods.QP(hot_start=False), wb.methods.QP(solver="active_set")]
+)
 def test_a_tracker_tells_of_every_step(over_a_table, method):
     tracker, q = method.tracker(over_a_table, 0.01), over_a_table.start
     steps = []
@@ -103,7 +107,13 @@ def test_a_tracker_tells_of_every_step(over_a_table, method):
 
 
 @pytest.mark.parametrize(
-    "method", [wb.QP(), wb.QP(hot_start=False), wb.QP(solver="active_set"), wb.QP(solver="daqp", hot_start=False)]
+    "method",
+    [
+        wb.methods.QP(),
+        wb.methods.QP(hot_start=False),
+        wb.methods.QP(solver="active_set"),
+        wb.methods.QP(solver="daqp", hot_start=False),
+    ],
 )
 def test_the_same_call_has_the_same_answer(over_a_table, method):
     once, again = method.solve(over_a_table), method.solve(over_a_table)
@@ -113,9 +123,9 @@ def test_the_same_call_has_the_same_answer(over_a_table, method):
 
 @pytest.mark.parametrize("name", solver_names())
 def test_every_way_comes_to_the_same_posture(over_a_table, name):
-    expected = wb.QP(tolerance=1e-7).solve(over_a_table).q
+    expected = wb.methods.QP(tolerance=1e-7).solve(over_a_table).q
     for hot_start in (True, False):
-        q = wb.QP(solver=name, hot_start=hot_start, tolerance=1e-7).solve(over_a_table).q
+        q = wb.methods.QP(solver=name, hot_start=hot_start, tolerance=1e-7).solve(over_a_table).q
         assert q == pytest.approx(expected, abs=1e-4)
 
 
@@ -130,7 +140,7 @@ def test_every_way_comes_to_the_same_posture(over_a_table, name):
     ],
 )
 def test_the_name_says_what_runs(settings, name):
-    assert wb.QP(**settings).name == name
+    assert wb.methods.QP(**settings).name == name
 
 
 def test_programs_are_counted_until_they_are_asked_for():

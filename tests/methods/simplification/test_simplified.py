@@ -31,7 +31,7 @@ FROZEN = [wb.Freeze("root", "legs", "spine", "neck", "left_arm")]
 
 
 def test_frozen_joints_and_pairs_between_them_are_left_out(human: Figure) -> None:
-    whole = standing(human, constraints=[*FEET, *FROZEN], measures=[wb.Effort(), wb.Discomfort()])
+    whole = standing(human, constraints=[*FEET, *FROZEN], measures=[wb.Effort(), wb.tasks.Discomfort()])
     part = wb.simplify(whole)
     model = part.problem.scene.model
     assert {*part.left_out.joints, *model.names} == {*human.model.names}
@@ -133,7 +133,7 @@ def test_an_arm_among_hundreds_of_things_keeps_what_it_reaches(
     )
     tip = arm.segments[-1]
     at = State(arm.model).update(q).frame(arm.frame_id(tip)).translation.copy()
-    problem = wb.Problem(scene, goals=[wb.Point(tip, at)], measures=[wb.Displacement()], clearance=0.001)
+    problem = wb.Problem(scene, goals=[wb.Point(tip, at)], measures=[wb.tasks.Displacement()], clearance=0.001)
     part, answer = solved(problem)
     assert len(part.left_out.things) > 60
     assert set(part.problem.scene.objects) == set(scene.objects) - set(part.left_out.things)

@@ -300,7 +300,7 @@ def test_a_middle_that_cannot_be_freed_ends_with_a_sentence(swing: Clip) -> None
 def test_a_search_that_other_starts_may_end_is_short(swing: Clip, monkeypatch: pytest.MonkeyPatch) -> None:
     lengths, short = list[int](), Bisection().short
 
-    class Endless(wb.QP):
+    class Endless(wb.methods.QP):
         """Has its answer at once, and goes on until it is ended."""
 
         def solve(self, problem: wb.Problem, progress: Progress | None = None) -> wb.Solution:
@@ -319,7 +319,7 @@ def test_the_search_goes_on_where_no_start_leads_to_a_free_posture_soon(swing: C
     scene, kept, swing = dressed(swing.figure, "side_sphere"), list[wb.Solution](), swing[:15]
     overlapping = swing.q[np.argmax(depths(scene, swing.q))]
 
-    class Slow(wb.QP):
+    class Slow(wb.methods.QP):
         """Has found a posture that overlaps when it is ended."""
 
         def solve(self, problem: wb.Problem, progress: Progress | None = None) -> wb.Solution:
@@ -350,7 +350,7 @@ def test_ctrl_c_in_a_prediction_ends_all(swing: Clip) -> None:
     """A solve on its own answers Ctrl-C with the best posture so far; the others would go on."""
     begun = list[float]()
 
-    class Interrupted(wb.QP):
+    class Interrupted(wb.methods.QP):
         def solve(self, problem: wb.Problem, progress: Progress | None = None) -> wb.Solution:
             begun.append(0.0)
             return super().solve(problem, lambda entry: os.kill(os.getpid(), signal.SIGINT))
@@ -412,7 +412,7 @@ def test_names_and_frames_that_do_not_fit_are_refused(swing: Clip) -> None:
     scene = wb.Scene(swing.figure)
     with pytest.raises(wb.InputError, match="evaluation"):
         freed_by(Bisection(evaluation=(41,)), swing, scene)
-    with pytest.raises(wb.UnknownNameError, match="left_elbow"):
+    with pytest.raises(wb.errors.UnknownNameError, match="left_elbow"):
         freed_by(Bisection(planes=("left_elbov",)), swing, scene)
-    with pytest.raises(wb.UnknownNameError, match="spine"):
+    with pytest.raises(wb.errors.UnknownNameError, match="spine"):
         freed_by(Bisection(frozen=("spin",)), swing, scene)

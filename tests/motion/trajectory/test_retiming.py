@@ -72,7 +72,7 @@ def test_a_clip_is_slowed_where_joints_are_too_fast(planar_arm: Callable[..., Fi
     clip = swung(planar_arm)
     fastest = float(np.abs(np.diff(clip.q, axis=0)).max()) / DT
     limit = 0.7 * fastest
-    found = wb.avoid(clip, method=wb.motion.Trajectory(stretch=2.0), constraints=[wb.StepLimit(limit)])
+    found = wb.avoid(clip, method=wb.motion.Trajectory(stretch=2.0), constraints=[wb.tasks.StepLimit(limit)])
     report, times = found.report, found.report.times
     assert found.clip.dt == clip.dt
     assert report.solved, report.message
@@ -92,13 +92,13 @@ def test_a_clip_is_slowed_where_joints_are_too_fast(planar_arm: Callable[..., Fi
 
 def test_the_bound_on_slowing_holds_where_it_is_not_enough(planar_arm: Callable[..., Figure]) -> None:
     clip = swung(planar_arm)
-    found = wb.avoid(clip, method=wb.motion.Trajectory(stretch=1.2), constraints=[wb.StepLimit(0.5)])
+    found = wb.avoid(clip, method=wb.motion.Trajectory(stretch=1.2), constraints=[wb.tasks.StepLimit(0.5)])
     assert found.report.stretch <= 1.2
     assert not found.report.solved
     assert "a speed that was given is exceeded by" in found.report.message
     assert (DT / np.diff(found.report.times)).max() <= 1.2
     assert found.clip.duration <= 1.2 * clip.duration + 1e-9
-    same = wb.avoid(clip, constraints=[wb.StepLimit(0.5)])
+    same = wb.avoid(clip, constraints=[wb.tasks.StepLimit(0.5)])
     assert same.report.stretch == 1.0
     np.testing.assert_array_equal(same.clip.q, clip.q)
     np.testing.assert_array_equal(same.report.times, clip.times)
@@ -111,7 +111,7 @@ def test_what_is_freed_and_slowed_is_free_and_slow(planar_arm: Callable[..., Fig
     free = wb.avoid(clip, scene)
     assert free.report.before.colliding
     limit = 0.6 * float(np.abs(np.diff(free.clip.q, axis=0)).max()) / DT
-    found = wb.avoid(clip, scene, method=wb.motion.Trajectory(stretch=3.0), constraints=[wb.StepLimit(limit)])
+    found = wb.avoid(clip, scene, method=wb.motion.Trajectory(stretch=3.0), constraints=[wb.tasks.StepLimit(limit)])
     assert found.report.solved, found.report.message
     assert found.report.stretch > 1.1
     assert np.abs(np.diff(found.clip.q, axis=0)).max() <= limit * DT + 1e-6
@@ -120,10 +120,10 @@ def test_what_is_freed_and_slowed_is_free_and_slow(planar_arm: Callable[..., Fig
 def test_a_small_step_can_be_twice_as_fast_as_was_asked(planar_arm: Callable[..., Figure]) -> None:
     """0.2 rad/s at 120 Hz is 1.7 mrad a frame."""
     clip = wb.Clip(planar_arm((0.5, 0.5)), 0.2 * np.outer(np.arange(20) / 120.0, (1.0, 0.0)), 1 / 120)
-    found = wb.avoid(clip, method="trajectory", constraints=[wb.StepLimit(0.1)])
+    found = wb.avoid(clip, method="trajectory", constraints=[wb.tasks.StepLimit(0.1)])
     assert not found.report.solved
     assert "a speed that was given is exceeded by 100.0% of it" in found.report.message
-    assert wb.avoid(clip, method="trajectory", constraints=[wb.StepLimit(0.2)]).report.solved
+    assert wb.avoid(clip, method="trajectory", constraints=[wb.tasks.StepLimit(0.2)]).report.solved
 
 
 @pytest.mark.parametrize("stretch", [0.5, float("nan"), "2", 1e9])

@@ -319,9 +319,9 @@ def throws(thing: str, speed: float, person: str, swift: bool, count: int) -> Ro
         start = throw.scene.figure.posture("standing")
         tip = throw.scene.state(start).frame(throw.scene.frame_id("right_index_tip")).translation.copy()
         goal = wb.Point("right_index_tip", tip)
-        limits = wb.StepLimit(turning, root_velocity=going, root_turn=1.5 * going)
+        limits = wb.tasks.StepLimit(turning, root_velocity=going, root_turn=1.5 * going)
         problem = wb.Problem(throw.scene, start, goals=[goal], constraints=[limits], clearance=0.001)
-        tracker, q = wb.QP().tracker(problem, DT), problem.start
+        tracker, q = wb.methods.QP().tracker(problem, DT), problem.start
         for frame in range(throw.frames):
             way = throw.next()
             if person == "walks":

@@ -1,22 +1,18 @@
-"""`wholebody bench stability` and `attack`: named hard cases by every method, and random ones of every kind."""
+"""`wholebody bench stability`: named hard cases by every method."""
 
 from __future__ import annotations
 
 import argparse
 from functools import partial
-from itertools import count as numbers
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.tables import machine
-from wholebody.cli.bench.command import Chart, folders, listed, measuring, publish, seed
-from wholebody.cli.command import command, count, option
+from wholebody.cli.bench.command import Chart, listed, measuring, publish
+from wholebody.cli.command import count
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
-    from wholebody.bench.attack.judging import Case
     from wholebody.bench.suite.adapters.base import Adapter
     from wholebody.bench.suite.stability.asking import Cell
     from wholebody.bench.suite.stability.catalogue import HardCase
@@ -59,79 +55,3 @@ def _asked(pairs: Sequence[tuple[HardCase, Adapter]], jobs: int) -> list[Cell]:
             cells.append(cell)
             tell(len(cells), f"{cell.case.name}, {cell.method}")
     return cells
-
-
-@command(
-    "attack",
-    "random hard cases of every kind, judged",
-    """\
-Attack the package with random hard cases: solves that begin inside things, with goals that contradict or are out of
-reach; streams; sweeps; contacts beside points at the place found; mutated files; odd arguments. Answers are judged by
-coal over all pairs and by Pinocchio alone. Every failure is written as a script that repeats it. Case K of a seed is
-always the same. The exit code is 1 where something was wrong: a false claim, an error other than one sentence, a crash,
-or no end within a minute. What ended before Ctrl-C is written.""",
-    option("--seconds", type=float, default=60.0, metavar="S", help="how long (default: 60)"),
-    seed("of all cases"),
-    option("--first", type=int, default=0, metavar="K", help="number of the first case (default: 0)"),
-    count("--cases", None, "end after as many cases, if the time suffices"),
-    listed("--kinds", "of cases, such as solve, stream, own-term, sleeper, file (default: all)", "KIND"),
-    count("--jobs", 1, "processes at a time"),
-    listed("--also", "attack.csv of other runs, counted too", "CSV", type=Path, default=[]),
-    *folders("out/attack"),
-)
-def attack(arguments: argparse.Namespace) -> int:
-    """Attack; 1 where something was wrong."""
-    from wholebody.bench.attack import running
-    from wholebody.bench.rows import Row, read_rows
-
-    _check(arguments)
-    earlier = [one for path in arguments.also for one in read_rows(path)[1]]
-    rows: list[Row] = []
-    interrupted = False
-    try:
-        for case, verdict in running.attack(_cases(arguments), arguments.jobs, running.for_seconds(arguments.seconds)):
-            rows.append(running.row(case, verdict))
-            if rows[-1]["outcome"] == "wrong":
-                print(f"WRONG: {case.kind} {case.number}: {rows[-1]['words']}", flush=True)
-            elif len(rows) % 200 == 0:
-                print(f"{len(rows)} cases, {sum(one['outcome'] == 'wrong' for one in rows)} wrong", flush=True)
-            if rows[-1]["outcome"] == "wrong" or running.is_slow(rows[-1]):
-                running.keep(case, verdict, arguments.out)
-    except KeyboardInterrupt:
-        interrupted = True
-    rows += earlier
-    if not rows:
-        raise InputError("no case ended; give more --seconds")
-    rows.sort(key=lambda one: (one["seed"], one["number"]))
-    facts = machine()
-    publish(
-        "attack",
-        running.report(rows, facts),
-        arguments,
-        facts=facts,
-        tables={"attack": rows},
-        page="where-methods-fail.md",
-    )
-    return 130 if interrupted else int(any(one["outcome"] == "wrong" for one in rows))  # exit code after Ctrl-C
-
-
-def _check(arguments: argparse.Namespace) -> None:
-    from wholebody.bench.attack.judging import KINDS
-
-    if not 0.0 < arguments.seconds < 1e9:
-        raise InputError(f"--seconds is {arguments.seconds:g}; give a positive number of seconds")
-    if arguments.seed < 0 or arguments.first < 0:
-        raise InputError("--seed and --first are 0 or more")
-    for kind in arguments.kinds or ():
-        if kind not in KINDS:
-            raise UnknownNameError("kind of case", kind, KINDS, "--kinds")
-
-
-def _cases(arguments: argparse.Namespace) -> Iterator[Case]:
-    from wholebody.bench.attack.judging import Case, kind_of
-
-    kept = (k for k in numbers(arguments.first) if arguments.kinds is None or kind_of(k) in arguments.kinds)
-    for done, number in enumerate(kept):
-        if done == arguments.cases:
-            return
-        yield Case(arguments.seed, number, kind_of(number))

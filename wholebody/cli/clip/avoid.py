@@ -36,7 +36,7 @@ Free motions of collisions of the body with itself, with its equipment and with 
 sweeps between them judge the answer, independently of the method; the exit code is 1 if a collision remains.
 
 Several motions, pieces of equipment or methods are a batch: each motion with each equipment by each method, written
-into a folder with a table (cases.csv, cases.json). Cases that the folder holds are not done again, so an interrupted
+into a folder with a table (cases.csv, cases.jsonl). Cases that the folder holds are not done again, so an interrupted
 batch continues.""",
     *MOTIONS,
     option(

@@ -105,12 +105,13 @@ class PersonShape:
         child = {"upper_arm": "forearm", "forearm": "hand", "thigh": "shank", "shank": "foot"}[part]
         end = np.linalg.inv(self.bind[segment]) @ [*self.at(f"{side}_{child}"), 1.0]
         first, last = balls[0][1], balls[-1][1]
-        start = 0.86 * first if part == "thigh" else first
+        start, top = (0.95 * first, -0.015) if part == "thigh" else (first, 0.0)
         if part == "upper_arm":
             last = 0.5 * (last + caps(self.solids, f"{side}_forearm")[0][1])
         elif part == "forearm":
             start = 0.5 * (first + caps(self.solids, f"{side}_upper_arm")[-1][1])
-        return placed(limb([(np.zeros(3), start), *balls, (end[:3], last)]), self.bind[segment])
+        ends = (np.array([0.0, 0.0, top]), start), (end[:3], last)
+        return placed(limb([ends[0], *balls, ends[1]], 0.040), self.bind[segment])
 
     def _claims(self, segments: Sequence[str]) -> list[Claim]:
         """Claims of limbs by their fields, of the trunk's segments by their heights, of halves at the joints."""
@@ -121,9 +122,15 @@ class PersonShape:
             if name in segments:
                 found.append(Claim(name, _between(self._trunk, low, high)))
         for segment in segments:
+            side, _, part = segment.partition("_")
             if segment in self._limbs:
-                found.append(Claim(segment, self._limbs[segment]))
-            part = segment.partition("_")[2]
+                found.append(Claim(segment, self._limbs[segment], 0.020 if part == "upper_arm" else 0.014))
+            if part == "clavicle":
+                found.append(Claim(segment, self._trapezius(side)))
+            if part == "thigh":
+                found.append(Claim("pelvis", self._buttock(dict(SIDES)[side])))
+            if part == "upper_arm":  # a raised arm pulls the flank along
+                found.append(Claim(f"{segment}/half", grown(self._armpit(side)[1], -0.006), 0.022))
             if part in HALVES:
                 radius = {"upper_arm": 0.050, "forearm": 0.040, "hand": 0.026, "thigh": 0.085, "shank": 0.055}[part]
                 reach = radius * self.size.stature / 1.75
@@ -137,23 +144,12 @@ class PersonShape:
         neck = self.at("neck")
         solids = [self._trunk]
         for side, sign in SIDES:
-            shoulder = self.at(f"{side}_upper_arm")
             solids += [
                 self._limbs[f"{side}_clavicle"],
                 union([self._limbs[f"{side}_upper_arm"], self._limbs[f"{side}_forearm"]], 0.008),
-                round_cone(
-                    neck + np.array([-0.030, sign * 0.030, 0.012]) * scale,
-                    shoulder + np.array([-0.004, -sign * 0.012, 0.012]) * scale,
-                    0.046 * scale,
-                    0.036 * scale,
-                ),
+                self._trapezius(side),
+                *self._armpit(side),
             ]
-            solids.append(
-                ellipsoid(
-                    (shoulder[0] + 0.018 * scale, shoulder[1] - sign * 0.062 * scale, shoulder[2] - 0.085 * scale),
-                    np.array([0.075, 0.050, 0.100]) * scale,
-                )
-            )
             if size.body.sex == "female":
                 chest = self.at("thorax", (0.0, 0.0, 0.0))
                 front = self._trunk_ends(float(chest[2]) - 0.01 * scale)[1]
@@ -180,20 +176,32 @@ class PersonShape:
         claims = self._claims([name for name in segments if name != "neck"])
         return Garment("shirt", COLORS.shirt, body, low, high, 0.020, claims, cuts)
 
+    def _trapezius(self, side: str) -> Field:
+        """The slope from the side of the neck to the end of the shoulder."""
+        scale, sign = self.size.stature / 1.75, dict(SIDES)[side]
+        high = self.at("neck", np.array([-0.022, sign * 0.024, 0.028]) * scale)
+        low = self.at(f"{side}_upper_arm") + np.array([-0.006, -sign * 0.016, 0.004]) * scale
+        return round_cone(high, low, 0.036 * scale, 0.034 * scale)
+
+    def _armpit(self, side: str) -> list[Field]:
+        """Folds before and behind the armpit: from the chest and from the flank to the upper arm."""
+        scale, sign, radius = self.size.stature / 1.75, dict(SIDES)[side], 0.5 * self.person.radius("upper_arm")
+        folds = []
+        for trunk_part, start, ahead in (
+            ("thorax", (0.055, sign * 0.080, 0.045), 0.016),
+            ("lower_thorax", (-0.040, sign * 0.090, 0.060), -0.016),
+        ):
+            end = self.at(f"{side}_upper_arm", np.array([ahead, 0.0, -0.055]) * scale)
+            folds.append(round_cone(self.at(trunk_part, np.array(start) * scale), end, 0.045 * scale, radius))
+        return folds
+
     def _trousers(self) -> Garment:
         scale = self.size.stature / 1.75
-        hips = self.at("pelvis")
         solids = [self._trunk]
         for side, sign in SIDES:
-            back = self._trunk_ends(float(hips[2]) - 0.01 * scale)[0]
             legs = [self._limbs[f"{side}_thigh"], self._limbs[f"{side}_shank"], self._calf(side, sign)]
             solids.append(union(legs, 0.03))
-            solids.append(
-                ellipsoid(
-                    (back + 0.075 * scale, sign * 0.072 * scale, hips[2] - 0.030 * scale),
-                    np.array([0.080, 0.078, 0.085]) * scale,
-                )
-            )
+            solids.append(self._buttock(sign))
         body = grown(union(solids, 0.04 * scale), 0.003)  # m of cloth below the shirt
         cuts = [half_space((0.0, 0.0, self._belt()), (0.0, 0.0, 1.0))]
         for side, _ in SIDES:
@@ -207,6 +215,12 @@ class PersonShape:
         points = [self.at(name) for name in [*segments, *self._sided("foot")]]
         low, high = bounds([*points, np.array([0.0, 0.0, self._belt()])], 0.13 * scale + 0.04)
         return Garment("trousers", COLORS.trousers, body, low, high, 0.024, self._claims(segments), cuts)
+
+    def _buttock(self, sign: float) -> Field:
+        scale, height = self.size.stature / 1.75, float(self.bind["pelvis"][2, 3])
+        back = self._trunk_ends(height - 0.01 * scale)[0]
+        middle = (back + 0.075 * scale, sign * 0.072 * scale, height - 0.030 * scale)
+        return ellipsoid(middle, np.array([0.080, 0.078, 0.085]) * scale)
 
     def _calf(self, side: str, sign: float) -> Field:
         length, radius = self.person.length("left_shank"), self.person.radius("calf")

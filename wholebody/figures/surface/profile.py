@@ -63,15 +63,18 @@ def _contains(outer: Field, solid: Solid) -> bool:
     return bool((outer(ends) + float(solid.geometry.radius) < 1e-6).all())
 
 
-def limb(balls: Sequence[tuple[Array, float]]) -> Field:
-    """A smooth solid around balls in a row, centres (3,) and radii: middle line and radius run evenly along them."""
+def limb(balls: Sequence[tuple[Array, float]], smoothing: float = SMOOTHING) -> Field:
+    """A smooth solid around balls in a row, centres (3,) and radii: middle line and radius run evenly along them.
+
+    `smoothing` is the standard deviation along them, metres: cloth spans the hollows between muscles.
+    """
     centers, radii = np.array([center for center, _ in balls]), np.array([radius for _, radius in balls])
     start, span = centers[0], centers[-1] - centers[0]
     length = float(np.linalg.norm(span))
     along = span / length
     at = np.maximum.accumulate((centers - start) @ along)
     places = np.arange(0.0, length + LEVEL, LEVEL)
-    sigma = SMOOTHING / LEVEL
+    sigma = smoothing / LEVEL
     radius = gaussian_filter1d(np.interp(places, at, radii), sigma, mode="nearest")
     middle = np.column_stack([np.interp(places, at, centers[:, k]) for k in range(3)])
     middle = gaussian_filter1d(middle - np.outer(places, along), sigma, axis=0, mode="nearest")
@@ -104,7 +107,8 @@ def trunk(pieces: Field, low: float, high: float, x: float) -> Field:
 
     def smooth(values: Array, *, around: bool) -> Array:
         kept = maximum_filter1d(values, wide_enough) if around else values
-        return np.asarray(gaussian_filter1d(kept, SMOOTHING / LEVEL, mode="nearest"))
+        # an outline ends in nothing, so that shoulders slope up to the neck
+        return np.asarray(gaussian_filter1d(kept, SMOOTHING / LEVEL, mode="constant" if around else "nearest"))
 
     depth, side, middle = smooth(depth, around=True), smooth(side, around=True), smooth(middle, around=False)
 

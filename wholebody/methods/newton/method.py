@@ -43,7 +43,7 @@ class Newton(Settings, Descends):
         InputError: a value of the wrong kind, shape or range.
 
     Examples:
-        >>> wb.solve(problem, wb.Newton(iterations=100)).status
+        >>> wb.solve(problem, wb.methods.Newton(iterations=100)).status
         'solved'
     """
 

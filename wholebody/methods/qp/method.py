@@ -62,7 +62,7 @@ class QP(Settings, Descends):
         UnknownNameError: there is no such QP solver.
 
     Examples:
-        >>> wb.solve(problem, wb.QP(tolerance=1e-8, seed=1)).status
+        >>> wb.solve(problem, wb.methods.QP(tolerance=1e-8, seed=1)).status
         'solved'
     """
 

@@ -58,9 +58,9 @@ class Bisection(Checked):
         frozen: joints and groups that stay as they are; None for a free root, unless a frame cannot be freed so.
             ("root", "lower_body") moves the upper body alone.
         room: least distance in predicted postures of what overlapped, metres.
-        method: predicts postures: a name or a method such as `wb.QP(solver="daqp")`. "qp" is
-            `wb.QP(restarts=0, iterations=50)`, ended after `short` programs where another start or way is left: a
-            free root too is let go where no start frees a frame in so many.
+        method: predicts postures: a name or a method such as `wb.methods.QP(solver="daqp")`. "qp" is
+            `wb.methods.QP(restarts=0, iterations=50)`, ended after `short` programs where another start or way is left:
+            a free root too is let go where no start frees a frame in so many.
         character: radians and metres that interpolation between evaluation points may miss of the original; less
             follows the original more closely and predicts more postures.
         short: programs after which a prediction of "qp" is ended where others may be tried.

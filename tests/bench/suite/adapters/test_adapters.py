@@ -101,7 +101,7 @@ def test_out_of_reach_by_a_metre_is_not_called_solved(adapter: Adapter, reach: w
 def test_what_it_cannot_express_is_refused_by_name(adapter: Adapter, table: wb.Problem) -> None:
     if f"{adapter.name}/".startswith(("qp/", "newton/")):
         pytest.skip("it takes every term that there is")
-    refused = [wb.Plane("head", (0, 0, 1), side="above"), wb.ReachCones()]
+    refused = [wb.Plane("head", (0, 0, 1), side="above"), wb.tasks.ReachCones()]
     problem = wb.Problem(table.scene, goals=table.goals, constraints=refused)
     with pytest.raises(InputError, match=r"Plane|ReachCones"):
         adapter.make(1e-4, None).solve(problem)

@@ -72,6 +72,14 @@ def test_our_step_keeps_the_speed_of_the_root_too(name: str, short_contact: Trac
     assert 0.0 <= tool.remarks()["exact"] <= 1.0
 
 
+def test_a_goal_that_is_replaced_leads_where_one_that_moves_does(short_contact: Track) -> None:
+    tools = [make_tool(name, short_contact) for name in ("wholebody", "wholebody/retarget")]
+    for target in short_contact.targets[:12]:
+        for tool in tools:
+            tool.step(target)
+        assert np.allclose(*(tool.posture() for tool in tools), atol=1e-12)
+
+
 @pytest.mark.parametrize(("name", "most"), [("free", 0.265), ("contact", 0.62)])
 def test_our_steps_jolt_joints_about_as_little_as_the_best_peers(name: str, most: float) -> None:
     """In rad/s^2; pink has 0.2654 and 0.551 from arms at 0.3 rad."""

@@ -85,7 +85,7 @@ class Fake:
         if self.does == "compiles" and "COMPILED" not in os.environ:
             os.environ["COMPILED"] = "in this process"
             time.sleep(COMPILING)
-        solution = wb.QP(solver="daqp", tolerance=self.tolerance).solve(problem)
+        solution = wb.methods.QP(solver="daqp", tolerance=self.tolerance).solve(problem)
         if self.does == "nan":
             return replace(solution, q=np.full_like(solution.q, np.nan))
         if self.does == "lies":

@@ -49,7 +49,7 @@ def folder(asked: Settings, tmp_path_factory: pytest.TempPathFactory) -> Path:
         records += [record("lies", number, 10.0**-k, 0.001 * k, 0.4) for k in (2, 4, 6)]
         records.append(Record("arm", number, "refuses", 1e-4, 0, REFUSED, said=REFUSAL))
         records.append(Record("arm", number, "hangs", 1e-4, 0, OVERTIME, said="ended after 20 s"))
-        store.add(Chunk("arm", number, tuple(records)))
+        store.add(f"arm {number}", Chunk("arm", number, tuple(records)))
     missing = {"mink": "pip install 'wholebody[compare]'"}
     given = publishing.publish(asked, store, place / "out", FACTS, missing)
     publishing.to_docs(given, place / "out", docs)

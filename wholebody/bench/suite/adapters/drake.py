@@ -27,7 +27,8 @@ class Drake(OneCall["_Plant"]):
     name = "drake"
     loose = (*few(10, 20, 50), *((tolerance, None) for tolerance in (1e-2, 1e-3, 1e-4, 1e-5)))
     kinds = (
-        wb.Displacement, wb.Effort, wb.Frame, wb.Freeze, wb.Hold, wb.Orientation, wb.Point, wb.Relative, wb.StepLimit,
+        wb.tasks.Displacement, wb.Effort, wb.Frame, wb.Freeze, wb.Hold, wb.Orientation, wb.Point, wb.Relative,
+        wb.tasks.StepLimit,
     )  # fmt: skip
     way = "by one nonlinear program"
     failure = "SNOPT found no posture that meets goals and constraints"

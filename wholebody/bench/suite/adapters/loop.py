@@ -52,8 +52,8 @@ class Loop(Outside[Stepper], ABC):
     margin: ClassVar[float] = 7e-4
     out: ClassVar[float] = 0.1
     kinds: ClassVar[tuple[type, ...]] = (
-        wb.CenterOfMass, wb.Displacement, wb.Effort, wb.Frame, wb.Freeze, wb.Orientation, wb.Point, wb.Posture,
-        wb.Relative, wb.StepLimit,
+        wb.CenterOfMass, wb.tasks.Displacement, wb.Effort, wb.Frame, wb.Freeze, wb.Orientation, wb.Point, wb.Posture,
+        wb.Relative, wb.tasks.StepLimit,
     )  # fmt: skip
 
     def __init__(self, tolerance: float, iterations: int | None = None) -> None:
@@ -116,7 +116,7 @@ def posture_costs(problem: Problem) -> list[PostureCost]:
     """The measures, with weights of at most 1."""
     found = []
     for measure in problem.measures:
-        if isinstance(measure, (wb.Effort, wb.Displacement)):
+        if isinstance(measure, (wb.Effort, wb.tasks.Displacement)):
             weights = measure.distance.weights
             share = measure.weight / max(float(weights.max()), 1e-12)
             found.append(PostureCost(measure.distance.reference, share * weights))

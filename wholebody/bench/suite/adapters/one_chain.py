@@ -59,7 +59,7 @@ class OneChain(OneCall[Chain], ABC):
     """A solver of one frame's placement as a method. It has no count of iterations."""
 
     loose = tuple((tolerance, None) for tolerance in (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8))
-    kinds = (wb.Displacement, wb.Effort, wb.Frame)
+    kinds = (wb.tasks.Displacement, wb.Effort, wb.Frame)
 
     @abstractmethod
     def values(self, chain: Chain, start: Array, target: pin.SE3) -> Any:

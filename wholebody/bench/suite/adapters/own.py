@@ -21,6 +21,9 @@ from wholebody.methods.qp.step_program import QPStep
 from wholebody.tasks.base import Goal, Surroundings, filled
 from wholebody.tasks.residuals import point_rows
 
+RETARGET = "retarget"
+"""In place of a solver: a new `Point` and `Problem.retarget` at each step, where others move a target in place."""
+
 NEWTONS: dict[str, dict[str, Any]] = {
     "slack": {"inequalities": "slack"},
     "barrier": {"inequalities": "barrier"},
@@ -51,7 +54,7 @@ def one_start(family: str) -> Adapter:
     """The method of "qp", "newton" or "ccd" that has one start, as methods have that know no other."""
     known: dict[str, tuple[Adapter, Callable[..., Method]]] = {
         "qp": (qp_adapter(""), partial(QP, budget=0, restarts=0)),
-        "newton": (newton_adapter("slack"), partial(wb.Newton, restarts=0)),
+        "newton": (newton_adapter("slack"), partial(wb.methods.Newton, restarts=0)),
         "ccd": (ccd_adapter(), partial(wb.methods.CCD, restarts=0)),
     }
     adapter, kind = known[family]
@@ -75,7 +78,7 @@ def dls_adapter() -> Adapter:
 
 def newton_adapter(way: str) -> Adapter:
     """Sparse Newton in full coordinates, in one of the ways of `NEWTONS`."""
-    make = partial(made, partial(wb.Newton, **NEWTONS[way]), {"restarts": 0})
+    make = partial(made, partial(wb.methods.Newton, **NEWTONS[way]), {"restarts": 0})
     return Adapter(f"newton/{way}", make, (*few(3, 6, 12, 25), *LADDER[1:]))
 
 
@@ -112,28 +115,28 @@ class MovingPoint(Goal):
         return place - self.target, Wrench(point_rows(place), self._joint)
 
 
-def reach_problem(track: Track, **terms: Any) -> tuple[wb.Problem, MovingPoint]:
-    """The problem of a reach with its feet and bounds on speed, and its goal, whose target is moved afterwards."""
-    goal = MovingPoint(track.tip, np.array(track.targets[0]))
+def reach_problem(track: Track, goal: Goal) -> wb.Problem:
+    """The problem of a reach with its feet and bounds on speed."""
     speed, turn = (SETTING.root_speed, SETTING.root_turn) if track.floating else (np.inf, np.inf)
-    bound = wb.StepLimit(SETTING.joint_speed, root_velocity=speed, root_turn=turn)
+    bound = wb.tasks.StepLimit(SETTING.joint_speed, root_velocity=speed, root_turn=turn)
     kept: list[Any] = [*(wb.Hold(foot) for foot in track.feet), bound]
-    stated = wb.Problem(
-        track.scene, track.start, goals=[goal], constraints=kept, clearance=track.clearance, **terms
+    # the other tools cannot be told of what a person keeps
+    return wb.Problem(
+        track.scene, track.start, goals=[goal], constraints=kept, measures=[wb.tasks.Displacement()],
+        clearance=track.clearance, range_of_motion=False, balance=False,
     )  # fmt: skip
-    return stated, goal
 
 
 class OwnTool(Tool):
     """One program a step, with the workspace of the step before."""
 
     def __init__(self, track: Track, solver: str = "") -> None:
-        """State the problem; the target is moved afterwards. The solver is one of `qp_settings`."""
-        self.name = f"wholebody/{solver}" if solver else "wholebody"
-        # the other tools cannot be told of what a person keeps
-        self.problem, goal = reach_problem(track, measures=[wb.Displacement()], range_of_motion=False, balance=False)
-        self._target = goal.target
-        self._tracker = wb.QP(**qp_settings(solver)).tracker(self.problem, SETTING.dt)
+        """State the problem; the solver is one of `qp_settings`, or `RETARGET` for a goal that is replaced."""
+        self.name, self._tip = f"wholebody/{solver}" if solver else "wholebody", track.tip
+        self._moved = None if solver == RETARGET else MovingPoint(track.tip, np.array(track.targets[0]))
+        self.problem = reach_problem(track, self._moved or wb.Point(track.tip, track.targets[0]))
+        solver = "" if solver == RETARGET else solver
+        self._tracker = wb.methods.QP(**qp_settings(solver)).tracker(self.problem, SETTING.dt)
         self._q = np.array(track.start)
         self._told: list[QPStep] = []
 
@@ -144,7 +147,10 @@ class OwnTool(Tool):
 
     def step(self, target: Array) -> None:
         """Move one step."""
-        self._target[:] = target
+        if self._moved is None:
+            self.problem.retarget([wb.Point(self._tip, target)])
+        else:
+            self._moved.target[:] = target
         step = self._tracker.step(self._q)
         self._q = step.q
         self._told.append(step)

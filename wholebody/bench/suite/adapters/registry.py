@@ -16,7 +16,15 @@ from wholebody.base.errors import MissingPackageError, UnknownNameError
 from wholebody.base.files import packaged_toml
 from wholebody.bench.measure.track import Track
 from wholebody.bench.suite.adapters.base import LADDER, Adapter, Outside, Tool, made
-from wholebody.bench.suite.adapters.own import NEWTONS, ccd_adapter, dls_adapter, newton_adapter, one_start, qp_adapter
+from wholebody.bench.suite.adapters.own import (
+    NEWTONS,
+    RETARGET,
+    ccd_adapter,
+    dls_adapter,
+    newton_adapter,
+    one_start,
+    qp_adapter,
+)
 from wholebody.bench.suite.adapters.starts import ONE, STARTS, restarted
 from wholebody.methods.base import Method
 from wholebody.methods.qp.solvers.registry import solver_names
@@ -148,12 +156,13 @@ def _texts() -> dict[str, Any]:
 def stepping() -> tuple[str, ...]:
     """Every tool that follows reaches: an adapter, of which qp is called wholebody here."""
     ours = (f"wholebody/{solver}" for solver in ("active_set", "osqp", "daqp", *_texts()["solvers"]))
-    return "wholebody", *ours, "placo", "placo/pruned", "pink", "mink"
+    return "wholebody", f"wholebody/{RETARGET}", *ours, "placo", "placo/pruned", "pink", "mink"
 
 
 def chosen_tools(names: Iterable[str] | None = None) -> tuple[str, ...]:
     """Names of tools, all installed ones where None; UnknownNameError or MissingPackageError for one that is not."""
-    rows = {name: _rows()[name.replace("wholebody", "qp")] for name in stepping()}
+    known = _rows()
+    rows = {name: known[name.replace("wholebody", "qp").removesuffix(f"/{RETARGET}")] for name in stepping()}
     if names is None:
         return tuple(name for name, row in rows.items() if row.installed())
     chosen = tuple(names)

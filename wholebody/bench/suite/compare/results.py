@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
-import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -13,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.base.errors import FileFormatError, InputError, one_line
+from wholebody.base.records import RecordFile
 from wholebody.bench.suite.adapters.base import Budget
 
 DEFAULT: Budget = (1e-4, None)
@@ -222,25 +220,22 @@ class Chunk:
     kernel: float = 0.0
     fault: str = ""
 
+    @property
+    def key(self) -> str:
+        """Which case it is."""
+        return f"{self.set} {self.number}"
 
-class Store:
-    """The file of a run."""
+
+class Store(RecordFile[Chunk]):
+    """The file of a run; InputError for a run with other settings, FileFormatError for another file."""
 
     def __init__(self, folder: Path, settings: Mapping[str, Any]) -> None:
-        """Open or begin the file; InputError for a run with other settings, FileFormatError for another file."""
-        self.path = folder / NAME
-        folder.mkdir(parents=True, exist_ok=True)
-        self.chunks: list[Chunk] = []
-        wanted = json.loads(json.dumps(settings))
-        if self.path.exists() and self.path.stat().st_size:
-            self._resume(wanted)
-        else:
-            self._append(wanted)
+        super().__init__(folder / NAME, "records of wholebody bench compare", _chunk, settings)
 
-    def add(self, chunk: Chunk) -> None:
-        """Keep a chunk, on the disk before this returns."""
-        self.chunks.append(chunk)
-        self._append(asdict(chunk))
+    @property
+    def chunks(self) -> list[Chunk]:
+        """All chunks, in the order in which they came."""
+        return list(self.kept.values())
 
     @property
     def records(self) -> list[Record]:
@@ -248,32 +243,6 @@ class Store:
         chunks = sorted(self.chunks, key=lambda chunk: (chunk.set, chunk.number))
         return [record for chunk in chunks for record in chunk.records]
 
-    def _append(self, value: Any) -> None:
-        with self.path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(value) + "\n")
-            file.flush()
-            os.fsync(file.fileno())
 
-    def _resume(self, wanted: Any) -> None:
-        data = self.path.read_bytes()
-        whole = data[: data.rfind(b"\n") + 1]
-        lines = whole.decode("utf-8").splitlines()
-        if not lines:
-            raise FileFormatError(f"{self.path}: it was cut off before its first line; remove it and run again")
-        try:
-            found, *chunks = [json.loads(line) for line in lines]
-            for value in chunks:
-                records = tuple(Record(**each) for each in value.pop("records"))
-                self.chunks.append(Chunk(records=records, **value))
-        except (ValueError, TypeError, KeyError) as error:
-            raise FileFormatError(f"{self.path}: not a file of this command ({error}); give another --out") from None
-        if found != wanted:
-            name = next(key for key in {**wanted, **found} if found.get(key) != wanted.get(key))
-            raise InputError(
-                f"{self.path.parent} holds a run with {name} = {one_line(str(found.get(name)), 80)}, "
-                f"and {one_line(str(wanted.get(name)), 80)} is asked for; give another --out, or the settings "
-                "of that run to go on with it"
-            )
-        if len(whole) < len(data):
-            with self.path.open("r+b") as file:
-                file.truncate(len(whole))
+def _chunk(plain: dict[str, Any]) -> Chunk:
+    return Chunk(records=tuple(Record(**each) for each in plain.pop("records")), **plain)

@@ -225,11 +225,11 @@ def run(
     done = {(chunk.set, chunk.number) for chunk in store.chunks}
     end = began + 60.0 * settings.minutes - before / jobs
     for chunk in spread(work, _tasks(settings, plan, done, end), jobs, cluster):
-        store.add(chunk)
+        store.add(chunk.key, chunk)
         plan.note(chunk)
         worked = before + jobs * (time.perf_counter() - began)
         total = max(plan.seconds(plan.allowed()), worked)
-        tell(Progress(worked, total, f"{chunk.set} {chunk.number}"))
+        tell(Progress(worked, total, chunk.key))
     _check_built(store)
     return store
 

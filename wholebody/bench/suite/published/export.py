@@ -155,7 +155,7 @@ def _best(case: Case, body: BodyFiles, rebuilt: Rebuilt, proof: Score) -> float:
     problem = copy.copy(case.problem)
     problem.measures = tuple(term for term in problem.measures if isinstance(term, wb.Effort))
     # The effort to compare with is that of an exact answer.
-    found = wb.QP(tolerance=1e-7, time_limit=math.inf).solve(problem)
+    found = wb.methods.QP(tolerance=1e-7, time_limit=math.inf).solve(problem)
     score = rebuilt.score(np.array(body.posture(found.q)))
     return min(proof.effort, score.effort) if score.worst <= EXACT else proof.effort
 

@@ -1,8 +1,7 @@
-"""Inputs that are not what they should be: mutated files of every kind, paths to nothing, and odd arguments."""
+"""Files that are not what they should be: mutated ones of every kind, and paths to nothing."""
 
 from __future__ import annotations
 
-import ast
 import re
 from collections.abc import Callable, Mapping
 from functools import cache, partial
@@ -13,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.bench.attack.judging import CORPUS, Verdict, chosen
+from tests.audits.attack.judging import CORPUS, Verdict, chosen
 from wholebody.figures.packaged_urdf import task_paths, urdf_path
 from wholebody.taskfile import read_result, read_task
 
@@ -239,63 +238,3 @@ def _figure(figure: wb.Figure) -> Verdict:
         if not np.isfinite(q).all() or not pin.isNormalized(model, q, 1e-6):
             return Verdict("wrong", f"a robot was taken whose posture {name!r} is not made of numbers")
     return Verdict("right", "a robot was taken")
-
-
-def argument(rng: np.random.Generator, folder: Path) -> Verdict:
-    """A call with one odd argument, seldom two."""
-    calls, odd = calls_that_are_right(), _corpus("odd.txt")
-    name, arguments = calls[int(rng.integers(len(calls)))]
-    given = dict(arguments)
-    for key in rng.permutation(list(arguments))[: 1 if rng.random() < 0.85 else 2]:
-        given[str(key)] = odd[int(rng.integers(len(odd)))]
-    return called(name, given, folder)
-
-
-def called(name: str, given: dict[str, str], folder: Path) -> Verdict:
-    """Call a public callable with arguments, as Python by their names ("*" without one), and use what it makes."""
-    (folder / "robot.urdf").write_bytes((CORPUS / "two-links.urdf").read_bytes())
-    robot = folder / "robot.urdf"
-    figure = wb.load(robot)
-    scene = wb.Scene(figure).add(wb.Sphere(0.1), name="ball", at=(0.5, 0.5, 0.5))
-    problem = wb.Problem(scene, goals=[wb.Point("link2", (0.1, 0.0, 0.5))])
-    known = {"np": np, "pin": pin, "wb": wb, "Path": Path, "task_paths": task_paths}
-    known |= {"robot": robot, "figure": figure, "scene": scene, "problem": problem}
-    call = f"{name}({', '.join(f'*({v},)' if key == '*' else f'{key}={v}' for key, v in given.items())})"
-    try:
-        _use(eval(call, known), problem)
-    except wb.WholebodyError as error:
-        return refused(error)
-    return Verdict("right", f"{call[:200]} was taken")
-
-
-def _use(made: Any, problem: wb.Problem) -> None:
-    scene, qp = problem.scene, wb.QP(budget=5)
-    roles: dict[str, type] = {"goals": wb.Goal, "constraints": wb.Constraint, "measures": wb.Measure}
-    role: Any = {name: [made] for name, kind in roles.items() if isinstance(made, kind)}
-    if role:
-        wb.solve(wb.Problem(scene, **role), method=qp)
-    elif isinstance(made, wb.Shape):
-        scene.add(made, name="made", at=(3, 0, 0)).contacts(scene.figure.neutral)
-    elif isinstance(made, wb.Problem):
-        wb.solve(made, method=qp)
-    elif hasattr(made, "solve"):
-        wb.solve(problem, method=made)
-
-
-@cache
-def calls_that_are_right() -> list[tuple[str, dict[str, str]]]:
-    """Public callables with arguments that are right, both as Python."""
-    return [_call(line) for line in _corpus("calls.txt")]
-
-
-def _call(line: str) -> tuple[str, dict[str, str]]:
-    node = ast.parse(line, mode="eval").body
-    assert isinstance(node, ast.Call)
-    given = {str(each.arg): ast.get_source_segment(line, each.value) or "" for each in node.keywords}
-    if node.args:
-        given["*"] = ast.get_source_segment(line, node.args[0]) or ""
-    return ast.get_source_segment(line, node.func) or "", given
-
-
-def _corpus(name: str) -> list[str]:
-    return (CORPUS / name).read_text(encoding="utf-8").splitlines()

@@ -11,8 +11,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench.attack.judging import Pairs, Verdict, judge
-from wholebody.bench.attack.solves import verdict
+from tests.audits.attack.judging import Pairs, Verdict, judge
+from tests.audits.attack.solves import verdict
 from wholebody.bench.suite.stability.bodies import Builder, planar_arm, sliding_tool
 
 REACHED = (0.6, 0.0, 0.0)
@@ -94,7 +94,7 @@ def solved(arm: wb.Scene) -> tuple[wb.Problem, list[wb.Goal], wb.Solution]:
 
 def judged(problem: wb.Problem, goals: Sequence[wb.Goal], solution: wb.Solution, *, witness: bool) -> Verdict:
     found = judge(problem, goals, [], solution.q)
-    return verdict(problem, found, solution, tolerance=wb.QP().tolerance, witness=witness, seconds=0.1)
+    return verdict(problem, found, solution, tolerance=wb.methods.QP().tolerance, witness=witness, seconds=0.1)
 
 
 def outcome(solved: tuple[wb.Problem, list[wb.Goal], wb.Solution], **changed: Any) -> tuple[str, str]:

@@ -15,8 +15,8 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
+from tests.audits.attack.judging import Verdict, chosen
 from wholebody.base.arrays import Array
-from wholebody.bench.attack.judging import Verdict, chosen
 from wholebody.bench.suite.problem_sets.things import turned
 from wholebody.figures.state import State, Wrench
 from wholebody.problem import Problem
@@ -75,7 +75,7 @@ def _asked(kind: str, rng: np.random.Generator) -> Contact:
     if kind == "Lean":
         turn = 0.5 * rng.uniform(-0.5, 0.5)
         at = (rng.uniform(-0.6, -0.25), rng.uniform(-0.3, 0.3), 1.0, 0.0, 0.0, np.sin(turn), np.cos(turn))
-        return {"thing": (wb.Box((0.05, 2.0, 2.0)), at)}, wb.Lean("thing"), ["thorax"]
+        return {"thing": (wb.Box((0.05, 2.0, 2.0)), at)}, wb.tasks.Lean("thing"), ["thorax"]
     if kind == "Stand":
         place = rng.uniform((-0.1, -0.2, -0.15), (0.3, 0.2, 0.1))
         return {"thing": (wb.Box((0.6, 0.8, 0.3)), place)}, wb.Stand("thing"), ["left_foot", "right_foot"]
@@ -224,7 +224,7 @@ def own_term(rng: np.random.Generator, folder: Path) -> Verdict:
     constraints = [_Keep(asked)] if constrained else []
     problem = wb.Problem(wb.Scene(figure), goals=[_Reach(asked)], constraints=constraints, measures=[_Low(asked)])
     if method == "tracker":
-        tracker, q = wb.QP().tracker(problem, 0.05), problem.start
+        tracker, q = wb.methods.QP().tracker(problem, 0.05), problem.start
         for _ in range(30):
             q = tracker.step(q).q
         return own_verdict(problem, asked, q)

@@ -13,9 +13,9 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
+from tests.audits.attack.judging import Judged, Pairs, Verdict, chosen, judge
+from tests.audits.attack.scenes import Body, Thing, body, clear, inside, xyzquat
 from wholebody.base.arrays import Array
-from wholebody.bench.attack.judging import Judged, Pairs, Verdict, chosen, judge
-from wholebody.bench.attack.scenes import Body, Thing, body, clear, inside, xyzquat
 from wholebody.bench.suite.problem_sets.things import Occupied
 from wholebody.methods import installed_methods
 from wholebody.methods.solve import method_named
@@ -60,12 +60,18 @@ def case(rng: np.random.Generator, folder: Path) -> Verdict:
 def _methods() -> tuple[Any, ...]:
     """Mostly qp as it comes, and every other method now and then."""
     others = (method_named(name) for name in installed_methods() if name != "qp")
-    return *(wb.QP(),) * 12, wb.QP(tolerance=1e-8), wb.QP(measures=False), wb.QP(solver="daqp"), *others
+    return (
+        *(wb.methods.QP(),) * 12,
+        wb.methods.QP(tolerance=1e-8),
+        wb.methods.QP(measures=False),
+        wb.methods.QP(solver="daqp"),
+        *others,
+    )
 
 
 def _measures() -> tuple[Any, ...]:
-    effort, little = [wb.Effort(), wb.Discomfort(weight=0.1)], [wb.PotentialEnergy(weight=0.01)]
-    return None, None, None, [], effort, [wb.Displacement()], little, [wb.Discomfort()]
+    effort, little = [wb.Effort(), wb.tasks.Discomfort(weight=0.1)], [wb.tasks.PotentialEnergy(weight=0.01)]
+    return None, None, None, [], effort, [wb.tasks.Displacement()], little, [wb.tasks.Discomfort()]
 
 
 def scene_of(figure: Body, things: Sequence[Thing]) -> wb.Scene:
@@ -174,7 +180,7 @@ def _hold(
         terms.constraints.append(wb.Freeze(*some))
     if figure.people and rng.random() < 0.1:
         terms.feasible = False  # whether the witness balances is not looked at
-        terms.constraints.append(wb.Balance() if rng.random() < 0.7 else wb.ReachCones())
+        terms.constraints.append(wb.Balance() if rng.random() < 0.7 else wb.tasks.ReachCones())
 
 
 def verdict(

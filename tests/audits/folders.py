@@ -1,4 +1,4 @@
-"""`wholebody bench files`: what is read of a folder's files, and recordings retargeted by wholebody and by mink.
+"""What is read of a folder's files, and recordings retargeted by wholebody and by mink.
 
 mink follows frame by frame as General Motion Retargeting does (Araujo and others, Retargeting Matters, 2025;
 `motion_retarget.py` and `bvh_to_g1.json` of github.com/YanjieZe/GMR): targets of frames, two stages of weights, no
@@ -35,6 +35,14 @@ from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.motion.stance import paths
 from wholebody.motion.standing_ground import ground
 from wholebody.motion.structure import upright
+
+ABOUT = """\
+Recordings retargeted by `wb.retarget` on the ground that it finds, and by mink frame by frame with the stages, \
+weights and damping of General Motion Retargeting, without contact; there rotations and lengths of limbs come from \
+the rest postures, as here. Both are judged alike: bones by the angle to the recording's, overlaps with the floor \
+and the body itself by `wb.check`, slide as the speed of ankles and toes while those of the recording rest, jerk of \
+all joints' places in parts of the recording's at the same size. Times are the processor's, with the model's set-up."""
+"""What the report on `compare` says above its tables."""
 
 ROBOTS, MESHES, SKELETONS = (
     (".urdf", ".xml"),

@@ -24,10 +24,10 @@ from wholebody.scene.scene import Scene
 Outcome = Literal["right", "refused", "gave up", "wrong"]
 
 CORPUS = Path(__file__).parent / "corpus"
-"""Small files of every kind that people give to the package, each right as it stands, and calls that are right."""
+"""Small files of every kind that people give to the package, each right as it stands."""
 
 PATTERN = (
-    ("file", "solve", "file", "argument") * 4
+    ("file", "solve", "file") * 4
     + ("file", "sweep", "file", "solve") * 3
     + ("file", "solve", "file", "stream") * 2
     + ("file", "solve", "file", "contact")
@@ -36,7 +36,18 @@ PATTERN = (
     + ("file", "put")
 )
 """Kinds of cases in turn: two mutated files for each solve."""
-KINDS = tuple(dict.fromkeys(PATTERN))
+KINDS = {
+    "file": "mutated tasks, tracks, results, robots and meshes",
+    "solve": "solves, judged by coal over all pairs and by Pinocchio",
+    "sweep": "sweeps against a fine subdivision",
+    "stream": "streams of moving goals and things, every step and the motion between two",
+    "contact": "contacts, against the effort of a point or frame at the place found",
+    "own-term": "solves and steps with terms of one's own that are not finite, or answer something odd",
+    "pairs": "things in each other, against every two pieces",
+    "sleeper": "sleeping bodies whose support slides, turns, jumps or leaves",
+    "weights": "goals of one frame with weights from 1 to 1e6, met in at most thrice the frames of equal ones",
+    "put": "things that are put into a figure that is shown, every frame free or told",
+}
 
 
 class Verdict(NamedTuple):
@@ -61,7 +72,7 @@ class Case(NamedTuple):
 
     def rng(self) -> np.random.Generator:
         """Return a generator that depends on the case alone."""
-        return np.random.default_rng([self.seed, self.number, KINDS.index(self.kind)])
+        return np.random.default_rng([self.seed, self.number, [*KINDS].index(self.kind)])
 
     @property
     def name(self) -> str:
@@ -164,7 +175,7 @@ def judge(problem: Problem, goals: Sequence[Any], constraints: Sequence[Any], q:
     body = _Body(scene.model, start, q)
     held = [value for term in constraints for value in body.constraint(term)]
     for term in problem.constraints:
-        if isinstance(term, (wb.Balance, wb.ReachCones, wb.RangeOfMotion)):
+        if isinstance(term, (wb.Balance, wb.tasks.ReachCones, wb.tasks.RangeOfMotion)):
             value = np.atleast_1d(term.value(scene.state(q)))
             held += list(np.maximum(term.lower - value, value - term.upper))
     return Judged(

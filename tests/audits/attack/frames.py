@@ -15,11 +15,11 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
+from tests.audits.attack.judging import Pairs, Verdict, apart, chosen, extent, judge
+from tests.audits.attack.scenes import Body, Thing, body, clear, inside, shape, somewhere, xyzquat
+from tests.audits.attack.solves import scene_of
 from wholebody.base.arrays import Array
 from wholebody.base.errors import WholebodyError
-from wholebody.bench.attack.judging import Pairs, Verdict, apart, chosen, extent, judge
-from wholebody.bench.attack.scenes import Body, Thing, body, clear, inside, shape, somewhere, xyzquat
-from wholebody.bench.attack.solves import scene_of
 from wholebody.bench.suite.problem_sets.things import Occupied, coal_distance
 from wholebody.bench.suite.stability.bodies import planar_arm
 from wholebody.dynamics.world import World, WorldFrame
@@ -54,7 +54,7 @@ def frames_until(figure: Body, frame: str, there: pin.SE3, weighed: tuple[float,
         wb.Orientation(frame, there.rotation, weight=weighed[1]),
     ]
     problem = wb.Problem(wb.Scene(figure.figure), figure.standing, goals=goals)
-    tracker, q = wb.QP().tracker(problem, 1.0 / 60.0), problem.start
+    tracker, q = wb.methods.QP().tracker(problem, 1.0 / 60.0), problem.start
     for number in range(1, most + 1):
         q = tracker.frame(q).q
         if apart(figure.figure.placement(q, frame), there) <= 1e-4:
@@ -307,11 +307,11 @@ def stream(rng: np.random.Generator, folder: Path) -> Verdict:
     things = _things(figure, start, rng)
     dt = float(chosen(rng, (0.001, 1.0 / 60.0, 0.1, 1.0)))
     speed = float(rng.choice([np.inf, np.inf, 1.0, 10.0]))
-    constraints: list[Any] = [wb.StepLimit(speed)] if np.isfinite(speed) else []
+    constraints: list[Any] = [wb.tasks.StepLimit(speed)] if np.isfinite(speed) else []
     if rng.random() < 0.3:
         constraints.append(wb.Hold(str(rng.choice(figure.frames))))
     if figure.figure.root == "free" and np.isfinite(speed):
-        constraints.append(wb.StepLimit(speed, root_velocity=speed, root_turn=speed))
+        constraints.append(wb.tasks.StepLimit(speed, root_velocity=speed, root_turn=speed))
     clearance = float(rng.choice([0.0, 0.002, 0.005])) * min(1.0, figure.size)
     method = "step" if rng.random() < 0.7 else str(rng.choice(["qp", "qp", "newton", "ccd"]))
     frame = str(rng.choice(figure.frames))
@@ -323,8 +323,8 @@ def stream(rng: np.random.Generator, folder: Path) -> Verdict:
     scene = scene_of(figure, things)
     problem = Problem(scene, start, goals=[wb.Point(frame, targets[0])], constraints=constraints, clearance=clearance)
     watch = Watch(problem, constraints, speed=speed, dt=dt)
-    tracker = wb.QP().tracker(problem, dt) if method == "step" else None
-    drag = wb.Drag(problem, method=method, dt=dt) if tracker is None else None
+    tracker = wb.methods.QP().tracker(problem, dt) if method == "step" else None
+    drag = wb.tracking.Drag(problem, method=method, dt=dt) if tracker is None else None
     q = figure.figure.clamp(problem.start) if drag is None else drag.q
     for target, goals, moved in frames:
         for name, at in moved:

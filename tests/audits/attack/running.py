@@ -16,18 +16,18 @@ from pathlib import Path
 
 import numpy as np
 
+from tests.audits.attack import frames, inputs, solves, terms
+from tests.audits.attack.judging import KINDS, Case, Verdict
 from wholebody.base.errors import UnknownNameError, WholebodyError
 from wholebody.base.files import Scratch
 from wholebody.base.runner import ONE_THREAD, Child, Job, allow_processor, run_jobs
-from wholebody.bench.attack import frames, inputs, solves, terms
-from wholebody.bench.attack.judging import KINDS, Case, Verdict
-from wholebody.bench.rows import Row, texts, times
+from wholebody.bench.rows import Row, times
 from wholebody.bench.rows import report as tables_of
 from wholebody.bench.statistics import wilson
 from wholebody.bench.tables import render, write_text
 
+TEMPLATES = Path(__file__).parents[1] / "templates"
 CASES = {
-    "argument": inputs.argument,
     "file": inputs.file,
     "solve": solves.case,
     "stream": frames.stream,
@@ -174,9 +174,7 @@ def report(rows: Sequence[Row], facts: dict[str, str]) -> str:
         found = Counter(one["outcome"] for one in rows if one.tool == kind)
         outcomes = {name: found[name] for name in ("right", "refused", "gave up", "wrong")}
         most = 100.0 * wilson(found["wrong"], found.total())[1]
-        counts.append(
-            Row(texts()["attacked"][kind], kind, {"cases": found.total(), **outcomes, "wrong at most %": most})
-        )
+        counts.append(Row(KINDS[kind], kind, {"cases": found.total(), **outcomes, "wrong at most %": most}))
     spans = []
     for status in ("solved", "unreachable", "infeasible", "stalled"):
         spent = np.array([1e3 * one["seconds"] for one in rows if one.tool == "solve" and one["status"] == status])
@@ -191,5 +189,5 @@ def report(rows: Sequence[Row], facts: dict[str, str]) -> str:
 def keep(case: Case, verdict: Verdict, folder: Path) -> None:
     """Write a failure: the script that repeats it, and what was found."""
     place = folder / case.name
-    write_text(place / "repeat.py", render("repeat.py", case=case) + "\n")
+    write_text(place / "repeat.py", render("repeat.py", TEMPLATES, case=case, root=str(TEMPLATES.parents[2])) + "\n")
     write_text(place / "found.txt", verdict.words + "\n")

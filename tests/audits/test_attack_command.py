@@ -1,0 +1,63 @@
+"""The audit `attack` from end to end, on a kind that takes no time."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+
+import pytest
+
+from tests.audits.__main__ import attack as audit
+from tests.audits.attack.judging import Case, Verdict
+from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.bench.rows import read_rows
+
+
+def audited(*words: str) -> int:
+    parser = argparse.ArgumentParser()
+    audit.add_to(parser.add_subparsers())
+    arguments = parser.parse_args(["attack", *words])
+    return int(arguments.run(arguments))
+
+
+def test_counts_failures_and_page_are_written(tmp_path: Path) -> None:
+    docs, out = tmp_path / "docs", tmp_path / "out"
+    docs.mkdir()
+    (docs / "where-methods-fail.md").write_text("<!-- bench:attack -->\nold\n<!-- /bench:attack -->\n")
+    words = ("--cases", "12", "--kinds", "file", "--seed", "2", "--seconds", "900", "--out", str(out))
+    code = audited(*words, "--update-docs", str(docs))
+    _, rows = read_rows(out / "attack.csv")
+    wrong = [row for row in rows if row["outcome"] == "wrong"]
+    assert len(rows) == 12
+    assert {row.tool for row in rows} == {"file"}
+    assert code == int(bool(wrong))
+    for row in wrong:
+        assert (out / row.case / "repeat.py").is_file()
+    page = (docs / "where-methods-fail.md").read_text()
+    assert "\nold\n" not in page
+    assert "mutated tasks" in page
+
+
+def test_ctrl_c_leaves_what_ended_before_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def two(cases: Iterator[Case], *_: object) -> Iterator[tuple[Case, Verdict]]:
+        for case in islice(cases, 2):
+            yield case, Verdict("right", "nothing")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tests.audits.attack.running.attack", two)
+    assert audited("--out", str(tmp_path)) == 130
+    _, rows = read_rows(tmp_path / "attack.csv")
+    assert [row["number"] for row in rows] == [0, 1]
+
+
+def test_what_cannot_be_asked_is_refused() -> None:
+    with pytest.raises(UnknownNameError, match="solve"):
+        audited("--kinds", "solv")
+    with pytest.raises(InputError, match="--seconds"):
+        audited("--seconds", "nan")
+    with pytest.raises(InputError, match="--jobs"):
+        audited("--jobs", "0")
+    with pytest.raises(InputError, match="--seed"):
+        audited("--seed", "-1")
