@@ -7,7 +7,6 @@ writes its tables and charts into a folder, as the commands of `wholebody bench`
 from __future__ import annotations
 
 import argparse
-import itertools
 import shutil
 import sys
 from collections.abc import Sequence
@@ -15,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from wholebody.base.checks import number
-from wholebody.base.errors import InputError, WholebodyError
+from wholebody.base.errors import WholebodyError
 from wholebody.base.files import make_folder
-from wholebody.bench.rows import Row, only, report, told
+from wholebody.bench.rows import only, report
 from wholebody.bench.tables import machine, write_rows, write_text
-from wholebody.cli.bench.command import folders, listed, measuring, publish, seed
+from wholebody.cli.bench.command import listed, measuring, publish, seed
 from wholebody.cli.bench.measuring import CLIPS, chosen, clips
 from wholebody.cli.command import command, count, flag, option
 
@@ -101,11 +100,11 @@ def human(arguments: argparse.Namespace) -> None:
     pictures = arguments.out / "human"
     make_folder(pictures)
     found = None
-    for one in measure(pictures if drawn else None, quick=arguments.quick):
-        if isinstance(one, Measured):
-            found = one
+    for told in measure(pictures if drawn else None, quick=arguments.quick):
+        if isinstance(told, Measured):
+            found = told
         else:
-            print(one, flush=True)
+            print(told, flush=True)
     assert found is not None
     write_text(arguments.out / "human.json", figures(found, facts))
     for folder in filter(None, (arguments.out, arguments.update_docs)):
@@ -330,120 +329,7 @@ def postures(arguments: argparse.Namespace) -> None:
     publish("postures", text, arguments, facts=facts, tables={"postures": rows}, page=None)
 
 
-@command(
-    "attack",
-    "random hard cases of every kind, judged",
-    """\
-Attack the package with random hard cases: solves that begin inside things, with goals that contradict or are out of
-reach; streams; sweeps; contacts beside points at the place found; mutated files. Answers are judged by coal over all
-pairs and by Pinocchio alone. Every failure is written as a script that repeats it. Case K of a seed is
-always the same. The exit code is 1 where something was wrong: a false claim, an error other than one sentence, a crash,
-or no end within a minute. What ended before Ctrl-C is written.""",
-    option("--seconds", type=float, default=60.0, metavar="S", help="how long (default: 60)"),
-    seed("of all cases"),
-    count("--first", 0, "number of the first case", least=0),
-    count("--cases", None, "end after as many cases, if the time suffices"),
-    listed("--kinds", "of cases, such as solve, stream, own-term, sleeper, file (default: all)", "KIND"),
-    count("--jobs", 1, "processes at a time"),
-    *folders("out/attack"),
-)
-def attack(arguments: argparse.Namespace) -> int:
-    """Attack; 1 where something was wrong."""
-    from tests.audits.attack import running
-    from tests.audits.attack.judging import KINDS, Case, kind_of
-
-    seconds = number(arguments.seconds, "--seconds", 1e-3, 1e9, "s")
-    kinds = chosen(arguments.kinds, KINDS, "--kinds")
-    cases = (Case(arguments.seed, k, kind) for k in itertools.count(arguments.first) if (kind := kind_of(k)) in kinds)
-    asked = itertools.islice(cases, arguments.cases)
-    rows: list[Row] = []
-    interrupted = False
-    try:
-        for case, verdict in running.attack(asked, arguments.jobs, running.for_seconds(seconds)):
-            rows.append(running.row(case, verdict))
-            if rows[-1]["outcome"] == "wrong":
-                print(f"WRONG: {case.kind} {case.number}: {rows[-1]['words']}", flush=True)
-            elif len(rows) % 200 == 0:
-                print(f"{len(rows)} cases, {sum(one['outcome'] == 'wrong' for one in rows)} wrong", flush=True)
-            if rows[-1]["outcome"] == "wrong" or running.is_slow(rows[-1]):
-                running.keep(case, verdict, arguments.out)
-    except KeyboardInterrupt:
-        interrupted = True
-    if not rows:
-        raise InputError("no case ended; give more --seconds")
-    rows.sort(key=lambda one: one["number"])
-    facts = machine()
-    text, page = running.report(rows, facts), "where-methods-fail.md"
-    publish("attack", text, arguments, facts=facts, tables={"attack": rows}, page=page)
-    return 130 if interrupted else int(any(one["outcome"] == "wrong" for one in rows))  # exit code after Ctrl-C
-
-
-@measuring(
-    "files",
-    "what is read of the files of a folder",
-    "Read every robot, mesh and recording below a folder; recordings are retargeted to the person. The table has what "
-    "was read, the sentence by which the rest is refused, the errors of bones, and the processor's time.",
-    option("folder", type=Path, metavar="FOLDER", help="of the files"),
-    count("--frames", 60, "frames of each recording that are retargeted"),
-    flag("--compare", "recordings alone (BVH): by wholebody, and by mink frame by frame with GMR's weights"),
-    listed("--figure", "with --compare: figures that follow (default: the person)", "FIGURE"),
-)
-def files(arguments: argparse.Namespace) -> int:
-    """Read; 1 where a file ends in anything but an answer or a sentence."""
-    from tests.audits.folders import read
-
-    if not arguments.folder.is_dir():
-        raise InputError(f"{arguments.folder}: is no folder; give one with files")
-    if arguments.compare:
-        return _compared(arguments)
-    if arguments.figure is not None:
-        raise InputError("--figure is for --compare; recordings are read for the person")
-    rows = []
-    for row in read(arguments.folder, 5 if arguments.quick else arguments.frames):
-        rows.append(row)
-        print(f"{row.case}: {', '.join(f'{name} {value}' for name, value in row.figures.items())}", flush=True)
-    facts = machine()
-    known = [row["bones median deg"] for row in rows if "bones median deg" in row.figures]
-    about = f"{sum(row['read'] == 'yes' for row in rows)} of {len(rows)} files are read; {len(known)} recordings are "
-    about += f"retargeted, {sum(error < 5.0 for error in known)} of them with a median error of bones below 5 degrees."
-    publish("files", report(about, {"": rows}, facts), arguments, facts=facts, tables={"files": rows}, page=None)
-    return int(any(row["read"] == "FAULT" for row in rows))
-
-
-def _compared(arguments: argparse.Namespace) -> int:
-    """Follow recordings by both tools; figures of files may go about freely."""
-    from tests.audits.folders import ABOUT, compare, totals
-    from wholebody.figures import load
-
-    names = arguments.figure or ["human"]
-    figures = [load(name, root="free") if Path(name).suffix == ".urdf" else load(name) for name in names]
-    rows = []
-    for row in compare(arguments.folder, figures, 20 if arguments.quick else arguments.frames):
-        rows.append(row)
-        print(told(row), flush=True)
-    facts = machine() | {"frames": str(arguments.frames)}
-    tables = {"All clips": totals(rows), "Each": rows}
-    text = report(ABOUT, tables, facts)
-    publish("clips", text, arguments, facts=facts, tables={"clips": rows}, page=None)
-    return 0
-
-
-COMMANDS = (
-    newton,
-    qp,
-    human,
-    postures,
-    regress,
-    loads,
-    clip_constants,
-    detail,
-    ablation,
-    robots,
-    pen,
-    plans,
-    attack,
-    files,
-)
+COMMANDS = (newton, qp, human, postures, regress, loads, clip_constants, detail, ablation, robots, pen, plans)
 
 
 def main(words: Sequence[str] | None = None) -> int:

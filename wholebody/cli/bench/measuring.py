@@ -1,4 +1,4 @@
-"""`wholebody bench step`, `scaling`, `motion` and `world`: what things cost and achieve."""
+"""`wholebody bench step`, `scaling`, `motion`, `world` and `files`: what things cost and achieve."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from itertools import product
 from pathlib import Path
 
 from wholebody.base import checks
+from wholebody.base.errors import InputError
 from wholebody.base.files import make_folder
 from wholebody.bench.rows import Panel, Row, across, chart, only, report, texts, told
 from wholebody.bench.tables import machine, write_rows
 from wholebody.cli.bench.command import Chart, listed, measuring, publish
-from wholebody.cli.command import count, option
+from wholebody.cli.command import count, flag, option
 
 
 def chosen(wanted: Sequence[str] | None, known: Iterable[str], flag: str) -> tuple[str, ...]:
@@ -195,3 +196,53 @@ def _world(arguments: argparse.Namespace) -> dict[str, Iterable[Row]]:
         "throws": all_throws(1 if quick else 3, quick),
         "drops": (measure(known[name], tool, frames) for name, tool in product(names, tools)),
     }
+
+
+@measuring(
+    "files",
+    "what is read of the files of a folder",
+    "Read every robot, mesh and recording below a folder; recordings are retargeted to the person. The table has what "
+    "was read, the sentence by which the rest is refused, the errors of bones, and the processor's time.",
+    option("folder", type=Path, metavar="FOLDER", help="of the files"),
+    count("--frames", 60, "frames of each recording that are retargeted"),
+    flag("--compare", "recordings alone (BVH): by wholebody, and by mink frame by frame with GMR's weights"),
+    listed("--figure", "with --compare: figures that follow (default: the person)", "FIGURE"),
+)
+def files(arguments: argparse.Namespace) -> int:
+    """Read; 1 where a file ends in anything but an answer or a sentence."""
+    from wholebody.bench.measure.files import read
+
+    if not arguments.folder.is_dir():
+        raise InputError(f"{arguments.folder}: is no folder; give one with files")
+    if arguments.compare:
+        return _compared(arguments)
+    if arguments.figure is not None:
+        raise InputError("--figure is for --compare; recordings are read for the person")
+    rows = []
+    for row in read(arguments.folder, 5 if arguments.quick else arguments.frames):
+        rows.append(row)
+        print(f"{row.case}: {', '.join(f'{name} {value}' for name, value in row.figures.items())}", flush=True)
+    facts = machine()
+    known = [row["bones median deg"] for row in rows if "bones median deg" in row.figures]
+    about = f"{sum(row['read'] == 'yes' for row in rows)} of {len(rows)} files are read; {len(known)} recordings are "
+    about += f"retargeted, {sum(error < 5.0 for error in known)} of them with a median error of bones below 5 degrees."
+    publish("files", report(about, {"": rows}, facts), arguments, facts=facts, tables={"files": rows}, page=None)
+    return int(any(row["read"] == "FAULT" for row in rows))
+
+
+def _compared(arguments: argparse.Namespace) -> int:
+    """Follow recordings by both tools; figures of files may go about freely."""
+    from wholebody.bench.measure.files import ABOUT, compare, totals
+    from wholebody.figures import load
+
+    names = arguments.figure or ["human"]
+    figures = [load(name, root="free") if Path(name).suffix == ".urdf" else load(name) for name in names]
+    rows = []
+    for row in compare(arguments.folder, figures, 20 if arguments.quick else arguments.frames):
+        rows.append(row)
+        print(told(row), flush=True)
+    facts = machine() | {"frames": str(arguments.frames)}
+    tables = {"All clips": totals(rows), "Each": rows}
+    text = report(ABOUT, tables, facts)
+    publish("clips", text, arguments, facts=facts, tables={"clips": rows}, page=None)
+    return 0

@@ -15,8 +15,8 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from tests.audits.attack.judging import Verdict, chosen
 from wholebody.base.arrays import Array
+from wholebody.bench.attack.judging import Verdict, chosen
 from wholebody.bench.suite.problem_sets.things import turned
 from wholebody.figures.state import State, Wrench
 from wholebody.problem import Problem

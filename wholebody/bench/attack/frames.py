@@ -15,11 +15,11 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from tests.audits.attack.judging import Pairs, Verdict, apart, chosen, extent, judge
-from tests.audits.attack.scenes import Body, Thing, body, clear, inside, shape, somewhere, xyzquat
-from tests.audits.attack.solves import scene_of
 from wholebody.base.arrays import Array
 from wholebody.base.errors import WholebodyError
+from wholebody.bench.attack.judging import Pairs, Verdict, apart, chosen, extent, judge
+from wholebody.bench.attack.scenes import Body, Thing, body, clear, inside, shape, somewhere, xyzquat
+from wholebody.bench.attack.solves import scene_of
 from wholebody.bench.suite.problem_sets.things import Occupied, coal_distance
 from wholebody.bench.suite.stability.bodies import planar_arm
 from wholebody.dynamics.world import World, WorldFrame

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from tests.audits.folders import compare, judged, totals
 from tests.motion.test_retargeting import person
 from wholebody.base.errors import InputError
+from wholebody.bench.measure.files import compare, judged, totals
 from wholebody.bench.rows import Row
 from wholebody.motion.roles import matched
 

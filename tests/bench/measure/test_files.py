@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 import wholebody as wb
-from tests.audits.__main__ import main
-from tests.audits.folders import read
+from wholebody.bench.measure.files import read
+from wholebody.cli.main import main
 
 
 def test_every_file_is_read_or_has_its_sentence(tmp_path: Path) -> None:
@@ -35,5 +35,5 @@ def test_the_table_is_published(tmp_path: Path) -> None:
     (tmp_path / "files").mkdir()
     (tmp_path / "files" / "c.bvh").write_text("hello")
     given = [str(tmp_path / "files"), "--out", str(tmp_path / "out"), "--update-docs", str(tmp_path)]
-    assert main(["files", *given]) == 0
+    assert main(["bench", "files", *given]) == 0
     assert "| c.bvh | refused |" in (tmp_path / "assets/bench/files.txt").read_text()

@@ -11,8 +11,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from tests.audits.attack import frames, terms
-from tests.audits.attack.scenes import Body
+from wholebody.bench.attack import frames, terms
+from wholebody.bench.attack.scenes import Body
 from wholebody.bench.suite.stability.bodies import planar_arm
 from wholebody.tracking.loop import FrameLoop
 

@@ -1,4 +1,4 @@
-"""The audit `attack` from end to end, on a kind that takes no time."""
+"""`wholebody bench attack` from end to end, on a kind that takes no time."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from pathlib import Path
 
 import pytest
 
-from tests.audits.__main__ import attack as audit
-from tests.audits.attack.judging import Case, Verdict
 from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.bench.attack.judging import Case, Verdict
 from wholebody.bench.rows import read_rows
+from wholebody.cli.bench import run as group
 
 
-def audited(*words: str) -> int:
+def bench(*words: str) -> int:
     parser = argparse.ArgumentParser()
-    audit.add_to(parser.add_subparsers())
-    arguments = parser.parse_args(["attack", *words])
+    group.add_to(parser.add_subparsers())
+    arguments = parser.parse_args(["bench", "attack", *words])
     return int(arguments.run(arguments))
 
 
@@ -27,7 +27,7 @@ def test_counts_failures_and_page_are_written(tmp_path: Path) -> None:
     docs.mkdir()
     (docs / "where-methods-fail.md").write_text("<!-- bench:attack -->\nold\n<!-- /bench:attack -->\n")
     words = ("--cases", "12", "--kinds", "file", "--seed", "2", "--seconds", "900", "--out", str(out))
-    code = audited(*words, "--update-docs", str(docs))
+    code = bench(*words, "--update-docs", str(docs))
     _, rows = read_rows(out / "attack.csv")
     wrong = [row for row in rows if row["outcome"] == "wrong"]
     assert len(rows) == 12
@@ -46,18 +46,18 @@ def test_ctrl_c_leaves_what_ended_before_it(tmp_path: Path, monkeypatch: pytest.
             yield case, Verdict("right", "nothing")
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("tests.audits.attack.running.attack", two)
-    assert audited("--out", str(tmp_path)) == 130
+    monkeypatch.setattr("wholebody.bench.attack.running.attack", two)
+    assert bench("--out", str(tmp_path)) == 130
     _, rows = read_rows(tmp_path / "attack.csv")
     assert [row["number"] for row in rows] == [0, 1]
 
 
 def test_what_cannot_be_asked_is_refused() -> None:
     with pytest.raises(UnknownNameError, match="solve"):
-        audited("--kinds", "solv")
+        bench("--kinds", "solv")
     with pytest.raises(InputError, match="--seconds"):
-        audited("--seconds", "nan")
+        bench("--seconds", "nan")
     with pytest.raises(InputError, match="--jobs"):
-        audited("--jobs", "0")
+        bench("--jobs", "0")
     with pytest.raises(InputError, match="--seed"):
-        audited("--seed", "-1")
+        bench("--seed", "-1")

@@ -16,17 +16,16 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.audits.attack import frames, inputs, solves, terms
-from tests.audits.attack.judging import KINDS, Case, Verdict
 from wholebody.base.errors import UnknownNameError, WholebodyError
 from wholebody.base.files import Scratch
 from wholebody.base.runner import ONE_THREAD, Child, Job, allow_processor, run_jobs
+from wholebody.bench.attack import frames, inputs, solves, terms
+from wholebody.bench.attack.judging import KINDS, Case, Verdict
 from wholebody.bench.rows import Row, times
 from wholebody.bench.rows import report as tables_of
 from wholebody.bench.statistics import wilson
 from wholebody.bench.tables import render, write_text
 
-TEMPLATES = Path(__file__).parents[1] / "templates"
 CASES = {
     "file": inputs.file,
     "solve": solves.case,
@@ -189,5 +188,5 @@ def report(rows: Sequence[Row], facts: dict[str, str]) -> str:
 def keep(case: Case, verdict: Verdict, folder: Path) -> None:
     """Write a failure: the script that repeats it, and what was found."""
     place = folder / case.name
-    write_text(place / "repeat.py", render("repeat.py", TEMPLATES, case=case, root=str(TEMPLATES.parents[2])) + "\n")
+    write_text(place / "repeat.py", render("repeat.py", case=case) + "\n")
     write_text(place / "found.txt", verdict.words + "\n")

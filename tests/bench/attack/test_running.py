@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from tests.audits.attack import running
-from tests.audits.attack.inputs import mutated
-from tests.audits.attack.judging import KINDS, PATTERN, Case, Verdict, kind_of
-from tests.audits.attack.running import attack, keep, report, row
 from wholebody.base.errors import UnknownNameError
 from wholebody.base.runner import Child
+from wholebody.bench.attack import running
+from wholebody.bench.attack.inputs import mutated
+from wholebody.bench.attack.judging import KINDS, PATTERN, Case, Verdict, kind_of
+from wholebody.bench.attack.running import attack, keep, report, row
 
 FACTS = {"wholebody": "0"}
 
