@@ -157,6 +157,28 @@ def test_the_compiled_minimiser_on_a_face_is_that_of_array_code(random_program, 
         assert np.abs(-push[rows[0] :] - wanted.push).max(initial=0.0) < 1e-8 * scale
 
 
+@pytest.mark.parametrize("rows", ROWS)
+def test_compiled_loops_correct_an_active_set_as_array_code_does(random_program, rows):
+    rng = np.random.default_rng(21)
+    settled = []
+    for _ in range(25):
+        program = random_program(rng, int(rng.integers(2, 56)), *rows)
+        program = with_values(
+            program, weight=np.minimum(program.weight, 1e4), elastic_weight=np.minimum(program.elastic_weight, 1e4)
+        )
+        guess = guessed_set(rng, program.size, rows[1])
+        kept = ActiveSet(*(part.copy() for part in guess))
+        mine, wanted = (way(program, guess, 60) for way in (solve_from, reference.solve_from))
+        assert same(kept, guess)
+        assert (mine is None) == (wanted is None)
+        if mine is not None:
+            assert np.abs(mine.x - wanted.x).max() < 1e-9
+            assert same(mine.active, wanted.active)
+            assert program.optimality(mine.x) < 1e-7
+        settled.append(mine is not None)
+    assert any(settled)
+
+
 def test_active_set_is_read_off_a_near_answer(random_program):
     rng = np.random.default_rng(12)
     for _ in range(10):
