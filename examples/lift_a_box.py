@@ -21,7 +21,11 @@ def build(figure: wb.Figure | None = None) -> wb.Problem:
     scene.add(BOX, name="box", at=ON_TABLE, color=CARDBOARD)
     return wb.Problem(
         scene,
-        goals=[wb.Grasp("left", "box", kind="palm"), wb.Grasp("right", "box", kind="palm")],
+        goals=[
+            *(wb.Grasp(side, "box", kind="palm") for side in ("left", "right")),
+            # Hands turn with the box: fingers that hang as it is taken have wrists at their end as it is lifted.
+            *(wb.Axis(f"{side}_palm", (1, 0, 0), direction=(1, 0, 0), weight=0.1) for side in ("left", "right")),
+        ],
         constraints=[wb.Stand(on="floor")],
     )
 

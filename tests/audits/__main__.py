@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from wholebody.base.checks import number, whole
+from wholebody.base.checks import number
 from wholebody.base.errors import InputError, WholebodyError
 from wholebody.base.files import make_folder
 from wholebody.bench.rows import Row, only, report, told
@@ -341,7 +341,7 @@ always the same. The exit code is 1 where something was wrong: a false claim, an
 or no end within a minute. What ended before Ctrl-C is written.""",
     option("--seconds", type=float, default=60.0, metavar="S", help="how long (default: 60)"),
     seed("of all cases"),
-    option("--first", type=int, default=0, metavar="K", help="number of the first case (default: 0)"),
+    count("--first", 0, "number of the first case", least=0),
     count("--cases", None, "end after as many cases, if the time suffices"),
     listed("--kinds", "of cases, such as solve, stream, own-term, sleeper, file (default: all)", "KIND"),
     count("--jobs", 1, "processes at a time"),
@@ -353,11 +353,8 @@ def attack(arguments: argparse.Namespace) -> int:
     from tests.audits.attack.judging import KINDS, Case, kind_of
 
     seconds = number(arguments.seconds, "--seconds", 1e-3, 1e9, "s")
-    first, seeded = (
-        whole(value, name, 0, 1 << 62) for value, name in ((arguments.first, "--first"), (arguments.seed, "--seed"))
-    )
     kinds = chosen(arguments.kinds, KINDS, "--kinds")
-    cases = (Case(seeded, k, kind) for k in itertools.count(first) if (kind := kind_of(k)) in kinds)
+    cases = (Case(arguments.seed, k, kind) for k in itertools.count(arguments.first) if (kind := kind_of(k)) in kinds)
     asked = itertools.islice(cases, arguments.cases)
     rows: list[Row] = []
     interrupted = False

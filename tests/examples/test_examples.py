@@ -378,6 +378,18 @@ def test_takes_a_seat_and_lifts_a_box(example: Example, solved: Any, tmp_path: P
     assert np.linalg.norm(left - right) < 0.42
 
 
+def test_who_lifts_a_box_lifts_with_both_arms_alike(example: Example) -> None:
+    """Scene, box and goals are the same on both sides; arms of short and tall women differed by up to 132 degrees."""
+    box = example("lift_a_box")
+    for percentile in (3, 66, 97):
+        problem = box.build(figure := wb.load("human", sex="female", percentile=percentile))
+        _, lifted = box.lift(wb.solve(problem), problem)
+        assert lifted.status == "solved"
+        angles = figure.joint_values(lifted.q)
+        for name in figure.groups["left_arm"]:
+            assert abs(angles[name] - angles[name.replace("left_", "right_")]) < np.radians(10.0), (percentile, name)
+
+
 def test_who_pushes_a_cart_leans_into_it(example: Example, tmp_path: Path) -> None:
     """The ground presses between heel and toes only in the posture that was searched with the force."""
     cart = example("push_a_cart")

@@ -349,6 +349,82 @@ def test_round_shapes_and_far_ones_need_no_more_than_the_witness(free_bodies):
         assert len(contacts.distance) == len(rows.gap) == 1
 
 
+def slowly(scene, q, contacts):
+    """The rows of every pair in plain loops over swept points and faces, for boxes and hulls: (gap, point) by pair."""
+    placed = placed_at(scene, q)
+    piece = scene.geometry.geometryObjects
+    found = []
+    for number in range(len(contacts.distance)):
+        pair = [int(i) for i in contacts.pair[number]]
+        distance, normal = contacts.distance[number], contacts.normal[number]
+        found.append([(distance, contacts.point_a[number])])
+        if distance >= module.LEVER_DISTANCE:
+            continue
+        sides = []
+        for own, other, towards, at, facing in (
+            (pair[0], pair[1], normal, contacts.point_a[number], contacts.point_b[number]),
+            (pair[1], pair[0], -normal, contacts.point_b[number], contacts.point_a[number]),
+        ):
+            corners, over = [], True
+            for corner in corner_points(piece[own].geometry):
+                lever = placed.oMg[own].act(corner) - at
+                drop = max(-lever @ towards, 0.0)
+                if drop >= module.BAND:
+                    continue
+                lever = lever - (lever @ towards) * towards
+                share, sag = 1.0, 0.0
+                base = placed.oMg[other].actInv(facing + module.INSET * towards)
+                for *outward, offset in planes(piece[other].geometry):
+                    rate = np.dot(outward, placed.oMg[other].rotation.T @ lever)
+                    if rate > 1e-12:
+                        share = min(share, max(offset - np.dot(outward, base), 0.0) / rate)
+                    slope = -np.dot(outward, placed.oMg[other].rotation.T @ towards)
+                    there = offset - np.dot(outward, placed.oMg[other].actInv(facing)) < module.NORMAL_ROOM
+                    sag = max(sag, rate / slope) if there and slope > 0.0 else sag
+                over = over and share >= 1.0
+                gap = distance + share * drop + min(share * sag, module.INSET)
+                corners.append((gap, at + share * lever, share * np.linalg.norm(lever)))
+            sides.append((corners, over and bool(corners)))
+        (first, first_over), (second, second_over) = sides
+        kept = first if first_over else second if second_over else first + second
+        found[-1] += [(gap, point) for gap, point, length in kept if length > module.SHORTEST_LEVER]
+    return found
+
+
+def corner_points(piece):
+    if isinstance(piece, coal.Box):
+        return np.array(list(itertools.product((-1.0, 1.0), repeat=3))) * piece.halfSide
+    return np.array(piece.points())
+
+
+def test_rows_are_those_of_plain_loops(free_bodies, monkeypatch):
+    monkeypatch.setattr(module, "MOST_ENDS", 1000)  # the plain loops keep all
+    rng = np.random.default_rng(4)
+    flat = [SHAPES["box"], SHAPES["prism"], wb.Box((1.0, 0.3, 0.05)), wb.Hull(rng.normal(size=(12, 3)) * 0.2)]
+    scene = wb.Scene(free_bodies(*flat[:3]))
+    for k, shape in enumerate(flat):
+        scene.add(shape, name=f"thing{k}", at=(0.3 * k - 0.5, 0.1 * k, -0.2))
+    levers = 0
+    for _ in range(20):
+        q = scene.figure.neutral
+        for k in range(0, scene.model.nq, 7):
+            q[k : k + 3] = rng.uniform(-0.5, 0.5, 3)
+            q[k + 3 : k + 7] = pin.Quaternion(pin.exp3(rng.normal(size=3) * rng.choice([1e-3, 0.02, 1.0]))).coeffs()
+        contacts, rows, _ = rows_of(scene, q)
+        expected = slowly(scene, q, contacts)
+        assert len(rows.gap) == sum(map(len, expected))
+        normal = rows.wrench[:, :3]
+        place = np.cross(normal, rows.wrench[:, 3:])
+        for number, wanted in enumerate(expected):
+            mine = np.flatnonzero(rows.contact == number)
+            across = [point - (point @ normal[mine[0]]) * normal[mine[0]] for _, point in wanted]
+            for gap, point in zip([gap for gap, _ in wanted], across, strict=True):
+                away = np.abs(rows.gap[mine] - gap) + np.abs(place[mine] - point).max(axis=1)
+                assert away.min() < 1e-8
+            levers += len(mine) - 1
+    assert levers > 50
+
+
 def test_near_ends_are_not_left_out_for_far_ones_that_stand_back(free_bodies):
     """A foot of eight corners below a rim of forty: whichever way it tips, its lowest corner is foreseen."""
     turns = np.linspace(0.0, 2 * np.pi, 40, endpoint=False)

@@ -15,7 +15,7 @@ from scipy.spatial import ConvexHull, Delaunay
 from wholebody import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import Balance
-from wholebody.tasks.balance import DOWN, convex_polygon, edges, shrunk
+from wholebody.tasks.balance import DOWN, convex_polygon, polygon, shrunk
 from wholebody.tasks.surfaces import outermost
 
 
@@ -74,14 +74,13 @@ def test_standing_on_corners_is_refused(humanoid: Any, random_posture: Any) -> N
 def test_convex_polygon_is_scipys_hull(seed: int, count: int) -> None:
     points = np.random.default_rng(seed).uniform(-0.2, 0.2, size=(count, 2))
     try:
-        corners = convex_polygon(points)
+        corners, normals, offsets, _ = convex_polygon(points)
     except InputError:
         assert count < 6
         return
     hull = ConvexHull(points)
     area = 0.5 * sum(a[0] * b[1] - a[1] * b[0] for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True))
     np.testing.assert_allclose(area, hull.volume, atol=1e-6)
-    normals, offsets = edges(corners)
     assert (points @ normals.T - offsets).min() > -2e-6
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0)
 
@@ -93,7 +92,7 @@ def test_points_on_a_line_are_no_polygon(points: Any) -> None:
 
 
 def test_shrinking_cuts_the_margin_off_every_side() -> None:
-    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    square = polygon(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]))
     rest = shrunk(square, 0.2)
     np.testing.assert_allclose(sorted(map(tuple, rest.round(9))), [(0.2, 0.2), (0.2, 0.8), (0.8, 0.2), (0.8, 0.8)])
     assert len(shrunk(square, 0.51)) == 0

@@ -56,6 +56,20 @@ def test_a_picture_of_the_human(chromium: str, tmp_path: Path) -> None:
     assert (values.min(axis=2) > 250).mean() < 0.02  # nothing is burnt out
 
 
+def test_a_contact_colours_the_shoe_around_it_and_not_all_of_it(chromium: str, tmp_path: Path) -> None:
+    figure = load("human")
+    q = figure.posture("standing")
+    sole = figure.placement(q, "left_sole").translation
+    scene = Scene(figure).add(HalfSpace((0.0, 0.0, 1.0), offset=sole[2]), name="floor")
+    with Viewer(scene) as viewer:
+        viewer.show(q)
+        viewer.look(sole + [0.6, 0.9, 0.5], sole)
+        values = np.asarray(Image.open(viewer.picture(tmp_path / "x.png", (320, 240), legend=False)).convert("RGB"))
+    red, _, blue = np.moveaxis(values.astype(int), -1, 0)
+    painted, plain = red > blue + 30, (red > blue + 5) & (red < 75)
+    assert 40 < painted.sum() < plain.sum()
+
+
 def test_a_body_that_is_small_in_the_picture_is_drawn_with_fewer_triangles(browser: Browser, tmp_path: Path) -> None:
     figure = load("human")
     viewer = Viewer(Scene(figure))

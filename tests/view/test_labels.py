@@ -1,4 +1,4 @@
-"""Labels in a real Chromium: they hide neither hands nor each other."""
+"""Labels in a real Chromium: they hide neither hands and faces nor each other."""
 
 from __future__ import annotations
 
@@ -33,16 +33,17 @@ def test_labels_hide_neither_the_hand_nor_each_other(browser: Browser, tmp_path:
     q = scene.figure.with_joints(scene.figure.posture("standing"), arm)
     tip, palm = (scene.figure.placement(q, name).translation for name in ("right_index_tip", "right_palm"))
     places = [(1 - share) * tip + share * palm for share in np.linspace(0.0, 1.0, 9)]
-    goal = wb.Point("right_index_tip", tip)
+    eyes = scene.figure.placement(q, "gaze").translation
+    goals = [wb.Point("right_index_tip", tip), wb.Point("gaze", eyes)]
     with wb.Viewer(scene, names=True) as viewer:
-        viewer.show(q, problem=wb.Problem(scene, q, goals=[goal]))
+        viewer.show(q, problem=wb.Problem(scene, q, goals=goals))
         browser.open(viewer.save(tmp_path / "labels.html").as_uri())
     boxes = browser.evaluate(_BOXES)
     assert {text.split()[0] for *_, text in boxes} >= {"right_index_tip", "table"}
     for x, y, w, h, text in boxes:
-        for place in places:
+        for place in [*places, eyes]:
             across, down, _ = browser.evaluate(f"{_SEEN}({np.round(place, 6).tolist()})")
-            assert not (x < across < x + w and y < down < y + h), f"{text} hides the hand"
+            assert not (x < across < x + w and y < down < y + h), f"{text} hides the hand or the face"
     for k, (x, y, w, h, _) in enumerate(boxes):
         for a, b, c, d, _ in boxes[:k]:
             assert x + w <= a or a + c <= x or y + h <= b + 1e-9 or b + d <= y + 1e-9

@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 
 from wholebody.base.checks import is_number
 from wholebody.base.errors import InputError, UnknownNameError, suggestion
-from wholebody.cli.command import Option, flag, option
+from wholebody.cli.command import Option, count, flag, option
 
 JOINED = "X,Y,Z"
 """How the help shows numbers that are joined by commas."""
@@ -79,6 +79,19 @@ def person_options(arguments: argparse.Namespace) -> dict[str, Any]:
     return given
 
 
+JOBS: tuple[Option, ...] = (
+    count("--jobs", None, "cases at a time (default: 1, or all of the cluster)"),
+    option("--cluster", metavar="ADDRESS", help="of a dask scheduler, such as tcp://10.0.0.1:8786"),
+)
+
+
+def jobs_of(arguments: argparse.Namespace) -> int:
+    """How many cases are done at a time; raises WholebodyError for a cluster that does not answer."""
+    from wholebody.base.batches import threads
+
+    return int(arguments.jobs or (threads(arguments.cluster) if arguments.cluster else 1))
+
+
 def scene_options(scene: str, overlap: str, out: str) -> tuple[Option, ...]:
     """Options of a command that runs scenes with a scripted tracker: help of two, and the folder if none is given."""
     return (
@@ -86,7 +99,7 @@ def scene_options(scene: str, overlap: str, out: str) -> tuple[Option, ...]:
         flag("--list", "list the scenes"),
         option("--overlap", default="qp", metavar="METHOD", help=overlap),
         option("--frames", type=int, metavar="N", help="number of frames (default: the whole script, once)"),
-        option("--seed", type=int, default=0, metavar="N", help="seed of all random numbers (default: 0)"),
+        count("--seed", 0, "seed of all random numbers", least=0),
         option("--out", type=Path, default=Path(out), metavar="DIR", help=f"folder (default: {out})"),
     )
 
@@ -103,6 +116,4 @@ def scene_names(arguments: argparse.Namespace, scenes: Mapping[str, str], comman
     for name in names:
         if name not in scenes and not (files and name.endswith(".toml")):
             raise UnknownNameError("scene", name, scenes)
-    if arguments.seed < 0:
-        raise InputError(f"--seed is {arguments.seed}; give 0 or more")
     return names

@@ -46,11 +46,11 @@ class Command:
             add(parser)
 
     def run(self, arguments: argparse.Namespace) -> int:
-        """Run it, and return the exit code; raises InputError where an option that counts things is below one."""
-        for flag in arguments.counted:
+        """Run it, and return the exit code; raises InputError where an option of `count` is below its least."""
+        for flag, least in arguments.counted:
             number = getattr(arguments, flag.removeprefix("--").replace("-", "_"))
-            if number is not None and number < 1:
-                raise InputError(f"{flag} is {number}; give 1 or more")
+            if number is not None and number < least:
+                raise InputError(f"{flag} is {number}; give {least} or more")
         return self.measure(arguments) or 0
 
 
@@ -90,12 +90,12 @@ def flag(name: str, help: str) -> Option:
     return option(name, action="store_true", help=help)
 
 
-def count(name: str, default: int | None, help: str) -> Option:
-    """An option that counts things to do: one or more; the help says the default."""
+def count(name: str, default: int | None, help: str, least: int = 1) -> Option:
+    """An option that counts things to do, `least` or more; the help says the default."""
 
     def add(parser: argparse.ArgumentParser) -> None:
         said = help if default is None or "(default" in help else f"{help} (default: {default})"
         parser.add_argument(name, type=int, default=default, metavar="N", help=said)
-        parser.set_defaults(counted=(*parser.get_default("counted"), name))
+        parser.set_defaults(counted=(*parser.get_default("counted"), (name, least)))
 
     return add

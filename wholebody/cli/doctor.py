@@ -1,10 +1,10 @@
-"""`wholebody doctor`: check this installation and print the result."""
+"""`wholebody doctor` and `completion`: this installation examined, and completed in a shell."""
 
 from __future__ import annotations
 
 import argparse
 
-from wholebody.cli.command import command, flag
+from wholebody.cli.command import command, flag, option
 
 _MARKS = {"works": "[green]works[/]", "absent": "[dim]absent[/]", "broken": "[red]broken[/]"}
 
@@ -18,7 +18,7 @@ wrong search paths with their repairs. Print the folder and size of the cache of
 something is wrong; an absent optional package is no fault.""",
     flag("--clear-cache", "empty the cache of mesh pieces, and end"),
 )
-def run(arguments: argparse.Namespace) -> int:
+def doctor(arguments: argparse.Namespace) -> int:
     """Examine and print; 1 if there are faults."""
     if arguments.clear_cache:
         from wholebody.geometry.mesh_cache import clear_cache
@@ -49,3 +49,33 @@ def run(arguments: argparse.Namespace) -> int:
     if report.healthy:
         shown.print("[green]nothing is wrong[/]")
     return 0 if report.healthy else 1
+
+
+SHELLS = ("bash", "zsh", "tcsh")
+
+
+@command(
+    "completion",
+    "print the completion script of a shell",
+    """\
+Print a script with which a shell completes the commands and options of wholebody. It needs shtab:
+pip install 'wholebody[completion]'. The script itself needs nothing and costs no time when the command starts.""",
+    option("shell", choices=SHELLS, help="the shell"),
+    epilog="""\
+examples:
+  wholebody completion bash > ~/.local/share/bash-completion/completions/wholebody
+  wholebody completion zsh > ~/.zfunc/_wholebody""",
+)
+def completion(arguments: argparse.Namespace) -> int:
+    """Print the script; raises MissingPackageError where shtab is not installed."""
+    from wholebody.base.errors import MissingPackageError
+    from wholebody.cli.main import parser
+
+    try:
+        import shtab
+    except ImportError:
+        raise MissingPackageError(
+            "completion scripts need shtab, which is not installed; run: pip install 'wholebody[completion]'"
+        ) from None
+    print(shtab.complete(parser(), shell=arguments.shell))
+    return 0

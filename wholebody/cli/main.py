@@ -7,7 +7,7 @@ import logging
 import os
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from importlib import import_module
 from io import TextIOWrapper, UnsupportedOperation
@@ -18,11 +18,13 @@ from wholebody.base.imports import raise_again
 from wholebody.cli.arguments import Parser
 from wholebody.version import __version__
 
-COMMANDS = (
-    *("pose", "show", "figure", "demo", "gallery", "interact", "drag", "world", "clip"),
-    *("study", "reach", "assess", "bench", "doctor", "completion"),
-)
-"""Each is a module of this folder, whose `run` is the command."""
+COMMANDS = {
+    **{name: f"{name}.run" for name in ("pose", "show", "figure")},
+    **{"demo": "demo.demo", "gallery": "demo.gallery"},
+    **{name: f"{name}.run" for name in ("interact", "drag", "world", "clip", "study", "reach", "assess", "bench")},
+    **{"doctor": "doctor.doctor", "completion": "doctor.completion"},
+}
+"""Where each command is: a module of this folder, and its name there."""
 
 DESCRIPTION = """\
 Pose people, avatars, hands and robots among objects, in contact and without penetration.
@@ -37,14 +39,15 @@ exit codes:
   2  the command, a task or another file is wrong; the message says what, where, and how to correct it"""
 
 
-def parser(names: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
+def parser(names: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
     """Return the parser of some commands; it loads their modules alone."""
     shape = argparse.RawDescriptionHelpFormatter
     top = Parser(prog="wholebody", description=DESCRIPTION, epilog=EXIT_CODES, formatter_class=shape)
     top.add_argument("--version", action="version", version=f"wholebody {__version__}")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name in names:
-        import_module(f"wholebody.cli.{name}").run.add_to(commands)
+        module, _, command = COMMANDS[name].partition(".")
+        getattr(import_module(f"wholebody.cli.{module}"), command).add_to(commands)
     return top
 
 

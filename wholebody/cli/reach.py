@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from wholebody.cli.arguments import JOINED
+from wholebody.cli.arguments import JOBS, JOINED, jobs_of
 from wholebody.cli.command import command, flag, option
 
 
@@ -25,8 +25,7 @@ goals, and write into a folder:
     option("--low", required=True, metavar=JOINED, help="least corner of the grid, metres"),
     option("--high", required=True, metavar=JOINED, help="greatest corner"),
     option("--step", default="0.1", metavar="M", help="metres between places, or X,Y,Z (default: 0.1)"),
-    option("--jobs", type=int, default=1, metavar="N", help="processes (default: 1)"),
-    option("--cluster", metavar="ADDRESS", help="dask scheduler that runs the searches"),
+    *JOBS,
     flag("--goals", "meet the task's goals at every place too"),
     option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-TASK)"),
     epilog="""\
@@ -51,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     make_folder(out)
     with Console(stderr=True).status("searching") as status:
         found = reach_map(
-            task.problem, arguments.frame, low, high, step, jobs=arguments.jobs, cluster=arguments.cluster,
+            task.problem, arguments.frame, low, high, step, jobs=jobs_of(arguments), cluster=arguments.cluster,
             progress=lambda done, total: status.update(f"{done} of {total} places"),
         )  # fmt: skip
     print(found)

@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from wholebody.cli.arguments import JOBS, jobs_of
 from wholebody.cli.command import command, flag, option
 
 
@@ -19,8 +20,7 @@ Solve the task of a study file for each person, with each target, in each layout
   records.jsonl     the same with the postures; an interrupted run continues from it""",
     option("study", type=Path, metavar="FILE.toml", help="the study file"),
     option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-FILE)"),
-    option("--jobs", type=int, default=1, metavar="N", help="cases at a time (default: 1)"),
-    option("--cluster", metavar="ADDRESS", help="dask scheduler that runs the cases"),
+    *JOBS,
     flag("--parquet", "write cases.parquet too (needs pyarrow)"),
     epilog="""\
 a study file:
@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
     with Console(stderr=True).status("solving") as status:
         records = study(
             asked.task, people=asked.people, targets=asked.targets, layouts=asked.layouts, method=asked.method,
-            warm_start=asked.warm_start, jobs=arguments.jobs, cluster=arguments.cluster, folder=out,
+            warm_start=asked.warm_start, jobs=jobs_of(arguments), cluster=arguments.cluster, folder=out,
             progress=lambda told: status.update(f"{told.done} of {told.total}"),
         )  # fmt: skip
     made = table("case", "outcome", "goal error", "overlap", "time")

@@ -19,7 +19,7 @@ from wholebody.figures.joining import mounted_parts, posture_of_all
 from wholebody.figures.model_check import LARGEST, Turning, check_model
 from wholebody.figures.postures import grounded
 from wholebody.figures.reduction import reduced_parts
-from wholebody.figures.state import free_roots, root_freedoms
+from wholebody.figures.state import Posed, free_roots, root_freedoms
 from wholebody.geometry.placement import placement
 
 
@@ -107,7 +107,7 @@ class Figure(checks.FixedAttributes):
         self.excluded_pairs, self.notes = description.excluded, description.notes
         self.loaded_as: tuple[str, dict[str, Any]] | None = None
         self.members = MappingProxyType(dict(description.members))
-        self._data = Pool(model.createData, at_most=1)  # 6.5 MB for 55 freedoms, 27 MB for 95
+        self._data = Pool(lambda: Posed(model), at_most=1)  # 6.5 MB for 55 freedoms, 27 MB for 95
         self._description = description
         self._made: dict[str, Array] = {}
         self._outer: tuple[pin.GeometryObject, ...] | None = None
@@ -219,15 +219,14 @@ class Figure(checks.FixedAttributes):
     def placement(self, q: Array, name: str) -> pin.SE3:
         """Return the placement in the world, at the posture q (nq,), of a frame, a segment or a joint."""
         frame, q = self.frame_id(name), self._checked(q)
-        with self._data.borrow() as data:
-            pin.forwardKinematics(self.model, data, q)
-            return pin.updateFramePlacement(self.model, data, frame).copy()
+        with self._data.borrow() as posed:
+            return pin.updateFramePlacement(self.model, posed.at(q), frame).copy()
 
     def joint_placements(self, q: Array, joints: Iterable[int]) -> dict[int, pin.SE3]:
         """Return the placements in the world, at the posture q (nq,), of joints by their indices in the model."""
-        with self._data.borrow() as data:
-            pin.forwardKinematics(self.model, data, self._checked(q))
-            return {joint: data.oMi[joint].copy() for joint in joints}
+        with self._data.borrow() as posed:
+            placed = posed.at(self._checked(q)).oMi
+            return {joint: placed[joint].copy() for joint in joints}
 
     def joint_id(self, name: str) -> int:
         """Return the index of a joint in the model; "root", or "anna/root", is a free root."""

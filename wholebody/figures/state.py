@@ -36,6 +36,23 @@ class Wrench(NamedTuple):
     against: int = 0
 
 
+class Posed:
+    """Pinocchio's data of a model with its joints at a posture, computed once while the same one is asked for."""
+
+    def __init__(self, model: pin.Model) -> None:
+        """Allocate the data."""
+        self._model, self._data, self._q = model, model.createData(), b""
+
+    def at(self, q: Array) -> pin.Data:
+        """The data at a posture (nq,)."""
+        asked = q.tobytes()
+        if asked != self._q:
+            self._q = b""
+            pin.forwardKinematics(self._model, self._data, q)
+            self._q = asked
+        return self._data
+
+
 class State:
     """Placements and Jacobians of a model at one posture, from a single pass of Pinocchio.
 

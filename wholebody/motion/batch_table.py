@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 from wholebody.base.arrays import brief
@@ -85,7 +86,11 @@ class BatchTable:
         self.folder = folder
         of = "cases of wb.motion.avoid_many"
         self._cases = RecordFile(folder / TABLE, of, lambda row: AvoidedCase(**row))  # by the names of the clips' files
-        self._originals = RecordFile(folder / ORIGINALS / "clips.jsonl", "clips of wb.motion.read_many", str)
+
+    @cached_property
+    def _originals(self) -> RecordFile[str]:
+        """Fingerprints of recordings, by the names of their clips."""
+        return RecordFile(self.folder / ORIGINALS / "clips.jsonl", "clips of wb.motion.read_many", str)
 
     def done(self, asked: AvoidedCase) -> AvoidedCase | None:
         """The row of a case that need not be done again; None if there is none, or its clip was taken away."""

@@ -25,7 +25,7 @@ from wholebody.motion.structure import upright
 from wholebody.motion.thing_contacts import ThingContact, Things, thickness
 from wholebody.motion.windows import long_runs, runs
 
-STRONG = 24.0  # s, weight of what rests, over the time step, as that of accelerations; 1 of a bone
+FIRM, STRONG = 24.0, 48.0  # s, weights of what rests, over the time step, in the first pass and later; 1 of a bone
 NEARING, SWING = 30.0, 0.3  # weights of what nearly rests, and of a sole between
 TOUCH = 100.0  # of what touches a thing
 LANDING = 3.0  # weight in the frame in which a point comes down, where contact decides
@@ -166,7 +166,7 @@ class Holds:
         # of the highest surface below a place (3,), None for the recording's ground.
         self.points, self._scale, self._surface, self._touched = points, scale, surface, touched
         self.over, self.ahead = max(1, round(OVER / dt)), max(1, round(AHEAD / dt))
-        self._strong = STRONG / dt
+        self._dt = dt
         contacts = () if touched is None else touched.contacts
         # a part that touches a thing while it seems to rest on the ground rests on the thing
         apart = [
@@ -253,7 +253,7 @@ class Holds:
 
     def goals(self, frame: int, paths: Mapping[int, Array], shift: Array, again: bool = False) -> tuple[Array, Array]:
         """Goals and weights (h, 3) of a frame; `paths` (h, 3) by frame without holds, `shift` (3,) of the body."""
-        down = self._facing_down(paths[frame])
+        down, strong = self._facing_down(paths[frame]), (STRONG if again else FIRM) / self._dt
         goals, weights = np.array(paths[frame]), np.zeros((len(self.points), 3))
         for number, stands in enumerate(self._stands):
             after = bisect_right([stand.first for stand in stands], frame)
@@ -269,7 +269,7 @@ class Holds:
                 if self.points[number].thing:
                     weights[number] = TOUCH
                 else:
-                    weights[number] = LANDING * BESIDE if frame == around[0].first and not again else self._strong
+                    weights[number] = LANDING * BESIDE if frame == around[0].first and not again else strong
             else:
                 goals[number], share = self._swing(number, frame, nearest, places, paths)
                 weights[number] = (

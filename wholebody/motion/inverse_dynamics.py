@@ -18,7 +18,7 @@ from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
 from wholebody.motion.stance import pieces_on
-from wholebody.tasks.balance import DOWN, convex_polygon, edges
+from wholebody.tasks.balance import DOWN, convex_polygon
 from wholebody.tasks.surfaces import outermost
 
 ROOT = 6  # degrees of freedom of a free root
@@ -273,8 +273,7 @@ def _standing(points: Array, owner: Indices) -> Stand:
 def _support(points: Array) -> tuple[Array, Array, Array]:
     """Corners (c, 2), normals (e, 2) and offsets (e,) of the convex hull of points (p, 2), which may lie on a line."""
     try:
-        corners = convex_polygon(points)
-        return corners, *edges(corners)
+        return convex_polygon(points)[:3]
     except InputError:  # one capsule, or one point: a foot without width
         middle = points.mean(axis=0)
         along = np.linalg.svd(points - middle)[2][0]

@@ -43,6 +43,7 @@ BEND = 2.0  # s, weight of an acceleration of the deviation in sweeps, over the 
 GOES_ON, RETURN = 0.9, 0.3  # share of the last change that goes on; s in which a deviation that nothing needs goes back
 CALM, SPREAD = 0.025, 0.06  # s over which the free fit and the deviation of the first pass are smoothed
 LEAST_LEVER = 0.1  # m
+WHOLE = 4.0, 2.0  # weights of a root's places and turns: they move the whole mass, so that legs give way first
 KEPT = 30  # frames before the last one that stay known, for what looks back
 SPARE = 0.9  # share of the speed limits that the free fit takes, so that there is some for what deviates from it
 BONES = {"hand": 0.5, "toe": 0.7, "head": 0.7}  # weights of bones by their far ends, where it is not 1
@@ -367,7 +368,7 @@ def normal(time: float, dt: float) -> Array:
 
 
 def levers(figure: Figure) -> Array:
-    """(nv,) by how many metres a degree of freedom moves what it moves farthest, a radian or metre."""
+    """(nv,) by how many metres a degree of freedom moves what it moves farthest, a radian or metre; a root by more."""
     model, data = figure.model, figure.model.createData()
     pin.forwardKinematics(model, data, figure.neutral)
     ends: list[list[Array]] = [[np.array(data.oMi[joint].translation)] for joint in range(model.njoints)]
@@ -381,4 +382,5 @@ def levers(figure: Figure) -> Array:
         found[first : first + model.nvs[joint]] = max(reach, LEAST_LEVER)
     if figure.root == "free":
         found[:3] = 1.0
+        found[:6] *= np.repeat(WHOLE, 3)
     return found

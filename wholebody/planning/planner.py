@@ -187,12 +187,14 @@ class _End(NamedTuple):
 
 
 def _answers(problem: Problem, sampler: Sampler) -> Iterator[_End]:
-    """Ends that meet the goals: from the start, then from random postures."""
+    """Ends that meet the goals: that of the least measures, then those near random postures."""
+    bare = problem.with_start(problem.start)
+    bare.measures = ()  # these lead most starts to one end
     for number in range(ENDS):
         if number == 0:
             solution = QP().solve(problem)
         else:
-            solution = QP(restarts=0, budget=0).solve(problem.with_start(sampler.near(problem.start, 1.0)))
+            solution = QP(restarts=0, budget=0).solve(bare.with_start(sampler.near(problem.start, number / (ENDS - 1))))
         # Half of the ends are on any side of whole turns: things can block the nearest.
         near = problem.start if number < ENDS // 2 else sampler.anywhere()
         end = sampler.turns.nearest(solution.q, near) if solution.solved else None
@@ -274,7 +276,7 @@ class _Search:
             near = ends[self._rng.integers(len(ends))]
             middle = np.asarray(pin.interpolate(model, start, near, self._rng.uniform()))
             sample = self._sampler.near(middle, self._spreads[self._rng.integers(len(self._spreads))])
-            if self._apart(start, sample) + min(self._apart(sample, q) for q in ends) > most:
+            if most < np.inf and self._apart(start, sample) + min(self._apart(sample, q) for q in ends) > most:
                 continue
             path = trees.grow(sample)
             if path is not None:

@@ -17,26 +17,18 @@ from wholebody.geometry.placement import FARTHEST
 from wholebody.methods.base import Method
 from wholebody.methods.inputs import check_problem
 from wholebody.methods.qp.method import QP
+from wholebody.methods.simplification.reach import beyond_reach
 from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
 from wholebody.studies.reach_result import BEYOND, EXCLUDED, INSIDE, MISSED, NOT_TRIED, REACHED, ReachMap
-from wholebody.studies.reach_search import (
-    SLACK,
-    SURE,
-    Asked,
-    Search,
-    Try,
-    covered,
-    distance_beyond,
-    reach_balls,
-    search_places,
-)
+from wholebody.studies.reach_search import SURE, Asked, Search, Try, covered, search_places
 from wholebody.tasks import inputs
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
 MOST_PLACES = 1_000_000
+SLACK = 1e-6  # m: for rounding: a place that is out of reach by no more may be reached
 LEAST_EDGE, MOST_EDGE = 2, 6  # places along an edge of a brick
 
 
@@ -127,8 +119,7 @@ class _Search:
         self._asked, self._grid = asked, grid
         self._jobs, self._cluster, self._progress = running
         count = len(grid.places)
-        center, radius = reach_balls(asked.problem, asked.frame, asked.offset)
-        least = distance_beyond(grid.places, center, radius)
+        least = beyond_reach(asked.problem, asked.frame, asked.offset, grid.places)
         self._verdict = np.where(least > SLACK, BEYOND, NOT_TRIED).astype(np.int8)
         self._left = np.where(least > SLACK, least, 0.0)
         self._measure = np.zeros(count)

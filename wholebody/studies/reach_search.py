@@ -1,4 +1,4 @@
-"""Searches of the places of a reach map, each from a posture; places provably out of reach."""
+"""Searches of the places of a reach map, each from a posture."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import numpy as np
 from wholebody.base.arrays import Array, Mask
 from wholebody.methods.base import Method
 from wholebody.methods.contradictions import contradictions
-from wholebody.methods.simplification.reach import Balls, Reach, held_balls, still_dofs
 from wholebody.problem import Problem
 from wholebody.tasks import Point
 
@@ -87,29 +86,3 @@ def covered(places: Array, center: Array, radius: Array) -> Mask:
     for middle, size in zip(center, radius, strict=True):
         inside |= np.linalg.norm(places - middle, axis=1) < SURE * size
     return inside
-
-
-SLACK = 1e-6  # m: for rounding: a place that is out of reach by no more may be reached
-
-
-def reach_balls(problem: Problem, frame: str, offset: Array) -> tuple[Array, Array]:
-    """Centres (k, 3) and radii (k,) of balls that hold a point of a frame in every posture within limits and holds."""
-    figure, model = problem.scene.figure, problem.scene.model
-    held = model.frames[figure.frame_id(frame)]
-    point = (held.placement.act(offset))[None]
-    joint = np.array([held.parentJoint], dtype=np.intp)
-    resting = Balls(point, np.zeros(1), np.zeros(1, dtype=np.intp))
-    reach = Reach(model, problem.start, resting, joint, still_dofs(problem))
-    found = [reach.seen_from(0), *held_balls(figure, reach, problem.constraints)]
-    center = np.concatenate([balls.center for balls in found])
-    radius = np.concatenate([balls.radius for balls in found])
-    bounded = np.isfinite(radius)
-    return center[bounded], radius[bounded]
-
-
-def distance_beyond(places: Array, center: Array, radius: Array) -> Array:
-    """By how much (n,) places are at least out of reach, metres."""
-    least = np.zeros(len(places))
-    for middle, size in zip(center, radius, strict=True):
-        least = np.maximum(least, np.linalg.norm(places - middle, axis=1) - size)
-    return least

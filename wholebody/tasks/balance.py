@@ -7,7 +7,7 @@ from dataclasses import KW_ONLY, dataclass, field
 from functools import partial
 from itertools import pairwise
 from math import dist, hypot
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
 import pinocchio as pin
@@ -65,15 +65,24 @@ def _pieces_of(scene: Surroundings, joint: int) -> list[tuple[int, pin.SE3, Any,
     ]
 
 
-def convex_polygon(points: Array) -> Array:
-    """Corners (k, 2) of the convex hull of points (n, 2), anticlockwise."""
+class Polygon(NamedTuple):
+    """A convex polygon, anticlockwise: inside, normals @ x >= offsets."""
+
+    corners: Array  # (k, 2)
+    normals: Array  # (k, 2) unit normals of the edges, inward
+    offsets: Array  # (k,) of the edges
+    width: float  # least extent over the directions of the normals
+
+
+def convex_polygon(points: Array) -> Polygon:
+    """The convex hull of points (n, 2)."""
     flat = np.round(points[:, :2], 6)
-    corners = flat[hull_corners(flat)].reshape(-1, 2)
-    if len(corners) < 3 or least_width(corners) < 1e-4:  # Width [m] below which a polygon counts as a line.
+    found = polygon(flat[hull_corners(flat)].reshape(-1, 2))
+    if found.width < 1e-4:  # Width [m] below which a polygon counts as a line.
         raise InputError(
             "Balance: the feet stand on a line, not an area; name more feet, or load a figure with more detail"
         )
-    return corners
+    return found
 
 
 def hull_corners(points: Array) -> list[int]:
@@ -100,22 +109,25 @@ def hull_corners(points: Array) -> list[int]:
     return corners if len(corners) > 2 else []
 
 
-def edges(corners: Array) -> tuple[Array, Array]:
-    """Inward unit normals (k, 2) and offsets (k,) of a convex polygon: inside, normals @ x >= offsets."""
+def polygon(corners: Array) -> Polygon:
+    """The polygon with these corners (k, 2), anticlockwise; a point or none has no width."""
     normals, offsets = [], []
     places = corners.tolist()  # few: numbers are faster than arrays
+    width = np.inf if len(places) > 2 else 0.0
     for (x, y), (following_x, following_y) in pairwise([*places, *places[:1]]):
         along_x, along_y = following_x - x, following_y - y
         length = hypot(along_x, along_y)
-        normals.append((-along_y / length, along_x / length))
-        offsets.append((along_x * y - along_y * x) / length)
-    return np.reshape(normals, (-1, 2)), np.array(offsets)
+        a, b, offset = -along_y / length, along_x / length, (along_x * y - along_y * x) / length
+        width = min(width, max([a * x + b * y for x, y in places]) - offset)
+        normals.append((a, b))
+        offsets.append(offset)
+    return Polygon(corners, np.reshape(normals, (-1, 2)), np.array(offsets), width)
 
 
-def shrunk(corners: Array, margin: float) -> Array:
+def shrunk(whole: Polygon, margin: float) -> Array:
     """Corners (m, 2) of a polygon with a margin cut off (Sutherland and Hodgman 1974); empty if nothing remains."""
-    rest = corners
-    for normal, offset in zip(*edges(corners), strict=True):
+    rest = whole.corners
+    for normal, offset in zip(whole.normals, whole.offsets, strict=True):
         inside = rest @ normal - offset - margin
         kept = []
         for i in range(len(rest)):
@@ -126,14 +138,6 @@ def shrunk(corners: Array, margin: float) -> Array:
                 kept.append(rest[i])
         rest = np.array(kept).reshape(-1, 2)
     return rest
-
-
-def least_width(corners: Array) -> float:
-    """Least extent of a polygon over the directions of its normals."""
-    (normals, offsets), places = edges(corners), corners.tolist()
-    lines = zip(normals.tolist(), offsets.tolist(), strict=True)
-    width: float = min(max([a * x + b * y for x, y in places]) - offset for (a, b), offset in lines)
-    return width
 
 
 Feet: TypeAlias = Annotated[Sequence[str], Names("['left_foot', 'right_foot']")]
@@ -173,16 +177,14 @@ class Balance(Constraint):
 
     def on_points(self, points: Array, scene: Surroundings, steady: bool = False) -> Balance:
         """Copy that is ready to be evaluated, on points (n, 3) of the soles; if `steady`, with that as its margin."""
-        joints, corners = inputs.joints_with_mass(scene, "Balance", self.feet), convex_polygon(points)
-        width = least_width(corners)
-        margin = STEADY * width if steady else self.margin
+        joints, sole = inputs.joints_with_mass(scene, "Balance", self.feet), convex_polygon(points)
+        margin = STEADY * sole.width if steady else self.margin
         # The circle inside a convex set has at least a third of its width as radius (Blaschke 1915).
-        if 3.0 * margin > width and len(shrunk(corners, margin)) == 0:
+        if 3.0 * margin > sole.width and len(shrunk(sole, margin)) == 0:
             raise InputError(
                 f"Balance: a margin of {margin:g} m leaves nothing of the support polygon; make it smaller"
             )
-        normals, offsets = edges(corners)
-        return filled(self, margin=margin, joints=joints, normals=normals, offsets=offsets)
+        return filled(self, margin=margin, joints=joints, normals=sole.normals, offsets=sole.offsets)
 
     @property
     def lower(self) -> Array:

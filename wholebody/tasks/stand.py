@@ -15,7 +15,7 @@ from wholebody.base.fields import Names
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
-from wholebody.tasks.balance import STANDING_HEIGHT, STEADY, Feet, Margin, hull_corners, least_width
+from wholebody.tasks.balance import STANDING_HEIGHT, STEADY, Feet, Margin, hull_corners, polygon
 from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.contact_parts import Facing, Gap, Over, Part, TermOfParts, between, owner_pairs, through
 from wholebody.tasks.distance import SumOfSquares
@@ -96,11 +96,11 @@ class Stand(TermOfParts):
                 joints += each[1]
         if self.balance:
             mass = inputs.joints_with_mass(scene, where, self.feet)
-            polygon = SolePolygon(np.array(corners), np.array(joints, dtype=np.intp), mass)
-            if not (polygon.rows(state)[0] < FAR_INSIDE).any():
+            soles = SolePolygon(np.array(corners), np.array(joints, dtype=np.intp), mass)
+            if not (soles.rows(state)[0] < FAR_INSIDE).any():
                 raise InputError(f"{where}: the soles are a line, not an area; name more feet, or leave balance out")
-            parts.append(polygon)
-            keeps = STEADY * least_width(polygon.corners(state)) if self.margin is None else self.margin
+            parts.append(soles)
+            keeps = STEADY * polygon(soles.corners(state)).width if self.margin is None else self.margin
         return filled(self, parts=tuple(parts), touches=touches, keeps=keeps)
 
     @property

@@ -219,7 +219,7 @@ class Bodies:
         return self.scene.piece_owner[index] in self._owned or (body.thing is None and body.color[3] == 0.0)
 
     def paint(self, keyframe: Keyframe, index: int, state: Color) -> None:
-        """Give a piece the colour of a state, or the patches of the surface on its segment."""
+        """Give a piece the colour of a state, or what is drawn in its place; on a surface the page does it."""
         body = self.all[index]
         if index in self._among:
             path, number = self._among[index]
@@ -229,7 +229,7 @@ class Bodies:
             keyframe.colors[body.path] = body.state_color(state)
             return
         for owner, patch in self._patches:
-            if owner == self.scene.piece_owner[index]:
+            if patch.whole and owner == self.scene.piece_owner[index]:
                 keyframe.colors[patch.path] = style.tinted(patch.color, state, LOOK.paint)
 
     def pose(self, keyframe: Keyframe, data: Any) -> None:

@@ -37,7 +37,7 @@ def color_contacts(keyframe: Keyframe, bodies: Bodies, contacts: Any) -> None:
 def mark_contacts(keyframe: Keyframe, bodies: Bodies, contacts: Any) -> None:
     """Mark witness points and normals, penetrations by vectors of at least `LOOK.shortest_depth`, labelled."""
     # number of the nearest contacts with markers; a page with thousands of nodes is slow
-    witness, touch = Marker("ball", LOOK.witness, LOOK.witness_radius), Marker("arrow", LOOK.normal, 0.8)
+    witness, touch = Marker("ball", LOOK.witness, LOOK.witness_radius), Marker("arrow", LOOK.normal, 0.8, symbol=True)
     for row in range(min(len(contacts.distance), 60)):
         root = f"{LOOK.contact_node}/{row}"
         distance, normal = float(contacts.distance[row]), np.asarray(contacts.normal[row])

@@ -173,17 +173,21 @@ def convex_faces(convex: Any) -> NDArray[np.uint32]:
     return faces
 
 
-# ---- markers: small things on top of the picture, never lit, never hidden
+# ---- markers: small things on top of the picture, never lit, never hidden, of one size in near and far pictures
+
+_SIZE, _WIDTH = (True, True, True), (True, True, False)
 
 
-def arrow(name: str, color: tuple[float, float, float], slender: float = 1.0) -> Three:
-    """An arrow of length 1 along z from the origin; thinner with a smaller `slender`."""
+def arrow(name: str, color: tuple[float, float, float], slender: float = 1.0, *, symbol: bool = False) -> Three:
+    """An arrow of length 1 along z from the origin; a `symbol`'s length is not a measure, and adapts to the picture."""
     shaft, head = 0.045 * slender, 0.12 * slender
     outline = np.array([[0.0, 1.0], [head, 0.68], [shaft, 0.68], [shaft, 0.0], [0.0, 0.0]])
     vertices, faces, normals = revolved(
         outline, np.broadcast_to([1.0, 0.0], outline.shape), 16
     )  # unlit: any normal will do
-    return _mesh(name, _triangles(vertices, faces, normals), _overlay((*color, 1.0)), order=6)
+    return _mesh(
+        name, _triangles(vertices, faces, normals), _overlay((*color, 1.0)), order=6, scales=_SIZE if symbol else _WIDTH
+    )
 
 
 def rod(name: str, color: tuple[float, float, float], dashes: int = 1) -> Three:
@@ -192,12 +196,12 @@ def rod(name: str, color: tuple[float, float, float], dashes: int = 1) -> Three:
     one = np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]]) * (1.0, share)  # from the top down
     outline = np.concatenate([one + (0.0, start / dashes) for start in reversed(range(dashes))])
     vertices, faces, normals = revolved(outline, np.broadcast_to([1.0, 0.0], outline.shape), 12)
-    return _mesh(name, _triangles(vertices, faces, normals), _overlay((*color, 1.0)), order=5)
+    return _mesh(name, _triangles(vertices, faces, normals), _overlay((*color, 1.0)), order=5, scales=_WIDTH)
 
 
 def ball(name: str, color: tuple[float, float, float], radius: float) -> Three:
     """A small ball."""
-    return _mesh(name, _ball(radius), _overlay((*color, 1.0)), order=7)
+    return _mesh(name, _ball(radius), _overlay((*color, 1.0)), order=7, scales=_SIZE)
 
 
 # ---- three.js
@@ -255,9 +259,19 @@ def _matrix(scale: tuple[float, float, float], placement: Array | None) -> list[
 
 
 def _mesh(
-    name: str, shape: Three, material: Three, *, matrix: list[float] | None = None, order: int = 0, shadow: bool = True
+    name: str,
+    shape: Three,
+    material: Three,
+    *,
+    matrix: list[float] | None = None,
+    order: int = 0,
+    shadow: bool = True,
+    scales: tuple[bool, ...] = (),
 ) -> Three:
-    """A three.js mesh. The name is its uuid: animations tell objects apart by it, and files come out the same."""
+    """A three.js mesh. The name is its uuid: animations tell objects apart by it, and files come out the same.
+
+    `scales` says of a marker along which of its axes the page makes it larger in a picture of more.
+    """
     made: Three = {
         "uuid": name,
         "type": "Mesh",
@@ -265,7 +279,7 @@ def _mesh(
         "material": f"{name}#material",
         "matrix": matrix or _matrix((1.0, 1.0, 1.0), None),
         "renderOrder": order,
-        "userData": {"shadow": shadow and order == 0},
+        "userData": {"shadow": shadow and order == 0} | ({"scales": list(scales)} if scales else {}),
     }
     return {
         "metadata": {"version": 4.5, "type": "Object"},

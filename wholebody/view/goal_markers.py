@@ -87,7 +87,7 @@ class Goals:
         blue, green = LOOK.axes[2], LOOK.target
         for name, color, way in (("is", blue, now), ("wanted", green, wanted)):
             place = drawing.arrow_placement(here.translation, way / np.linalg.norm(way), 2.5 * LOOK.axes_length)
-            keyframe.markers[f"{root}/{name}"] = (Marker("arrow", color, 0.35), place)
+            keyframe.markers[f"{root}/{name}"] = (Marker("arrow", color, 0.35, symbol=True), place)
 
 
 def _wanted(goal: Any, here: pin.SE3) -> Array:

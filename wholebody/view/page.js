@@ -13,8 +13,10 @@
 
   // meshcat lets everything throw a shadow; ghosts and the floor should not.
   const put = viewer.set_object.bind(viewer);
+  const markers = new Map(); // arrows, balls and rods, which are as large in every picture
   viewer.set_object = function (path, object) {
     if (object.userData && object.userData.shadow === false) object.castShadow = false;
+    if (object.userData && object.userData.scales) markers.set(path.join("/"), object);
     put(path, object);
   };
 
@@ -83,9 +85,8 @@
     texture.generateMipmaps = false;
     const sprite = new THREE.Sprite(new THREE.SpriteMaterial(
       { map: texture, depthTest: false, depthWrite: false, transparent: true, sizeAttenuation: false }));
-    sprite.scale.set(cmd.size * width / height, cmd.size, 1);
     sprite.renderOrder = 20;
-    sprite.userData.text = cmd.text;
+    sprite.userData = { text: cmd.text, size: cmd.size, slender: width / height };
     labels.set(cmd.path, sprite);
     viewer.set_object(cmd.path.split("/").filter(x => x), sprite);
   }
@@ -147,11 +148,51 @@
   }
 
   const SMALL = 0.0035; // m: of a pixel where the camera looks at, from which bodies are drawn coarsely
+  const USUAL = 2.4; // m: height of the picture in which markers have the size in which they are made
   let small = false;
   function measure() {
     const distance = viewer.camera.position.distanceTo(viewer.controls.target);
     const across = 2 * distance * Math.tan(viewer.camera.fov * Math.PI / 360);
     small = across / viewer.renderer.domElement.height > SMALL;
+    const size = Math.min(Math.max(across / USUAL, 0.15), 3);
+    for (const [path, marker] of markers) {
+      if (!marker.parent) markers.delete(path);
+      else marker.scale.set(...marker.userData.scales.map(scaled => scaled ? size : 1));
+    }
+  }
+
+  // Around a contact a body takes the colour of its state. Where contacts are is told by their markers.
+  const spots = { value: Array.from({ length: 64 }, () => new THREE.Vector4()) }, spot_count = { value: 0 };
+  function find_contacts() {
+    const folder = viewer.scene_tree.children.contacts;
+    spot_count.value = 0;
+    for (const { children } of Object.values(folder ? folder.children : {})) {
+      if (!children.a || !children.a.object.visible || spot_count.value === spots.value.length) continue;
+      const at = new THREE.Vector3().setFromMatrixPosition(children.a.object.matrixWorld);
+      const overlaps = children.depth && children.depth.object.visible;
+      spots.value[spot_count.value++].set(at.x, at.y, at.z, overlaps ? 1 : 0);
+    }
+  }
+  function paint_contacts(material, look) {
+    const color = rgb => `vec3(${rgb.map(part => part.toFixed(4)).join(", ")})`;
+    material.onBeforeCompile = shader => {
+      Object.assign(shader.uniforms, { spots, spot_count });
+      shader.vertexShader = "varying vec3 seen_at;\n" + shader.vertexShader.replace("#include <project_vertex>",
+        "#include <project_vertex>\n  seen_at = (modelMatrix * vec4(transformed, 1.0)).xyz;");
+      shader.fragmentShader = `varying vec3 seen_at;
+        uniform vec4 spots[${spots.value.length}];
+        uniform int spot_count;
+      ` + shader.fragmentShader.replace("#include <color_fragment>", `#include <color_fragment>
+        vec2 near = vec2(0.0);
+        for (int k = 0; k < ${spots.value.length}; k++) {
+          if (k >= spot_count) break;
+          float share = 1.0 - smoothstep(${(0.7 * look.radius).toFixed(4)}, ${look.radius.toFixed(4)},
+                                         distance(seen_at, spots[k].xyz));
+          near = max(near, share * vec2(1.0, spots[k].w));
+        }
+        diffuseColor.rgb = mix(diffuseColor.rgb, mix(${color(look.touch)}, ${color(look.overlap)}, near.y),
+                               ${look.share.toFixed(4)} * near.x);`);
+    };
   }
 
   function skin(cmd) {
@@ -168,6 +209,7 @@
       color: new THREE.Color(r, g, b), opacity: alpha, transparent: alpha < 1, shininess: 10, specular: 0x141414,
       polygonOffset: alpha < 1, polygonOffsetFactor: 2, polygonOffsetUnits: 8,
     });
+    if (alpha === 1) paint_contacts(material, cmd.contacts);
     const mesh = new THREE.SkinnedMesh(shape, material);
     // Shadows are thrown by the coarse triangles, which follow the fine ones; so is a body drawn that is small.
     const coarse = shape.index.count - cmd.fine, fewer = () => shape.setDrawRange(cmd.fine, coarse);
@@ -182,15 +224,17 @@
     viewer.set_object(parts(cmd.path), mesh);
   }
 
-  // Boxes on the screen around wrists that are large enough for hands.
-  const HAND = 0.17, CLOSE = 0.5; // m; of half the screen's height, from which a hand is all that is looked at
-  function hands(up) {
+  // Boxes on the screen around hands and heads: their joints, half sizes and how far above the joints they are, m.
+  const GUARDED = [["wrist", 0.17, 0], ["neck2_rotation", 0.14, 0.09]];
+  const CLOSE = 0.5; // of half the screen's height, from which a hand is all that is looked at
+  function guarded(up) {
     const figure = viewer.scene_tree.children.figure, found = [];
     const eye = new THREE.Vector3().setFromMatrixPosition(viewer.camera.matrixWorld);
     for (const [name, node] of Object.entries(figure ? figure.children : {})) {
-      if (!name.includes("wrist")) continue;
-      const at = new THREE.Vector3().setFromMatrixPosition(node.object.matrixWorld);
-      const size = HAND / (eye.distanceTo(at) * up);
+      const [, half, lift] = GUARDED.find(([joint]) => name.includes(joint)) || [];
+      if (!half) continue;
+      const at = new THREE.Vector3(0, 0, lift).applyMatrix4(node.object.matrixWorld);
+      const size = half / (eye.distanceTo(at) * up);
       at.project(viewer.camera);
       const box = { x: at.x, w: 2 * size / viewer.camera.aspect, bottom: at.y - size, h: 2 * size, hand: true };
       if (size < CLOSE) found.push(box);
@@ -198,9 +242,13 @@
     return found;
   }
 
-  // Moves labels off hands, up or down, and lifts those that would cover each other, the lower ones first in place.
+  // Puts labels, the lower ones first, where they hide no hands, heads and other labels: up or down to the nearest free
+  // place. None leaves the picture, and none is too small to be read.
+  const LEAST = 15; // pixels: height of a label
   function arrange() {
     const up = Math.tan(viewer.camera.fov * Math.PI / 360);
+    const least = 2 * up * LEAST / viewer.renderer.getSize(new THREE.Vector2()).y;
+    viewer.camera.updateProjectionMatrix(); // meshcat does so later, in drawing
     viewer.camera.updateMatrixWorld();
     viewer.scene.updateMatrixWorld();
     const found = [];
@@ -210,27 +258,28 @@
       if (top !== viewer.scene) labels.delete(path);
       const at = new THREE.Vector3().setFromMatrixPosition(sprite.matrixWorld).project(viewer.camera);
       if (top !== viewer.scene || !seen || at.z > 1) continue;
-      found.push({ sprite, x: at.x, y: at.y, w: sprite.scale.x / (up * viewer.camera.aspect), h: sprite.scale.y / up });
+      const high = Math.max(sprite.userData.size, least), w = sprite.userData.slender * high / (up * viewer.camera.aspect);
+      sprite.scale.set(sprite.userData.slender * high, high, 1);
+      const x = Math.min(Math.max(at.x, w / 2 - 1), 1 - w / 2);
+      found.push({ sprite, aside: (at.x - x) / w, x, y: at.y, w, h: high / up });
     }
     found.sort((a, b) => a.y - b.y);
-    const placed = hands(up);
+    const placed = guarded(up);
     for (const item of found) {
-      let bottom = item.y + 0.4 * item.h;
-      for (let hit = true, tries = 0; hit && tries < 12; tries++) {
-        hit = placed.find(p => Math.abs(p.x - item.x) < (p.w + item.w) / 2
-                               && p.bottom < bottom + item.h && bottom < p.bottom + p.h);
-        if (!hit) break;
-        const above = hit.bottom + hit.h + 0.05 * item.h, below = hit.bottom - 1.05 * item.h;
-        bottom = hit.hand && bottom - below < above - bottom ? below : above;
-      }
+      const start = item.y + 0.4 * item.h, free = bottom => bottom > -1 && bottom + item.h < 1
+        && !placed.some(p => Math.abs(p.x - item.x) < (p.w + item.w) / 2
+                             && p.bottom < bottom + item.h && bottom < p.bottom + p.h);
+      const steps = [...Array(80).keys()].map(k => start + (k % 2 ? 0.25 : -0.25) * Math.ceil(k / 2) * item.h);
+      const near = steps.find(free), bottom = near === undefined ? start : near;
       placed.push({ x: item.x, w: item.w, bottom, h: item.h });
-      item.sprite.center.set(0.5, (item.y - bottom) / item.h);
+      item.sprite.center.set(0.5 + item.aside, (item.y - bottom) / item.h);
     }
   }
   const draw = viewer.render.bind(viewer);
   viewer.render = function () {
-    arrange();
     measure();
+    arrange();
+    find_contacts();
     draw();
   };
 

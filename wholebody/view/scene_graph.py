@@ -27,6 +27,7 @@ class Marker:
     color: Any  # red, green, blue; of a label, its CSS colour
     size: float = 1.0  # of an arrow its width relative to the usual, of a ball its radius, of a label its height
     text: str = ""  # of a label
+    symbol: bool = False  # of an arrow: its length is no measure
 
 
 @dataclass
@@ -142,7 +143,7 @@ class SceneGraph:
         if marker.kind == "label":
             self.do(commands.label(path, marker.text, marker.color, marker.size))
         elif marker.kind == "arrow":
-            self.put(path, drawing.arrow(path, marker.color, marker.size))
+            self.put(path, drawing.arrow(path, marker.color, marker.size, symbol=marker.symbol))
         elif marker.kind in ("rod", "dashes"):
             self.put(path, drawing.rod(path, marker.color, 1 if marker.kind == "rod" else 4))
         else:

@@ -39,6 +39,36 @@ def beside(motion: SkeletonMotion | None, clips: Mapping[str, Clip], scene: Scen
     Raises:
         InputError: motions of other numbers of frames, or two names that differ in "/" and " " alone.
     """
+    _check(motion, clips, scene)
+    wide = max(APART, 0.5 + max(_across(clip) for clip in clips.values()))
+    count = len(clips) + (motion is not None)
+    first = -0.5 * wide * (count - 1)  # what looks against the x axis has y on its right
+    aside = {name: first + wide * (number + (motion is not None)) for number, name in enumerate(clips)}
+    fixed = [name for name, clip in clips.items() if clip.figure.root == "fixed"]
+    world = _furnished(clips, scene, aside)
+    tracks = {} if motion is None else _bones(world, motion, first)
+    for name, clip in clips.items():
+        for thing, track in clip.things.items():
+            tracks[f"{thing} by {name}"] = [pin.XYZQUATToSE3(at + np.eye(7)[1] * aside[name]) for at in track]
+    viewed = ViewedWorld(world, tracks, between_things=False)
+    moved = [
+        clip.q if name in fixed else clip.q + np.eye(clip.q.shape[1])[1] * aside[name] for name, clip in clips.items()
+    ]
+    parts = np.concatenate(moved, axis=1)
+    postures = [
+        viewed.configuration(q, {name: track[frame] for name, track in tracks.items()}) for frame, q in enumerate(parts)
+    ]
+    dt = next(iter(clips.values())).dt
+    viewer = Viewer(viewed, title=title, contact_distance=-1e-4)  # overlaps alone are shown
+    middle = np.mean([_middle(clip) for clip in clips.values()], axis=0)
+    away = 1.2 + 1.1 * wide * count
+    viewer.look(tuple(middle + away * np.array([0.9, 0.1, 0.25])), tuple(middle))
+    viewer.play(postures, dt)
+    return viewer
+
+
+def _check(motion: SkeletonMotion | None, clips: Mapping[str, Clip], scene: Scene) -> None:
+    """Refuse motions that cannot be shown beside each other; see `beside`."""
     if len({_figure(name) for name in clips}) < len(clips):
         raise InputError(
             f"side by side: the names {', '.join(map(repr, clips))} need to differ in more than '/' and ' '"
@@ -49,16 +79,17 @@ def beside(motion: SkeletonMotion | None, clips: Mapping[str, Clip], scene: Scen
     if len(set(counts.values())) > 1:
         told = ", ".join(f"{name} {count}" for name, count in counts.items())
         raise InputError(f"side by side: motions have different numbers of frames ({told}); give the same ones")
-    wide = max(APART, 0.5 + max(_across(clip) for clip in clips.values()))
-    count = len(clips) + (motion is not None)
-    first = -0.5 * wide * (count - 1)  # what looks against the x axis has y on its right
-    aside = {name: first + wide * (number + (motion is not None)) for number, name in enumerate(clips)}
-    around = [each for each in scene.objects.values() if each.segment is None]
+    around = [name for name, each in scene.objects.items() if each.segment is None]
     for clip in clips.values():
         for thing in clip.things:
-            known(thing, [one.name for one in around], "thing", "side by side: scene")
+            known(thing, around, "thing", "side by side: scene")
             if isinstance(scene.objects[thing].shape, HalfSpace):
                 raise InputError(f"side by side: {thing} of {clip.name} moves; a half-space is drawn where it is")
+
+
+def _furnished(clips: Mapping[str, Clip], scene: Scene, aside: Mapping[str, float]) -> Scene:
+    """The figures, those on a fixed base at their place, with what each carries and what stands around each."""
+    around = [each for each in scene.objects.values() if each.segment is None]
     fixed = [name for name, clip in clips.items() if clip.figure.root == "fixed"]
     world = Scene(
         {
@@ -82,25 +113,7 @@ def beside(motion: SkeletonMotion | None, clips: Mapping[str, Clip], scene: Scen
     for each in around:
         if isinstance(each.shape, HalfSpace):
             world.add(each.shape, name=each.name, at=each.placement, color=each.color)
-    tracks = {} if motion is None else _bones(world, motion, first)
-    for name, clip in clips.items():
-        for thing, track in clip.things.items():
-            tracks[f"{thing} by {name}"] = [pin.XYZQUATToSE3(at + np.eye(7)[1] * aside[name]) for at in track]
-    viewed = ViewedWorld(world, tracks, between_things=False)
-    moved = [
-        clip.q if name in fixed else clip.q + np.eye(clip.q.shape[1])[1] * aside[name] for name, clip in clips.items()
-    ]
-    parts = np.concatenate(moved, axis=1)
-    postures = [
-        viewed.configuration(q, {name: track[frame] for name, track in tracks.items()}) for frame, q in enumerate(parts)
-    ]
-    dt = next(iter(clips.values())).dt
-    viewer = Viewer(viewed, title=title, contact_distance=-1e-4)  # overlaps alone are shown
-    middle = np.mean([_middle(clip) for clip in clips.values()], axis=0)
-    away = 1.2 + 1.1 * wide * count
-    viewer.look(tuple(middle + away * np.array([0.9, 0.1, 0.25])), tuple(middle))
-    viewer.play(postures, dt)
-    return viewer
+    return world
 
 
 def _figure(name: str) -> str:

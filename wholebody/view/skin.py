@@ -20,6 +20,7 @@ class Skinned(NamedTuple):
     path: str
     segment: str
     color: Color
+    whole: bool = True  # whether all of it takes the colour of a contact; on a surface the page colours a patch
 
 
 class Skin:
@@ -56,5 +57,5 @@ class Skin:
             path = f"{root}/{patch.name}"
             # metres: positions are sent as whole multiples of it, in half of the bytes
             graph.do(commands.set_skin(path, root, patch, shown, 1e-4))
-            drawn.append(Skinned(path, patch.segment, shown))
+            drawn.append(Skinned(path, patch.segment, shown, whole=False))
         return drawn

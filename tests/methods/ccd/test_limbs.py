@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.reference.limbs import turned
 from wholebody.methods.ccd.limbs import Limbs, floats, movable, moved, rotated, seen_from
 
 
@@ -78,7 +79,7 @@ def test_lines_are_the_axes_about_which_joints_turn() -> None:
     for node, joint in enumerate(limbs.joints):
         axis, origin = np.array(limbs.lines[node][:3]), np.array(limbs.lines[node][3:])
         column = jacobian[:, model.joints[joint].idx_v]
-        if limbs.slides(node):
+        if limbs.slides[node]:
             assert column == pytest.approx([*axis, 0.0, 0.0, 0.0], abs=1e-12)
         else:
             assert column == pytest.approx([*np.cross(origin, axis), *axis], abs=1e-12)
@@ -90,3 +91,6 @@ def test_vectors_of_frames() -> None:
     assert moved(floats(place), *point) == pytest.approx(place.act(point))
     assert rotated(floats(place), *point) == pytest.approx(place.rotation @ point)
     assert seen_from(floats(place), *point) == pytest.approx(place.rotation.T @ point)
+    axis = point / np.linalg.norm(point)
+    arrow = rng.normal(size=3)
+    assert turned(*axis, np.cos(0.7), np.sin(0.7), *arrow) == pytest.approx(pin.exp3(0.7 * axis) @ arrow)

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import wholebody as wb
+from tests.reference import limbs as reference
 from wholebody.methods.ccd.limbs import Limbs, movable
 from wholebody.methods.ccd.sweep import Aims, within
 
@@ -108,38 +109,36 @@ def test_a_target_out_of_reach_is_said_to_be_so(planar_arm: Callable[..., Any]) 
 
 
 @pytest.mark.parametrize("name", ["human", "avatar", "slides"])
-def test_sweeps_come_nearer_and_points_go_where_pinocchio_has_them(name: str) -> None:
-    """On random postures, aims and plans of any joints."""
+def test_compiled_kinematics_and_sweeps_do_what_plain_floats_do(name: str) -> None:
+    """On random postures, aims and plans, entry by entry; the same numbers but for the last digits."""
     rng = np.random.default_rng(5)
     model = _sliding_arm(rng) if name == "slides" else wb.load(name).model
     joints = [joint for joint in range(1, model.njoints) if movable(model, joint)]
     data = model.createData()
-    for case in range(60):
+    for case in range(200):
         chosen = sorted(rng.choice(joints, size=int(rng.integers(1, len(joints) + 1)), replace=False).tolist())
         limbs = Limbs(model, chosen)
         q = pin.integrate(model, pin.neutral(model), rng.normal(size=model.nv))
         pin.forwardKinematics(model, data, q)
         limbs.read(q, data)
         limbs.forward()
+        frames, lines = reference.forward(limbs)
+        assert np.abs(limbs.frames - frames).max() < 1e-13
+        assert np.abs(limbs.lines - lines).max() < 1e-13
         count = int(rng.integers(1, 5))
-        own, there = rng.normal(size=(2, count, 3))
+        here, there = rng.normal(size=(2, count, 3))
         tips, weights = rng.integers(len(chosen), size=count).tolist(), rng.uniform(0.1, 2.0, count)
-        points = (rng.random(count) < 0.6).tolist()
-        aims = Aims(limbs, tips, own, there, points, weights)
+        aims = Aims(limbs, tips, here, there, (rng.random(count) < 0.6).tolist(), weights)
+        aims.here[:] = here
         plan = aims.plan() if case % 2 else aims.plan(rng.choice(len(chosen), 3).tolist())
-        left = np.inf  # what moves is within its limits from the first sweep on
-        for _ in range(3):
-            aims.sweep(plan)
-            limbs.forward()
-            limbs.write(q)
-            pin.forwardKinematics(model, data, q)
-            for tip, point, place, now in zip(tips, points, own, aims.here, strict=True):
-                at = data.oMi[chosen[tip]]
-                assert now == pytest.approx(at.act(place) if point else at.rotation @ place, abs=1e-9)
-            assert aims.distance == pytest.approx(np.sqrt(aims.weights @ ((there - aims.here) ** 2).sum(axis=1)))
-            assert aims.distance <= left + 1e-9
-            left = aims.distance
-            aims.carry()
+        steps = [(node, tuple(plan.moved[k:last].tolist()), points) for node, k, last, points in plan.turns.tolist()]
+        values, carried = limbs.values.tolist(), [tuple(place) for place in here.tolist()]
+        targets = [tuple(place) for place in there.tolist()]
+        expected = reference.sweep(limbs, values, carried, targets, aims.weights.tolist(), steps)
+        assert aims.sweep(plan) == pytest.approx(expected, abs=1e-12)
+        assert np.abs(limbs.values - values).max() < 1e-12
+        assert np.abs(aims.here - carried).max() < 1e-12
+        assert aims.distance == pytest.approx(np.sqrt(aims.weights @ ((there - aims.here) ** 2).sum(axis=1)))
 
 
 def _sliding_arm(rng: np.random.Generator) -> Any:

@@ -96,6 +96,15 @@ def test_a_goal_out_of_reach_is_approached_and_said_to_be(human: wb.Figure) -> N
     assert solution.assessment.goal_error < reached + 0.1
 
 
+def test_no_other_start_is_tried_for_a_goal_farther_than_all_links(planar_arm) -> None:
+    problem = wb.Problem(wb.Scene(planar_arm((0.4, 0.3))), goals=[wb.Point("tip", (3.0, 0.1, 0.0))])
+    solution = wb.methods.Newton().solve(problem)
+    assert solution.status == "unreachable"
+    assert solution.assessment.goal_error == pytest.approx(np.hypot(3.0, 0.1) - 0.7, abs=1e-4)
+    assert "another start" not in solution.message
+    assert solution.iterations == wb.methods.Newton(restarts=0).solve(problem).iterations
+
+
 def test_frozen_joints_stay(human: wb.Figure) -> None:
     problem = wb.Problem(
         wb.Scene(human),

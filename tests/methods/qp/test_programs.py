@@ -10,6 +10,7 @@ import pytest
 from tests.reference import active_set as reference
 from tests.reference.active_set import guess_active_set, objective, same
 from wholebody.base.arrays import with_values
+from wholebody.base.errors import UnknownNameError
 from wholebody.methods.qp.active_set import solve_from
 from wholebody.methods.qp.face_kernel import Face, minimise_on_face
 from wholebody.methods.qp.quadratic_program import ActiveSet
@@ -221,6 +222,11 @@ def test_programs_at_the_edge_of_sense(random_program, name):
         upper=np.full(12, 0.3),
     )
     assert solver.solve_cold(against).x[0] == pytest.approx(0.0, abs=1e-2)
+
+
+def test_unknown_solver_is_answered_with_the_names():
+    with pytest.raises(UnknownNameError, match="osqp"):
+        make_solver("oskp")
 
 
 PARTS = ("diagonal", "linear", "rows", "target", "weight", "elastic", "least", "elastic_weight", "lower", "upper")

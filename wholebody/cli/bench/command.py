@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from wholebody.bench.tables import publish_text, write_rows, write_text
-from wholebody.cli.command import Command, Measure, Option, command, flag, option
+from wholebody.cli.command import Command, Measure, Option, command, count, flag, option
 
 
 def measuring(name: str, help: str, description: str, *options: Option) -> Callable[[Measure], Command]:
@@ -42,7 +42,7 @@ def listed(name: str, help: str, metavar: str | None = "NAME", **settings: Any) 
 
 def seed(of: str) -> Option:
     """The option `--seed`."""
-    return option("--seed", type=int, default=0, metavar="N", help=f"{of} (default: 0)")
+    return count("--seed", 0, of, least=0)
 
 
 class Chart(NamedTuple):

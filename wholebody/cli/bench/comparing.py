@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from wholebody.base.errors import InputError
 from wholebody.bench.tables import machine, write_rows, write_text
+from wholebody.cli.arguments import JOBS, jobs_of
 from wholebody.cli.bench.command import folders, listed, quick, seed
 from wholebody.cli.command import command, count, flag, option
 
@@ -38,8 +39,7 @@ cases in parallel by joblib, --cluster on a dask cluster.""",
     count("--cases", None, "problems of each set (default: 200)"),
     option("--minutes", type=float, metavar="N", help="of solving in all (default: 25; with --quick 2)"),
     seed("of all problems"),
-    count("--jobs", None, "cases in parallel (default: 1, or all workers of the cluster)"),
-    option("--cluster", metavar="ADDRESS", help="of a dask scheduler, such as tcp://10.0.0.1:8786"),
+    *JOBS,
     flag("--held-out", "pose problems of distributions that no constant was tuned on"),
     option("--again", type=Path, metavar="LOCK.json", help="repeat the comparison that left this file"),
     *folders("out/compare"),
@@ -50,14 +50,13 @@ def compare(arguments: argparse.Namespace) -> int:
         return _compare_on_task(arguments)
     if arguments.again is not None:
         return _again(arguments)
-    from wholebody.base.batches import threads
     from wholebody.bench.suite.adapters.registry import missing
     from wholebody.bench.suite.compare import run as comparison
     from wholebody.bench.suite.compare.report import PAGE, publish, to_docs
     from wholebody.bench.suite.compare.summary import advice
     from wholebody.cli.tables import bar
 
-    jobs = arguments.jobs or (threads(arguments.cluster) if arguments.cluster else 1)
+    jobs = jobs_of(arguments)
     settings = _settings(arguments)
     with bar("starting") as tell:
         store = comparison.run(
@@ -144,8 +143,9 @@ def _again(arguments: argparse.Namespace) -> int:
 
     published = read_lock(arguments.again)
     settings = published.settings()
-    store = comparison.run(settings, arguments.out, arguments.jobs or 1, None, lambda progress: print(progress.said))
-    facts = _facts(f"{arguments.jobs or 1} on this machine")
+    jobs = jobs_of(arguments)
+    store = comparison.run(settings, arguments.out, jobs, None, lambda progress: print(progress.said))
+    facts = _facts(f"{jobs} on this machine")
     found = locked(publish(settings, store, arguments.out, facts, missing()))
     for line in in_words(published, found):
         print(line)

@@ -34,8 +34,6 @@ def export(arguments: argparse.Namespace) -> None:
 
     sets = [problem_set(name) for name in dict.fromkeys(arguments.sets or SETS)]
     per_set = arguments.per_set or CASES
-    if arguments.seed < 0:
-        raise InputError(f"--seed is {arguments.seed}; give 0 or more")
     written = count_from(1)
     with bar("writing", per_set * len(sets)) as tell:
         index = export(sets, per_set, arguments.seed, arguments.folder, lambda name: tell(next(written), name))

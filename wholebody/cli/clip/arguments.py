@@ -42,21 +42,6 @@ SCENE = option("--scene", type=Path, metavar="TASK.toml", help="task file with t
 
 PAGE = option("--html", type=Path, metavar="FILE", help="write curves over time and a film beside the recording")
 
-JOBS: tuple[Option, ...] = (
-    option("--jobs", type=int, metavar="N", help="cases at a time (default: 1, or all of the cluster)"),
-    option("--cluster", metavar="ADDRESS", help="of a dask scheduler, such as tcp://10.0.0.1:8786"),
-)
-
-
-def jobs_of(arguments: argparse.Namespace) -> int:
-    """How many cases are done at a time; raises WholebodyError for less than one, or a cluster that does not answer."""
-    from wholebody.base.batches import threads
-    from wholebody.base.checks import whole
-
-    if arguments.jobs is None:
-        return threads(arguments.cluster) if arguments.cluster else 1
-    return whole(arguments.jobs, "--jobs", 1, 4096)
-
 
 def figure_of(arguments: argparse.Namespace) -> Figure:
     """Load the figure."""

@@ -7,14 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from wholebody.cli.arguments import JOBS, jobs_of
 from wholebody.cli.clip.arguments import (
     EQUIPMENT,
-    JOBS,
     MOTIONS,
     PAGE,
     SCENE,
     figure_of,
-    jobs_of,
     scene_of,
     skeleton_of,
 )
@@ -85,7 +84,6 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.motion.worn_equipment import put_on
 
     (file,) = arguments.files
-    jobs_of(arguments)  # one case needs no jobs; what is wrong with them is said all the same
     out = check_writable(check_ending(arguments.out or file.with_name(f"{file.stem}-free.npz")), [file])
     if arguments.html is not None:
         checked_target(arguments.html, "--html", "a page", (".htm", ".html"))

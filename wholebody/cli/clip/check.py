@@ -7,7 +7,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wholebody.cli.clip.arguments import EQUIPMENT, JOBS, MOTIONS, SCENE, jobs_of, scene_of
+from wholebody.cli.arguments import JOBS, jobs_of
+from wholebody.cli.clip.arguments import EQUIPMENT, MOTIONS, SCENE, scene_of
 from wholebody.cli.command import command, flag, option
 
 if TYPE_CHECKING:
@@ -56,7 +57,6 @@ def run(arguments: argparse.Namespace) -> int:
     depth = DEPTH if arguments.depth is None else 1e-3 * arguments.depth
     if len(arguments.files) * max(1, len(arguments.equipment)) > 1:
         return _many(arguments, depth)
-    jobs_of(arguments)  # one case needs no jobs; what is wrong with them is said all the same
     if arguments.html is not None:
         checked_target(arguments.html, "--html", "a page", (".htm", ".html"))
     (file,), worn = arguments.files, (*arguments.equipment, NOTHING)[0]

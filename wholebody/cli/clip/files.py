@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.clip.arguments import JOBS, MOTIONS, ONE_MOTION, PAGE, SCENE, clip_of, figure_of, jobs_of, scene_of
+from wholebody.cli.arguments import JOBS, jobs_of
+from wholebody.cli.clip.arguments import MOTIONS, ONE_MOTION, PAGE, SCENE, clip_of, figure_of, scene_of
 from wholebody.cli.command import command, flag, option
 
 if TYPE_CHECKING:

@@ -68,8 +68,11 @@ def _hair(female: bool) -> Field:
     """Hair over the skull above a line from the forehead past the ears to the nape; women's reaches the neck."""
     above = half_space((0.066, 0.0, 0.190), (0.64, 0.0, -0.77))
     back = half_space((-0.016, 0.0, 0.10), (1.0, 0.0, -0.12))
-    line = union([above, intersection(back, half_space((0.0, 0.0, 0.062), (0.0, 0.0, -1.0)), 0.02)], 0.02)
-    hair = intersection(grown(_skull(), 0.007), line, 0.010)
+    temple = half_space((0.036, 0.0, 0.150), (1.0, 0.0, 0.35))
+    line = [above]
+    for edge, low in ((back, 0.062), (temple, 0.112)):
+        line.append(intersection(edge, half_space((0.0, 0.0, low), (0.0, 0.0, -1.0)), 0.02))
+    hair = intersection(grown(_skull(), 0.007), union(line, 0.02), 0.010)
     return union([hair, _part("long_hair")], 0.03) if female else hair
 
 

@@ -42,8 +42,8 @@ class _Colors(NamedTuple):
     shirt: Color = (0.42, 0.55, 0.68)
     trousers: Color = (0.27, 0.30, 0.38)
     shoes: Color = (0.22, 0.18, 0.16)
-    eyes: Color = (0.95, 0.95, 0.94)
-    irises: Color = (0.20, 0.24, 0.26)
+    eyes: Color = (0.86, 0.84, 0.82)
+    irises: Color = (0.26, 0.20, 0.15)
 
 
 COLORS = _Colors()
@@ -251,12 +251,12 @@ class PersonShape:
         yield Garment("hair", COLORS.hair, placed(shape.hair, frame), low, high, 0.012, rigid)
         eye = self.at("head", (self.size.eye_x, 0.0, self.size.eye_z))
         around = bounds([eye], 0.075 * scale)
-        yield Garment("eyes", COLORS.eyes, placed(shape.eyes, frame), *around, 0.0035, rigid)
-        yield Garment("lids", COLORS.skin, placed(shape.lids, frame), *around, 0.0022, rigid)
+        yield Garment("eyes", COLORS.eyes, placed(shape.eyes, frame), *around, 0.0040, rigid)
+        yield Garment("lids", COLORS.skin, placed(shape.lids, frame), *around, 0.0024, rigid)
         yield Garment("irises", COLORS.irises, placed(shape.irises, frame), *around, 0.0025, rigid)
         yield Garment("brows", COLORS.hair, placed(shape.brows, frame), *around, 0.0022, rigid)
         mouth = bounds([eye - np.array([0.0, 0.0, 0.075]) * scale], 0.05 * scale)
-        yield Garment("lips", COLORS.lips, placed(shape.lips, frame), *mouth, 0.003, rigid)
+        yield Garment("lips", COLORS.lips, placed(shape.lips, frame), *mouth, 0.0027, rigid)
 
     def _hand(self, side: str) -> Garment:
         shape, frame = hand_shape(self.person, side), self.bind[f"{side}_hand"]

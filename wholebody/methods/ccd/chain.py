@@ -173,7 +173,7 @@ class ChainResolver:
         ux, uy, uz, px, py, pz = self.limbs.lines[node].tolist()
         x, y, z = point[0] - px, point[1] - py, point[2] - pz
         along = ux * x + uy * y + uz * z
-        return not self.limbs.slides(node) and x * x + y * y + z * z - along * along < SHORT * SHORT
+        return not self.limbs.slides[node] and x * x + y * y + z * z - along * along < SHORT * SHORT
 
     def _inner(self, link: Link) -> tuple[int, ...]:
         """The nodes inwards of the link's own: those that move the previous link."""

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
 
 Vector = tuple[float, float, float]
@@ -24,10 +24,7 @@ Placement = tuple[float, ...]
 """Twelve floats: the rotation row by row, then the translation."""
 
 WORLD: Placement = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-SAME = 1e-12  # an axis or a rotation nearer than this to a simple one is replaced by the simple one
-
-X, Y, Z, OBLIQUE, SLIDE = range(5)
-"""What a joint does: turn about an axis of its own frame (either way round), about any other, or slide."""
+SAME = 1e-12  # part of a joint's motion that is rounding
 
 
 class Limbs:
@@ -42,8 +39,7 @@ class Limbs:
         lines: (n, 6) after `forward`: unit axis and origin of each node in the world.
         parents: (n,) parent node of each; -1 is the world.
         places: (n, 12) placement of each in its parent's frame before it moves, as in `frames`.
-        kinds: (n,) X, Y, Z, OBLIQUE or SLIDE.
-        signs: (n,) -1 where a joint turns about the negative axis.
+        slides: (n,) whether a node is prismatic; others turn.
         axes: (n, 3) unit axis in the joint's own frame.
         paths: for each node, the nodes that move it, including itself, from the tip inwards.
         plans: of sweeps, by what is carried and which nodes move.
@@ -64,10 +60,9 @@ class Limbs:
         self.plans: dict[Hashable, Any] = {}
         for node, parent in enumerate(self.parents.tolist()):
             self.paths.append((node, *self.paths[parent]) if parent >= 0 else (node,))
-        kinds = [_kind(model.joints[joint]) for joint in self.joints]
-        self.kinds = np.array([kind for kind, _, _ in kinds], dtype=np.intp)
-        self.signs = np.array([sign for _, sign, _ in kinds], dtype=float)
-        self.axes = np.array([axis for _, _, axis in kinds], dtype=float).reshape(-1, 3)
+        motions = np.reshape([_motion(model.joints[joint]) for joint in self.joints], (-1, 2, 3))  # slide, turn
+        self.slides: Mask = np.abs(motions[:, 0]).max(axis=1, initial=0.0) > 0.5
+        self.axes = np.where(self.slides[:, None], motions[:, 0], motions[:, 1])
         self.places = np.tile(np.array(WORLD), (count, 1))
         self._first = np.array([model.joints[joint].idx_q for joint in self.joints], dtype=np.intp)
         wide = np.array([model.joints[joint].nq == 2 for joint in self.joints], dtype=bool)
@@ -79,7 +74,7 @@ class Limbs:
         for node, joint in enumerate(self.joints):
             above, parent = int(model.parents[joint]), int(self.parents[node])
             if parent >= 0 and self.joints[parent] == above:
-                self.places[node] = _settled(floats(model.jointPlacements[joint]))
+                self.places[node] = floats(model.jointPlacements[joint])
             else:
                 self._loose.append((node, above, self.joints[parent] if parent >= 0 else -1))
 
@@ -101,7 +96,7 @@ class Limbs:
             base = data.oMi[above] * self.model.jointPlacements[self.joints[node]]
             if parent >= 0:
                 base = data.oMi[parent].actInv(base)
-            self.places[node] = _settled(floats(base))
+            self.places[node] = floats(base)
 
     def write(self, q: Array) -> None:
         """Write the values into a posture q (nq,), in place."""
@@ -112,17 +107,11 @@ class Limbs:
 
     def forward(self) -> None:
         """Compute `frames` and `lines` from `values`."""
-        self._kernel.forward(
-            self.parents, self.places, self.kinds, self.signs, self.axes, self.values, self.frames, self.lines
-        )
+        self._kernel.forward(self.parents, self.places, self.slides, self.axes, self.values, self.frames, self.lines)
 
     def frame(self, node: int) -> Placement:
         """Placement of a node after `forward`, -1 being the world, as twelve floats."""
         return tuple(self.frames[node].tolist())
-
-    def slides(self, node: int) -> bool:
-        """Whether a node is prismatic."""
-        return bool(self.kinds[node] == SLIDE)
 
 
 class CarriedFrame:
@@ -150,8 +139,8 @@ class CarriedFrame:
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
     """This module, after its loop is compiled or loaded from the cache; called before a solve, not during it."""
-    none, places = np.zeros(0), np.zeros(0, dtype=np.intp)
-    forward(places, np.zeros((0, 12)), places, none, np.zeros((0, 3)), none, np.zeros((0, 12)), np.zeros((0, 6)))
+    none, slides, places = np.zeros(0), np.zeros(0, dtype=bool), np.zeros((0, 12))
+    forward(np.zeros(0, dtype=np.intp), places, slides, np.zeros((0, 3)), none, places, np.zeros((0, 6)))
     return sys.modules[__name__]
 
 
@@ -166,8 +155,7 @@ def movable(model: pin.Model, joint: int) -> bool:
     made = model.joints[joint]
     if made.nv != 1 or made.nq > 2:
         return False
-    subspace = np.abs(np.asarray(made.createData().S).ravel())
-    return bool(subspace[:3].max() < SAME or subspace[3:].max() < SAME)
+    return bool((np.abs(_motion(made)).max(axis=1) < SAME).any())
 
 
 def floats(placement: Any) -> Placement:
@@ -193,36 +181,15 @@ def seen_from(frame: Placement, x: float, y: float, z: float) -> Vector:
     return a * x + d * y + g * z, b * x + e * y + h * z, c * x + f * y + i * z
 
 
-def _settled(placement: Placement) -> Placement:
-    """The placement without a rotation that is none but for rounding."""
-    near = max(abs(value - plain) for value, plain in zip(placement[:9], WORLD[:9], strict=True)) < SAME
-    return (*WORLD[:9], *placement[9:]) if near else placement
-
-
-def _kind(joint: Any) -> tuple[int, float, Vector]:
-    """Kind, sign and axis of a joint."""
-    subspace = np.asarray(joint.createData().S).ravel().tolist()
-    sliding = max(abs(value) for value in subspace[3:]) < SAME
-    x, y, z = subspace[:3] if sliding else subspace[3:]
-    if sliding:
-        return SLIDE, 1.0, (x, y, z)
-    for kind, value in ((X, x), (Y, y), (Z, z)):
-        if abs(value) > 1.0 - SAME:
-            return kind, 1.0 if value > 0.0 else -1.0, (x, y, z)
-    return OBLIQUE, 1.0, (x, y, z)
+def _motion(joint: Any) -> Array:
+    """(2, 3) how a joint of one degree of freedom moves: along an axis, and about one."""
+    return np.asarray(joint.createData().S, dtype=float).reshape(2, 3)
 
 
 @compiled()
 def forward(
-    parents: Indices,
-    places: Array,
-    kinds: Indices,
-    signs: Array,
-    axes: Array,
-    values: Array,
-    frames: Array,
-    lines: Array,
-) -> None:
+    parents: Indices, places: Array, slides: Mask, axes: Array, values: Array, frames: Array, lines: Array
+) -> None:  # fmt: skip
     """Write frames (n + 1, 12) and lines (n, 6) from values; arguments as the attributes of `Limbs`."""
     for k in range(len(parents)):
         base, place, frame, line = frames[parents[k]], places[k], frames[k], lines[k]
@@ -231,29 +198,17 @@ def forward(
             for column in range(3):
                 frame[3 * row + column] = a * place[column] + b * place[3 + column] + c * place[6 + column]
             frame[9 + row] = base[9 + row] + (a * place[9] + b * place[10] + c * place[11])
-        kind, value = kinds[k], signs[k] * values[k]
-        if kind < OBLIQUE:
-            co, si = cos(value), sin(value)
-            after, before = (kind + 1) % 3, (kind + 2) % 3  # the axes that turn, in the order of a right-handed turn
+            line[row] = 0.0
+            for column in range(3):
+                line[row] += frame[3 * row + column] * axes[k, column]
+        if slides[k]:
             for row in range(3):
-                line[row] = signs[k] * frame[3 * row + kind]
-                one, other = frame[3 * row + after], frame[3 * row + before]
-                frame[3 * row + after] = co * one + si * other
-                frame[3 * row + before] = co * other - si * one
+                frame[9 + row] += values[k] * line[row]
         else:
-            for row in range(3):
-                line[row] = 0.0
-                for column in range(3):
-                    line[row] += frame[3 * row + column] * axes[k, column]
-            if kind == SLIDE:
-                for row in range(3):
-                    frame[9 + row] += value * line[row]
-            else:
-                co, si = cos(value), sin(value)
-                for column in range(3):
-                    x, y, z = frame[column], frame[3 + column], frame[6 + column]
-                    x, y, z = turned(line, co, si, x, y, z)
-                    frame[column], frame[3 + column], frame[6 + column] = x, y, z
+            co, si = cos(values[k]), sin(values[k])
+            for column in range(3):
+                x, y, z = turned(line, co, si, frame[column], frame[3 + column], frame[6 + column])
+                frame[column], frame[3 + column], frame[6 + column] = x, y, z
         for row in range(3):
             line[3 + row] = frame[9 + row]
 

@@ -23,9 +23,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
-from wholebody.methods.ccd.limbs import SLIDE, Limbs, turned
+from wholebody.methods.ccd.limbs import Limbs, turned
 
 TURN = 2.0 * pi
 
@@ -73,7 +73,9 @@ class Aims:
         # Only aims are updated, not axes, so a sweep is linear. Call `limbs.forward` and `carry` before the next.
         limbs = self._limbs
         return float(
-            self._kernel.sweep(limbs.lines, limbs.kinds, limbs.values, limbs.limits, self._rows, plan.turns, plan.moved)
+            self._kernel.sweep(
+                limbs.lines, limbs.slides, limbs.values, limbs.limits, self._rows, plan.turns, plan.moved
+            )
         )
 
     @property
@@ -92,7 +94,7 @@ def _plan(limbs: Limbs, carriers: tuple[int, ...], points: tuple[bool, ...], nod
     for node in sorted(set(range(len(limbs.joints)) if nodes is None else nodes), reverse=True):
         mine = [k for k, tip in enumerate(carriers) if tip >= 0 and node in limbs.paths[tip]]
         places = [k for k in mine if points[k]]
-        if places or (mine and not limbs.slides(node)):
+        if places or (mine and not limbs.slides[node]):
             turns.append((node, len(moved), len(moved) + len(mine), len(places)))
             moved += [*places, *(k for k in mine if not points[k])]
     return Plan(np.array(turns, dtype=np.intp).reshape(-1, 4), np.array(moved, dtype=np.intp))
@@ -102,7 +104,7 @@ def _plan(limbs: Limbs, carriers: tuple[int, ...], points: tuple[bool, ...], nod
 def compiled_kernel() -> Any:
     """This module, after its loops are compiled or loaded from the cache; called before a solve, not during it."""
     places, six, rows = np.zeros(0, dtype=np.intp), np.zeros((0, 6)), np.zeros((0, 11))
-    sweep(six, places, np.zeros(0), np.zeros((2, 0)), rows, np.zeros((0, 4), dtype=np.intp), places)
+    sweep(six, np.zeros(0, dtype=bool), np.zeros(0), np.zeros((2, 0)), rows, np.zeros((0, 4), dtype=np.intp), places)
     distance(rows)
     carry(np.zeros((0, 12)), places, rows)
     greatest_error(rows)
@@ -111,17 +113,17 @@ def compiled_kernel() -> Any:
 
 @compiled()
 def sweep(
-    lines: Array, kinds: Indices, values: Array, limits: Array, aims: Array, turns: Indices, moved: Indices
+    lines: Array, slides: Mask, values: Array, limits: Array, aims: Array, turns: Indices, moved: Indices
 ) -> float:  # fmt: skip
     """Give each joint its best value and carry the aims along; return the largest change.
 
-    Arrays one by one, as unpacking records takes long: lines (n, 6) axis and origin, kinds (n,), values (n,) in place,
+    Arrays one by one, as unpacking records takes long: lines (n, 6) axis and origin, slides (n,), values (n,) in place,
     limits (2, n), aims (m, 11) in place, turns (s, 4) and `moved` of the plan.
     """
     largest = 0.0
     for node, first, last, places in turns:
         old, lower, upper, mine, line = values[node], limits[0, node], limits[1, node], moved[first:last], lines[node]
-        if kinds[node] == SLIDE:
+        if slides[node]:
             new = min(max(old + _shift(line, aims, mine[:places]), lower), upper)
             values[node] = new
             for k in mine[:places]:

@@ -21,8 +21,11 @@ from wholebody.methods.newton.linear_algebra import NAMES
 from wholebody.methods.newton.measures import refine
 from wholebody.methods.newton.settings import STARTS
 from wholebody.methods.newton.terms import FigureSystem
+from wholebody.methods.simplification.reach import beyond_reach
 from wholebody.methods.starts import Minima, off_limits, restarts
 from wholebody.solution import TraceEntry
+from wholebody.tasks.frame import Frame
+from wholebody.tasks.point import Point
 
 
 @dataclass(frozen=True)
@@ -76,7 +79,7 @@ class Search:
         self.contradictions = contradictions(self.active_system.problem, self.active_system.workspace)
         hopeless = least_left(self.contradictions) is None
         best = self._go(q, "", STARTS.trial) if hopeless else self.from_here(q)
-        if not self._solves(best) and not hopeless:
+        if not self._solves(best) and not hopeless and not self._beyond_reach():
             best = self._from_other_starts(q, best)
         if self.active_system.control.over:
             return best
@@ -85,6 +88,20 @@ class Search:
         if self._solves(best) and self.active_system.objective.minimised:
             best = self._refined(best)
         return best
+
+    def _beyond_reach(self) -> bool:
+        """Whether a goal is out of reach for certain, so that no other start can solve the problem."""
+        problem = self.active_system.problem
+        for goal in problem.goals:
+            if isinstance(goal, Point):
+                offset, at = goal.resolved_offset, goal.resolved_target
+            elif isinstance(goal, Frame):
+                offset, at = np.zeros(3), goal.residual.placement.translation
+            else:
+                continue
+            if beyond_reach(problem, goal.frame, offset, at[None])[0] > self.settings.assessed_tolerance:
+                return True
+        return False
 
     def _from_other_starts(self, q: Array, best: SearchResult) -> SearchResult:
         """The best result of the other starts and the best so far; each start has a trial first."""

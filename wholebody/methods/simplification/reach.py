@@ -206,6 +206,24 @@ def held_balls(figure: Figure, reach: Reach, constraints: Iterable[Constraint]) 
     return found
 
 
+def beyond_reach(problem: Problem, frame: str, offset: Array, places: Array) -> Array:
+    """By how much places (n, 3) are at least out of reach of a point (3,) of a frame, metres (n,).
+
+    The point stays in balls in every posture within limits, bounds and holds.
+    """
+    figure, model = problem.scene.figure, problem.scene.model
+    held = model.frames[figure.frame_id(frame)]
+    resting = Balls(held.placement.act(offset)[None], np.zeros(1), np.zeros(1, dtype=np.intp))
+    joint = np.array([held.parentJoint], dtype=np.intp)
+    reach = Reach(model, problem.start, resting, joint, still_dofs(problem))
+    least = np.zeros(len(places))
+    for balls in (reach.seen_from(0), *held_balls(figure, reach, problem.constraints)):
+        for middle, size in zip(balls.center, balls.radius, strict=True):
+            if np.isfinite(size):
+                least = np.maximum(least, np.linalg.norm(places - middle, axis=1) - size)
+    return least
+
+
 def about_point(balls: Balls, point: Array) -> Balls:
     """Balls after any rotation about a point."""
     radius = balls.radius + np.linalg.norm(balls.center - point, axis=1)
