@@ -317,12 +317,13 @@ def postures(arguments: argparse.Namespace) -> None:
     """Measure or fit; --quick takes the half that is fitted to."""
     from tests.audits import human_fit, human_postures
 
-    facts, man = machine(), human_postures.median_man()
+    facts = machine()
     if arguments.fit:
-        fitted = human_fit.fit(man, lambda told: print(told, flush=True))
-        factors = ", ".join(f"{group} {factor:.2f}" for group, factor in fitted.factors.items())
-        rows, notes = fitted.rows, [f"Factors on the weights: {factors}."]
+        fitted = human_fit.fit(lambda told: print(told, flush=True))
+        factors = ", ".join(f"{group} {factor}" for group, factor in fitted.factors.items())
+        rows, notes = fitted.rows, [f"Changes of the weights and angles: {factors}."]
     else:
+        man = human_postures.median_man()
         rows, notes = list(human_postures.measure(man, "fit" if arguments.quick else None)), []
     told = f"Standard deviations of people: {human_postures.summary(rows)}."
     text = "\n\n".join(["# Postures of people and ours", told, *notes])

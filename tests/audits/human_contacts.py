@@ -22,7 +22,7 @@ TOUCHING = 5.0
 """mm: parts nearer than this touch."""
 
 
-STILL = ("spine", "neck", "left_arm", "right_arm")
+STILL = ("spine", "neck")
 """Parts that rest while legs are crossed."""
 
 

@@ -1,4 +1,4 @@
-"""The weights of a person's effort, fitted to one half of the published postures and judged by the other."""
+"""Weights of a person's effort and how arms rest, fitted to one half of the published postures; the other judges."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from tests.audits.human_postures import PostureRow, measure
+from tests.audits.human_postures import PostureRow, measure, median_man
+from wholebody.figures.tables import table
 from wholebody.tasks import rhythm
 
 if TYPE_CHECKING:
@@ -31,41 +32,52 @@ GROUPS = {
 SHARES = {"lumbar spine's share": "lumbar_weight", "knee's share": "knee_weight"}
 """Weights of `Rhythm` that are multiplied by one factor each."""
 
+RESTS = {"resting forearm": "elbow_pronation", "resting wrist": "wrist_flexion"}
+"""Joints whose angles in the named postures are fitted too, where the table has them."""
+
+TEN = 10.0  # degrees that count as much as a logarithm of 1
+
 STEPS = (np.log(4.0), np.log(2.0), np.log(1.4))  # of a factor's logarithm, one after the other
 PRIOR = 0.02  # of the square of each logarithm: a factor that nothing asks for stays 1
 FAR = 3.0  # standard deviations: what is further off counts hardly more, since its task is stated otherwise than it was
 
 
 class Fitted(NamedTuple):
-    """Factors on the present weights by group, and the rows of both halves with them."""
+    """What to change of present weights and angles by group, and the rows of both halves with it."""
 
-    factors: dict[str, float]
+    factors: dict[str, str]
     rows: list[PostureRow]
 
 
-def fit(figures: Mapping[str, Figure], told: Callable[[str], None], held: Collection[str] = ()) -> Fitted:
+def fit(told: Callable[[str], None], held: Collection[str] = ()) -> Fitted:
     """Change one factor at a time while that brings the postures of half "fit" nearer to people's; say what is found.
 
     Args:
-        figures: as for `measure`; their weights are changed, and are those of the answer at the end.
         told: takes a sentence.
-        held: groups whose weights stay.
+        held: groups whose weights or angles stay.
     """
-    present = {kind: figure.effort_weights.copy() for kind, figure in figures.items()}
     free = rhythm.STYLES["free"]
-    logs = {group: 0.0 for group in (*GROUPS, *SHARES) if group not in held}
+    rests = [row for row in table("postures") if row["of"] == "human" and row["joint"] in RESTS.values()]
+    present = [float(row["degrees"]) for row in rests]
+    logs = {group: 0.0 for group in (*RESTS, *GROUPS, *SHARES) if group not in held}
 
-    def cost(logs: Mapping[str, float]) -> float:
-        changed = {SHARES[group]: np.exp(log) for group, log in logs.items() if group in SHARES}
-        shares = {name: getattr(free, name) * factor for name, factor in changed.items()}
+    def people(logs: Mapping[str, float]) -> dict[str, Figure]:
+        """The median man with these weights and resting angles."""
+        turned = {joint: TEN * logs[group] for group, joint in RESTS.items() if group in logs}
+        for row, degrees in zip(rests, present, strict=True):
+            row["degrees"] = str(degrees + turned.get(row["joint"], 0.0))
+        shares = {name: getattr(free, name) * np.exp(logs[group]) for group, name in SHARES.items() if group in logs}
         rhythm.STYLES["free"] = free._replace(**shares)
-        for kind, figure in figures.items():
-            figure.effort_weights[:] = present[kind]
+        figures = median_man()
+        for figure in figures.values():
             for joint in figure.joints:
                 for group, ends in GROUPS.items():
                     if group in logs and joint.endswith(ends) and "thumb" not in joint:  # thumbs are on no key
                         figure.effort_weights[figure.dofs([joint])] *= np.exp(logs[group])
-        return error(list(measure(figures, "fit"))) + PRIOR * sum(value**2 for value in logs.values())
+        return figures
+
+    def cost(logs: Mapping[str, float]) -> float:
+        return error(list(measure(people(logs), "fit"))) + PRIOR * sum(value**2 for value in logs.values())
 
     least = cost(logs)
     for step in STEPS:
@@ -77,10 +89,15 @@ def fit(figures: Mapping[str, Figure], told: Callable[[str], None], held: Collec
                     tried = {**logs, group: logs[group] + change}
                     if (found := cost(tried)) < least - 1e-3:
                         least, logs, moved = found, tried, True
-                        told(f"{group} times {np.exp(logs[group]):.2f}: {least:.3f}")
+                        told(f"{group} {factor(group, logs[group])}: {least:.3f}")
                         break
-    cost(logs)
-    return Fitted({group: float(np.exp(value)) for group, value in logs.items()}, list(measure(figures)))
+    rows = list(measure(people(logs)))
+    return Fitted({group: factor(group, value) for group, value in logs.items()}, rows)
+
+
+def factor(group: str, log: float) -> str:
+    """What a logarithm does: the factor on a weight, or degrees that are added to an angle."""
+    return f"{TEN * log:+.0f} degrees" if group in RESTS else f"times {np.exp(log):.2f}"
 
 
 def error(rows: Sequence[PostureRow]) -> float:

@@ -30,6 +30,8 @@ STOOP, RANGE = 35.9, 64.0
 """Lordosis that people lose in a stoop (von Arx et al. 2021), and what the lumbar joints bend by at most, degrees."""
 
 THORACIC = ("spine3_flexion", "spine4_flexion")
+STRAIGHT = {"wrist_flexion": 0.0, "wrist_deviation": 0.0}  # so that no target depends on how a wrist rests
+SOLE = np.radians(25.0)  # of pedals from level: those of examples/driver.py
 
 
 @dataclass(frozen=True)
@@ -162,9 +164,8 @@ def typing(figure: Figure) -> Problem:
     elbow = figure.placement(q, "right_elbow").translation
     goals: list[Any] = []
     constraints: list[Any] = [wb.Hold("pelvis"), wb.Hold("left_foot"), wb.Hold("right_foot")]
-    level = figure.with_joints(
-        q, {"right_shoulder_flexion": 0.0, "right_elbow_flexion": np.pi / 2, "right_elbow_pronation": np.pi / 2 - 0.2}
-    )
+    bent = {"shoulder_flexion": 0.0, "elbow_flexion": np.pi / 2, "elbow_pronation": np.pi / 2 - 0.2, **STRAIGHT}
+    level = figure.with_joints(q, {f"right_{joint}": value for joint, value in bent.items()})
     row = float(figure.placement(level, "right_middle_tip").translation[0])
     for side, sign in SIDES:
         for finger, keys in KEYS.items():
@@ -266,9 +267,9 @@ def overhead(figure: Figure) -> Problem:
     import wholebody as wb
 
     scene = wb.Scene(figure).add(wb.HalfSpace(), name="floor")
-    q = figure.with_joints(
-        figure.posture("standing"), {f"{side}_shoulder_flexion": np.radians(170.0) for side, _ in SIDES}
-    )
+    raised = {"shoulder_flexion": np.radians(170.0), **STRAIGHT}
+    high = {f"{side}_{joint}": value for side, _ in SIDES for joint, value in raised.items()}
+    q = figure.with_joints(figure.posture("standing"), high)
     goals = [
         wb.Point(f"{side}_middle_tip", figure.placement(q, f"{side}_middle_tip").translation + (0.0, 0.0, 0.04))
         for side, _ in SIDES
@@ -287,7 +288,7 @@ def squat(figure: Figure) -> Problem:
 
 
 def drive(figure: Figure) -> Problem:
-    """A seat that slides, with a backrest of 20 degrees, a wheel and a pedal (places are estimates)."""
+    """A seat that slides, with a backrest of 20 degrees; hands at the sides of a wheel, soles on pedals (estimates)."""
     import wholebody as wb
 
     cushion = wb.Box((0.46, 0.50, 0.06)), (0.15, 0.0, -0.03)
@@ -303,7 +304,8 @@ def drive(figure: Figure) -> Problem:
     goals.append(wb.Point("one/right_heel", (0.0, -0.12, 0.0)))
     goals.append(wb.Point("one/left_heel", (-0.02, 0.12, 0.0)))
     goals += [wb.Point(f"one/{side}_grip", (-0.40, 0.17 * sign, 0.66)) for side, sign in SIDES]
-    goals += [wb.Axis(f"one/{side}_palm", UP, direction=DOWN, weight=0.01) for side, _ in SIDES]
+    along = np.cos(SOLE), 0.0, np.sin(SOLE)
+    goals += [wb.Axis(f"one/{side}_foot", FRONT, direction=along, weight=0.02) for side, _ in SIDES]
     return wb.Problem(scene, start=start, goals=goals)
 
 

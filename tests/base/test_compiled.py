@@ -65,19 +65,6 @@ def run(tmp_path: Path, root: Path):
     return use
 
 
-def test_the_first_compilation_is_told_once_and_kept(run, tmp_path: Path) -> None:
-    kept = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")}
-    assert run(**kept) == (
-        ["3.0", "True", "True"],
-        ["compiling the inner loops: up to a minute, once on a machine"],
-    )
-    # Read back without what numba needs to compile; where this fails, look how numba keeps things now (`_loop_type`).
-    others = "print(loop_of_a_test.twice(1j), loop_of_a_test.of_another(2.0))"
-    answers, told = run(others, **kept)
-    assert answers == ["3.0", "False", "False", "2j", "5.0"]
-    assert len(told) == 1  # of the others
-
-
 def test_loops_work_where_nothing_can_be_kept(run, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     nowhere = str(tmp_path / "file" / "folder")
@@ -137,11 +124,12 @@ def quarter(x):
 """
 
 
-def test_what_compiled_loops_alone_call_is_kept_and_refuses_python(run, tmp_path: Path) -> None:
-    """In the user's cache, which is taken where the package cannot be written to."""
+def test_the_first_compilation_is_told_once_and_kept(run, tmp_path: Path) -> None:
+    """In the user's cache, which is taken where the package cannot be written to; inner loops refuse Python."""
     (tmp_path / "wholebody" / "__pycache__").write_text("in the way")
     (tmp_path / "wholebody" / "loop_of_another_test.py").write_text(INNER)
-    (tmp_path / "wholebody" / "loop_of_a_test.py").write_text(
+    path = tmp_path / "wholebody" / "loop_of_a_test.py"
+    path.write_text(
         LOOP.replace("return 2.0 * x", "return 4.0 * half(x)") + "from wholebody.loop_of_another_test import half\n"
     )
     asks = """
@@ -154,15 +142,14 @@ except TypeError as error:
 """
     kept = {"NUMBA_CACHE_DIR": "", "HOME": str(tmp_path / "home"), "XDG_CACHE_HOME": str(tmp_path / "cache")}
     refused = "half_is_compiled_for_calls_from_compiled_functions_only"
-    first, _ = run(asks, **kept)
-    assert [first[0], *first[3:]] == ["3.0", "1.5", refused]
+    told = ["compiling the inner loops: up to a minute, once on a machine"]
+    assert run(asks, **kept) == (["3.0", "True", "True", "1.5", refused], told)
     assert list((tmp_path / "cache").rglob("*.nbi"))
-    again, told = run(asks, **kept)
-    assert again[1] == "False"  # read back, not compiled
-    assert told == []
-    path = tmp_path / "wholebody" / "loop_of_a_test.py"
+    # Read back without what numba needs to compile; where this fails, look how numba keeps things now (`_loop_type`).
+    assert run(asks, **kept) == (["3.0", "False", "False", "1.5", refused], [])
     path.write_text(path.read_text() + "\n")  # compiled anew with what was kept of the other
-    assert run(asks, **kept)[0] == first
+    others = "print(loop_of_a_test.twice(1j), loop_of_a_test.of_another(2.0))"
+    assert run(asks + others, **kept) == (["3.0", "True", "True", "1.5", refused, "2j", "5.0"], told)
 
 
 IN_PROCESSES = """

@@ -74,13 +74,3 @@ def test_the_process_of_the_command_is_told_from_others():
     assert _is_command(["python", "-X", "utf8", "/usr/bin/wholebody", "pose"])
     assert not _is_command(["python", "-m", "pytest", "wholebody"])
     assert not _is_command(["python", "my.py", "wholebody"])
-
-
-def test_the_name_of_a_task_is_a_title_whatever_the_locale(tmp_path):
-    """The title of a page is asked for after the solve, which would be lost."""
-    task = tmp_path / f"\u00fcn\u00ef\n{'a' * 230}.toml"
-    task.write_text('[figure]\nname = "hand"\n')
-    plain = {"PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0", "LC_ALL": "C", "PYTHONCOERCECLOCALE": "0"}
-    found = run("pose", str(task), "--no-picture", "--out", str(tmp_path / "out"), environment=plain)
-    assert found.returncode == 0, found.stderr
-    assert (tmp_path / "out" / "scene.html").exists()

@@ -234,6 +234,14 @@ def test_who_has_a_thing_below_the_pelvis_sits(person: wb.Figure) -> None:
     assert wb.ergonomics.ergonomics_of(scene, q).seat == "does not sit, by the posture"
 
 
+@pytest.mark.parametrize("posture", ["standing", "sitting"])
+def test_arms_at_rest_are_neutral(person: wb.Figure, posture: str) -> None:
+    """The lowest scores that the worksheets give to hanging arms: the elbow is less bent than 60 degrees."""
+    rula, reba = (score(person, person.posture(posture)).left for score in (wb.ergonomics.rula, wb.ergonomics.reba))
+    assert (rula.upper_arm, rula.lower_arm, rula.wrist, rula.wrist_twist) == (1, 2, 1, 1)
+    assert (reba.upper_arm, reba.lower_arm, reba.wrist) == (1, 2, 1)
+
+
 def test_a_seated_trunk_with_a_back_scores_one_in_rula(person: wb.Figure) -> None:
     """McAtamney and Corlett: 1 "when sitting and well supported with a hip-trunk angle of 90 degrees or more"."""
     q = person.posture("sitting")

@@ -193,7 +193,7 @@ def test_arms_that_were_recorded_inside_the_trunk_are_outside(human: wb.Figure) 
 def test_speed_limits_hold() -> None:
     """Feet that go twice as fast, of a person whose knees turn at 3 rad/s at most."""
     motion, _ = walker(flat, 1.0)
-    slow = wb.load("human")
+    slow = wb.load("human", stature=1.75)
     limit = np.array(slow.model.velocityLimit)
     limit[6:] = 3.0
     slow.model.velocityLimit = limit

@@ -161,9 +161,9 @@ class OverlapResolver:
         q = q.copy()
         pin.forwardKinematics(self.scene.model, self._data, q)
         for chain in self.chains.values():
-            if not chain.in_cones(self._data):
+            if not chain.guard.inside(q):
                 chain.read(q, self._data)
-                chain.keep_ranges()
+                chain.guard.keep()
                 chain.limbs.write(q)
                 pin.forwardKinematics(self.scene.model, self._data, q)
         return q
