@@ -450,14 +450,17 @@ def test_clearances_that_change_where_they_are_count_from_the_next_take(problem)
     assert len(lineariser.at(problem.start, 0.3).contacts.number) > len(before)
 
 
-def test_goals_that_move_are_written_where_nobody_else_reads(problem):
+@pytest.mark.parametrize("more", [{}, {"offset": (0.0, 0.0, 0.1)}])
+def test_goals_that_move_are_written_where_nobody_else_reads(problem, more):
     """A relaxed lineariser, and the problem's own plan, keep the goals that they were made with."""
     scene, places = problem.scene, ((0.4, -0.2, 1.0), (0.5, 0.1, 0.8))
-    first, second = (wb.Problem(scene, goals=[wb.Point("right_palm", at, offset=(0.0, 0.0, 0.1))]) for at in places)
+    asked = ([wb.Frame("left_palm", at), wb.Point("right_palm", at, **more)] for at in places)
+    first, second = (wb.Problem(scene, goals=goals) for goals in asked)
+    moved = np.concatenate([np.subtract(*places), np.zeros(3), np.subtract(*places)])
     q = first.start
     lineariser = first.lineariser(first.workspace())
     relaxed, kept = lineariser.relaxed(0.01), lineariser.at(q, 0.0).goal_error
     lineariser.take(second.goals, first.clearances)
-    assert np.allclose(lineariser.at(q, 0.0).goal_error, kept + np.subtract(places[0], places[1]))
+    assert np.allclose(lineariser.at(q, 0.0).goal_error, kept + moved)
     assert np.array_equal(relaxed.at(q, 0.0).goal_error, kept)
     assert np.array_equal(first.lineariser(first.workspace()).at(q, 0.0).goal_error, kept)

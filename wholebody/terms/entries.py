@@ -71,6 +71,13 @@ def entries_of(term: Goal | Constraint, model: pin.Model) -> list[Entry] | None:
     return None if write is None else write(term, model)
 
 
+def only_moved(goal: Goal, before: Goal) -> bool:
+    """Whether two resolved goals of a figure differ in their targets (3,) alone, floats 24 to 26 of `RESIDUAL`."""
+    if not (type(goal) is tasks.Point is type(before)):
+        return False
+    return goal.place[:2] == before.place[:2] and goal.offset is before.offset is tasks.Point.offset
+
+
 def placement_floats(place: Any) -> Array:
     """The columns of the rotation, then the translation."""
     floats = np.empty((4, 3))

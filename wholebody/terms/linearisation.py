@@ -150,7 +150,7 @@ class Lineariser:
             count = len(self.workspace.table.pairs)
             raise InputError(f"clearances have shape {clearances.shape}; give one for each of the {count} pairs")
         others = None if constraints is self.constraints else constraints
-        if others is not None or (goals is not self.goals and not self._plan.put(goals, self.state.model)):
+        if others is not None or (goals is not self.goals and not self._plan.put(goals, self.goals, self.state.model)):
             self.constraints = self.constraints if others is None else others
             before, self._plan = self._plan, self._again(self._plan, goals, others)
             if before.others or self._plan.others:

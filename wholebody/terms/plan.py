@@ -23,7 +23,7 @@ from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.distance import LEAST_CURVATURE, SquaredDistance
 from wholebody.tasks.rhythm import LUMBAR_RATE
 from wholebody.terms import entries as kinds
-from wholebody.terms.entries import Entry, Integers, Row, entries_of, placement_floats
+from wholebody.terms.entries import Entry, Integers, Row, entries_of, only_moved, placement_floats
 
 
 class Terms(NamedTuple):
@@ -92,13 +92,17 @@ class TermPlan(NamedTuple):
         """A plan into which goals may be put."""
         return self._replace(floats=self.floats.copy())
 
-    def put(self, goals: Sequence[Goal], model: pin.Model) -> bool:
-        """Write other resolved goals in the place of these; False where `with_terms` has to look at them."""
-        if len(goals) != len(self.goals):
+    def put(self, goals: Sequence[Goal], before: Sequence[Goal], model: pin.Model) -> bool:
+        """Write resolved goals in the place of those before; False where `with_terms` has to look at them."""
+        if len(goals) != len(before):
             return False
         places = dict[int, int]()
-        for goal, known in zip(goals, self.goals, strict=True):
-            if known is None or not self._put(goal, model, known, places):
+        for goal, old, known in zip(goals, before, self.goals, strict=True):
+            if only_moved(goal, old):
+                place = places.get(kinds.RESIDUAL) or int(self.layout[kinds.RESIDUAL, 0])
+                self.floats[place + 24 : place + 27] = goal.resolved_target  # type: ignore[attr-defined]
+                places[kinds.RESIDUAL] = place + kinds.WIDTHS[kinds.RESIDUAL][0]
+            elif known is None or not self._put(goal, model, known, places):
                 return False
         return True
 
