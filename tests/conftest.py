@@ -11,7 +11,6 @@ import socket
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
-from functools import cache, wraps
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, ClassVar
@@ -31,9 +30,8 @@ import pinocchio as pin
 import pytest
 from hypothesis import HealthCheck, settings
 
-from wholebody import figures
 from wholebody.base.errors import WholebodyError
-from wholebody.figures import loading
+from wholebody.figures import load
 from wholebody.figures.description import Description
 from wholebody.figures.figure import Figure
 from wholebody.scene.scene import Scene
@@ -59,28 +57,6 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
 settings.load_profile("ci" if os.environ.get("CI") else "default")
-
-_MADE = loading.load
-
-
-@cache
-def _shared(spec: str, options: tuple[tuple[str, Any], ...]) -> Figure:
-    return _MADE(spec, **dict(options))
-
-
-@wraps(_MADE)
-def load(spec: Any, **options: Any) -> Figure:
-    """Load a figure; "human", "avatar" and "hand" of few options are made once for all tests: figures do not change.
-
-    To make one takes 30 ms, its postures 10 ms, and more than a thousand tests ask for one.
-    """
-    plain = spec in ("human", "avatar", "hand") if isinstance(spec, str) else False
-    if plain and all(type(value) is str for value in options.values()):
-        return _shared(spec, tuple(sorted(options.items())))
-    return _MADE(spec, **options)
-
-
-loading.load = figures.load = load  # before anything asks for the name
 
 COAL = {"formula": (0.0, 1e-12), "iterated": (1e-6, 1e-9), "ellipsoid": (1e-6, 1e-5)}
 """Accuracy of coal's distances: metres, and share of the size of both pieces together.
