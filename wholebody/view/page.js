@@ -269,7 +269,7 @@
       const start = item.y + 0.4 * item.h, free = bottom => bottom > -1 && bottom + item.h < 1
         && !placed.some(p => Math.abs(p.x - item.x) < (p.w + item.w) / 2
                              && p.bottom < bottom + item.h && bottom < p.bottom + p.h);
-      const steps = [...Array(80).keys()].map(k => start + (k % 2 ? 0.25 : -0.25) * Math.ceil(k / 2) * item.h);
+      const steps = [...Array(48).keys()].map(k => start + (k % 2 ? 0.25 : -0.25) * Math.ceil(k / 2) * item.h);
       const near = steps.find(free), bottom = near === undefined ? start : near;
       placed.push({ x: item.x, w: item.w, bottom, h: item.h });
       item.sprite.center.set(0.5 + item.aside, (item.y - bottom) / item.h);
