@@ -35,7 +35,7 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> wb.planning.Sol
             print(f"  {viewer.save(out / 'branches_of_an_arm.html')}")
             try:
                 print(f"  {viewer.picture(out / 'branches_of_an_arm.png')}")
-            except wb.errors.MissingPackageError as error:
+            except wb.MissingPackageError as error:
                 print(f"  no picture: {error}")
     return found
 

@@ -79,7 +79,7 @@ def draw(problems: dict[tuple[str, str], wb.Problem], solutions: dict[tuple[str,
                 viewer.show(solutions[person, control].q, problem=problems[person, control])
                 try:
                     one = Image.open(viewer.picture(path, size=(width, height), legend=False))
-                except wb.errors.MissingPackageError as error:
+                except wb.MissingPackageError as error:
                     print(f"no picture: {error}")
                     continue
                 whole.paste(one, (width * column, height * row))

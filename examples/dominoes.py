@@ -50,7 +50,7 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> int:
             print(f"  {viewer.save(out / 'dominoes.html')}")
             try:
                 print(f"  {write_filmstrip(viewer, [motion[k] for k in (20, 45, 60, 140)], out / 'dominoes.png')}")
-            except wb.errors.MissingPackageError as error:
+            except wb.MissingPackageError as error:
                 print(f"  no picture: {error}")
     return fallen
 

@@ -110,7 +110,7 @@ def draw(
         print(f"  {viewer.save(out / 'four_bar.html')}")
     try:
         chart, ((left, right),) = style.figure(1, 2, (9.6, 4.2))
-    except wb.errors.MissingPackageError as error:
+    except wb.MissingPackageError as error:
         print(f"  no picture: {error}")
         return
     for place, shade in zip(places[:-1:15], (0.8, 0.7, 0.6, 0.5, 0.4, 0.3), strict=True):

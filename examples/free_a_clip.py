@@ -104,7 +104,7 @@ def film(scene: wb.Scene, before: wb.Clip, after: wb.Clip, out: Path) -> None:
                 in_place = clip.q[frames].copy()
                 in_place[:, :2] += root[0, :2] - root[:, :2]
                 print(f"  {write_filmstrip(viewer, list(in_place), out / f'free_a_clip_{name}.png', (300, 480))}")
-        except wb.errors.MissingPackageError as error:
+        except wb.MissingPackageError as error:
             print(f"  no pictures: {error}")
 
 

@@ -65,7 +65,7 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> wb.Clip:
             print(f"  {viewer.save(out / 'lift_retargeted.html')}")
             try:
                 print(f"  {viewer.picture(out / 'lift_retargeted.png')}")
-            except wb.errors.MissingPackageError as error:
+            except wb.MissingPackageError as error:
                 print(f"  no picture: {error}")
     return clip
 

@@ -79,7 +79,7 @@ def picture(
         print(f"  {viewer.save(out / f'{name}.html')}")
         try:
             print(f"  {viewer.picture(out / f'{name}.png')}")
-        except wb.errors.MissingPackageError as error:
+        except wb.MissingPackageError as error:
             print(f"  no picture: {error}")
 
 
@@ -120,7 +120,7 @@ def film(
         viewer.show(recording.q[frame])
         try:
             print(f"  {viewer.picture(out / f'{name}.png')}")
-        except wb.errors.MissingPackageError as error:
+        except wb.MissingPackageError as error:
             print(f"  no picture: {error}")
 
 
@@ -156,7 +156,7 @@ def play(
         print(f"  {viewer.save(out / f'{name}.html')}")
         try:
             print(f"  {write_filmstrip(viewer, chosen, out / f'{name}.png', *(() if size is None else (size,)))}")
-        except wb.errors.MissingPackageError as error:
+        except wb.MissingPackageError as error:
             print(f"  no picture: {error}")
 
 

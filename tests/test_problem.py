@@ -24,13 +24,13 @@ GOAL = wb.Point("right_index_tip", (0.5, -0.2, 1.0))
         ({"start": np.zeros(55)}, wb.InputError, r"start has shape \(56,\), not \(55,\)"),
         ({"start": np.full(56, np.nan)}, wb.InputError, "start entry 0 is not finite"),
         ({"start": np.ones(56)}, wb.InputError, "quaternion is not of unit length"),
-        ({"start": "stading"}, wb.errors.UnknownNameError, "did you mean standing"),
+        ({"start": "stading"}, wb.UnknownNameError, "did you mean standing"),
         ({"goals": GOAL}, wb.InputError, "goals is Point.*not a list"),
         ({"goals": [GOAL, wb.Hold("left_foot")]}, wb.InputError, r"goals\[1\] is a Hold, not a Goal"),
         ({"goals": ["right_hand"]}, wb.InputError, r"goals\[0\] is a str, not a Goal"),
         (
             {"goals": [wb.Point("rigth_index_tip", (0, 0, 0))]},
-            wb.errors.UnknownNameError,
+            wb.UnknownNameError,
             "did you mean right_index_tip",
         ),
         ({"constraints": [GOAL]}, wb.InputError, r"constraints\[0\] is a Point, not a Constraint or Bound"),
@@ -43,7 +43,7 @@ GOAL = wb.Point("right_index_tip", (0.5, -0.2, 1.0))
         ({"clearance": None}, wb.InputError, "clearance is None;"),
         ({"touching": [("right_hand",)]}, wb.InputError, "touching takes a list of pairs of names"),
         ({"touching": ["floor"]}, wb.InputError, "touching takes a list of pairs of names"),
-        ({"touching": [("right_hand", "flor")]}, wb.errors.UnknownNameError, "did you mean floor"),
+        ({"touching": [("right_hand", "flor")]}, wb.UnknownNameError, "did you mean floor"),
     ],
 )
 def test_mistakes_are_answered_with_a_sentence(scene, given, error, sentence):
@@ -113,7 +113,7 @@ def test_goals_are_replaced_and_the_rest_stays(scene):
     assert len(problem.goals) == 2
     assert problem.constraints is constraints
     assert problem.clearances is clearances
-    with pytest.raises(wb.errors.UnknownNameError):
+    with pytest.raises(wb.UnknownNameError):
         problem.retarget([wb.Point("left_index", (0.5, 0.2, 1.0))])
     assert len(problem.goals) == 2
     with pytest.raises(wb.InputError):

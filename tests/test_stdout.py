@@ -49,7 +49,7 @@ def test_textures_without_a_file(compiler: str, file: str, tmp_path: Path, capfd
     assert main(["figure", str(tmp_path / "painted.xml")]) == 0
     assert "Warning" not in capfd.readouterr().out
     (tmp_path / "parts" / "wedge.obj").unlink()
-    with pytest.raises(wb.errors.FileFormatError, match="wedge") as told:
+    with pytest.raises(wb.FileFormatError, match="wedge") as told:
         wb.load(tmp_path / "painted.xml")
     assert "scratch" not in str(told.value)
 

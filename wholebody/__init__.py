@@ -9,7 +9,7 @@ The public names are loaded when they are first used, so that ``import wholebody
     problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.55, -0.25, 0.95))])
     solution = wb.solve(problem, method="qp")
 
-What fewer programs need stands in `wb.dynamics`, `wb.ergonomics`, `wb.errors`, `wb.figures`, `wb.methods`, `wb.motion`,
+What fewer programs need stands in `wb.dynamics`, `wb.ergonomics`, `wb.figures`, `wb.methods`, `wb.motion`,
 `wb.planning`, `wb.studies`, `wb.taskfile`, `wb.tasks` and `wb.tracking`.
 """
 

@@ -11,9 +11,11 @@ from wholebody import (
     tracking as tracking,
 )
 from wholebody.assessment.posture import Assessment as Assessment, assess as assess
-from wholebody.base import errors as errors
 from wholebody.base.errors import (
+    FileFormatError as FileFormatError,
     InputError as InputError,
+    MissingPackageError as MissingPackageError,
+    UnknownNameError as UnknownNameError,
     WholebodyError as WholebodyError,
 )
 from wholebody.dynamics.coupling import Actuated as Actuated

@@ -47,7 +47,7 @@ def test_a_clip_draws_the_joints_that_move_most() -> None:
     assert drawn[figure.joints[3]] == pytest.approx(q[:, column])
     assert len(clip._repr_html_()) < MOST
     assert len(repr(clip)) < 120
-    with pytest.raises(wb.errors.UnknownNameError, match="tail"):
+    with pytest.raises(wb.UnknownNameError, match="tail"):
         clip.plot(["tail"])
 
 

@@ -126,14 +126,14 @@ HEAD = {"content": "solves of a test", "version": "1.0"}
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("no JSON\n", "Expecting value"),
-        ("no JSON, and no line", "does not begin as one"),
+        ("no JSON\n", "its first line is not the head"),
+        ("no JSON, and no line", "its first line is not the head"),
         ('{"seed": 0}\n', "holds no solves of a test"),
         ("[1, 2]\n", "holds no solves of a test"),
         (json.dumps(HEAD | {"version": "2.0"}) + "\n", r"its version is 2\.0, not 1\.0"),
         (json.dumps(HEAD | {"content": "cases"}) + "\n", "its content is cases"),
         (json.dumps(HEAD) + '\n{"said": "a"}\n', "holds no solves of a test"),
-        (json.dumps(HEAD) + '\n["a", {"unsaid": "a"}]\n', "unsaid"),
+        (json.dumps(HEAD) + '\n["a", {"unsaid": "a"}]\n', "a line is no record"),
         (json.dumps(HEAD) + "\n" + 10000 * "[" + "\n", "holds no solves of a test"),
         ("\udcff\n", "holds no solves of a test"),
     ],
@@ -150,5 +150,19 @@ def test_another_file_is_refused_and_stays_as_it_is(tmp_path: Path, text: str, s
 
 def test_a_place_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "run" / "solves.jsonl").mkdir(parents=True)
-    with pytest.raises(InputError, match="cannot be written"):
+    with pytest.raises(InputError, match="is no file"):
         opened(tmp_path)
+
+
+def test_a_finished_run_is_read_where_nothing_can_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    kept = opened(tmp_path)
+    kept.add("a", Solve("a"))
+    path = kept.path
+    path.write_bytes(path.read_bytes() + b'["b", {"sa')  # cut off
+    before = path.read_bytes()
+    monkeypatch.setattr("os.access", lambda *_: False)  # nothing keeps root from writing
+    found = opened(tmp_path)
+    assert found.kept == {"a": Solve("a")}
+    with pytest.raises(InputError, match="cannot be written"):
+        found.add("b", Solve("b"))
+    assert path.read_bytes() == before

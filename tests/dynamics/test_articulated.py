@@ -242,7 +242,7 @@ def test_what_drives_a_joint_is_given_by_its_name() -> None:
     assert stiffness[:6] == pytest.approx(500.0)
     assert (stiffness[elbow], damping[elbow], damping.sum()) == (20.0, 3.0, 3.0)
     assert stiffness.sum() == 6 * 500.0 + 20.0 * len(figure.groups["left_arm"])
-    with pytest.raises(wb.errors.UnknownNameError, match="left_elbow_flexion"):
+    with pytest.raises(wb.UnknownNameError, match="left_elbow_flexion"):
         wb.Actuated(figure, stiffness={"left_elbow_flexio": 1.0})
     with pytest.raises(wb.InputError, match="damping"):
         wb.Actuated(figure, damping=-1.0)

@@ -72,7 +72,7 @@ def test_a_lost_tracker_holds_then_eases_back_and_a_jump_is_followed_at_a_bounde
     for _ in range(80):
         live.move()
     assert live.place("left_palm") == pytest.approx(began, abs=0.02)
-    with pytest.raises(wb.errors.UnknownNameError, match="left_palm"):
+    with pytest.raises(wb.UnknownNameError, match="left_palm"):
         live.follow({"left_pal": began})
     with pytest.raises(wb.InputError, match="place of left_palm"):
         live.follow({"left_palm": [np.nan, 0.0, 0.0]})

@@ -63,7 +63,7 @@ def test_torques_of_one_of_several_are_those_of_the_person_alone(person: wb.Figu
     np.testing.assert_allclose(found, alone.value(wb.Scene(person).state(bent)), atol=1e-9)
     with pytest.raises(wb.InputError, match="several figures"):
         StrengthLimit(forces).resolve(scene, q)
-    with pytest.raises(wb.errors.UnknownNameError, match="anna"):
+    with pytest.raises(wb.UnknownNameError, match="anna"):
         Exertion(CARRIED, person="ana").resolve(scene, q)
 
 

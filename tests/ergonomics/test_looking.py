@@ -72,7 +72,7 @@ def test_the_derivative_is_that_of_finite_differences(scene: wb.Scene) -> None:
 
 
 def test_another_frame_or_no_field_is_refused(scene: wb.Scene) -> None:
-    with pytest.raises(wb.errors.UnknownNameError, match="gazes"):
+    with pytest.raises(wb.UnknownNameError, match="gazes"):
         wb.Problem(scene, constraints=[wb.ergonomics.Look((1, 0, 1), eyes="gazes")])
     with pytest.raises(wb.InputError, match="FieldOfView"):
         wb.ergonomics.Look((1, 0, 1), view=0.3)  # type: ignore[arg-type]

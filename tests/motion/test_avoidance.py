@@ -300,7 +300,7 @@ def test_a_free_clip_that_misses_what_is_held_is_not_solved(
 def test_names_of_methods(planar_arm: Callable[..., Figure]) -> None:
     clip, scene = arm_and_ball(planar_arm, 5)
     assert set(METHODS) >= {"trajectory", "frames", "bisection"}
-    with pytest.raises(wb.errors.UnknownNameError, match="trajectory"):
+    with pytest.raises(wb.UnknownNameError, match="trajectory"):
         wb.avoid(clip, scene, method="trajectry")
     with pytest.raises(wb.InputError, match="other joints"):
         wb.avoid(clip, wb.Scene(wb.load("hand")))

@@ -179,16 +179,16 @@ def test_a_written_clip_is_read_again_without_loss(human: Figure, tmp_path: Path
 
 def test_clips_of_another_figure_and_other_endings_are_refused(human: Figure, tmp_path: Path) -> None:
     path = moving(human, 2).write(tmp_path / "walk.npz")
-    with pytest.raises(wb.errors.UnknownNameError, match=r"walk\.npz"):
+    with pytest.raises(wb.UnknownNameError, match=r"walk\.npz"):
         wb.read_clip(path, wb.load("hand"))
-    with pytest.raises(wb.errors.FileFormatError, match=r"walk\.xyz: a clip cannot be written as \.xyz; give one of"):
+    with pytest.raises(wb.FileFormatError, match=r"walk\.xyz: a clip cannot be written as \.xyz; give one of"):
         moving(human, 2).write(tmp_path / "walk.xyz")
-    with pytest.raises(wb.errors.FileFormatError, match="there is no such file"):
+    with pytest.raises(wb.FileFormatError, match="there is no such file"):
         wb.read_clip(tmp_path / "none.npz", human)
     assert [path.name for path in tmp_path.iterdir()] == ["walk.npz"]
     with np.load(path) as arrays:
         np.savez(path, **{**arrays, "wholebody_clip": np.array(2)})
-    with pytest.raises(wb.errors.FileFormatError, match=r"walk\.npz: its layout is 2, and 1 is known"):
+    with pytest.raises(wb.FileFormatError, match=r"walk\.npz: its layout is 2, and 1 is known"):
         wb.read_clip(path, human)
 
 

@@ -281,7 +281,7 @@ def nowhere(count: int) -> dict[str, np.ndarray]:
 )
 def test_a_changed_ground_is_checked(change: dict[str, Any], sentence: str) -> None:
     found = wb.motion.ground(walker(flat, 2.0)[0])
-    with pytest.raises((wb.InputError, wb.errors.UnknownNameError), match=f"Ground: .*{sentence}") as told:
+    with pytest.raises((wb.InputError, wb.UnknownNameError), match=f"Ground: .*{sentence}") as told:
         dataclasses.replace(found, **change)
     assert "\n" not in str(told.value)
 

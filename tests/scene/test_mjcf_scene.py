@@ -58,7 +58,7 @@ def test_distances_are_mujocos(path: Path) -> None:
 
 def test_a_urdf_is_no_scene(tmp_path: Path) -> None:
     (tmp_path / "robot.xml").write_text('<robot name="r"><link name="a"/></robot>')
-    with pytest.raises(wb.errors.FileFormatError, match="<mujoco>"):
+    with pytest.raises(wb.FileFormatError, match="<mujoco>"):
         wb.read_scene(tmp_path / "robot.xml")
 
 
@@ -67,7 +67,7 @@ def test_a_height_that_is_no_number_is_refused_with_its_place(tmp_path: Path) ->
         '<mujoco><asset><hfield name="h" nrow="2" ncol="3" size="1 1 1 0.1" elevation="0 0 0 0 nan 0"/></asset>'
         '<worldbody><geom type="hfield" hfield="h"/><body><freejoint/><geom size="0.1"/></body></worldbody></mujoco>'
     )
-    with pytest.raises(wb.errors.FileFormatError, match=r"terrain\.xml: a height field has nan in row \d, column 1"):
+    with pytest.raises(wb.FileFormatError, match=r"terrain\.xml: a height field has nan in row \d, column 1"):
         wb.read_scene(tmp_path / "terrain.xml")
 
 

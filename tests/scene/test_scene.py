@@ -139,11 +139,11 @@ def test_mistakes_are_answered_before_anything_changes(scene):
         scene.add(wb.Sphere(0.1), name="ball", at=(1.0, np.nan, 0.0))
     with pytest.raises(wb.InputError):
         scene.move("table", at=(1.0, 0.0))
-    with pytest.raises(wb.errors.UnknownNameError, match="did you mean table"):
+    with pytest.raises(wb.UnknownNameError, match="did you mean table"):
         scene.move("tabel", at=(1.0, 0.0, 0.0))
-    with pytest.raises(wb.errors.UnknownNameError, match="did you mean table"):
+    with pytest.raises(wb.UnknownNameError, match="did you mean table"):
         scene.remove("tables")
-    with pytest.raises(wb.errors.UnknownNameError, match="right_hand"):
+    with pytest.raises(wb.UnknownNameError, match="right_hand"):
         scene.attach(wb.Sphere(0.1), to="rigth_hand", name="ball")
     assert (scene.revision, list(scene.objects)) == (revision, ["table"])
 

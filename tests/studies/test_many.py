@@ -142,7 +142,7 @@ def test_a_folder_keeps_what_is_done(arm: wb.Figure, tmp_path: Path) -> None:
 
 def test_a_folder_of_something_else_is_refused(arm: wb.Figure, tmp_path: Path) -> None:
     (tmp_path / "records.jsonl").write_text("{}\n")
-    with pytest.raises(wb.errors.FileFormatError, match="another folder"):
+    with pytest.raises(wb.FileFormatError, match="another folder"):
         wb.solve_many([problem(arm, PLACES[0])], folder=tmp_path)
 
 
@@ -156,7 +156,7 @@ def test_records_are_written_as_a_table(arm: wb.Figure, tmp_path: Path) -> None:
     try:
         import pyarrow  # noqa: F401
     except ImportError:
-        with pytest.raises(wb.errors.MissingPackageError, match="pyarrow"):
+        with pytest.raises(wb.MissingPackageError, match="pyarrow"):
             records.to_parquet(tmp_path / "a.parquet")
         assert not (tmp_path / "a.parquet").exists()
 

@@ -104,7 +104,7 @@ def test_people_of_a_study_have_proportions_of_their_own(folder: Path) -> None:
         targets=[(3.0, 0.0, 1.0)],
     )  # fmt: skip
     assert near.goal_error > far.goal_error + 0.02
-    with pytest.raises(wb.errors.UnknownNameError, match="no dimension is called 'spam'"):
+    with pytest.raises(wb.UnknownNameError, match="no dimension is called 'spam'"):
         wb.study(folder / "task.toml", people=[{"proportions": {"spam": 1.75}}])
 
 

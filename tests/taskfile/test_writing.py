@@ -110,7 +110,7 @@ def test_whose_strength_it_is_goes_round(tmp_path: Path) -> None:
     path = wb.taskfile.write_task(problem, tmp_path / "two.toml")
     same(problem, wb.read_task(path).problem)
     path.write_text(path.read_text().replace('person = "ben"', 'person = "bne"'))
-    with pytest.raises(wb.errors.UnknownNameError, match="did you mean ben"):
+    with pytest.raises(wb.UnknownNameError, match="did you mean ben"):
         wb.read_task(path)
 
 
@@ -173,5 +173,5 @@ def test_millimetres_are_thought_of(told: Any, tmp_path: Path) -> None:
         wb.load("human", stature=1750)
     file = tmp_path / "t.toml"
     file.write_text('[figure]\nname = "human"\n[[goal]]\ntype = "point"\nframe = "gaze"\ntarget = [800, 0, 1]\n')
-    with pytest.raises(wb.errors.FileFormatError, match=r"0\.8 if it is in millimetres"):
+    with pytest.raises(wb.FileFormatError, match=r"0\.8 if it is in millimetres"):
         wb.read_task(file)

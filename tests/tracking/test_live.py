@@ -115,7 +115,7 @@ def test_a_figure_that_need_not_keep_its_ranges_is_dragged_without_them() -> Non
 
 
 def test_mistakes_are_named(drag: LiveDrag) -> None:
-    with pytest.raises(wb.errors.UnknownNameError, match="right_palm"):
+    with pytest.raises(wb.UnknownNameError, match="right_palm"):
         drag.take("right_plam")
     with pytest.raises(wb.InputError, match="take one first"):
         drag.move((0.0, 0.0, 0.0))

@@ -248,7 +248,7 @@ def test_wrong_motions_are_one_sentence(planar_arm) -> None:
     assert scene.objects["ball"].motion.start.translation == pytest.approx([0.7, 0.3, 0.0])
     assert scene.move("ball", at=(0.0, 2.0, 0.0)).objects["ball"].motion is None
     q = np.zeros(3)
-    with pytest.raises(wb.errors.UnknownNameError, match="ball"):
+    with pytest.raises(wb.UnknownNameError, match="ball"):
         scene.sweep(q, q, moves={"bal": ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))})
     with pytest.raises(wb.InputError, match="two placements"):
         scene.sweep(q, q, moves={"ball": (0.0, 0.0, 0.0)})
@@ -281,7 +281,7 @@ def test_a_whole_track_with_a_thing_that_moves_is_judged_with_it(planar_arm) -> 
     for wrong in ({"ball": places[1:]}, {"ball": 3}, 4):
         with pytest.raises(wb.InputError, match="moves"):
             tracking.follow(scene, track, moves=wrong)
-    with pytest.raises(wb.errors.UnknownNameError, match="ball"):
+    with pytest.raises(wb.UnknownNameError, match="ball"):
         tracking.follow(scene, track, moves={"bell": places})
 
 

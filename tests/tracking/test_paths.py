@@ -52,6 +52,6 @@ def test_a_file_of_places(tmp_path: Path) -> None:
 def test_a_bad_file_is_named_with_its_line(text: str, message: str, tmp_path: Path) -> None:
     file = tmp_path / "way.csv"
     file.write_text(text)
-    with pytest.raises(wb.errors.FileFormatError, match="way") as caught:
+    with pytest.raises(wb.FileFormatError, match="way") as caught:
         read_path(file)
     assert message in str(caught.value)

@@ -73,7 +73,7 @@ def test_frames_cut_or_repeat_the_script() -> None:
     longer = build_scene("hand_on_table", frames=len(whole) + 5).track
     np.testing.assert_array_equal(longer.q[-5:], whole.q[:5])
     assert not np.array_equal(build_scene("hand_on_table", seed=1).track.q, whole.q)
-    with pytest.raises(wb.errors.UnknownNameError, match="hand_on_table"):
+    with pytest.raises(wb.UnknownNameError, match="hand_on_table"):
         build_scene("hand_on_tabel")
 
 

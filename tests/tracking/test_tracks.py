@@ -28,7 +28,7 @@ def test_placements_and_glove_angles(hand: wb.Figure) -> None:
         posed(hand, roots=[(0.0, 0.0, 0.0)] * 2, angles=angles, dt=0.02)
     with pytest.raises(wb.InputError, match="frame 1"):
         posed(hand, roots=[(0.0, 0.0, 0.0), (0.0, np.nan, 0.0)], dt=0.02)
-    with pytest.raises(wb.errors.UnknownNameError):
+    with pytest.raises(wb.UnknownNameError):
         posed(hand, angles={"right_index_pip": [0.0]}, dt=0.02)
 
 
@@ -101,7 +101,7 @@ def test_times_of_three_decimals_have_their_mean_step(rate: float, hand: wb.Figu
     path.write_text("\n".join([header, *made]))
     assert 1.0 / wb.read_clip(path, hand).dt == pytest.approx(rate, rel=5e-4)
     path.write_text("\n".join([header, *made[:300], *made[302:]]))
-    with pytest.raises(wb.errors.FileFormatError, match="line 302: the time step changes"):
+    with pytest.raises(wb.FileFormatError, match="line 302: the time step changes"):
         wb.read_clip(path, hand)
 
 
@@ -147,5 +147,5 @@ def test_a_table_without_names_has_the_order_of_the_figure(tmp_path):
     assert track.dt == pytest.approx(1.0 / 30.0)
     np.testing.assert_allclose(track.q, q, atol=1e-8)
     np.savetxt(path, q[:, 1:], delimiter=",", fmt="%.9f")
-    with pytest.raises(wb.errors.FileFormatError, match=rf"no names of columns, and {q.shape[1] - 1} numbers where"):
+    with pytest.raises(wb.FileFormatError, match=rf"no names of columns, and {q.shape[1] - 1} numbers where"):
         wb.read_clip(path, figure)

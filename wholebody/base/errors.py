@@ -7,8 +7,6 @@ from collections.abc import Collection, Iterable
 from difflib import SequenceMatcher
 from typing import Any
 
-__all__ = ["FileFormatError", "InputError", "MissingPackageError", "UnknownNameError", "WholebodyError"]
-
 SHOWN = 80  # characters of a name in a message
 
 OFFERED = 4  # names that a message offers; of a few more, all, if none is similar
@@ -133,9 +131,12 @@ class UnknownNameError(WholebodyError, KeyError):
         """Build the sentence of a kind of object and all known names; `where` is a place, such as "goal 2"."""
         known = sorted(set(known))
         place = f"{where}: " if where else ""
-        self.kind, self.name, self.known = kind, name, tuple(known)
+        self.kind, self.name, self.known, self.where = kind, name, tuple(known), where
         called = repr(name) if len(name) <= SHOWN else f"{name[:SHOWN]!r}..."
         super().__init__(f"{place}no {kind} is called {called}; {suggestion(str(name), known)}")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.kind, self.name, self.known, self.where)
 
     def __str__(self) -> str:  # KeyError would show its repr
         return str(self.args[0])
@@ -155,6 +156,6 @@ class MissingPackageError(WholebodyError, ImportError):
     """An optional package that the call needs, with the command that installs it.
 
     Examples:
-        >>> issubclass(wb.errors.MissingPackageError, wb.WholebodyError)
+        >>> issubclass(wb.MissingPackageError, wb.WholebodyError)
         True
     """

@@ -20,8 +20,8 @@ def exported(package: str, file: str) -> tuple[Callable[[str], object], Callable
         if name not in home:
             told = f"module {package!r} has no attribute {name!r}"
             raise AttributeError(told, name=name, obj=sys.modules[package])  # Python names the nearest
-        value = None if home[name] == package else getattr(import_module(home[name]), name, None)
-        value = import_module(f"{home[name]}.{name}") if value is None else value  # a room
+        room = home[name] == package
+        value = import_module(f"{package}.{name}") if room else getattr(import_module(home[name]), name)
         setattr(sys.modules[package], name, value)
         return value
 

@@ -9,13 +9,14 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, is_dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, Generic, TypeVar
+from typing import Any, BinaryIO, Generic, Literal, TypeVar
 
 from wholebody.base.errors import FileFormatError, InputError, one_line
-from wholebody.base.files import make_folder
+from wholebody.base.files import LARGEST, make_folder
 
 T = TypeVar("T")
 VERSION = "1.0"
+NO_HEAD = "its first line is not the head of a run"
 
 
 class RecordFile(Generic[T]):
@@ -40,6 +41,8 @@ class RecordFile(Generic[T]):
         self, path: Path, content: str, make: Callable[[Any], T], settings: Mapping[str, Any] | None = None
     ) -> None:
         make_folder(path.parent)
+        if path.exists() and not path.is_file():
+            raise InputError(f"{path} is no file; give another folder")
         self.path, self._make, self._read = path, make, 0
         self.kept: dict[str, T] = {}
         self._head = {"content": content, "version": VERSION, **(settings or {})}
@@ -56,43 +59,56 @@ class RecordFile(Generic[T]):
     @contextmanager
     def _opened(self) -> Iterator[BinaryIO]:
         """The file, locked and read to its end."""
+        # a finished run is read where nothing can be written
+        mode: Literal["rb", "a+b"] = "rb" if self.path.exists() and not os.access(self.path, os.W_OK) else "a+b"
         try:
-            with self.path.open("a+b") as file:
+            with self.path.open(mode) as file:
                 with suppress(OSError):  # a network file system may have no locks
                     fcntl.flock(file, fcntl.LOCK_EX)
                 self._read_on(file)
                 yield file
         except OSError as error:
-            raise InputError(f"{self.path} cannot be written ({error.strerror}); give another folder") from None
+            why = error.strerror or error
+            raise InputError(f"{self.path} cannot be written ({why}); give another folder") from None
 
     def _read_on(self, file: BinaryIO) -> None:
         """Read what was written since the last time, and remove what was cut off."""
         if os.fstat(file.fileno()).st_size < self._read:  # somebody began it anew
             self._read = 0
         file.seek(self._read)
-        data = file.read()
+        data = file.read(LARGEST + 1)
+        if len(data) > LARGEST:
+            raise self._foreign("it is larger than any run")
         whole = data[: data.rfind(b"\n") + 1]
         lines = whole.split(b"\n")[:-1]
         if not self._read and not lines:
             head = _line(self._head)
             if not head.startswith(data):
-                raise self._foreign("it does not begin as one")
+                raise self._foreign(NO_HEAD)
             file.truncate(0)
             self._read = file.write(head)
             return
         try:
             if not self._read:
-                self._check_head(json.loads(lines.pop(0)))
+                self._check_head(lines.pop(0))
             for line in lines:
                 key, plain = json.loads(line)
                 self.kept[str(key)] = self._make(plain)
-        except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
-            raise error if isinstance(error, (FileFormatError, InputError)) else self._foreign(str(error)) from None
-        if len(whole) < len(data):
+        except (FileFormatError, InputError):
+            raise
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+            raise self._foreign("a line is no record of it") from None
+        if len(whole) < len(data) and file.writable():
             file.truncate(self._read + len(whole))
         self._read += len(whole)
 
-    def _check_head(self, found: Any) -> None:
+    def _check_head(self, line: bytes) -> None:
+        try:
+            found = json.loads(line)
+        except (ValueError, RecursionError):
+            found = None
+        if not isinstance(found, dict) or not {"content", "version"} <= found.keys():
+            raise self._foreign(NO_HEAD)
         for name in ("content", "version"):
             if found[name] != self._head[name]:
                 raise self._foreign(f"its {name} is {found[name]}, not {self._head[name]}")

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 from wholebody.base.arrays import brief
+from wholebody.base.errors import InputError
 from wholebody.base.files import csv_text, write
 from wholebody.base.records import RecordFile
 from wholebody.motion.clip import Clip
@@ -86,6 +88,8 @@ class BatchTable:
         self.folder = folder
         of = "cases of wb.motion.avoid_many"
         self._cases = RecordFile(folder / TABLE, of, lambda row: AvoidedCase(**row))  # by the names of the clips' files
+        with suppress(InputError):  # where a finished batch is only read
+            self._write_sheet()  # it may be gone, or a row short
 
     @cached_property
     def _originals(self) -> RecordFile[str]:
@@ -105,8 +109,12 @@ class BatchTable:
             row = replace(row, file=f"{row.stem}.npz")
             clip.write(self.folder / row.file)
         self._cases.add(row.stem, row)
-        write(self.folder / SHEET, csv_text(map(asdict, self._cases.kept.values())))
+        self._write_sheet()
         return row
+
+    def _write_sheet(self) -> None:
+        if self._cases.kept:
+            write(self.folder / SHEET, csv_text(map(asdict, self._cases.kept.values())))
 
     def original(self, name: str) -> Path:
         """The file of a clip as it was before."""

@@ -85,7 +85,7 @@ def test_a_joint_that_was_released_lets_shapes_touch_and_makes_room_for_another(
     with pytest.raises(wb.InputError, match="already"):
         made.fixed("a", "b")
     assert list(made.constraints) == ["fixed joint of 'a' and 'b'", "fixed joint of 'world' and 'a'"]
-    with pytest.raises(wb.errors.UnknownNameError, match="fixed joint"):
+    with pytest.raises(wb.UnknownNameError, match="fixed joint"):
         made.release("fixed joint of 'a' and 'c'")
 
 

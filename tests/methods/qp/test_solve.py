@@ -268,7 +268,7 @@ def test_what_is_no_problem_or_method_is_refused(planar_arm):
     problem = wb.Problem(wb.Scene(planar_arm(LENGTHS)))
     with pytest.raises(wb.InputError, match="not a Problem"):
         wb.solve("reach")
-    with pytest.raises(wb.errors.UnknownNameError, match="did you mean qp"):
+    with pytest.raises(wb.UnknownNameError, match="did you mean qp"):
         wb.solve(problem, "qpp")
     problem.scene.add(wb.Sphere(0.1), name="late", at=(3.0, 0.0, 0.0))
     with pytest.raises(wb.InputError, match="state the problem anew"):

@@ -138,7 +138,7 @@ def test_a_wrong_joint_profile_names_its_line(
     lines = list(PROFILE)
     lines[line] = text
     (tmp_path / "a.txt").write_text("\n".join(lines))
-    with pytest.raises(wb.errors.FileFormatError, match=rf"^a\.txt, {sentence}"):
+    with pytest.raises(wb.FileFormatError, match=rf"^a\.txt, {sentence}"):
         wb.read_clip(tmp_path / "a.txt", human)
 
 
@@ -371,16 +371,14 @@ def test_up_and_units_are_recognised_or_said(tmp_path: Path) -> None:
 def test_a_wrong_bvh_names_its_line(old: str, new: str, sentence: str, human: Figure, tmp_path: Path) -> None:
     assert old in BVH
     (tmp_path / "a.bvh").write_text(BVH.replace(old, new, 1))
-    with pytest.raises(wb.errors.FileFormatError, match=rf"^a\.bvh, {sentence}"):
+    with pytest.raises(wb.FileFormatError, match=rf"^a\.bvh, {sentence}"):
         wb.read_clip(tmp_path / "a.bvh", human)
 
 
 def test_a_skeleton_of_unknown_bones_names_its_file(human: Figure, tmp_path: Path) -> None:
     text = BVH.replace("hips", "one").replace("Bip01 L Thigh", "two").replace("shank", "three").replace("spine", "four")
     (tmp_path / "a.bvh").write_text(text)
-    with pytest.raises(
-        wb.errors.FileFormatError, match=r"^a\.bvh: no bones of the skeleton are known to belong to human"
-    ):
+    with pytest.raises(wb.FileFormatError, match=r"^a\.bvh: no bones of the skeleton are known to belong to human"):
         wb.read_clip(tmp_path / "a.bvh", human)
 
 
@@ -451,14 +449,14 @@ def test_a_later_archive_of_amass_is_read_and_its_objects_are_not(
 def test_a_wrong_archive_of_amass_is_one_sentence(
     changed: dict[str, Any], sentence: str, human: Figure, tmp_path: Path
 ) -> None:
-    with pytest.raises(wb.errors.FileFormatError, match=rf"^a\.npz: {sentence}"):
+    with pytest.raises(wb.FileFormatError, match=rf"^a\.npz: {sentence}"):
         wb.read_clip(amass(tmp_path / "a.npz", **changed), human)
 
 
 def test_csv_of_other_columns_is_refused_with_its_line(human: Figure, tmp_path: Path) -> None:
     path = swinging(human, 3, 0).write(tmp_path / "a.csv")
     path.write_text(path.read_text().replace("left_knee_flexion", "left_knee_flexoin", 1))
-    with pytest.raises(wb.errors.UnknownNameError, match=r"a\.csv, line 1: no column is called 'left_knee_flexoin'"):
+    with pytest.raises(wb.UnknownNameError, match=r"a\.csv, line 1: no column is called 'left_knee_flexoin'"):
         wb.read_clip(path, human)
     with pytest.raises(wb.InputError, match="two frames or more"):
         swinging(human, 1, 0).write(tmp_path / "b.csv")
@@ -491,16 +489,14 @@ def test_a_rest_posture_that_turns_some_joints_is_left_out(tmp_path: Path) -> No
 
 def test_an_unknown_ending_is_answered_with_all_that_can_be_read(human: Figure, tmp_path: Path) -> None:
     (tmp_path / "walk.mocap").write_text("HIERARCHY\n")
-    with pytest.raises(
-        wb.errors.FileFormatError, match=r"as \.mocap; give one of \.bvh, \.csv, \.glb, \.gltf, \.npz, \.txt$"
-    ):
+    with pytest.raises(wb.FileFormatError, match=r"as \.mocap; give one of \.bvh, \.csv, \.glb, \.gltf, \.npz, \.txt$"):
         wb.read_clip(tmp_path / "walk.mocap", human)
 
 
 def test_fbx_is_answered_with_what_turns_it_into_what_is_read(human: Figure, tmp_path: Path) -> None:
     (tmp_path / "walk.fbx").write_bytes(b"Kaydara FBX Binary  ")
     for read in (wb.motion.read_skeleton, partial(wb.read_clip, figure=human)):
-        with pytest.raises(wb.errors.FileFormatError, match=r"walk\.fbx: FBX is not read; Blender .*Export > glTF"):
+        with pytest.raises(wb.FileFormatError, match=r"walk\.fbx: FBX is not read; Blender .*Export > glTF"):
             read(tmp_path / "walk.fbx")
 
 
@@ -515,7 +511,7 @@ def test_an_archive_of_too_many_frames_is_refused_by_its_header(tmp_path: Path, 
     )
     with zipfile.ZipFile(tmp_path / "long.npz", "w") as archive:
         archive.writestr("q.npy", header.getvalue() + b"too few numbers")
-    with pytest.raises(wb.errors.FileFormatError, match=rf"q has {frames} frames; give 1 to {MOST_FRAMES}"):
+    with pytest.raises(wb.FileFormatError, match=rf"q has {frames} frames; give 1 to {MOST_FRAMES}"):
         wb.read_clip(tmp_path / "long.npz", figure)
 
 

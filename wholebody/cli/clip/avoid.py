@@ -84,6 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.motion.worn_equipment import put_on
 
     (file,) = arguments.files
+    jobs_of(arguments)  # one case needs no jobs; what is wrong with them is said all the same
     out = check_writable(check_ending(arguments.out or file.with_name(f"{file.stem}-free.npz")), [file])
     if arguments.html is not None:
         checked_target(arguments.html, "--html", "a page", (".htm", ".html"))

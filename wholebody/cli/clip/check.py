@@ -57,6 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
     depth = DEPTH if arguments.depth is None else 1e-3 * arguments.depth
     if len(arguments.files) * max(1, len(arguments.equipment)) > 1:
         return _many(arguments, depth)
+    jobs_of(arguments)  # one case needs no jobs; what is wrong with them is said all the same
     if arguments.html is not None:
         checked_target(arguments.html, "--html", "a page", (".htm", ".html"))
     (file,), worn = arguments.files, (*arguments.equipment, NOTHING)[0]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -79,8 +80,8 @@ class Search:
         self.contradictions = contradictions(self.active_system.problem, self.active_system.workspace)
         hopeless = least_left(self.contradictions) is None
         best = self._go(q, "", STARTS.trial) if hopeless else self.from_here(q)
-        if not self._solves(best) and not hopeless and not self._beyond_reach():
-            best = self._from_other_starts(q, best)
+        if not self._solves(best) and not hopeless:
+            best = self._from_other_starts(q, best, STARTS.beyond if self._beyond_reach() else None)
         if self.active_system.control.over:
             return best
         if not best.judgement.holds(self.settings.assessed_tolerance) and not hopeless:
@@ -103,10 +104,10 @@ class Search:
                 return True
         return False
 
-    def _from_other_starts(self, q: Array, best: SearchResult) -> SearchResult:
-        """The best result of the other starts and the best so far; each start has a trial first."""
+    def _from_other_starts(self, q: Array, best: SearchResult, count: int | None) -> SearchResult:
+        """The best result of other starts, at most `count`, and the best so far; each start has a trial first."""
         minima, control, most = Minima(), self.active_system.control, self.iterations + STARTS.iterations
-        for start, how in self._starts(q):
+        for start, how in islice(self._starts(q), count):
             if minima.complete:
                 break
             found = self._go(start, how, min(STARTS.trial, self.settings.iterations))

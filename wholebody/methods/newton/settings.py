@@ -84,6 +84,8 @@ class Starts(NamedTuple):
     sharper: float = 0.3
     trial: int = 30  # iterations in which another start must come nearer than the best so far
     iterations: int = 250  # after which no other start follows. More: more is solved, later; one to four seconds
+    # other starts where a goal is farther than the limbs are long: none solves it, one may come nearer past things
+    beyond: int = 2
     longest: float = 20.0  # s of processor time: several times what these take
     # of the time limit for other starts: the last iteration, towards the least violation, takes time too
     time_share: float = 0.5
