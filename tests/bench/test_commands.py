@@ -11,7 +11,7 @@ from tests.csv_rows import csv_rows
 from wholebody.bench import plot_style
 from wholebody.bench.measure.track import VARIANTS
 from wholebody.bench.rows import Panel, chart, shares
-from wholebody.bench.suite.adapters.registry import stepping
+from wholebody.bench.suite.adapters.registry import adapters, stepping
 from wholebody.cli.bench import run as group
 
 
@@ -85,3 +85,5 @@ def test_every_tool_has_a_colour_of_its_own() -> None:
     assert plot_style.method_style("qp") == plot_style.method_style("wholebody")  # the same method in another chart
     colors = [color for color, _ in plot_style.STYLE["methods"].values()]
     assert len(set(colors)) == len(colors)
+    usual = {adapter.name for adapter in adapters(starts=True)}
+    assert len({plot_style.method_style(name) for name in usual}) == len(usual)
