@@ -363,9 +363,3 @@ class ConstraintValues:
             checked_count(term, len(part), rows)
             value[row : row + rows] = part
         return value
-
-    def rows(self, state: State) -> Array:
-        """The derivatives (c, nv) at the state of the last `at`, which the next one overwrites."""
-        for term, _, row, rows in self._plan.others:
-            self._jacobian[row : row + rows] = state.dense_jacobian(term.jacobian(state))
-        return self._jacobian

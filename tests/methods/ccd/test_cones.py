@@ -1,4 +1,4 @@
-"""Limbs that stay in their reach cones."""
+"""Cones on floats against the figure's own, and limbs that stay in them."""
 
 from __future__ import annotations
 
@@ -10,8 +10,24 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.methods.ccd.guards import Guard, Kept
+from wholebody.methods.ccd.guards import Kept, Polygon, guards
 from wholebody.methods.ccd.limbs import Limbs
+
+
+@pytest.mark.parametrize("name", ["right_shoulder", "left_hip"])
+def test_a_polygon_is_the_figures_cone(name: str, human: wb.Figure) -> None:
+    cone = human.cones[name].cone
+    polygon = Polygon(cone)
+    rows = np.random.default_rng(4).normal(size=(3000, 3))
+    rows /= np.linalg.norm(rows, axis=1)[:, None]
+    angles = np.array([cone.signed_angle(row)[0] for row in rows])
+    assert [polygon.contains(tuple(row)) for row in rows.tolist()] == (angles >= 0.0).tolist()
+    nearest = np.array([polygon.nearest(tuple(row)) for row in rows[angles < 0.0].tolist()])
+    turned = np.linalg.norm(np.cross(rows[angles < 0.0], nearest), axis=1)
+    assert np.arctan2(turned, (rows[angles < 0.0] * nearest).sum(axis=1)) == pytest.approx(
+        -angles[angles < 0.0], abs=2e-6
+    )
+    assert all(cone.contains(each) for each in nearest)
 
 
 @pytest.mark.parametrize("chain", ["right_arm", "left_leg"])
@@ -19,19 +35,20 @@ def test_a_limb_that_left_its_cone_is_brought_back(
     chain: str, human: wb.Figure, random_joints: Callable[..., Any], outside: Callable[..., float]
 ) -> None:
     limbs = Limbs(human.model, map(human.joint_id, human.chains[chain].joints))
-    guard = Guard(wb.Scene(human), limbs, Kept())
+    cones = guards(human, limbs, Kept())
     data, rng, left = human.model.createData(), np.random.default_rng(7), 0
     for _ in range(150):
         start, q = human.neutral, random_joints(human, human.chains[chain].joints, rng)
         pin.forwardKinematics(human.model, data, start)
         limbs.read(start, data)
         limbs.forward()
-        guard.read(start)
+        for cone in cones:
+            cone.read(start, data)
         pin.forwardKinematics(human.model, data, q)
         limbs.read(q, data)
         limbs.forward()
         left += outside(human, q) > 1e-9
-        guard.keep()
+        assert all(cone.keep() for cone in cones)
         limbs.write(q)
         assert outside(human, q) <= 1e-9
         assert human.within_limits(q)

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.methods.ccd.guards import Guard, Kept
+from wholebody.methods.ccd.guards import Kept, guards
 from wholebody.methods.ccd.limbs import Limbs
 
 
@@ -32,7 +32,7 @@ def test_what_left_its_range_is_brought_back(
     scene = wb.Scene(human)
     names = human.chains[chain].joints if moving is None else moving
     limbs = Limbs(human.model, map(human.joint_id, names))
-    guard = Guard(scene, limbs, Kept(ranges=tuple(human.ranges)))
+    made = guards(human, limbs, Kept(ranges=tuple(human.ranges)))
     data, rng, out = human.model.createData(), np.random.default_rng(5), 0
     for _ in range(60):
         start = human.neutral
@@ -40,12 +40,13 @@ def test_what_left_its_range_is_brought_back(
         pin.forwardKinematics(human.model, data, start)
         limbs.read(start, data)
         limbs.forward()
-        guard.read(start)
+        for guard in made:
+            guard.read(start, data)
         pin.forwardKinematics(human.model, data, q)
         limbs.read(q, data)
         limbs.forward()
         out += _left(scene, q) > 1e-6
-        guard.keep()
+        assert all(guard.keep() for guard in made)
         limbs.write(q)
         assert _left(scene, q) <= 1e-9
         assert outside(human, q) <= 1e-9

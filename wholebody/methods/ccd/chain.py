@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.methods.ccd.guards import Guard, Kept
+from wholebody.methods.ccd.guards import Kept, cone_guards, guards
 from wholebody.methods.ccd.limbs import Limbs, Vector, rotated, seen_from, three
 from wholebody.methods.ccd.links import Link, LinkFinder
 from wholebody.methods.ccd.sweep import Aims
@@ -34,7 +34,6 @@ class ChainResolver:
 
     Attributes:
         limbs: its joints.
-        guard: keeps them in their reach cones and ranges of motion.
         finder: of its links that overlap.
         reach: for each node, an upper bound of the distance from its joint to a point of the chain, metres.
         translated: joints that keep the orientation of links that were moved out by translation.
@@ -55,7 +54,8 @@ class ChainResolver:
         self.limbs = Limbs(scene.model, joints)
         self._base = int(scene.model.parents[joints[0]])
         self.finder = LinkFinder(workspace, self.limbs, foreign, exact)
-        self.guard = Guard(scene, self.limbs, kept)
+        self._guards = guards(scene.figure, self.limbs, kept)
+        self._cones = cone_guards(scene.figure, self.limbs, kept)
         self._tip = three(scene.model.frames[tip].placement.translation)
         carriers = {self.limbs.carrier(int(joint)) for joint in workspace.table.joint}
         self._bearing = sorted(node for node in carriers if node >= 0)  # links with pieces
@@ -80,7 +80,17 @@ class ChainResolver:
         """Read a posture q (nq,), with the joint placements in `data`."""
         self.limbs.read(q, data)
         self.limbs.forward()
-        self.guard.read(q)
+        for guard in self._guards:
+            guard.read(q, data)
+
+    def in_cones(self, data: Any) -> bool:
+        """Whether the limbs are in their reach cones at the joint placements in `data`; `read` is not needed."""
+        return all(cone.holds(data) for cone in self._cones)
+
+    def keep_ranges(self) -> None:
+        """Bring limbs that have left their reach cones, or joints their ranges of motion, back into them."""
+        for guard in self._guards:
+            guard.keep()
 
     def push(self, link: Link, margin: float = MARGIN, tracked: Tracked | None = None) -> tuple[int, ...]:
         """Move the link out of the obstacle by `margin` metres; the nodes that moved. Call `read` first."""
@@ -109,7 +119,7 @@ class ChainResolver:
         for _ in range(SWEEPS):
             aims.sweep(plan)
             self.limbs.forward()
-            self.guard.keep()
+            self.keep_ranges()
             aims.carry()
             before, left = left, aims.distance
             if left < 1e-4 or left > 0.9 * before:  # m: reached; or slow
@@ -166,7 +176,7 @@ class ChainResolver:
             if change < 1e-4:  # rad
                 break
             aims.carry()
-        self.guard.keep()
+        self.keep_ranges()
 
     def _passes(self, node: int, point: Sequence[float]) -> bool:
         """Whether the axis of a node passes through a point (3,)."""

@@ -1,28 +1,22 @@
-"""Guards: limbs that left their reach cones or ranges of motion are brought back, or else stay at their last values.
+"""Guards: joints that have left a reach cone or a range of motion are brought back, or else stay at their last values.
 
-Cones and ranges are the constraints `ReachCones` and `RangeOfMotion`, whose values are angles, positive inside. Where
-some are violated, Newton's method looks for the least change of the joints that makes them hold: a limb is projected to
-the nearest direction inside (Wilhelms and Van Gelder 2001).
+Cones and ranges that share joints, those of a shoulder or of a leg, are kept together. The cones are those of
+`wholebody.figures.reach_cones`, the ranges those of `ranges`.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.figures.self_pairs import random_postures
-from wholebody.figures.state import State
-from wholebody.methods.ccd.limbs import Limbs
-from wholebody.scene.scene import Scene
-from wholebody.tasks.base import Constraint
-from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
-from wholebody.terms.linearisation import ConstraintValues
-
-INWARD = 1e-8  # rad: inside by which limbs are brought back; larger than rounding and what the last step leaves
-ROUNDING = 1e-12  # rad
-STEPS = 10  # most of Newton's; mostly three
+from wholebody.figures.figure import Figure
+from wholebody.figures.reach_cones import ReachCone
+from wholebody.methods.ccd.limbs import CarriedFrame, Limbs, Vector, rotated, three
+from wholebody.methods.ccd.ranges import RangeGuard, range_guards
+from wholebody.methods.ccd.sweep import Aims
 
 
 class Kept(NamedTuple):
@@ -36,81 +30,140 @@ class Kept(NamedTuple):
 NOTHING_FIXED = Kept()
 
 
-class Guard:
-    """Keeps some limbs in the cones and ranges that their nodes can leave."""
+class Polygon:
+    """A reach cone: the test of a direction, on plain floats, and the nearest direction inside."""
 
-    def __init__(self, scene: Scene, limbs: Limbs, kept: Kept) -> None:
-        """Find these cones and ranges."""
-        self._limbs, self._state = limbs, State(scene.model)
-        self._dofs = np.array([scene.model.joints[joint].idx_v for joint in limbs.joints], dtype=np.intp)
-        cones = scene.figure.cones if kept.cones is None else kept.cones
-        terms = [*self._kept(scene, ReachCones, tuple(cones)), *self._kept(scene, RangeOfMotion, kept.ranges)]
-        self._values = ConstraintValues(terms, self._state.update(scene.figure.neutral)) if terms else None
-        self._q: Array = scene.figure.neutral
+    def __init__(self, cone: ReachCone) -> None:
+        """Copy the planes of the cone."""
+        self._cone, slices = cone, np.cross(cone.visible, cone.vertices)
+        self._wedges = [
+            (three(slice_), three(after), three(edge))
+            for slice_, after, edge in zip(slices, np.roll(slices, -1, axis=0), cone.boundaries, strict=True)
+        ]
+
+    def contains(self, direction: Vector) -> bool:
+        """Whether a unit direction is inside: find the wedge that contains it, then test the wedge's edge."""
+        x, y, z = direction
+        for (a, b, c), (d, e, f), (g, h, i) in self._wedges:
+            if a * x + b * y + c * z >= 0.0 > d * x + e * y + f * z:
+                return g * x + h * y + i * z >= 0.0
+        g, h, i = self._wedges[0][2]
+        return g * x + h * y + i * z >= 0.0
+
+    def nearest(self, direction: Vector) -> Vector:
+        """The nearest direction inside to a unit direction outside, a little inside of the edge."""
+        angle, inward = self._cone.signed_angle(direction)
+        # a share of the way to the middle; larger than rounding
+        found = np.cos(angle) * np.array(direction) - np.sin(angle) * inward + 1e-6 * self._cone.visible
+        return three(found / np.linalg.norm(found))
+
+
+class ConeGuard:
+    """Keeps one limb in its cone while the nodes of some limbs move; `nodes` are those that turn it there.
+
+    A limb that has left its cone is projected to the nearest direction inside (Wilhelms and Van Gelder 2001): the
+    joints of the ball joint turn, each to its best, until the limb points there.
+    """
+
+    def __init__(self, figure: Figure, limbs: Limbs, name: str) -> None:
+        """Find the nodes between the cone's reference frame and the limb."""
+        cone = figure.cones[name]
+        self._polygon, self._axis, self._limbs = Polygon(cone.cone), np.asarray(cone.axis, dtype=float), limbs
+        self._limb, self._base = (CarriedFrame(limbs, figure.frame_id(frame)) for frame in (cone.limb, cone.reference))
+        self.nodes = limbs.between(self._base.node, self._limb.node)
+
+    def holds(self, data: Any) -> bool:
+        """Whether the limb is in its cone at the joint placements of Pinocchio's data."""
+        return self._polygon.contains(three((self._limb.rotation(data) @ self._axis) @ self._base.rotation(data)))
+
+    def read(self, q: Array, data: Any) -> None:
+        """Read what the limbs do not move from `data` at the posture q (nq,); call `limbs.read` first."""
+        self._limb.read(data)
+        self._base.read(data)
+
+    def inside(self) -> bool:
+        """Whether the limb is in its cone, after `limbs.forward`."""
+        return self._polygon.contains(self._base.seen(*self._limb.direction(*self._axis)))
+
+    def turn_back(self) -> None:
+        """Turn the joints of the limb to the nearest direction of its cone, and call `limbs.forward`."""
+        nearest = self._polygon.nearest(self._base.seen(*self._limb.direction(*self._axis)))
+        target, local = self._base.direction(*nearest), rotated(self._limb.placement, *self._axis)
+        Aims(self._limbs, [self._limb.node], [local], [target], [False]).sweep_until(self.nodes, self.inside)
+
+
+Part = ConeGuard | RangeGuard
+"""What is kept: `read` it at a posture, ask whether it is `inside`, and `turn_back` its `nodes`."""
+
+
+class Guard:
+    """Keeps cones and ranges that share nodes."""
+
+    def __init__(self, limbs: Limbs, parts: Sequence[Part]) -> None:
+        """Take the parts."""
+        self.parts, self._limbs = tuple(parts), limbs
+        self._rows = np.array(sorted({node for part in parts for node in part.nodes}), dtype=np.intp)
         self._last: Array | None = None
 
-    def _kept(self, scene: Scene, kind: type[ReachCones | RangeOfMotion], names: tuple[str, ...]) -> list[Constraint]:
-        """A constraint with those of some cones or ranges that the nodes can leave; none without any."""
-        if not names:
-            return []
-        term, state = kind(names).resolve(scene, scene.figure.neutral), self._state
-        slopes = [term.jacobian(state.update(q))[:, self._dofs] for q in random_postures(scene.model, 3, seed=1)]
-        left = np.any(np.array(slopes), axis=(0, 2))
-        mine = [name for name, own in zip(names, left, strict=True) if own]
-        return [kind(mine).resolve(scene, scene.figure.neutral)] if mine else []
+    def read(self, q: Array, data: Any) -> None:
+        """Begin at the posture q (nq,) with its placements in `data`, after `limbs.read` and `limbs.forward`."""
+        self._last = None
+        for part in self.parts:
+            part.read(q, data)
+        self._remember()
 
-    def inside(self, q: Array) -> bool:
-        """Whether all hold at a posture q (nq,); it need not be read."""
-        return self._values is None or bool((self._values.at(self._state.update(q)) >= -ROUNDING).all())
-
-    def read(self, q: Array) -> None:
-        """Begin at the posture q (nq,), which the limbs have read."""
-        self._q = q.copy()
-        self._last = self._limbs.values.copy() if self.inside(q) else None
-
-    def keep(self) -> None:
-        """Bring the nodes back inside, if possible, and call `limbs.forward` where they moved."""
-        if self._values is None or self._holds():
-            return
-        if not self._projected() and self._last is not None:
+    def keep(self) -> bool:
+        """Bring the nodes back inside, after `limbs.forward`, and call it; true if they are inside then."""
+        if self._remember():
+            return True
+        for _ in range(2):  # to bring a limb back into one may take it out of another
+            for part in self.parts:
+                if not part.inside():
+                    part.turn_back()
+            if self._remember():
+                return True
+        if self._last is not None:
             self._retreat(self._last)
-        self._limbs.forward()
+        return self._remember()
 
-    def _holds(self) -> bool:
-        """Whether all hold at the present values, which are remembered then."""
-        self._limbs.write(self._q)
-        if not self.inside(self._q):
+    def _inside(self) -> bool:
+        return all(part.inside() for part in self.parts)
+
+    def _remember(self) -> bool:
+        if not self._inside():
             return False
-        self._last = self._limbs.values.copy()
+        self._last = self._limbs.values[self._rows]
         return True
 
-    def _projected(self) -> bool:
-        """Make what is violated hold by the least change of the nodes, each within its limits; whether all hold."""
-        limbs, free = self._limbs, np.ones(len(self._dofs), dtype=bool)
-        assert self._values is not None
-        violated = np.zeros(len(self._values.at(self._state)), dtype=bool)
-        for _ in range(STEPS):
-            value, rows = self._values.at(self._state), self._values.rows(self._state)[:, self._dofs]
-            violated |= value < -ROUNDING
-            way = np.zeros(len(free))
-            way[free] = np.linalg.lstsq(rows[violated][:, free], INWARD - value[violated], rcond=1e-6)[0]
-            wanted = limbs.values + way
-            limbs.values[:] = np.clip(wanted, limbs.lower, limbs.upper)
-            free &= limbs.values == wanted  # what a limit stops is left to the others
-            if self._holds():
-                return True
-        return False
-
     def _retreat(self, last: Array) -> None:
-        """Move from the last values inside as far towards the present ones as all holds."""
-        wanted = self._limbs.values.copy()
+        """Move from the last values inside as far towards the present ones as all parts allow."""
+        wanted = self._limbs.values[self._rows]
         inside, outside = 0.0, 1.0
         for _ in range(20):  # to a millionth of the motion
             middle = 0.5 * (inside + outside)
-            self._limbs.values[:] = last + middle * (wanted - last)
-            if self._holds():
+            self._blend(last, wanted, middle)
+            if self._inside():
                 inside = middle
             else:
                 outside = middle
-        self._limbs.values[:] = last + inside * (wanted - last)
-        self._holds()
+        self._blend(last, wanted, inside)
+
+    def _blend(self, first: Array, second: Array, share: float) -> None:
+        self._limbs.values[self._rows] = first + share * (second - first)
+        self._limbs.forward()
+
+
+def guards(figure: Figure, limbs: Limbs, kept: Kept) -> list[Guard]:
+    """Guards of the kept cones and ranges that these limbs can leave."""
+    groups: list[list[Part]] = []
+    for part in (*cone_guards(figure, limbs, kept), *range_guards(figure, limbs, kept.ranges)):
+        sharing = [group for group in groups if any(set(part.nodes) & set(other.nodes) for other in group)]
+        groups = [group for group in groups if group not in sharing]
+        groups.append([*(other for group in sharing for other in group), part])
+    return [Guard(limbs, group) for group in groups]
+
+
+def cone_guards(figure: Figure, limbs: Limbs, kept: Kept) -> list[ConeGuard]:
+    """The kept cones that these limbs can leave."""
+    made = [ConeGuard(figure, limbs, name) for name in (figure.cones if kept.cones is None else kept.cones)]
+    return [guard for guard in made if guard.nodes]

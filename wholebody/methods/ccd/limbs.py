@@ -86,6 +86,11 @@ class Limbs:
             joint = int(self.model.parents[joint])
         return -1
 
+    def between(self, base: int, tip: int) -> tuple[int, ...]:
+        """The nodes that move node `tip` relative to node `base`, from the tip inwards; -1 is the world."""
+        under = self.paths[base] if base >= 0 else ()
+        return tuple(node for node in (self.paths[tip] if tip >= 0 else ()) if node not in under)
+
     def read(self, q: Array, data: Any) -> None:
         """Read values from a posture q (nq,), and placements of other joints from `data` at the same posture."""
         self.values[self._plain] = q[self._plain_q]
@@ -134,6 +139,18 @@ class CarriedFrame:
         joint = self._limbs.joints[self.node] if self.node >= 0 else 0
         if joint != self._joint:
             self.placement = floats(data.oMi[joint].actInv(data.oMi[self._joint] * self._fixed))
+
+    def rotation(self, data: Any) -> Array:
+        """(3, 3) rotation at the joint placements of Pinocchio's data."""
+        return np.asarray(data.oMi[self._joint].rotation @ self._fixed.rotation)
+
+    def direction(self, x: float, y: float, z: float) -> Vector:
+        """The world's components of a direction of this frame, after `Limbs.forward`."""
+        return rotated(self._limbs.frame(self.node), *rotated(self.placement, x, y, z))
+
+    def seen(self, x: float, y: float, z: float) -> Vector:
+        """A direction of the world in the components of this frame, after `Limbs.forward`."""
+        return seen_from(self.placement, *seen_from(self._limbs.frame(self.node), x, y, z))
 
 
 @lru_cache(maxsize=1)

@@ -154,7 +154,7 @@ class _Shared:
         key = (request.joints, request.kept)
         if key != self._key:
             self._key = key
-            self._reach = Reach(self._scene, request, control)
+            self._reach = Reach(self._scene.figure, request, control)
             self._resolver = OverlapResolver(self._scene, self.workspace, request.kept)
         self._reach.begin(request, control)
         return self._reach, self._resolver

@@ -10,12 +10,12 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.methods.ccd.guards import Guard
+from wholebody.figures.figure import Figure
+from wholebody.methods.ccd.guards import guards
 from wholebody.methods.ccd.limbs import CarriedFrame, Limbs, moved, rotated
 from wholebody.methods.ccd.sweep import Aims
 from wholebody.methods.ccd.terms import GoalPlace, Request
 from wholebody.methods.control import Control
-from wholebody.scene.scene import Scene
 
 
 class Reached(NamedTuple):
@@ -47,13 +47,13 @@ def _aims(limbs: Limbs, data: Any, goals: Sequence[GoalPlace]) -> Aims:
 class Reach:
     """The joints of a request, and its goals."""
 
-    def __init__(self, scene: Scene, request: Request, control: Control) -> None:
+    def __init__(self, figure: Figure, request: Request, control: Control) -> None:
         """Prepare the joints."""
-        self._model = scene.model
+        self._model = figure.model
         self.begin(request, control)
-        self.limbs = Limbs(scene.model, request.joints)
-        self._guard = Guard(scene, self.limbs, request.kept)
-        self._data = scene.model.createData()
+        self.limbs = Limbs(figure.model, request.joints)
+        self._guards = guards(figure, self.limbs, request.kept)
+        self._data = figure.model.createData()
 
     def begin(self, request: Request, control: Control) -> None:
         """Begin a run for the goals of a request that moves and keeps the same joints."""
@@ -66,8 +66,9 @@ class Reach:
         pin.forwardKinematics(self._model, self._data, q)
         limbs.read(q, self._data)
         limbs.forward()
-        self._guard.read(q)
-        self._guard.keep()
+        for guard in self._guards:
+            guard.read(q, self._data)
+            guard.keep()
         aims = _aims(limbs, self._data, self._goals)
         plan = aims.plan()
         error, last = aims.error, inf
@@ -80,7 +81,8 @@ class Reach:
                     break
             change = aims.sweep(plan)
             limbs.forward()
-            self._guard.keep()
+            for guard in self._guards:
+                guard.keep()
             aims.carry()
             error = aims.error
             sweeps += 1

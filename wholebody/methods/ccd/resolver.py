@@ -14,8 +14,8 @@ from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.methods.ccd.chain import MARGIN, ChainResolver, Tracked
-from wholebody.methods.ccd.guards import NOTHING_FIXED, Guard, Kept
-from wholebody.methods.ccd.limbs import Limbs, movable
+from wholebody.methods.ccd.guards import NOTHING_FIXED, Kept
+from wholebody.methods.ccd.limbs import movable
 from wholebody.methods.ccd.links import Link, LinkFinder, Overlap
 from wholebody.methods.control import Control
 from wholebody.scene.scene import Scene
@@ -88,12 +88,6 @@ class OverlapResolver:
             if joints
         }
 
-    @cached_property
-    def _guard(self) -> Guard:
-        """All cones and ranges at once: mostly all hold."""
-        joints = [joint for chain in self.chains.values() for joint in chain.limbs.joints]
-        return Guard(self.scene, Limbs(self.scene.model, joints), self._kept)
-
     def query(self, q: Array) -> list[Overlap]:
         """The overlaps at a posture q (nq,), the deepest first."""
         began = time.perf_counter()
@@ -165,13 +159,11 @@ class OverlapResolver:
     def into_cones(self, q: Array) -> Array:
         """Copy of a posture q (nq,) with its limbs turned back into their reach cones."""
         q = q.copy()
-        if self._guard.inside(q):
-            return q
         pin.forwardKinematics(self.scene.model, self._data, q)
         for chain in self.chains.values():
-            if not chain.guard.inside(q):
+            if not chain.in_cones(self._data):
                 chain.read(q, self._data)
-                chain.guard.keep()
+                chain.keep_ranges()
                 chain.limbs.write(q)
                 pin.forwardKinematics(self.scene.model, self._data, q)
         return q

@@ -15,7 +15,7 @@ Inverse Kinematics Problem of Mechanical Manipulators, IEEE Transactions on Robo
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache
 from math import acos, atan2, ceil, cos, floor, inf, pi, sin
 from typing import Any, NamedTuple
@@ -77,6 +77,16 @@ class Aims:
                 limbs.lines, limbs.slides, limbs.values, limbs.limits, self._rows, plan.turns, plan.moved
             )
         )
+
+    def sweep_until(self, nodes: Sequence[int], done: Callable[[], bool]) -> None:
+        """Sweep with these nodes, and call `limbs.forward`, until `done` is true: mostly twice."""
+        plan = self.plan(nodes)
+        for _ in range(12):
+            self.sweep(plan)
+            self._limbs.forward()
+            if done():
+                return
+            self.carry()
 
     @property
     def error(self) -> float:
