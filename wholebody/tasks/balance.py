@@ -60,12 +60,14 @@ def standing_points(scene: Surroundings, q: Array, feet: Sequence[str]) -> Array
     for number, shape, local in soles.ellipsoids:
         points[number] = outermost(shape, placed[soles.joints[soles.carrier[number]]] * local, DOWN)[0]
     height = points[:, 2]
-    return points[height <= np.minimum.reduceat(height, soles.begin)[soles.foot] + STANDING_HEIGHT]
+    low: Array = points[height <= np.minimum.reduceat(height, soles.begin)[soles.foot] + STANDING_HEIGHT]
+    return low
 
 
 def _soles_of(scene: Surroundings, feet: Sequence[str]) -> _Soles:
     joints: dict[int, int] = {}
-    points, radii, carrier, begin, foot, ellipsoids = list[Array](), list[float](), list[int](), [], list[int](), []
+    points, radii, carrier, begin, foot = list[Array](), list[float](), list[int](), list[int](), list[int]()
+    ellipsoids: list[tuple[int, Any, pin.SE3]] = []
     for number, name in enumerate(feet):
         joint = inputs.find_place(scene, name, "Balance").joint
         begin.append(len(radii))
@@ -81,8 +83,8 @@ def _soles_of(scene: Surroundings, feet: Sequence[str]) -> _Soles:
         foot += [number] * (len(radii) - begin[-1])
         if len(radii) == begin[-1]:
             raise InputError(f"Balance: {name!r} has no pieces to stand on; name segments with geometry as feet")
-    numbers = (np.array(each, dtype=np.intp) for each in (carrier, begin, foot))
-    return _Soles([*joints], np.concatenate(points), np.array(radii), *numbers, ellipsoids)
+    at, first, of = (np.array(each, dtype=np.intp) for each in (carrier, begin, foot))
+    return _Soles([*joints], np.concatenate(points), np.array(radii), at, first, of, ellipsoids)
 
 
 class Polygon(NamedTuple):
