@@ -12,7 +12,7 @@ from typing import Annotated, Any, NamedTuple, TypeAlias
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Names, Range
 from wholebody.figures.state import State
@@ -34,11 +34,17 @@ came 20 to 59 % less far from the middle of the stance than the edges are (Forth
 33: 715, its abstract); here it is 30 %."""
 
 DOWN = np.array((0.0, 0.0, -1.0))
+FAR_INSIDE = 1.0  # m: value of a row whose corner is no corner of the polygon
 NEAREST = 1e-5  # Distance [m] below which two points count as one corner
 
 
 def standing_points(scene: Surroundings, q: Array, feet: Sequence[str]) -> Array:
     """Points (n, 3) on which the feet, toes included, stand at q: the lowest corners of their pieces."""
+    return standing_corners(scene, q, feet)[0]
+
+
+def standing_corners(scene: Surroundings, q: Array, feet: Sequence[str]) -> tuple[Array, Indices]:
+    """The same, and the joints (n,) that carry them."""
     soles = []
     for foot in feet:
         joint = inputs.find_place(scene, foot, "Balance").joint
@@ -46,14 +52,14 @@ def standing_points(scene: Surroundings, q: Array, feet: Sequence[str]) -> Array
         if not soles[-1] or joint == 0:
             raise InputError(f"Balance: {foot!r} has no pieces to stand on; name segments with geometry as feet")
     places = scene.figure.joint_placements(q, {joint for pieces in soles for joint, *_ in pieces})
-    points = []
+    points, joints = [], []
     for pieces in soles:
-        lows = np.concatenate(
-            [outermost(shape, places[joint] * placed, DOWN, swept) for joint, placed, shape, swept in pieces]
-        )
-        height = lows[:, 2]
-        points.append(lows[height <= height.min() + STANDING_HEIGHT])
-    return np.concatenate(points)
+        found = [outermost(shape, places[joint] * placed, DOWN, swept) for joint, placed, shape, swept in pieces]
+        lows, of = np.concatenate(found), np.repeat([joint for joint, *_ in pieces], [len(one) for one in found])
+        low = lows[:, 2] <= lows[:, 2].min() + STANDING_HEIGHT
+        points.append(lows[low])
+        joints.append(of[low])
+    return np.concatenate(points), np.concatenate(joints)
 
 
 def _pieces_of(scene: Surroundings, joint: int) -> list[tuple[int, pin.SE3, Any, SweptPoints]]:
@@ -138,6 +144,62 @@ def shrunk(whole: Polygon, margin: float) -> Array:
                 kept.append(rest[i])
         rest = np.array(kept).reshape(-1, 2)
     return rest
+
+
+class SolePolygon(NamedTuple):
+    """The convex hull of points of the feet, seen from above; row i is for the edge that begins at point i.
+
+    With e = b - a the edge from a to b, anticlockwise, n its inward normal and s = (e . (c - a)) / |e|^2, the distance
+    d = n . (c - a) of the centre of mass c changes by n . (dc - (1 - s) da - s db): n turns with the edge.
+    """
+
+    points: Array  # (m, 3) in the axes of their joints [m]
+    joints: Indices  # (m,) joint that carries each
+    mass: range | None  # joints of the figure whose centre of mass it is; None for all
+
+    @property
+    def in_radians(self) -> tuple[bool, ...]:
+        """None is."""
+        return (False,) * len(self.joints)
+
+    def corners(self, state: State) -> Array:
+        """Corners (k, 2) of the polygon, anticlockwise."""
+        points = self._placed(state)[:, :2]
+        return points[hull_corners(points)]
+
+    def _placed(self, state: State) -> Array:
+        """The points (m, 3) in the world."""
+        placed = [state.data.oMi[joint] for joint in self.joints.tolist()]
+        return np.array([place.act(point) for place, point in zip(placed, self.points, strict=True)])
+
+    def rows(self, state: State) -> tuple[Array, Array]:
+        """Distances (m,) inside the edges and their derivative (m, nv); `FAR_INSIDE` and zero for no corner."""
+        return self.inside(state, state.center_of_mass(self.mass), state.center_of_mass_jacobian(self.mass))
+
+    def height(self, state: State) -> tuple[float, Array]:
+        """Mean height of the points [m] and its derivative (nv,)."""
+        points, up = self._placed(state), np.zeros((len(self.joints), 6))
+        up[:, 2], up[:, 3], up[:, 4] = 1.0, points[:, 1], -points[:, 0]
+        return float(points[:, 2].mean()), state.rows(up, self.joints, np.zeros_like(self.joints)).mean(axis=0)
+
+    def inside(self, state: State, center: Array, moves: Array) -> tuple[Array, Array]:
+        """The same of another point (2,) or (3,) than the centre of mass, with its derivative."""
+        points = self._placed(state)
+        values, rows = np.full(len(points), FAR_INSIDE), np.zeros((len(points), state.model.nv))
+        begin = np.array(hull_corners(points[:, :2]), dtype=np.intp)
+        if not len(begin):
+            return values, rows
+        end = np.roll(begin, -1)
+        edge, arm = (points[end] - points[begin])[:, :2], center[:2] - points[begin, :2]
+        length = np.hypot(edge[:, 0], edge[:, 1])
+        normals = np.column_stack([-edge[:, 1], edge[:, 0], np.zeros(len(edge))]) / length[:, None]
+        share = np.einsum("ij,ij->i", edge, arm) / length**2
+        values[begin] = np.einsum("ij,ij->i", normals[:, :2], arm)
+        rows[begin] = normals[:, :2] @ moves[:2]
+        for corner, part in ((begin, 1.0 - share), (end, share)):
+            wrench = np.hstack([normals, cross(points[corner], normals)])
+            rows[begin] -= part[:, None] * state.rows(wrench, self.joints[corner], np.zeros_like(corner))
+        return values, rows
 
 
 Feet: TypeAlias = Annotated[Sequence[str], Names("['left_foot', 'right_foot']")]
