@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from wholebody.cli.arguments import JOBS, JOINED, jobs_of
+from wholebody.cli.arguments import JOBS, JOINED
 from wholebody.cli.command import command, flag, option
 
 
@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     make_folder(out)
     with Console(stderr=True).status("searching") as status:
         found = reach_map(
-            task.problem, arguments.frame, low, high, step, jobs=jobs_of(arguments), cluster=arguments.cluster,
+            task.problem, arguments.frame, low, high, step, jobs=arguments.at_once, cluster=arguments.cluster,
             progress=lambda done, total: status.update(f"{done} of {total} places"),
         )  # fmt: skip
     print(found)

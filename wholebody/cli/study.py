@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from wholebody.cli.arguments import JOBS, jobs_of
+from wholebody.cli.arguments import JOBS
 from wholebody.cli.command import command, flag, option
 
 
@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
     with Console(stderr=True).status("solving") as status:
         records = study(
             asked.task, people=asked.people, targets=asked.targets, layouts=asked.layouts, method=asked.method,
-            warm_start=asked.warm_start, jobs=jobs_of(arguments), cluster=arguments.cluster, folder=out,
+            warm_start=asked.warm_start, jobs=arguments.at_once, cluster=arguments.cluster, folder=out,
             progress=lambda told: status.update(f"{told.done} of {told.total}"),
         )  # fmt: skip
     made = table("case", "outcome", "goal error", "overlap", "time")

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.arguments import JOBS, jobs_of
+from wholebody.cli.arguments import JOBS
 from wholebody.cli.clip.arguments import (
     EQUIPMENT,
     MOTIONS,
@@ -84,7 +84,6 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.motion.worn_equipment import put_on
 
     (file,) = arguments.files
-    jobs_of(arguments)  # one case needs no jobs; what is wrong with them is said all the same
     out = check_writable(check_ending(arguments.out or file.with_name(f"{file.stem}-free.npz")), [file])
     if arguments.html is not None:
         checked_target(arguments.html, "--html", "a page", (".htm", ".html"))
@@ -184,7 +183,7 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
             rows = avoid_many(
                 arguments.files, folder, figure=figure_of(arguments), equipment=worn,
                 methods=ways, constraints=[MotionBounds(keep_ends=True)] if arguments.keep_ends else (),
-                hold_feet=not arguments.no_feet, jobs=jobs_of(arguments), cluster=arguments.cluster, progress=said,
+                hold_feet=not arguments.no_feet, jobs=arguments.at_once, cluster=arguments.cluster, progress=said,
             )  # fmt: skip
     except KeyboardInterrupt:
         print(f"ended; {folder} keeps what is done, and the same command goes on")

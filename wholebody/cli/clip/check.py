@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wholebody.cli.arguments import JOBS, jobs_of
+from wholebody.cli.arguments import JOBS
 from wholebody.cli.clip.arguments import EQUIPMENT, MOTIONS, SCENE, scene_of
 from wholebody.cli.command import command, flag, option
 
@@ -57,7 +57,6 @@ def run(arguments: argparse.Namespace) -> int:
     depth = DEPTH if arguments.depth is None else 1e-3 * arguments.depth
     if len(arguments.files) * max(1, len(arguments.equipment)) > 1:
         return _many(arguments, depth)
-    jobs_of(arguments)  # one case needs no jobs; what is wrong with them is said all the same
     if arguments.html is not None:
         checked_target(arguments.html, "--html", "a page", (".htm", ".html"))
     (file,), worn = arguments.files, (*arguments.equipment, NOTHING)[0]
@@ -109,7 +108,7 @@ def _many(arguments: argparse.Namespace, depth: float) -> int:
     work = (Job(case, _check_one, (arguments, *case, depth), 0.0) for case in cases)
     found: dict[tuple[Path, str], dict[str, Any]] = {}
     with bar("checking", len(cases)) as tell:
-        for outcome in run_batch(work, jobs_of(arguments), arguments.cluster):
+        for outcome in run_batch(work, arguments.at_once, arguments.cluster):
             found[outcome.job.name] = outcome.answer or {"refused": str(outcome.error)}
             tell(len(found), str(outcome.job.name[0].name))
     if arguments.json:
