@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from wholebody.cli.arguments import JOBS, JOINED
-from wholebody.cli.command import command, flag, option
+from wholebody.cli.command import command, option
 
 
 @command(
@@ -26,7 +26,6 @@ goals, and write into a folder:
     option("--high", required=True, metavar=JOINED, help="greatest corner"),
     option("--step", default="0.1", metavar="M", help="metres between places, or X,Y,Z (default: 0.1)"),
     *JOBS,
-    flag("--goals", "meet the task's goals at every place too"),
     option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-TASK)"),
     epilog="""\
 examples:
@@ -44,8 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
     low, high = _numbers(arguments.low, "--low"), _numbers(arguments.high, "--high")
     step = _numbers(arguments.step, "--step") if "," in arguments.step else _numbers(arguments.step, "--step", 1)[0]
     task = read_task(arguments.task)
-    if not arguments.goals:
-        task.problem.retarget([])
+    task.problem.retarget([])
     out = arguments.out or Path("out") / arguments.task.stem
     make_folder(out)
     with Console(stderr=True).status("searching") as status:

@@ -13,8 +13,6 @@ from wholebody.cli.command import command, flag, option
 
 if TYPE_CHECKING:
     from wholebody.motion.checking import ClipCheck
-    from wholebody.motion.clip import Clip
-    from wholebody.scene.scene import Scene
 
 MOST = 20  # lines of a table
 WIDE = 110  # letters that its lines need
@@ -50,7 +48,8 @@ def run(arguments: argparse.Namespace) -> int:
     from rich.console import Console
 
     from wholebody.base.files import checked_target, write
-    from wholebody.motion.checking import DEPTH
+    from wholebody.cli.tables import bar
+    from wholebody.motion.checking import DEPTH, check
     from wholebody.motion.reading import read_clip
     from wholebody.motion.worn_equipment import NOTHING, put_on
 
@@ -62,7 +61,8 @@ def run(arguments: argparse.Namespace) -> int:
     (file,), worn = arguments.files, (*arguments.equipment, NOTHING)[0]
     scene = put_on(scene_of(arguments), worn)
     clip = read_clip(file, scene.figure)
-    found = checked(clip, scene, depth)
+    with bar(said := "checking every pair", len(clip)) as tell:
+        found = check(clip, scene, depth=depth, progress=lambda done: tell(done, said))
     if arguments.json:
         print(json.dumps(found.as_dict(), indent=1))
     else:
@@ -74,15 +74,6 @@ def run(arguments: argparse.Namespace) -> int:
             page = timeline(found, scene)
         print(f"wrote {write(arguments.html, page)}", file=sys.stderr if arguments.json else sys.stdout)
     return 0 if found.free and not found.limits else 1
-
-
-def checked(clip: Clip, scene: Scene, depth: float) -> ClipCheck:
-    """Check, with a progress bar."""
-    from wholebody.cli.tables import bar
-    from wholebody.motion.checking import check
-
-    with bar("checking every pair", len(clip)) as tell:
-        return check(clip, scene, depth=depth, progress=lambda done: tell(done, "checking every pair"))
 
 
 def _many(arguments: argparse.Namespace, depth: float) -> int:
