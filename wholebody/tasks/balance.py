@@ -12,7 +12,7 @@ from typing import Annotated, Any, NamedTuple, TypeAlias
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Names, Range
 from wholebody.figures.state import State
@@ -34,6 +34,7 @@ came 20 to 59 % less far from the middle of the stance than the edges are (Forth
 33: 715, its abstract); here it is 30 %."""
 
 DOWN = np.array((0.0, 0.0, -1.0))
+FAR_INSIDE = 1.0  # m: value of a row whose corner is no corner of the polygon
 NEAREST = 1e-5  # Distance [m] below which two points count as one corner
 
 
@@ -51,6 +52,11 @@ class _Soles(NamedTuple):
 
 def standing_points(scene: Surroundings, q: Array, feet: Sequence[str]) -> Array:
     """Points (n, 3) on which the feet, toes included, stand at q: the lowest corners of their pieces."""
+    return standing_corners(scene, q, feet)[0]
+
+
+def standing_corners(scene: Surroundings, q: Array, feet: Sequence[str]) -> tuple[Array, Indices]:
+    """The same, and the joints (n,) that carry them."""
     soles = inputs.once(scene, ("soles", tuple(feet)), partial(_soles_of, scene, feet))
     placed = scene.figure.joint_placements(q, soles.joints)
     places = np.array([placed[joint].homogeneous for joint in soles.joints])[soles.carrier]
@@ -60,8 +66,8 @@ def standing_points(scene: Surroundings, q: Array, feet: Sequence[str]) -> Array
     for number, shape, local in soles.ellipsoids:
         points[number] = outermost(shape, placed[soles.joints[soles.carrier[number]]] * local, DOWN)[0]
     height = points[:, 2]
-    low: Array = points[height <= np.minimum.reduceat(height, soles.begin)[soles.foot] + STANDING_HEIGHT]
-    return low
+    low = height <= np.minimum.reduceat(height, soles.begin)[soles.foot] + STANDING_HEIGHT
+    return points[low], np.array(soles.joints, dtype=np.intp)[soles.carrier[low]]
 
 
 def _soles_of(scene: Surroundings, feet: Sequence[str]) -> _Soles:
@@ -162,6 +168,62 @@ def shrunk(whole: Polygon, margin: float) -> Array:
                 kept.append(rest[i])
         rest = np.array(kept).reshape(-1, 2)
     return rest
+
+
+class SolePolygon(NamedTuple):
+    """The convex hull of points of the feet, seen from above; row i is for the edge that begins at point i.
+
+    With e = b - a the edge from a to b, anticlockwise, n its inward normal and s = (e . (c - a)) / |e|^2, the distance
+    d = n . (c - a) of the centre of mass c changes by n . (dc - (1 - s) da - s db): n turns with the edge.
+    """
+
+    points: Array  # (m, 3) in the axes of their joints [m]
+    joints: Indices  # (m,) joint that carries each
+    mass: range | None  # joints of the figure whose centre of mass it is; None for all
+
+    @property
+    def in_radians(self) -> tuple[bool, ...]:
+        """None is."""
+        return (False,) * len(self.joints)
+
+    def corners(self, state: State) -> Array:
+        """Corners (k, 2) of the polygon, anticlockwise."""
+        points = self._placed(state)[:, :2]
+        return points[hull_corners(points)]
+
+    def _placed(self, state: State) -> Array:
+        """The points (m, 3) in the world."""
+        placed = [state.data.oMi[joint] for joint in self.joints.tolist()]
+        return np.array([place.act(point) for place, point in zip(placed, self.points, strict=True)])
+
+    def rows(self, state: State) -> tuple[Array, Array]:
+        """Distances (m,) inside the edges and their derivative (m, nv); `FAR_INSIDE` and zero for no corner."""
+        return self.inside(state, state.center_of_mass(self.mass), state.center_of_mass_jacobian(self.mass))
+
+    def height(self, state: State) -> tuple[float, Array]:
+        """Mean height of the points [m] and its derivative (nv,)."""
+        points, up = self._placed(state), np.zeros((len(self.joints), 6))
+        up[:, 2], up[:, 3], up[:, 4] = 1.0, points[:, 1], -points[:, 0]
+        return float(points[:, 2].mean()), state.rows(up, self.joints, np.zeros_like(self.joints)).mean(axis=0)
+
+    def inside(self, state: State, center: Array, moves: Array) -> tuple[Array, Array]:
+        """The same of another point (2,) or (3,) than the centre of mass, with its derivative."""
+        points = self._placed(state)
+        values, rows = np.full(len(points), FAR_INSIDE), np.zeros((len(points), state.model.nv))
+        begin = np.array(hull_corners(points[:, :2]), dtype=np.intp)
+        if not len(begin):
+            return values, rows
+        end = np.roll(begin, -1)
+        edge, arm = (points[end] - points[begin])[:, :2], center[:2] - points[begin, :2]
+        length = np.hypot(edge[:, 0], edge[:, 1])
+        normals = np.column_stack([-edge[:, 1], edge[:, 0], np.zeros(len(edge))]) / length[:, None]
+        share = np.einsum("ij,ij->i", edge, arm) / length**2
+        values[begin] = np.einsum("ij,ij->i", normals[:, :2], arm)
+        rows[begin] = normals[:, :2] @ moves[:2]
+        for corner, part in ((begin, 1.0 - share), (end, share)):
+            wrench = np.hstack([normals, cross(points[corner], normals)])
+            rows[begin] -= part[:, None] * state.rows(wrench, self.joints[corner], np.zeros_like(corner))
+        return values, rows
 
 
 Feet: TypeAlias = Annotated[Sequence[str], Names("['left_foot', 'right_foot']")]
