@@ -56,6 +56,20 @@ def test_answers_are_those_of_single_solves_whatever_jobs_is(arm: wb.Figure) -> 
             np.testing.assert_array_equal(record.q, q)
 
 
+def test_a_cluster_answers_many_goals_of_a_scene_at_once_as_this_process_does(arm: wb.Figure) -> None:
+    distributed = pytest.importorskip("distributed")
+    scene = wb.Scene(arm)
+    problems = [wb.Problem(scene, goals=[wb.Point("hand", place)]) for place in PLACES]
+    here = wb.solve_many(problems)
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None
+    ) as cluster:
+        there = wb.solve_many(problems, jobs=2, cluster=cluster.scheduler_address)
+    assert len({record.seconds for record in there}) == 1  # each has its share of the time of all
+    for one, other in zip(here, there, strict=True):
+        np.testing.assert_array_equal(one.q, other.q)
+
+
 @pytest.mark.parametrize("stopped", [1, 2, 20])
 def test_runs_that_were_ended_and_go_on_answer_as_those_that_were_not(
     arm: wb.Figure, tmp_path: Path, stopped: int

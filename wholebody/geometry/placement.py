@@ -41,13 +41,14 @@ def placement(at: PlacementLike, what: str = "placement") -> pin.SE3:
             _check_values(values, what)
         return pin.SE3(_UPRIGHT, values)
     if values.shape == (7,):
-        norm = float(np.linalg.norm(values[3:]))
-        if np.isfinite(norm) and abs(norm - 1.0) > ROUNDING:
+        turn = values[3:]
+        norm = math.sqrt(turn.dot(turn))
+        if math.isfinite(norm) and abs(norm - 1.0) > ROUNDING:
             raise InputError(f"{what}: the quaternion has length {norm:.6g}, not 1; give qx, qy, qz, qw of a rotation")
         if values[3] == 1.0:
             told = "is half a turn about x; quaternions are x, y, z, w, and (0, 0, 0, 1) is no turn"
             warnings.warn(f"{what}: the quaternion (1, 0, 0, 0) {told}", stacklevel=3)
-        x, y, z, w = values[3:] / norm if np.isfinite(norm) else values[3:]
+        x, y, z, w = (turn / norm if math.isfinite(norm) else turn).tolist()
         rotation = np.array(
             [
                 [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],

@@ -131,15 +131,15 @@ class PairTable:
         self.reach = np.array([swept.reach for swept in self.swept]).reshape(-1)
         self.half = np.minimum(np.array([swept.half for swept in self.swept]).reshape(-1, 3), ENDLESS)
         width = np.array([swept.width for swept in self.swept]).reshape(-1)
-        self.widths: Array = width[self.pairs].sum(axis=1)
+        first, second = self.pairs.T
+        self.widths: Array = width[first] + width[second]
         radius = self.radius = np.array([swept.radius for swept in self.swept]).reshape(-1)
         self.axis: Array = np.array([swept.axis for swept in self.swept]).reshape(-1, 3)
         self.points, self.first_point = _joined([np.zeros((0, 3)), *(swept.points for swept in self.swept)])
         self.faces, self.first_face = _joined([np.zeros((0, 4)), *(swept.faces for swept in self.swept)])
         # where round pieces' swept points meet, coal's normal is zero or noise along an axis
-        self.points_meet = np.where(
-            (radius[self.pairs] > 0.0).all(axis=1), COAL_ACCURACY - radius[self.pairs].sum(axis=1), -np.inf
-        )
+        one, other = radius[first], radius[second]
+        self.points_meet = np.where((one > 0.0) & (other > 0.0), COAL_ACCURACY - (one + other), -np.inf)
 
 
 def _joined(parts: list[Array]) -> tuple[Array, Indices]:

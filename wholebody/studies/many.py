@@ -168,7 +168,9 @@ def run_cases(
     over = tell is not None and tell(SolveProgress(len(done), len(order), None)) is True
     single = [run[0] for run in numbered if len(run) == 1 and run[0] not in done]
     if not over and hasattr(running.method, "batches") and _is_quick([order[k] for k in single], running):
-        with closing(at_once([order[k].make() for k in single], running.method, running.jobs)) as answers:
+        with closing(
+            at_once([order[k].make() for k in single], running.method, running.jobs, running.cluster)
+        ) as answers:
             for place, answer in answers:
                 record = order[single[place]].record  # `replace` would take three times as long
                 over = keep(single[place], SolveRecord(record.name, factors=record.factors, **answer))
@@ -243,7 +245,7 @@ def _answers(
         seconds = (running.seconds or 0.0) * len(work[some[0]][0])
         return Job(some, sent_to, (function, given, running.method), seconds)
 
-    if _is_quick(cases, running):
+    if running.cluster is None and _is_quick(cases, running):
         yield from shared(keys, running.jobs, here, there)
         return
     # Several in a job, since each job has its scene with it; those of a job whose process ended are done one by one. A
@@ -262,8 +264,7 @@ def _answers(
 
 def _is_quick(cases: Iterable[Case], running: Running) -> bool:
     """Whether nobody else's code can end or hold up the process that solves these."""
-    quick = running.seconds is None and running.cluster is None
-    return quick and all(isinstance(case.make, _Given) and not case.make.is_own for case in cases)
+    return running.seconds is None and all(isinstance(case.make, _Given) and not case.make.is_own for case in cases)
 
 
 @dataclass(frozen=True)

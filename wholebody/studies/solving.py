@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, as_dict
-from wholebody.base.batches import shared
+from wholebody.base.batches import run_batch, shared
 from wholebody.base.errors import WholebodyError, one_line
 from wholebody.base.runner import Job, packed
 from wholebody.methods.base import Method, check_problem
@@ -138,7 +138,9 @@ def warmed(method: Any) -> Any:
         return method
 
 
-def at_once(problems: Sequence[Problem], method: Any, jobs: int) -> Generator[tuple[int, dict[str, Any]], None, None]:
+def at_once(
+    problems: Sequence[Problem], method: Any, jobs: int, cluster: str | None
+) -> Generator[tuple[int, dict[str, Any]], None, None]:
     """Solve those problems that a method with `batches` answers many of at a time: place and record of each solved."""
     sender = Sender()
 
@@ -146,7 +148,12 @@ def at_once(problems: Sequence[Problem], method: Any, jobs: int) -> Generator[tu
         return Job(batches, sent_to, (lambda given: [one.run() for one in given], sender.sent(batches, full)), 0.0)
 
     batches = method.batches(problems, LARGEST)
-    for batch, answers, error in shared(batches, jobs, lambda batch: batch.run(), there):
+    if cluster is None:
+        found = shared(batches, jobs, lambda batch: batch.run(), there)
+    else:
+        ended = run_batch((there([batch], True) for batch in batches), jobs, cluster)
+        found = ((job.name[0], answer and answer[0], error) for job, _, answer, error in ended)
+    for batch, answers, error in found:
         if error is None:
             yield from _records(batch, answers)
 

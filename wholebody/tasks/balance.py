@@ -57,7 +57,8 @@ def standing_points(scene: Surroundings, q: Array, feet: Sequence[str]) -> Array
 
 def standing_corners(scene: Surroundings, q: Array, feet: Sequence[str]) -> tuple[Array, Indices]:
     """The same, and the joints (n,) that carry them."""
-    soles = inputs.once(scene, ("soles", tuple(feet)), partial(_soles_of, scene, feet))
+    joints = tuple([inputs.find_place(scene, foot, "Balance").joint for foot in feet])
+    soles = inputs.once(scene, ("soles", joints), partial(_soles_of, scene, feet, joints))
     placed = scene.figure.joint_placements(q, soles.joints)
     places = np.array([placed[joint].homogeneous for joint in soles.joints])[soles.carrier]
     points = np.einsum("nij,nj->ni", places[:, :3, :3], soles.points)
@@ -70,12 +71,11 @@ def standing_corners(scene: Surroundings, q: Array, feet: Sequence[str]) -> tupl
     return points[low], np.array(soles.joints, dtype=np.intp)[soles.carrier[low]]
 
 
-def _soles_of(scene: Surroundings, feet: Sequence[str]) -> _Soles:
+def _soles_of(scene: Surroundings, feet: Sequence[str], bearing: Sequence[int]) -> _Soles:
     joints: dict[int, int] = {}
     points, radii, carrier, begin, foot = list[Array](), list[float](), list[int](), list[int](), list[int]()
     ellipsoids: list[tuple[int, Any, pin.SE3]] = []
-    for number, name in enumerate(feet):
-        joint = inputs.find_place(scene, name, "Balance").joint
+    for number, (name, joint) in enumerate(zip(feet, bearing, strict=True)):
         begin.append(len(radii))
         for piece in scene.geometry.geometryObjects if joint else ():
             if joint in scene.model.supports[piece.parentJoint]:
