@@ -269,8 +269,8 @@ class _Search:
                     self._reached.append(end.q)
                     if self._apart(start, end.q) < most:
                         ends.append(end.q)
-                        if path := self._led(end.q):
-                            return path, trees
+                        if led := self._led(end.q):
+                            return led, trees
                         trees.add_end(end.q)
                 if not ends:
                     continue
