@@ -87,9 +87,9 @@ def plan(
 ) -> Plan:
     """Plan a motion of a figure among things that stand still.
 
-    The straight motion is tried first, then steps from the end to the start along things, then two trees of motions grow towards each other (RRT-Connect, Kuffner and
-    LaValle 2000). The path is shortened and smoothed, and timed as fast as `pace` lets it (TOPP-RA, Pham and Pham
-    2018).
+    The straight motion is tried first, then steps along things from the end to the start. Then two trees of motions
+    grow towards each other (RRT-Connect, Kuffner and LaValle 2000). The path is shortened and smoothed, and timed as
+    fast as `pace` lets it (TOPP-RA, Pham and Pham 2018).
 
     Args:
         scene: the figure among things.
