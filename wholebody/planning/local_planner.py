@@ -180,7 +180,7 @@ class TrackedMotions:
 
     def __init__(self, problem: Problem, workspace: Workspace) -> None:
         """Take a problem whose constraints and bounds hold on the way."""
-        self._geodesics = Geodesics(problem, workspace)
+        self.geodesics = Geodesics(problem, workspace)
         self._problem = problem.with_start(problem.start)
         self._model = problem.scene.model
         self._goal = Posture(problem.start).resolve(problem.scene, problem.start)
@@ -197,7 +197,7 @@ class TrackedMotions:
 
     def admit(self, q: Array) -> None:
         """See `LocalPlanner`."""
-        self._geodesics.admit(q)
+        self.geodesics.admit(q)
         least = np.array(self._problem.clearances)
         near = self._tracker.workspace.near(q, float(least.max(initial=0.0)) + NOISE)
         least[near.number] = np.minimum(least[near.number], np.maximum(near.distance - NOISE, 0.0))
@@ -205,14 +205,14 @@ class TrackedMotions:
 
     def joined(self, q: Array, target: Array, most: float) -> list[Array]:
         """See `LocalPlanner`; a geodesic if it may be, as it costs a tenth of steps."""
-        if not self._held and (way := self._allowed(self._geodesics.joined(q, target, most))):
+        if not self._held and (way := self._allowed(self.geodesics.joined(q, target, most))):
             return way
         way, met = self.towards(q, target, most)
         return way if met else []
 
     def through(self, path: Array) -> list[Array]:
         """See `LocalPlanner`; by geodesics."""
-        return self._allowed(self._geodesics.through(path))
+        return self._allowed(self.geodesics.through(path))
 
     def _allowed(self, way: list[Array]) -> list[Array]:
         """Postures (nq,) of a motion that keep the constraints; none where one does not."""

@@ -1,6 +1,6 @@
 """`wb.plan`: a motion from a posture to another one, or to goals, free of collision and within limits of speed.
 
-ends -> straight motion, else two trees -> shortcuts -> smoothing and timing -> judge
+ends -> straight motion, else steps along things, else two trees -> shortcuts -> smoothing and timing -> judge
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from wholebody.methods.conclusion import meets
 from wholebody.methods.qp.method import QP
 from wholebody.methods.simplification.reach import still_dofs
 from wholebody.motion.clip import Clip
-from wholebody.planning.local_planner import Geodesics, LocalPlanner, TrackedMotions
+from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
 from wholebody.planning.rrt_connect import RRTConnect
 from wholebody.planning.sampling import Sampler, holds
 from wholebody.planning.smoothing import SPACING, length, resampled, shortcut, smooth
@@ -87,9 +87,9 @@ def plan(
 ) -> Plan:
     """Plan a motion of a figure among things that stand still.
 
-    The straight motion is tried first. Then two trees of motions grow towards each other (RRT-Connect, Kuffner and
-    LaValle 2000). The path is shortened and smoothed, and timed as fast as `pace` lets it (TOPP-RA, Pham and Pham
-    2018).
+    The straight motion is tried first, then steps along things from the end to the start. Then two trees of motions
+    grow towards each other (RRT-Connect, Kuffner and LaValle 2000). The path is shortened and smoothed, and timed as
+    fast as `pace` lets it (TOPP-RA, Pham and Pham 2018).
 
     Args:
         scene: the figure among things.
@@ -125,13 +125,14 @@ def plan(
     found = None
     with problem.borrow() as workspace:
         tracked = bool(problem.constraints or problem.bounds or scene.figure.followers)
-        local: LocalPlanner = TrackedMotions(problem, workspace) if tracked else Geodesics(problem, workspace)
+        slides = TrackedMotions(problem, workspace)
+        local: LocalPlanner = slides if tracked else slides.geodesics
         ready = processor_time()  # what is compiled or built at the first plan is no part of the search
 
         def ended() -> bool:
             return processor_time() - ready > limit
 
-        search = _Search(problem, local, ends, (sampler, rng), ended)
+        search = _Search(problem, (local, slides), ends, (sampler, rng), ended)
         path, message = search.shortest()
         while path is not None:
             found = _smoothed(problem, local, path, pace)
@@ -210,18 +211,20 @@ class _Search:
     def __init__(
         self,
         problem: Problem,
-        local: LocalPlanner,
+        planners: tuple[LocalPlanner, TrackedMotions],
         ends: Iterator[_End],
         random: tuple[Sampler, np.random.Generator],
         ended: Callable[[], bool],
     ) -> None:
-        self._problem, self._local, self._ends, self._ended = problem, local, ends, ended
+        self._problem, self._ends, self._ended = problem, ends, ended
+        self._local, self._slides = planners
         self._sampler, self._rng = random
         self._reached: list[Array] = []
         self._said = ""
         free_root = bool(problem.scene.figure.roots) and not holds(problem)
         self._spreads = (0.0,) * free_root + (0.1, 0.3, 1.0)
-        local.admit(problem.start)
+        self._slides.admit(problem.start)
+        self._straight = False
 
     def shortest(self) -> tuple[list[Array] | None, str]:
         """The shortest of some paths, with shortcuts, and how it was found; or None and why there is none."""
@@ -231,7 +234,7 @@ class _Search:
             runs, samples = runs + 1, samples + trees.samples * (runs > 0)
             if path is None:
                 break
-            if not trees.samples:
+            if self._straight:
                 return path, "the straight motion"
             path = shortcut(model, path, self._local, self._rng, self._ended)
             if (found := length(model, path)) < most:
@@ -262,13 +265,12 @@ class _Search:
                     self._said = self._said or end.why
                     continue
                 if end is not None and end.q is not None:
-                    self._local.admit(end.q)
+                    self._slides.admit(end.q)
                     self._reached.append(end.q)
                     if self._apart(start, end.q) < most:
                         ends.append(end.q)
-                        way, met = self._local.towards(start, end.q)
-                        if met:
-                            return [start, *way[:-1], end.q], trees
+                        if led := self._led(end.q):
+                            return led, trees
                         trees.add_end(end.q)
                 if not ends:
                     continue
@@ -282,6 +284,18 @@ class _Search:
             if path is not None:
                 return path, trees
         return None, trees
+
+    def _led(self, end: Array) -> list[Array]:
+        """Postures from the start to an end (nq,) without trees, if any: straight, or along things from the end back.
+
+        Most narrow places are around ends, and steps towards the start lead out of them.
+        """
+        start = self._problem.start
+        way, self._straight = self._local.towards(start, end)
+        if self._straight:
+            return [start, *way[:-1], end]
+        way, met = self._slides.towards(end, start)
+        return [start, *way[-2::-1], end] if met else []
 
     def _apart(self, q: Array, other: Array) -> float:
         return float(np.linalg.norm(pin.difference(self._problem.scene.model, q, other)))
