@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -27,7 +26,7 @@ from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.figures.figure import Figure
 from wholebody.motion.held_points import HeldPoint, Holds
 from wholebody.motion.posture_fit import Fitter, Goals, Layout
-from wholebody.motion.retarget_targets import LIMBS, Targets, has_trunk, known_bones
+from wholebody.motion.retarget_targets import LIMBS, Targets, Wanted, has_trunk, known_bones, parts_of
 from wholebody.motion.roles import Roles
 from wholebody.motion.structure import upright
 from wholebody.scene.workspace import Workspace
@@ -38,8 +37,8 @@ SLOWING = 8  # frames before it would be too fast in which a joint begins to mov
 JUMP = 0.5  # rad, m: postures of neighbouring frames that are farther apart were found otherwise
 STARTS = 4  # how often the first frame is solved, each time from where soles came down beside each other
 SPAN = 0.034  # s between the frames of the first sweeps at most: more lets feet slide, less leaves jerk
-SWEEPS = (1.8, 1.7, 1.6, 1.4, 1.2, 1.0)  # omega of each; more: less jerk, and slower by a tenth each
-FINER = (1.4, 1.2, 1.0)  # the same of sweeps over twice as many frames
+SWEEPS: tuple[float, ...] = (1.8, 1.7, 1.6, 1.4, 1.2, 1.0)  # omega of each; more: less jerk, and slower by a tenth each
+FINER: tuple[float, ...] = (1.4, 1.2, 1.0)  # the same of sweeps over twice as many frames
 ANCHOR = 0.3  # weight of the place of the hips; 1 is that of a bone
 STAY = 0.03  # m/rad from the neutral posture, for what no goal determines
 CHANGE = 0.3  # weight of a change of the deviation in the first pass, in metres that limbs move
@@ -52,29 +51,6 @@ KEPT = 30  # frames before the last one that stay known, for what looks back
 SPARE = 0.9  # share of the speed limits that the free fit takes, so that there is some for what deviates from it
 BONES = {"hand": 0.5, "toe": 0.7, "head": 0.7}  # weights of bones by their far ends, where it is not 1
 TURNS = {"pelvis": 0.3, "head": 0.15, "ankle": 0.15, "hand": 0.08}  # m/rad, weights of angles
-
-
-class Wanted(NamedTuple):
-    """Goals of one frame."""
-
-    places: Array  # (p, 3) of the points, metres
-    turns: Array  # (t, 3, 3) orientations
-    root: Array  # (3, 3) of the pelvis, from which a descent begins
-
-
-def wanted_of(targets: Targets, roles: Roles) -> list[Wanted]:
-    """Goals frame by frame, of what the figure has."""
-    points, turns = parts_of(targets, roles)
-    places = np.stack([targets.points[role] for role in points], axis=1)
-    rotations = np.stack([targets.turns[role] for role in turns], axis=1) if turns else np.zeros((len(places), 0, 3, 3))
-    return [Wanted(*each) for each in zip(places, rotations, targets.root, strict=True)]
-
-
-def parts_of(targets: Targets, roles: Roles) -> tuple[list[str], list[str]]:
-    """Roles of the points, and of the orientations, that skeleton and figure have."""
-    return [role for role in targets.points if role in roles.frames], [
-        role for role in targets.turns if role in roles.frames
-    ]
 
 
 class Run:
@@ -109,7 +85,7 @@ class Run:
         self._wanted, self._chain = dict[int, Wanted](), dict[int, tuple[Array, float]]()
         self._slow, self._free, self._paths = (dict[int, Array]() for _ in range(3))
         self._first, self._found, self._deviation = (dict[int, Array]() for _ in range(3))
-        self._held = dict[int, tuple[Array, Array]]()
+        self._held = dict[int, tuple[int, tuple[Array, Array]]]()
         self._backward = dict[int, tuple[Array, float]]()
         self._came, self.ended = 0, False
         self._front, self._latest = np.zeros(0), (np.zeros(self.model.nv), np.zeros(self.model.nv))
@@ -324,9 +300,9 @@ class Run:
         wanted = near[2] + omega * (smooth - near[2])
         reference = np.asarray(pin.integrate(self.model, self._free[k], wanted))
         self.fitter.see(self.holds.moved(k))
-        if k not in self._held:
-            self._held[k] = self.holds.goals(k, self._paths, np.zeros(3), again=True)
-        goals = self._goals(k, reference, BEND / (span * self.dt) * self.levers, self._held[k])
+        if k not in self._held or self._held[k][0] != span:
+            self._held[k] = span, self.holds.goals(k, self._paths, np.zeros(3), again=True, span=span)
+        goals = self._goals(k, reference, BEND / (span * self.dt) * self.levers, self._held[k][1])
         before = self._found[k - span] if k else None
         q = self._reached(before, reference, span)
         for number in range(8 * SWEEP):  # more than the usual where cones, or contacts, are curved
@@ -337,9 +313,7 @@ class Run:
 
     def _room(self, q: Array, before: Array | None, span: int = 1) -> Array | None:
         """Least and greatest displacement (2, nv) of q that joints reach from the posture before in time."""
-        if before is None:
-            return None
-        return np.asarray(span * self.reach - pin.difference(self.model, before, q))
+        return None if before is None else np.asarray(span * self.reach - pin.difference(self.model, before, q))
 
     def _reached(self, before: Array | None, q: Array, span: int = 1) -> Array:
         """The posture nearest to q (nq,) that joints reach from the posture before in time."""
