@@ -24,7 +24,8 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.figures.figure import Figure
-from wholebody.motion.held_points import HeldPoint, Holds
+from wholebody.motion.held_points import HeldPoint
+from wholebody.motion.holds import Holds
 from wholebody.motion.posture_fit import Fitter, Goals, Layout
 from wholebody.motion.retarget_targets import LIMBS, Targets, Wanted, has_trunk, known_bones, parts_of
 from wholebody.motion.roles import Roles
@@ -35,6 +36,7 @@ FIRST, FREE, PASS, SWEEP = 60, 2, 3, 1  # most steps of a first frame, a free on
 EVERY, WORTH = 10, 0.8  # frames after which a free posture is sought anew, and the share of the cost that it is for
 SLOWING = 8  # frames before it would be too fast in which a joint begins to move
 JUMP = 0.5  # rad, m: postures of neighbouring frames that are farther apart were found otherwise
+FIRST_STEP = 0.1  # rad, m: largest change in a step of the first frame; with more, steps at things are too long
 STARTS = 4  # how often the first frame is solved, each time from where soles came down beside each other
 SPAN = 0.034  # s between the frames of the first sweeps at most: more lets feet slide, less leaves jerk
 SWEEPS: tuple[float, ...] = (1.8, 1.7, 1.6, 1.4, 1.2, 1.0)  # omega of each; more: less jerk, and slower by a tenth each
@@ -259,9 +261,10 @@ class Run:
             held = holds.goals(k, self._paths, shift)
             goals = self._goals(k, reference, CHANGE * self.levers, held)
             q = self._settled(q, goals, before)
-            if holds.lost(k, self.fitter.held(q), held):
+            if holds.lost(k, q, self.fitter.held(q), held):
                 q = self._settled(self._reached(before, reference), goals, before)
-            holds.landed(k, self.fitter.held(q))
+            holds.touch(k, q, self.fitter.held(q), held)
+            holds.landed(k, self.fitter.held(q), held)
         self._first[k] = np.asarray(pin.difference(model, free, q))
         self._latest = self._first[k], self._first[k] - deviation if k else change
 
@@ -302,18 +305,22 @@ class Run:
         self.fitter.see(self.holds.moved(k))
         if k not in self._held or self._held[k][0] != span:
             self._held[k] = span, self.holds.goals(k, self._paths, np.zeros(3), again=True, span=span)
-        goals = self._goals(k, reference, BEND / (span * self.dt) * self.levers, self._held[k][1])
+        held = self._held[k][1]
+        goals = self._goals(k, reference, BEND / (span * self.dt) * self.levers, held)
         before = self._found[k - span] if k else None
         q = self._reached(before, reference, span)
         for number in range(8 * SWEEP):  # more than the usual where cones, or contacts, are curved
             if number >= SWEEP and not (self.fitter.outside(q) or self.fitter.overlaps(q)):
                 break
             q = self.fitter.step(q, goals, most=self._room(q, before, span))
+        self.holds.touch(k, q, self.fitter.held(q), held)
         self._found[k], self._deviation[k] = q, np.asarray(pin.difference(self.model, self._free[k], q))
 
-    def _room(self, q: Array, before: Array | None, span: int = 1) -> Array | None:
+    def _room(self, q: Array, before: Array | None, span: int = 1) -> Array:
         """Least and greatest displacement (2, nv) of q that joints reach from the posture before in time."""
-        return None if before is None else np.asarray(span * self.reach - pin.difference(self.model, before, q))
+        if before is None:
+            return np.asarray(FIRST_STEP * np.outer((-1.0, 1.0), np.ones(self.model.nv)))
+        return np.asarray(span * self.reach - pin.difference(self.model, before, q))
 
     def _reached(self, before: Array | None, q: Array, span: int = 1) -> Array:
         """The posture nearest to q (nq,) that joints reach from the posture before in time."""
