@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -124,3 +125,28 @@ def _with_soles(motion: SkeletonMotion, ankles: list[str]) -> SkeletonMotion:
         offsets[toe + 1] = offsets[toe + 1] + (0.0, 0.0, 0.04)
     local = np.tile(np.eye(3), (2, len(names), 1, 1))
     return SkeletonMotion.moved(tuple(names), np.array(parents), np.array(offsets), local, motion.positions[:, 0], 0.02)
+
+
+def test_a_robot_with_long_fingers_has_its_elbows_before_its_wrists(tmp_path: Path) -> None:
+    """Fingers of 22 cm, as of the grippers of Talos, and a root link without a shape, as of Romeo."""
+    lines, sides = ["<robot name='robot'><link name='base'/>"], (("left", 1), ("right", -1))
+    links = [("base", "torso", (0, 0, 0.4), 0.3), ("torso", "head", (0, 0, 0.3), 0.1)]
+    for side, sign in sides:
+        links += [("base", f"{side}_a", (0, 0.1 * sign, -0.1), 0.1), (f"{side}_a", f"{side}_b", (0, 0, -0.38), 0.1)]
+        links += [(f"{side}_b", f"{side}_c", (0, 0, -0.35), 0.1), ("torso", f"{side}_d", (0, 0.25 * sign, 0.1), 0.05)]
+        links += [(f"{side}_d", f"{side}_e", (0, 0, -0.27), 0.05), (f"{side}_e", f"{side}_f", (0, 0, -0.26), 0.05)]
+        links += [(f"{side}_f", f"{side}_{end}", (x, 0, -0.22), 0.02) for end, x in (("g", -0.05), ("h", 0.05))]
+        links += [(f"{side}_{end}", f"{side}_{end}2", (0, 0, -0.12), 0.02) for end in "gh"]
+    for parent, name, place, size in links:
+        at = " ".join(map(str, place))
+        lines.append(
+            f"<link name='{name}'><collision><geometry><box size='{size} {size} {size}'/></geometry></collision></link>"
+            f"<joint name='{name}_j' type='revolute'><parent link='{parent}'/><child link='{name}'/>"
+            f"<origin xyz='{at}'/><axis xyz='0 1 0'/><limit lower='-2' upper='2' effort='9' velocity='9'/></joint>"
+        )
+    path = tmp_path / "robot.urdf"
+    path.write_text("".join([*lines, "</robot>"]))
+    figure = wb.load(path, root="free")
+    found = matched(still(tuple(KNOWN["SMPL-X"].split())), figure, None).frames
+    parts = zip(LEGS, "abcdef", strict=True)
+    assert found == {"pelvis": "base"} | {f"left_{part}": f"left_{joint}_j" for part, joint in parts}

@@ -190,8 +190,14 @@ class Holds:
         """Take the postures (nq,) of the free fit by frame, which say which side of a part touches a thing."""
         self._free = free
 
-    def goals(self, frame: int, paths: Mapping[int, Array], shift: Array, again: bool = False) -> tuple[Array, Array]:
-        """Goals and weights (h, 3) of a frame; `paths` (h, 3) by frame without holds, `shift` (3,) of the body."""
+    def goals(
+        self, frame: int, paths: Mapping[int, Array], shift: Array, again: bool = False, span: int = 1
+    ) -> tuple[Array, Array]:
+        """Goals and weights (h, 3) of a frame; `paths` (h, 3) by frame without holds, `shift` (3,) of the body.
+
+        Of every `span`-th frame the last one before a rest and the first one after it are at rest too, so that what
+        lies between two of these frames is.
+        """
         down, strong = self._facing_down(paths[frame]), (STRONG if again else FIRM) / self._dt
         goals, weights = np.array(paths[frame]), np.zeros((len(self.points), 3))
         for number, stands in enumerate(self._stands):
@@ -203,12 +209,13 @@ class Holds:
             places = [
                 self._place(number, stand, paths, shift, near) for stand, near in zip(around, nearest, strict=True)
             ]
-            if around[0].first <= frame < around[0].end:
-                goals[number] = places[0]
+            on = [k for k, stand in enumerate(around) if stand.first - span < frame < stand.end + span - 1]
+            if on:
+                goals[number] = places[on[0]]
                 if self.points[number].thing:
                     weights[number] = 0.0 if again and (number, frame) in self._gone else TOUCH
                 else:
-                    weights[number] = LANDING * BESIDE if frame == around[0].first and not again else strong
+                    weights[number] = LANDING * BESIDE if frame == around[on[0]].first and not again else strong
             else:
                 goals[number], share = self._swing(number, frame, nearest, places, paths)
                 weights[number] = (

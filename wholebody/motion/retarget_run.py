@@ -9,14 +9,15 @@ on the sum of all frames' costs and of |w d''|^2),
     d_k* = (4 (d_{k-1} + d_{k+1}) - (d_{k-2} + d_{k+2})) / 6,
 
 by successive over-relaxation (Young 1954): a sweep seeks d_k + omega (d_k* - d_k), the last one with omega = 1. The
-body begins to give way before a contact comes.
+first sweeps take every second or fourth frame of a fast recording, so that a contact is felt equally far ahead at every
+rate; the frames between are interpolated, and swept after (nested iteration; Briggs, Henson and McCormick, A Multigrid
+Tutorial, 2000). The body begins to give way before a contact comes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -26,7 +27,7 @@ from wholebody.figures.figure import Figure
 from wholebody.motion.held_points import HeldPoint
 from wholebody.motion.holds import Holds
 from wholebody.motion.posture_fit import Fitter, Goals, Layout
-from wholebody.motion.retarget_targets import LIMBS, Targets, has_trunk, known_bones
+from wholebody.motion.retarget_targets import LIMBS, Targets, Wanted, has_trunk, known_bones, parts_of
 from wholebody.motion.roles import Roles
 from wholebody.motion.structure import upright
 from wholebody.scene.workspace import Workspace
@@ -37,7 +38,9 @@ SLOWING = 8  # frames before it would be too fast in which a joint begins to mov
 JUMP = 0.5  # rad, m: postures of neighbouring frames that are farther apart were found otherwise
 FIRST_STEP = 0.1  # rad, m: largest change in a step of the first frame; with more, steps at things are too long
 STARTS = 4  # how often the first frame is solved, each time from where soles came down beside each other
-SWEEPS = (1.8, 1.7, 1.6, 1.4, 1.2, 1.0)  # omega of each; more: less jerk, and slower by a tenth each
+SPAN = 0.034  # s between the frames of the first sweeps at most: more lets feet slide, less leaves jerk
+SWEEPS: tuple[float, ...] = (1.8, 1.7, 1.6, 1.4, 1.2, 1.0)  # omega of each; more: less jerk, and slower by a tenth each
+FINER: tuple[float, ...] = (1.4, 1.2, 1.0)  # the same of sweeps over twice as many frames
 ANCHOR = 0.3  # weight of the place of the hips; 1 is that of a bone
 STAY = 0.03  # m/rad from the neutral posture, for what no goal determines
 CHANGE = 0.3  # weight of a change of the deviation in the first pass, in metres that limbs move
@@ -50,29 +53,6 @@ KEPT = 30  # frames before the last one that stay known, for what looks back
 SPARE = 0.9  # share of the speed limits that the free fit takes, so that there is some for what deviates from it
 BONES = {"hand": 0.5, "toe": 0.7, "head": 0.7}  # weights of bones by their far ends, where it is not 1
 TURNS = {"pelvis": 0.3, "head": 0.15, "ankle": 0.15, "hand": 0.08}  # m/rad, weights of angles
-
-
-class Wanted(NamedTuple):
-    """Goals of one frame."""
-
-    places: Array  # (p, 3) of the points, metres
-    turns: Array  # (t, 3, 3) orientations
-    root: Array  # (3, 3) of the pelvis, from which a descent begins
-
-
-def wanted_of(targets: Targets, roles: Roles) -> list[Wanted]:
-    """Goals frame by frame, of what the figure has."""
-    points, turns = parts_of(targets, roles)
-    places = np.stack([targets.points[role] for role in points], axis=1)
-    rotations = np.stack([targets.turns[role] for role in turns], axis=1) if turns else np.zeros((len(places), 0, 3, 3))
-    return [Wanted(*each) for each in zip(places, rotations, targets.root, strict=True)]
-
-
-def parts_of(targets: Targets, roles: Roles) -> tuple[list[str], list[str]]:
-    """Roles of the points, and of the orientations, that skeleton and figure have."""
-    return [role for role in targets.points if role in roles.frames], [
-        role for role in targets.turns if role in roles.frames
-    ]
 
 
 class Run:
@@ -107,7 +87,7 @@ class Run:
         self._wanted, self._chain = dict[int, Wanted](), dict[int, tuple[Array, float]]()
         self._slow, self._free, self._paths = (dict[int, Array]() for _ in range(3))
         self._first, self._found, self._deviation = (dict[int, Array]() for _ in range(3))
-        self._held = dict[int, tuple[Array, Array]]()
+        self._held = dict[int, tuple[int, tuple[Array, Array]]]()
         self._backward = dict[int, tuple[Array, float]]()
         self._came, self.ended = 0, False
         self._front, self._latest = np.zeros(0), (np.zeros(self.model.nv), np.zeros(self.model.nv))
@@ -120,8 +100,13 @@ class Run:
             self._stages += [
                 (self._passed, holds.ahead + holds.over),
                 (self._spread, max(len(self.spread) // 2, holds.ahead)),
-                *[(partial(self._swept, omega=omega), 2) for omega in SWEEPS],
             ]
+            span, sweeps = 2 ** int(max(0.0, np.log2(SPAN / dt))), SWEEPS
+            while span:
+                self._stages += [(partial(self._swept, omega=omega, span=span), 2 * span) for omega in sweeps]
+                span, sweeps = span // 2, FINER
+                if span:
+                    self._stages.append((partial(self._between, span=span), 3 * span))
             holds.begin(self._free)
         self._done = [0] * len(self._stages)  # frames that each stage has passed
 
@@ -299,41 +284,54 @@ class Run:
                 break
         return q
 
-    def _swept(self, k: int, omega: float) -> None:
+    def _between(self, k: int, span: int) -> None:
+        """The deviation of a frame `span` frames from two that were swept: the cubic through four of these."""
+        if k % (2 * span) == span:
+            last = (self._came - 1) // (2 * span) * 2 * span
+            near = [self._deviation[min(max(k + j * span, 0), last)] for j in (-3, -1, 1, 3)]
+            self._deviation[k] = (9.0 * (near[1] + near[2]) - (near[0] + near[3])) / 16.0
+            self._found[k] = self.figure.clamp(pin.integrate(self.model, self._free[k], self._deviation[k]))
+
+    def _swept(self, k: int, omega: float, span: int) -> None:
+        """Solve a frame anew between those `span` and twice as many frames before and after it."""
         assert self.holds is not None
-        last = self._came - 1
-        near = [self._deviation[min(max(j, 0), last)] for j in range(k - 2, k + 3)]
+        if k % span:
+            return
+        last = (self._came - 1) // span * span
+        near = [self._deviation[min(max(j, 0), last)] for j in range(k - 2 * span, k + 2 * span + 1, span)]
         smooth = (4.0 * (near[1] + near[3]) - (near[0] + near[4])) / 6.0
         wanted = near[2] + omega * (smooth - near[2])
         reference = np.asarray(pin.integrate(self.model, self._free[k], wanted))
         self.fitter.see(self.holds.moved(k))
-        if k not in self._held:
-            self._held[k] = self.holds.goals(k, self._paths, np.zeros(3), again=True)
-        goals = self._goals(k, reference, BEND / self.dt * self.levers, self._held[k])
-        before = self._found[k - 1] if k else None
-        q = self._reached(before, reference)
+        if k not in self._held or self._held[k][0] != span:
+            self._held[k] = span, self.holds.goals(k, self._paths, np.zeros(3), again=True, span=span)
+        held = self._held[k][1]
+        goals = self._goals(k, reference, BEND / (span * self.dt) * self.levers, held)
+        before = self._found[k - span] if k else None
+        q = self._reached(before, reference, span)
         for number in range(8 * SWEEP):  # more than the usual where cones, or contacts, are curved
             if number >= SWEEP and not (self.fitter.outside(q) or self.fitter.overlaps(q)):
                 break
-            q = self.fitter.step(q, goals, most=self._room(q, before))
-        self.holds.touch(k, q, self.fitter.held(q), self._held[k])
+            q = self.fitter.step(q, goals, most=self._room(q, before, span))
+        self.holds.touch(k, q, self.fitter.held(q), held)
         self._found[k], self._deviation[k] = q, np.asarray(pin.difference(self.model, self._free[k], q))
 
-    def _room(self, q: Array, before: Array | None) -> Array:
+    def _room(self, q: Array, before: Array | None, span: int = 1) -> Array:
         """Least and greatest displacement (2, nv) of q that joints reach from the posture before in time."""
         if before is None:
             return np.asarray(FIRST_STEP * np.outer((-1.0, 1.0), np.ones(self.model.nv)))
-        return np.asarray(self.reach - pin.difference(self.model, before, q))
+        return np.asarray(span * self.reach - pin.difference(self.model, before, q))
 
-    def _reached(self, before: Array | None, q: Array) -> Array:
+    def _reached(self, before: Array | None, q: Array, span: int = 1) -> Array:
         """The posture nearest to q (nq,) that joints reach from the posture before in time."""
         q = self.figure.clamp(q)
         if before is None:
             return q
         way = np.asarray(pin.difference(self.model, before, q))
-        if (np.abs(way) <= self.most).all():
+        most = span * self.most
+        if (np.abs(way) <= most).all():
             return q
-        return self.figure.clamp(pin.integrate(self.model, before, np.clip(way, -self.most, self.most)))
+        return self.figure.clamp(pin.integrate(self.model, before, np.clip(way, -most, most)))
 
 
 def _layout(points: list[str], turns: list[str], roles: Roles, figure: Figure, held: list[HeldPoint]) -> Layout:

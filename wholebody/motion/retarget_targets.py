@@ -39,6 +39,29 @@ class Targets(NamedTuple):
     root: Array  # (n, 3, 3) orientation of the pelvis, from which the descent begins
 
 
+class Wanted(NamedTuple):
+    """Goals of one frame."""
+
+    places: Array  # (p, 3) of the points, metres
+    turns: Array  # (t, 3, 3) orientations
+    root: Array  # (3, 3) of the pelvis, from which a descent begins
+
+
+def wanted_of(targets: Targets, roles: Roles) -> list[Wanted]:
+    """Goals frame by frame, of what the figure has."""
+    points, turns = parts_of(targets, roles)
+    places = np.stack([targets.points[role] for role in points], axis=1)
+    rotations = np.stack([targets.turns[role] for role in turns], axis=1) if turns else np.zeros((len(places), 0, 3, 3))
+    return [Wanted(*each) for each in zip(places, rotations, targets.root, strict=True)]
+
+
+def parts_of(targets: Targets, roles: Roles) -> tuple[list[str], list[str]]:
+    """Roles of the points, and of the orientations, that skeleton and figure have."""
+    return [role for role in targets.points if role in roles.frames], [
+        role for role in targets.turns if role in roles.frames
+    ]
+
+
 class _Body:
     """Places of roles, of the figure in its neutral posture or of the skeleton in all frames; (..., 3)."""
 

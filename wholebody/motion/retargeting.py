@@ -17,8 +17,17 @@ from wholebody.geometry.shapes import HalfSpace
 from wholebody.motion.clip import Clip
 from wholebody.motion.held_points import held_points, touching_points
 from wholebody.motion.holds import Holds, Touched
-from wholebody.motion.retarget_run import Run, Wanted, wanted_of
-from wholebody.motion.retarget_targets import LIMBS, Proportions, known_bones, soled, soles, standing_places
+from wholebody.motion.retarget_run import Run
+from wholebody.motion.retarget_targets import (
+    LIMBS,
+    Proportions,
+    Wanted,
+    known_bones,
+    soled,
+    soles,
+    standing_places,
+    wanted_of,
+)
 from wholebody.motion.roles import Roles, matched, skeleton_roles
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
 from wholebody.motion.stance import paths

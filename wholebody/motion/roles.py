@@ -141,7 +141,8 @@ def figure_roles(figure: Figure) -> dict[str, str]:
     if not {"left_knee", "left_elbow"} <= found.keys():  # a humanoid whose joints are numbered, such as Talos
         found = built_figure(figure) | found
     if figure.root == "free":
-        found["pelvis"] = figure.segments[0]
+        links = (*figure.segments, *figure.frames)  # a root link without a shape is no segment
+        found["pelvis"] = next(name for name in links if figure.model.frames[figure.frame_id(name)].parentJoint == 1)
     return found
 
 

@@ -16,8 +16,8 @@ from wholebody.geometry.shapes import HalfSpace
 from wholebody.motion.footholds import LiveRests
 from wholebody.motion.held_points import held_points
 from wholebody.motion.holds import Holds
-from wholebody.motion.retarget_run import EVERY, SLOWING, Run, wanted_of
-from wholebody.motion.retarget_targets import Proportions
+from wholebody.motion.retarget_run import EVERY, SLOWING, Run
+from wholebody.motion.retarget_targets import Proportions, wanted_of
 from wholebody.motion.retargeting import checked_ground, same_figure
 from wholebody.motion.roles import matched, skeleton_roles
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion

@@ -76,6 +76,8 @@ def _limb(start: int, children: list[list[int]], lengths: Array, reach: Array) -
     shorter = [min(lengths[joints[k + 1]], lengths[joints[k + 2]]) for k in range(len(joints) - 2)]
     # of several the outermost that does not end the limb: a clavicle may be longer than a forearm, and hands follow
     long = np.flatnonzero(np.array(shorter) >= 0.67 * max(shorter)).tolist()
+    # one bone goes on from an elbow or a knee; several fingers do from a wrist
+    long = [k for k in long if len(children[joints[k + 1]]) == 1] or long
     first = next((k for k in reversed(long) if k + 3 < len(joints)), long[-1])
     bones = float(lengths[joints[first + 1]]), float(lengths[joints[first + 2]])
     return _Limb(joints, first, bones) if sum(bones) > 0.4 * reach[start] else None
