@@ -173,6 +173,59 @@ def test_a_robot_lifts_a_box_between_the_ends_of_its_arms(tmp_path: Path) -> Non
     assert wb.check(clip, scene).free
 
 
+def hand_distance(clip: wb.Clip, ends: str) -> np.ndarray:
+    """(n,) distance of the pieces of one hand to those of the other, by coal."""
+    figure, found = clip.figure, []
+    data, placed = figure.model.createData(), figure.geometry.createData()
+    joints = [figure.model.frames[figure.frame_id(f"{side}_{ends}")].parentJoint for side in ("left", "right")]
+    for q in clip.q:
+        pin.updateGeometryPlacements(figure.model, data, figure.geometry, placed, q)
+        left, right = (
+            [
+                (piece.geometry, coal.Transform3s(at.rotation, at.translation))
+                for piece, at in zip(figure.geometry.geometryObjects, placed.oMg, strict=True)
+                if joint in figure.model.supports[piece.parentJoint]
+            ]
+            for joint in joints
+        )
+        found.append(
+            min(
+                coal.distance(*one, *other, coal.DistanceRequest(), coal.DistanceResult())
+                for one in left
+                for other in right
+            )
+        )
+    return np.array(found)
+
+
+@pytest.mark.parametrize("stature", [1.5, 1.9, None])
+def test_hands_that_meet_in_the_recording_meet(stature: float | None, tmp_path: Path) -> None:
+    """Hands of a person of 1.75 m are 5 cm apart, as palms that touch are; those of others touch, a robot's too."""
+    low, high = 0.0, 1.2
+    while high - low > 1e-6:  # how far the arms, which point forward, are turned inward
+        motion = person(12)
+        local = np.tile(np.eye(3), (12, len(motion.names), 1, 1))
+        for side, sign in (("left", 1.0), ("right", -1.0)):
+            local[:, motion.names.index(f"{side}_shoulder")] = pin.utils.rotate("z", -sign * 0.5 * (np.pi + low + high))
+        root = np.tile([0.0, 0.0, 0.94], (12, 1))
+        motion = SkeletonMotion.moved(motion.names, motion.parents, motion.offsets, local, root, 1 / 30, "meeting")
+        motion = with_hands(motion)
+        hands = [
+            motion.positions[:, [motion.names.index(f"{side}_{part}") for part in ("wrist", "hand")]].mean(axis=1)
+            for side in ("left", "right")
+        ]
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if (hands[0] - hands[1])[0, 1] > 0.05 else (low, middle)
+    figure = robot(tmp_path) if stature is None else wb.load("human", stature=stature)
+    clip = wb.retarget(motion, figure)
+    apart = hand_distance(clip, "wrist_yaw" if stature is None else "hand")
+    assert apart.min() > 0.0
+    assert apart.max() < 1e-3
+    assert wb.check(clip).colliding == 0
+    alone = hand_distance(wb.retarget(motion, figure, ground=None), "wrist_yaw" if stature is None else "hand")
+    assert np.abs(alone).min() > 2e-3
+
+
 def test_the_thickness_of_a_part_whose_pieces_lie_beside_each_other() -> None:
     """A ball about the start, and one beyond it that one way passes at a distance and another one goes through."""
     pieces = [
@@ -233,7 +286,7 @@ def test_a_hand_rests_on_the_ground_before_and_after_it_touches_a_thing() -> Non
     contact = ThingContact("left_hand", 20, 30, "box", np.array([0.0, 0.15, 0.0]), np.array([0.0, 1.0, 0.0]))
     points = [HeldPoint("left_hand", "", 1, np.zeros(3)), HeldPoint("left_hand", "", 1, np.zeros(3), thing=True)]
     ground = replace(NOTHING, footholds=tuple(rests))
-    held = Holds(points, ground, 1.0, 1 / 30, None, Touched(scene.figure, Things(scene, {}), [contact]))
+    held = Holds(points, ground, 1.0, 1 / 30, None, Touched(scene.figure, Things(scene, {}), [contact], points))
     held.begin({20: scene.figure.neutral})
     paths = {frame: np.zeros((2, 3)) for frame in range(60)}
     weights = [held.goals(frame, paths, np.zeros(3))[1][:, 0] for frame in (3, 25, 45)]

@@ -18,7 +18,7 @@ from wholebody.figures.figure import Figure
 from wholebody.motion.held_points import HeldPoint
 from wholebody.motion.posture_fit import CLEARANCE
 from wholebody.motion.standing_ground import MOST_FRAMES, Foothold, Ground
-from wholebody.motion.thing_contacts import ThingContact, Things, thickness
+from wholebody.motion.thing_contacts import Placed, ThingContact, Things, least_distance, thickness
 from wholebody.motion.windows import long_runs, runs
 
 FIRM, STRONG = 24.0, 48.0  # s, weights of what rests, over the time step, in the first pass and later; 1 of a bone
@@ -30,6 +30,7 @@ STEP = 0.3  # m: a surface higher than this above the recording's ground is not 
 FACING = 0.3  # least cosine of the angle from up to the normal of a sole that faces the ground
 FOLLOW = 0.8  # share of the body's shift that a new place keeps; the rest goes back with time
 NEARLY = 3e-4  # m: by which the goal of a part that touches a thing is not moved
+APART = 0.1  # m: parts of the body that are farther apart do not meet
 LOST = 0.02  # m: points farther than this from their place on a thing cannot reach it
 OVER = 0.2  # s: in which a point goes over to where it rests
 AHEAD = 0.4  # s before a rest in which it is known: more leads longer swings to it, and postures come out later
@@ -38,28 +39,68 @@ AHEAD = 0.4  # s before a rest in which it is known: more leads longer swings to
 class Touched:
     """What a figure touches, and with which side."""
 
-    def __init__(self, figure: Figure, things: Things, contacts: Sequence[ThingContact]) -> None:
+    def __init__(
+        self, figure: Figure, things: Things, contacts: Sequence[ThingContact], points: Sequence[HeldPoint]
+    ) -> None:
         self.things, self.contacts, self._figure = things, contacts, figure
         self._data = figure.model.createData()
+        self.free: Mapping[int, Array] = {}  # postures of the free fit by frame
+        self._middles = dict[int, Array]()
+        self._parts = {(point.role, point.share): point for point in points}  # of the body, which hands touch
+
+    def at(self, contact: ThingContact, frame: int) -> pin.SE3:
+        """Where a thing is in a frame; a part of the body where it was last, z along the contact's normal.
+
+        Hands meet in the middle between them in the free fit.
+        """
+        if contact.ways is None:
+            return self.things.at(contact.thing, frame)
+        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), contact.ways[frame]).matrix()
+        if not contact.meets:
+            return pin.SE3(turn, self.part(contact))
+        pair = [self._parts[role, contact.share] for role in (contact.role, contact.thing)]
+        if frame not in self._middles:
+            data = self._figure.model.createData()
+            pin.forwardKinematics(self._figure.model, data, self.free[frame])
+            self._middles[frame] = np.mean([data.oMi[part.joint].act(part.place) for part in pair], axis=0)
+        return pin.SE3(turn, self._middles[frame])
+
+    def part(self, contact: ThingContact) -> Array:
+        """Where the part of the body that a hand touches was last, (3,) in the world."""
+        part = self._parts[contact.thing, contact.share]
+        return np.array(self._data.oMi[part.joint].act(part.place))
 
     def held(self, contact: ThingContact, point: HeldPoint, q: Array) -> Array:
         """(3,) where a point is held in a thing's axes, by the thickness of the part on the side that touches it."""
         pin.forwardKinematics(self._figure.model, self._data, q)
-        at = self._data.oMi[point.joint]
-        into = at.rotation.T @ self.things.at(contact.thing, contact.first).rotation @ -contact.normal
-        pieces = [piece for piece in self._figure.geometry.geometryObjects if piece.parentJoint == point.joint]
-        return contact.place + (thickness(pieces, point.place, into) + CLEARANCE) * contact.normal
+        normal = self.at(contact, contact.first).rotation @ contact.normal
+        sides = [(point, -normal)]
+        if contact.ways is not None and not contact.meets:  # from within the other part, through both
+            sides.append((self._parts[contact.thing, contact.share], normal))
+        away = CLEARANCE
+        for part, along in sides:
+            pieces = [piece for piece in self._figure.geometry.geometryObjects if piece.parentJoint == part.joint]
+            away += thickness(pieces, part.place, self._data.oMi[part.joint].rotation.T @ along)
+        return contact.place + away * contact.normal
 
     def gap(self, contact: ThingContact, point: HeldPoint, frame: int, q: Array) -> float:
         """Signed distance of a point's part, with what its joint carries, to a thing at a posture (nq,), metres."""
+        pin.forwardKinematics(self._figure.model, self._data, q)
+        own = self._carried(point.joint)
+        if contact.ways is None:
+            return least_distance(own, self.things.pieces(contact.thing, frame))
+        return least_distance(own, self._carried(self._parts[contact.thing, contact.share].joint, most=1))
+
+    def _carried(self, joint: int, most: int = 100) -> list[Placed]:
+        """Pieces on a joint and beyond it, over `most` joints with pieces at most."""
         model, geometry = self._figure.model, self._figure.geometry.geometryObjects
-        pin.forwardKinematics(model, self._data, q)
-        own = [
+        bearing = {piece.parentJoint for piece in geometry}
+        return [
             (piece.geometry, self._data.oMi[piece.parentJoint] * piece.placement)
             for piece in geometry
-            if point.joint in model.supports[piece.parentJoint]
+            if joint in (line := list(model.supports[piece.parentJoint]))
+            and len(bearing & set(line[line.index(joint) + 1 :])) <= most
         ]
-        return self.things.gap(contact.thing, frame, own)
 
 
 class Holds:
@@ -106,9 +147,8 @@ class Holds:
         """
         self._gone -= {each for each in self._gone if each[1] == frame}
         for number, stand in self._touches(frame, held[1]):
-            normal, gap = self._gap(number, stand, frame, q)
-            off = places[number] - held[0][number]
-            if np.hypot(np.linalg.norm(off - (off @ normal) * normal), gap) > LOST:
+            normal, gap, off = self._met(number, stand, frame, q, places, held[0])
+            if np.hypot(np.linalg.norm(off - (off @ normal) * normal), gap) > (LOST if stand.ways is None else APART):
                 held[1][number] = 0.0
                 self._gone.add((number, frame))
         return any(each[1] == frame for each in self._gone)
@@ -119,10 +159,14 @@ class Holds:
         How thick a part is there depends on how it is turned; it turns little if goals move no more than they need to.
         """
         for number, stand in self._touches(frame, held[1]):
-            normal, gap = self._gap(number, stand, frame, q)
-            off = float(normal @ (places[number] - held[0][number])) + CLEARANCE - gap
-            spare = 0.0 if frame == stand.first else NEARLY
-            held[0][number] += (off - min(max(off, -spare), spare)) * normal
+            normal, gap, way = self._met(number, stand, frame, q, places, held[0])
+            off, start = float(normal @ way) + CLEARANCE - gap, held[0][number]
+            if stand.ways is not None:
+                assert self._touched is not None
+                start, off = self._touched.at(stand, frame).translation, off * (0.5 if stand.meets else 1.0)
+            elif frame != stand.first:
+                off -= min(max(off, -NEARLY), NEARLY)
+            held[0][number] = start + off * normal
 
     def _touches(self, frame: int, weights: Array) -> list[tuple[int, ThingContact]]:
         """Points that are held at things in a frame, by their numbers, and where."""
@@ -133,11 +177,18 @@ class Holds:
             if isinstance(stand, ThingContact) and stand.first <= frame < stand.end and weights[number, 0] == TOUCH
         ]
 
-    def _gap(self, number: int, stand: ThingContact, frame: int, q: Array) -> tuple[Array, float]:
-        """The normal (3,) of a contact in the world in a frame, and the distance of the part to the thing, metres."""
+    def _met(
+        self, number: int, stand: ThingContact, frame: int, q: Array, places: Array, goals: Array
+    ) -> tuple[Array, float, Array]:
+        """Of a contact in a frame its normal (3,), the distance of the parts, and the way (3,) from its goal.
+
+        Of parts of the body it is the way from one to the other.
+        """
         assert self._touched is not None
-        normal = self._touched.things.at(stand.thing, frame).rotation @ stand.normal
-        return normal, self._touched.gap(stand, self.points[number], frame, q)
+        gap = self._touched.gap(stand, self.points[number], frame, q)
+        normal = self._touched.at(stand, frame).rotation @ stand.normal
+        start = goals[number] if stand.ways is None else self._touched.part(stand)
+        return normal, gap, places[number] - start
 
     def give_up(self) -> str:
         """Split the contacts with things where points were let go of; says which, or nothing."""
@@ -189,6 +240,8 @@ class Holds:
     def begin(self, free: Mapping[int, Array]) -> None:
         """Take the postures (nq,) of the free fit by frame, which say which side of a part touches a thing."""
         self._free = free
+        if self._touched is not None:
+            self._touched.free = free
 
     def goals(
         self, frame: int, paths: Mapping[int, Array], shift: Array, again: bool = False, span: int = 1
@@ -272,7 +325,7 @@ class Holds:
                 self._places[number, frame][:2] = places[number, :2]
         for number, contact in self._touches(frame, held[1]):
             assert self._touched is not None
-            at = self._touched.things.at(contact.thing, frame)
+            at = self._touched.at(contact, frame)
             self._places[number, contact.first] = np.array(at.actInv(held[0][number]))
 
     def _place(
@@ -285,7 +338,7 @@ class Holds:
             if known is None:
                 known = self._touched.held(stand, self.points[number], self._free[stand.first])
                 self._places[number, stand.first] = known
-            return np.asarray(self._touched.things.at(stand.thing, frame).act(known))
+            return np.asarray(self._touched.at(stand, frame).act(known))
         if known is not None:
             return known
         frames = range(stand.first, min(stand.end, stand.first + self.over))

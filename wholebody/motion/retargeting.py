@@ -33,7 +33,7 @@ from wholebody.motion.skeleton import SkeletonMotion, checked_motion
 from wholebody.motion.stance import paths
 from wholebody.motion.standing_ground import NOTHING, Ground
 from wholebody.motion.standing_ground import ground as find_ground
-from wholebody.motion.thing_contacts import Things, still_things, surface_of
+from wholebody.motion.thing_contacts import ThingContact, Things, meetings, still_things, surface_of
 from wholebody.motion.thing_tracks import thing_tracks
 from wholebody.scene.scene import Scene
 
@@ -68,9 +68,10 @@ def retarget(
     Returns:
         A clip within the figure's joint limits, reach cones and speed limits. Feet, hands and knees that rest are held
         where they came down, soles on the ground. Hands, elbows, knees and the pelvis that touch a thing of the scene
-        touch it at the same place, and go with it. In every frame the figure is free of itself, of the ground and of
-        things where the holds and limits leave room for it. Between frames parts may pass through each other: what
-        `wb.check` tells of either, `wb.avoid` mends. With `ground=None` and no scene the figure may collide.
+        touch it at the same place, and go with it; hands that meet do so. In every frame the figure is free of itself,
+        of the ground and of things where the holds and limits leave room for it. Between frames parts may pass through
+        each other: what `wb.check` tells of either, `wb.avoid` mends. With `ground=None` and no scene the figure may
+        collide.
 
     Raises:
         UnknownNameError: a name that does not exist.
@@ -117,17 +118,15 @@ def retarget(
     if ground is not None or scene is not None:
         held = NOTHING if ground is None else found
         surface = None if scene is None else surface_of(scene, tracks)
-        touched = None
-        if scene is not None:
-            recorded = Things(scene, tracks)
-            there = ground is not None and figure.root == "free"
-            tracks = {name: recorded.scaled(name, proportions.path) for name in tracks}
-            joints = skeleton_roles(motion, names)
-            contacts = recorded.contacts(motion, _touching(joints, roles)) if there else []
-            touched = Touched(figure, Things(scene, tracks), contacts)
-        points = held_points(figure, roles, held)
-        if touched is not None and touched.contacts:
-            points += touching_points(figure, roles, motion, touched.contacts, joints)
+        recorded, contacts = Things(world, tracks), list[ThingContact]()
+        tracks = {name: recorded.scaled(name, proportions.path) for name in tracks}
+        joints = skeleton_roles(motion, names)
+        if ground is not None and figure.root == "free":
+            touching = _touching(joints, roles)
+            contacts = meetings(motion, touching, recorded.contacts(motion, touching))
+        parts = touching_points(figure, roles, motion, contacts, joints)
+        touched = Touched(figure, Things(world, tracks), contacts, parts)
+        points = held_points(figure, roles, held) + parts
         holds = Holds(points, held, proportions.path, motion.dt, surface, touched)
     frames, lost = wanted_of(wanted, roles), ""
     with world.borrow() as workspace:

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Annotated, Any
 
-import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -25,6 +24,7 @@ from wholebody.figures.figure import Figure
 from wholebody.geometry.pieces import swept_points
 from wholebody.motion.clip import Clip
 from wholebody.motion.footholds import RestLimits, resting
+from wholebody.motion.thing_contacts import least_distance
 from wholebody.motion.windows import Window, runs
 from wholebody.tasks import Hold
 
@@ -246,18 +246,9 @@ def _middle(foot: _Foot, places: dict[str, pin.SE3]) -> Array:
 
 
 def _distance(first: _Foot, second: _Foot, places: dict[str, pin.SE3], shift: Array) -> float:
-    least = np.inf
-    for one in first.pieces:
-        at = _transform(places[one.name], shift)
-        for other in second.pieces:
-            request, result = coal.DistanceRequest(), coal.DistanceResult()
-            coal.distance(one.geometry, at, other.geometry, _transform(places[other.name]), request, result)
-            least = min(least, float(result.min_distance))
-    return least
-
-
-def _transform(place: pin.SE3, shift: Array | float = 0.0) -> Any:
-    return coal.Transform3s(place.rotation, place.translation + shift)
+    moved = pin.SE3(np.eye(3), shift)
+    here = [(piece.geometry, moved * places[piece.name]) for piece in first.pieces]
+    return least_distance(here, [(piece.geometry, places[piece.name]) for piece in second.pieces])
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ size: relations to things are kept, not distances to the trunk.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import coal
 import numpy as np
@@ -28,6 +28,11 @@ NEAR = {"hand": 0.05, "wrist": 0.06, "elbow": 0.07, "knee": 0.09, "pelvis": 0.16
 SHARES = (1.0, 0.5)
 """Places of a hand that touch, from its wrist at 0 to its joint, which may be at the knuckles or beyond the fingers."""
 
+BODY = {"hand": 0.08, "head": 0.18, "knee": 0.13}
+"""Metres from a hand to other joints of its body, at most, where it touches the skin over them."""
+
+STAYS = 0.6  # s: a hand that is near other parts than a hand for a shorter time may pass them
+
 GOES_ON = 1.4  # times as far away as a contact may begin, it ends
 THICKEST = 0.25  # m: of a part from its joint to its skin
 
@@ -43,6 +48,12 @@ class ThingContact(NamedTuple):
     place: Array  # (3,) on the thing's surface, in its axes, metres
     normal: Array  # (3,) of unit length, out of the thing, in its axes
     share: float = 1.0  # of a hand: where between its wrist and its joint it touches
+    ways: Array | None = None  # (n, 3) normals of unit length, in the world, where the thing is a part of the body
+
+    @property
+    def meets(self) -> bool:
+        """Whether both are hands, which give way alike."""
+        return self.ways is not None and self.thing.endswith(("hand", "wrist"))
 
 
 def still_things(scene: Scene) -> list[str]:
@@ -57,6 +68,20 @@ class Piece(NamedTuple):
     shape: coal.CollisionGeometry
     at: pin.SE3  # in the thing's axes
     reach: float  # metres from its origin to its farthest point
+
+
+Placed: TypeAlias = tuple[coal.CollisionGeometry, pin.SE3]
+"""A shape, and where it is in the world."""
+
+
+def least_distance(first: Sequence[Placed], second: Sequence[Placed]) -> float:
+    """Signed distance of two sets of shapes, metres."""
+    best, request = np.inf, coal.DistanceRequest()
+    for one, at in first:
+        for other, there in second:
+            ours, theirs = (coal.Transform3s(place.rotation, place.translation) for place in (at, there))
+            best = min(best, float(coal.distance(one, ours, other, theirs, request, coal.DistanceResult())))
+    return best
 
 
 class Things:
@@ -101,15 +126,9 @@ class Things:
         """Where the things that move are in a frame."""
         return {name: track[frame] for name, track in self._moving.items()}
 
-    def gap(self, name: str, frame: int, pieces: Sequence[tuple[coal.CollisionGeometry, pin.SE3]]) -> float:
-        """Signed distance of shapes in the world to a thing in a frame, metres."""
-        at, best = self.at(name, frame), np.inf
-        for own, where in pieces:
-            for shape, local, _ in self._pieces[name]:
-                ours, theirs = (coal.Transform3s(one.rotation, one.translation) for one in (where, at * local))
-                self._result.clear()
-                best = min(best, float(coal.distance(own, ours, shape, theirs, self._request, self._result)))
-        return best
+    def pieces(self, name: str, frame: int) -> list[Placed]:
+        """Shapes of a thing where they are in a frame."""
+        return [(shape, self.at(name, frame) * local) for shape, local, _ in self._pieces[name]]
 
     def contacts(self, motion: SkeletonMotion, joints: Mapping[str, str]) -> list[ThingContact]:
         """What the skeleton touches; `joints` are those of roles."""
@@ -160,6 +179,32 @@ class Things:
             if gap < best[0] and np.isfinite(normal).all() and normal.any():
                 best = gap, np.array(self._result.getNearestPoint1()), normal
         return best
+
+
+def meetings(motion: SkeletonMotion, joints: Mapping[str, str], others: Sequence[ThingContact]) -> list[ThingContact]:
+    """Where hands touch each other or another part of their body, and no thing; `joints` are those of roles."""
+    at, found = {role: motion.positions[:, motion.names.index(joint)] for role, joint in joints.items()}, list(others)
+    hands = [f"{side}_hand" if f"{side}_hand" in at else f"{side}_wrist" for side in ("left", "right")]
+    share = 0.5 if hands[0].endswith("hand") else 1.0
+    at |= {role: at[role] + share * (at[role.replace("hand", "wrist")] - at[role]) for role in hands if role in at}
+    for hand in (role for role in hands if role in at):
+        own, z = hand.split("_")[0], np.array([0.0, 0.0, 1.0])
+        free: Mask = np.ones(len(motion), dtype=bool)
+        for one in (one for one in found if one.role.replace("hand", "wrist") == hand.replace("hand", "wrist")):
+            free[one.first : one.end] = False
+        parts = [role for role in at if role.split("_")[-1] in BODY and role not in (hand, f"{own}_elbow")]
+        for part in sorted(parts, key=lambda role: role not in hands):
+            way = at[hand] - at[part]
+            far = np.linalg.norm(way, axis=1)
+            mask = slow(way, motion.dt, RestLimits()) & (far <= BODY[part.split("_")[-1]]) & (far > 1e-3) & free
+            least = RestLimits().least if part in hands else STAYS
+            for run in runs(long_runs(mask, max(1, round(least / motion.dt)))):
+                ways = way / (far[:, None] + 1e-9)
+                found.append(ThingContact(hand, *run, part, np.zeros(3), z, share, ways))
+                if part in hands:
+                    found.append(ThingContact(part, *run, hand, np.zeros(3), z, share, -ways))
+                free[run.first : run.end] = False
+    return sorted(found, key=lambda one: one.first)
 
 
 def thickness(pieces: Sequence[pin.GeometryObject], start: Array, along: Array) -> float:
