@@ -886,7 +886,7 @@ ANSWERS = (
     "InteractionScene", "Wrench", "Recording.of", "Scene.of_parts", "ClipCheck", "Beyond", "Avoided",
     "AvoidanceReport", "Contact", "Sliding", "Deviation", "Torques", "SphereFilling", "AssemblySolution",
     "AssemblyStep", "SolveRecord", "SolveRecord.of", "SolveRecord.row", "SolveRecord.as_json",
-    "SolveRecord.from_json", "SolveProgress", "Records.to_parquet", "ReachMap", "Accommodation", "Ergonomics",
+    "SolveRecord.from_json", "SolveProgress", "ReachMap", "Accommodation", "Ergonomics",
     "BodyAngles", "Rula", "Reba", "StaticTorques", "Sight", "Result", "Contacts.joined", "DerivativeCheck",
     "AvoidedCase", "BatchProgress", "Ground", "Plan", "WorldFrame", "Overlap", "EngineFrame", "Event",
 )  # fmt: skip

@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array
-from wholebody.methods.inputs import TIME_LIMIT, check_problem
+from wholebody.methods.base import TIME_LIMIT, check_problem
 from wholebody.methods.qp.chain import closed_form_postures
 from wholebody.methods.qp.method import QP
 from wholebody.methods.starts import all_found, restarts, throughout
