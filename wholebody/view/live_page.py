@@ -20,7 +20,7 @@ from wholebody.taskfile.task import View
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.live import LiveDrag, LiveFrame
 from wholebody.view.style import LOOK
-from wholebody.view.viser_server import put, viser_server
+from wholebody.view.viser_server import viser_server
 
 SETTLING = 90  # frames after the mouse or a key lets go in which the figure still follows to where that was
 STILL = 1e-5  # m, rad: what moves less is not sent
@@ -339,7 +339,7 @@ class LivePage:
     def _show(self, frame: LiveFrame) -> None:
         self._place(frame.q, {})
         for name, ball in self._handles.items():
-            put(ball, self.drag.place(name))
+            ball.position = self.drag.place(name)
         self._show_rings()
         self._status.content = f"**{frame.status}**"
         unit = "mm" if self._target is None or len(self._target) == 3 else "mrad"
@@ -359,8 +359,9 @@ class LivePage:
                     place = at[owner] * scene.objects[owner].placement.actInv(place)
                 known = self._sent.get(number)
                 if known is None or not place.isApprox(known, STILL):
-                    self._sent[number] = place
-                    put(self._pieces[number], place.translation, np.roll(pin.Quaternion(place.rotation).coeffs(), 1))
+                    handle, self._sent[number] = self._pieces[number], place
+                    handle.position = place.translation
+                    handle.wxyz = np.roll(pin.Quaternion(place.rotation).coeffs(), 1)
 
 
 def _handle_color(held: bool) -> tuple[int, int, int]:
