@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.dynamics.live_world import LiveWorld
 from wholebody.tracking.live import LiveDrag
 from wholebody.view import live_page
 from wholebody.view.browser import Browser
@@ -29,25 +28,8 @@ def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[LivePage]:
     scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
     scene.add(wb.Box((0.4, 0.8, 0.04)), name="table", at=(0.6, 0.3, 0.75))
     drag = LiveDrag(wb.Problem(scene, constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")]))
-    yield from bare(
-        LivePage(drag, tmp_path / "posture.toml", 8377, lambda path: wb.taskfile.write_task(drag.stated(), path))
-    )
-
-
-@pytest.fixture
-def world_page(tmp_path: Path) -> Iterator[LivePage]:
-    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
-    body = wb.Body(mass=0.4)
-    scene.add(wb.Sphere(0.1), name="ball", at=(0.7, -0.6, 0.1001), body=body)
-    scene.add(wb.Box((0.2, 0.2, 0.2)), name="box", at=(0.36, -0.1, 0.1001), body=body)
-    for made in bare(LivePage(LiveWorld(scene), tmp_path, 8379)):
-        made._pieces[made.drag.scene.piece_owner.index("ball")].visible = True
-        yield made
-
-
-def bare(made: LivePage) -> Iterator[LivePage]:
-    """A page without its meshes: the mouse finds handles, and to draw a person takes a core without a GPU."""
-    for piece in made._pieces:
+    made = LivePage(drag, tmp_path / "posture.toml", 8377, lambda path: wb.taskfile.write_task(drag.stated(), path))
+    for piece in made._pieces:  # the mouse finds handles; to draw the meshes of a person takes a core without a GPU
         piece.visible = False
     made.server.scene.configure_environment_map(None)
     yield made
@@ -119,57 +101,18 @@ def reached(browser: Browser, x: float, y: float) -> bool:
     return bool(browser.evaluate("[...document.querySelectorAll('canvas')].some(c => c.style.cursor === 'pointer')"))
 
 
-def opened(page: LivePage, browser: Browser) -> Any:
-    """The page's client, once it sees the scene from where `pixel` says."""
-    browser.resize(SIZE)
-    page.server.initial_camera.position, page.server.initial_camera.look_at = EYE, TARGET
-    browser.open(page.url, "document.readyState === 'complete'")
-    client = until(lambda: list(page.server.get_clients().values()))[0]
-    until(lambda: client.camera.fov)
-    until(lambda: np.allclose(client.camera.position, EYE, atol=1e-3))
-    return client
-
-
-@pytest.mark.timeout(500)
-def test_mouse_lifts_a_body_that_falls_when_let_go_and_a_hand_pushes_another(
-    world_page: LivePage, browser: Browser, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    live = world_page.drag
-    monkeypatch.setattr(browser, "timeout", 240.0)
-    client = opened(world_page, browser)
-
-    def take(name: str, beside: float = 0.0) -> tuple[float, float]:
-        at = pixel(live.place(name) + (0.0, 0.0, beside), client.camera.fov)
-        until(lambda: reached(browser, *at), pause=0.3)
-        mouse(browser, "mousePressed", *at, pressed=True)
-        return at
-
-    x, y = take("ball", beside=0.075)  # on the ball itself, not on the handle of 40 mm in its middle
-    for share in np.linspace(0.0, 1.0, 4)[1:]:
-        mouse(browser, "mouseMoved", x, y - 50 * share, pressed=True)
-    until(lambda: live.taken == "ball")
-    until(lambda: live.place("ball")[2] > 0.3)
-    assert np.hypot(*(live.place("ball")[:2] - (0.7, -0.6))) < 0.3  # the mouse moves it in the plane of the screen
-    mouse(browser, "mouseReleased", x, y - 50)
-    until(lambda: not live.taken and live.place("ball")[2] < 0.101)  # it falls to the floor, which is at 0
-    began, frames = live.place("box"), world_page.frames
-    x, y = take("right_sole")
-    goal = pixel(began + (0.1, 0.0, 0.0), client.camera.fov)
-    for share in np.linspace(0.0, 1.0, 6)[1:]:
-        mouse(browser, "mouseMoved", x + share * (goal[0] - x), y + share * (goal[1] - y), pressed=True)
-    until(lambda: np.linalg.norm(live.place("box") - began) > 0.02)
-    mouse(browser, "mouseReleased", *goal)
-    assert world_page.frames > frames
-    assert live.report().overlap < 1e-3
-
-
 @pytest.mark.timeout(500)
 def test_mouse_drags_holds_undoes_and_saves(
     page: LivePage, browser: Browser, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     drag, start = page.drag, page.drag.q.copy()
     monkeypatch.setattr(browser, "timeout", 240.0)
-    client = opened(page, browser)
+    browser.resize(SIZE)
+    page.server.initial_camera.position, page.server.initial_camera.look_at = EYE, TARGET
+    browser.open(page.url, "document.readyState === 'complete'")
+    client = until(lambda: list(page.server.get_clients().values()))[0]
+    until(lambda: client.camera.fov)
+    until(lambda: np.allclose(client.camera.position, EYE, atol=1e-3))
     before = drag.place("right_palm")
     x, y = pixel(before, client.camera.fov)
     until(lambda: reached(browser, x, y), pause=0.3)  # the page looks through all it shows at each move

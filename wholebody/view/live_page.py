@@ -158,11 +158,8 @@ class LivePage:
             if name in self.drag.handles:
                 self.toggle(name)
 
-        owners = self.drag.scene.piece_owner  # the ball of a thing is inside of it: the mouse takes the thing itself
-        of_thing = [piece for piece, owner in zip(self._pieces, owners, strict=True) if owner == name]
-        for taken in (ball, *(of_thing if name in self.drag.things else ())):
-            taken.on_drag(dragged)
-            taken.on_click(clicked)
+        ball.on_drag(dragged)
+        ball.on_click(clicked)
         return ball
 
     def toggle(self, name: str) -> None:
@@ -351,8 +348,8 @@ class LivePage:
     def _place(self, q: Array, at: Mapping[str, pin.SE3]) -> None:
         """Put the pieces where they are at a posture (nq,), and those of some things at other placements."""
         scene = self.drag.scene
-        with scene.borrow() as workspace, self.server.atomic():
-            data = workspace.state.update(q).data
+        data = scene.state(q).data
+        with self.server.atomic():
             for number, piece in enumerate(scene.geometry.geometryObjects):
                 place, owner = data.oMi[piece.parentJoint] * piece.placement, scene.piece_owner[number]
                 if owner in at:
