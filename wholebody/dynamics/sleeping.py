@@ -81,9 +81,10 @@ class Sleepers:
         both = self._touching(near)
         both = np.concatenate([both, both[:, ::-1]])
         both = both[asleep[both[:, 0]] & active[both[:, 1]]]
-        known = np.isin(self._keys(both), self._keys(self._touched))
-        woken = [both[~known | (self._speeds(both) > STILL), 0], self._touched[self._moved() > MOVED, 0]]
-        touched = np.concatenate(woken)
+        touched: Indices = self._touched[self._moved() > MOVED, 0]
+        if len(both):  # few steps have any, and the search takes longer than all else here
+            known = np.isin(self._keys(both), self._keys(self._touched))
+            touched = np.concatenate([both[~known | (self._speeds(both) > STILL), 0], touched])
         if not len(touched):
             return False
         waking = asleep & np.isin(self._island, self._island[touched])
