@@ -31,6 +31,16 @@ KNEELS = 0.05  # m, rad: a `Stand` that misses less at the start is of one who k
 _effort = Effort()
 
 
+def usual_measures(
+    scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound], *, ranges: bool
+) -> tuple[Measure, ...]:
+    """The measures of a problem that states none, for its resolved terms; the same ones of the same scene are known."""
+    feet, sits = stances(scene, start, terms), seated(scene, terms)
+    arms = free_arms(scene, start, terms, bounds) if ranges and scene.figure.ranges else ()
+    make = partial(default_measures, scene, start, feet, sits, arms, ranges=ranges)
+    return scene.built.known(("measures", ranges, feet, sits, arms, start.tobytes()), make)
+
+
 def default_measures(
     scene: Surroundings,
     start: Array,
