@@ -38,7 +38,8 @@ def usual_measures(
     feet, sits = stances(scene, start, terms), seated(scene, terms)
     arms = free_arms(scene, start, terms, bounds) if ranges and scene.figure.ranges else ()
     make = partial(default_measures, scene, start, feet, sits, arms, ranges=ranges)
-    return scene.built.known(("measures", ranges, feet, sits, arms, start.tobytes()), make)
+    found: tuple[Measure, ...] = scene.built.known(("measures", ranges, feet, sits, arms, start.tobytes()), make)
+    return found
 
 
 def default_measures(
