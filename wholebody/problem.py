@@ -25,7 +25,7 @@ from wholebody.scene.workspace import Workspace, borrowed
 from wholebody.tasks.answers import in_words, is_own
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.checks import KINDS, check_measure, check_rows, checked_terms, owner_pair
-from wholebody.tasks.defaults import balancing, default_constraints, default_measures, seated, stances, standing
+from wholebody.tasks.defaults import balancing, default_constraints, standing, usual_measures
 from wholebody.tasks.inputs import once
 from wholebody.terms.linearisation import Lineariser
 from wholebody.terms.plan import TermPlan, Terms, make_plan
@@ -110,7 +110,7 @@ class Problem(checks.FixedAttributes):
             start: (nq,) posture, or the name of one; of several figures also one by figure; None for the first posture.
             goals: equalities that are met if possible.
             constraints: what must always hold; bounds on the displacement are given here too.
-            measures: costs to minimise; None for `Effort()`, of a person also `Rhythm()` and, by `Stand`, `Stance()`.
+            measures: costs to minimise; None for `Effort()`, of a person also `Rhythm()`, `Stance()`, `Hang()`.
             clearance: least distance between pieces, metres.
             touching: pairs of segment or object names whose clearance is zero; those of contact terms are added.
             range_of_motion: whether a person keeps its ranges of motion and reach cones, and moves in its `Rhythm`.
@@ -141,7 +141,10 @@ class Problem(checks.FixedAttributes):
             _plan=None,
         )
         stated = self._resolved([given[place] for place in self._places])
-        measures = self._usual_measures(stated) if measured is None else tuple([m.resolve(scene, q) for m in measured])
+        if measured is None:
+            measures = usual_measures(scene, q, (*stated, *self.goals), self.bounds, ranges=self.range_of_motion)
+        else:
+            measures = tuple([m.resolve(scene, q) for m in measured])
         defaults, left_out = self._usual_constraints(stated)
         constraints = (*stated, *defaults)
         vars(self).update(measures=measures, constraints=constraints, defaults=defaults, left_out=left_out)
@@ -159,12 +162,6 @@ class Problem(checks.FixedAttributes):
         except TypeError:  # arrays and placements
             return tuple(found)
         return tuple(found) if not terms or any(map(is_own, terms)) else once(self.scene, key, partial(tuple, found))
-
-    def _usual_measures(self, stated: Sequence[Constraint]) -> tuple[Measure, ...]:
-        scene, start, ranges = self.scene, self.start, self.range_of_motion
-        feet, sits = stances(scene, start, stated), seated(scene, (*stated, *self.goals))
-        make = partial(default_measures, scene, start, feet, sits, ranges=ranges)
-        return scene.built.known(("measures", ranges, feet, sits, start.tobytes()), make)
 
     def _usual_constraints(self, stated: Sequence[Constraint]) -> tuple[tuple[Constraint, ...], str]:
         scene, start, ranges = self.scene, self.start, self.range_of_motion

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from tests.audits.human_postures import PostureRow, measure, median_man
-from wholebody.figures.tables import table
+from wholebody.figures.tables import named_angles, table
 from wholebody.tasks import rhythm
 
 if TYPE_CHECKING:
@@ -66,6 +66,7 @@ def fit(told: Callable[[str], None], held: Collection[str] = ()) -> Fitted:
         turned = {joint: TEN * logs[group] for group, joint in RESTS.items() if group in logs}
         for row, degrees in zip(rests, present, strict=True):
             row["degrees"] = str(degrees + turned.get(row["joint"], 0.0))
+        named_angles.cache_clear()
         shares = {name: getattr(free, name) * np.exp(logs[group]) for group, name in SHARES.items() if group in logs}
         rhythm.STYLES["free"] = free._replace(**shares)
         figures = median_man()

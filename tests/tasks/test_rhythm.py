@@ -12,6 +12,7 @@ import pytest
 import wholebody as wb
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
+from wholebody.tasks import Hang
 from wholebody.tasks.base import filled
 
 
@@ -260,3 +261,49 @@ def test_who_squats_bends_the_back_less() -> None:
     bent = {style: sum(lifted(style)[0].joint_values(lifted(style)[1])[f"spine{k}_flexion"] for k in (1, 2, 3))
             for style in ("stoop", "squat")}  # fmt: skip
     assert bent["squat"] < 0.7 * bent["stoop"]
+
+
+@pytest.mark.parametrize("at", [(0.45, -0.2, 0.05), (0.6, -0.1, 0.3)])
+def test_a_free_arm_hangs_where_the_trunk_bends(scene: wb.Scene, at: tuple[float, float, float]) -> None:
+    figure = scene.figure
+    goals = [wb.Point("right_index_tip", at)]
+    held = [wb.Hold("left_foot"), wb.Hold("right_foot")]
+    found = []
+    for measures in (None, [wb.Effort(), wb.tasks.Rhythm()]):
+        problem = wb.Problem(scene, "standing", goals=goals, constraints=held, measures=measures)
+        solution = wb.solve(problem)
+        assert solution.solved
+        shoulder, elbow = (figure.placement(solution.q, f"left_{end}").translation for end in ("shoulder", "elbow"))
+        arm = (elbow - shoulder) / np.linalg.norm(elbow - shoulder)
+        found.append(float(np.degrees(np.arccos(-arm[2]))))
+    # By an effort that counts from the trunk it points back, as far as the trunk is bent.
+    assert found[1] > 60.0
+    assert found[0] < 40.0
+
+
+def test_an_arm_that_a_term_moves_or_a_seat_carries_does_not_hang(scene: wb.Scene) -> None:
+    held = [wb.Hold("left_foot"), wb.Hold("right_foot")]
+    right, left = (wb.Point(f"{side}_palm", (0.4, 0.1, 1.0)) for side in ("right", "left"))
+    named = {
+        ("left",): ([right], held),
+        ("left", "right"): ([], held),
+        (): ([right, left], held),
+        ("right",): ([wb.Relative("left_palm", "pelvis", (0.2, 0.2, 0.2))], [*held, wb.Freeze("right_leg")]),
+    }
+    for arms, (goals, constraints) in named.items():
+        problem = wb.Problem(scene, "standing", goals=goals, constraints=constraints)
+        arms = tuple(f"{arm}_upper_arm" for arm in arms)
+        assert [tuple(one.arms) for one in problem.measures if isinstance(one, Hang)] == ([arms] if arms else [])
+    for constraints in ([*held, wb.Freeze("left_arm", "right_arm")], [wb.Hold("pelvis")]):
+        problem = wb.Problem(scene, "standing", constraints=constraints)
+        assert not any(isinstance(one, Hang) for one in problem.measures)
+
+
+def test_hang_is_the_angle_from_where_arms_hang(scene: wb.Scene) -> None:
+    figure = scene.figure
+    q = figure.with_joints(figure.posture("standing"), {"left_shoulder_flexion": 0.9, "spine2_flexion": 0.2})
+    term = Hang(["left_upper_arm"]).resolve(scene, q)
+    upright, here = (figure.placement(one, "left_upper_arm").rotation for one in (figure.posture("standing"), q))
+    cosine = float((here @ upright.T @ np.array((0.0, 0.0, 1.0)))[2])
+    assert term.value(scene.state(q)) == pytest.approx(np.arccos(cosine) ** 2, rel=1e-9)
+    assert wb.check_derivatives(Hang(), scene, q).agrees

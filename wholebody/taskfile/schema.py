@@ -150,6 +150,7 @@ MEASURES = {
     "discomfort": _form(tasks.Discomfort, "weight"),
     "displacement": _form(tasks.Displacement, "weight"),
     "rhythm": _form(tasks.Rhythm, "weight style"),
+    "hang": _form(tasks.Hang, "arms weight", arms=Several(SEGMENT)),
     "stance": _form(tasks.Stance, "feet weight", feet=Several(SEGMENT)),
     "exertion": _form(ergonomics.Exertion, "forces strength standing person weight", **_STRENGTHS),
     "potential_energy": _form(tasks.PotentialEnergy, "weight"),

@@ -106,7 +106,8 @@ def task_from(contents: Contents, file: Path) -> Task:
         terms["goal"] = [term for term in terms["goal"] if not isinstance(term, Soft)]
     options |= {f"{name}s": found for name, found in terms.items() if found}
     with contents.top.where.named():
-        usual = Problem(scene, start, **options).measures if soft and not terms["measure"] else ()
+        known = options | {"goals": [*terms["goal"], *(one.goal for one in soft)]}  # these move arms too
+        usual = Problem(scene, start, **known).measures if soft and not terms["measure"] else ()
         problem = Problem(scene, start, **(options | {"measures": [*terms["measure"], *soft]} if soft else options))
         if usual:  # as they are: who is to kneel spares effort from elsewhere than the start
             problem.measures = (*usual, *problem.measures)

@@ -13,6 +13,7 @@ from wholebody.tasks.distance import Displacement as Displacement, Effort as Eff
 from wholebody.tasks.forces import Force as Force
 from wholebody.tasks.frame import Frame as Frame, Hold as Hold, Orientation as Orientation, Relative as Relative
 from wholebody.tasks.grasp import Grasp as Grasp
+from wholebody.tasks.hang import Hang as Hang
 from wholebody.tasks.point import CenterOfMass as CenterOfMass, Plane as Plane, Point as Point
 from wholebody.tasks.posture import Posture as Posture
 from wholebody.tasks.potential_energy import PotentialEnergy as PotentialEnergy

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence, Set
+from functools import partial
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from wholebody.tasks.bounds import Freeze
 from wholebody.tasks.distance import Effort
 from wholebody.tasks.forces import LoadedBalance
 from wholebody.tasks.frame import Hold
+from wholebody.tasks.hang import Hang
 from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
 from wholebody.tasks.rhythm import Rhythm, girdles_of
 from wholebody.tasks.sit import Sit
@@ -29,30 +31,87 @@ KNEELS = 0.05  # m, rad: a `Stand` that misses less at the start is of one who k
 _effort = Effort()
 
 
+def usual_measures(
+    scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound], *, ranges: bool
+) -> tuple[Measure, ...]:
+    """The measures of a problem that states none, for its resolved terms; the same ones of the same scene are known."""
+    feet, sits = stances(scene, start, terms), seated(scene, terms)
+    arms = free_arms(scene, start, terms, bounds) if ranges and scene.figure.ranges else ()
+    make = partial(default_measures, scene, start, feet, sits, arms, ranges=ranges)
+    found: tuple[Measure, ...] = scene.built.known(("measures", ranges, feet, sits, arms, start.tobytes()), make)
+    return found
+
+
 def default_measures(
-    scene: Surroundings, start: Array, stances: Sequence[tuple[str, ...]], seated: Sequence[str], *, ranges: bool
+    scene: Surroundings,
+    start: Array,
+    stances: Sequence[tuple[str, ...]],
+    seated: Sequence[str],
+    hanging: Sequence[str],
+    *,
+    ranges: bool,
 ) -> tuple[Measure, ...]:
     """Resolved `Effort`, a person's `Rhythm`, `Stance` of sliding feet; kneelers count them from a kneeling posture.
 
-    `seated` are the persons who sit, by what their names begin with. The shares of knees and lumbar spine are those of
-    somebody who bends down on both feet: on a seat the knees follow the pedals, and who leans back bends no lordosis.
+    `hanging` are arms that hang, see `free_arms`. `seated` are the persons who sit, by what their names begin with. The
+    shares of knees and lumbar spine are those of somebody who bends down on both feet: on a seat the knees follow the
+    pedals, and who leans back bends no lordosis.
     """
     if not (ranges and scene.figure.ranges and inputs.once(scene, "girdles", lambda: girdles_of(scene.figure))):
         return (_effort.resolve(scene, start),)
     shanks = {side for sides in stances for side in sides if side.endswith("_shank")}
     rest = _kneeling(scene, start, shanks) if shanks else start
     pairs = [feet for feet in stances if len(feet) == 2 and shanks.isdisjoint(feet)]
-    rhythm = Rhythm().resolve(scene, rest)
+    rhythm, hangs = Rhythm().resolve(scene, rest), [Hang(hanging).resolve(scene, rest)] if hanging else []
     if seated:
         joints = [scene.model.joints[joint] for body in seated for joint in scene.figure.bodies[body]]
         rhythm = rhythm.of_arms({int(joint.idx_v) for joint in joints})
-    return (_effort.resolve(scene, rest), rhythm, *(Stance(pair).resolve(scene, rest) for pair in pairs))
+    return (_effort.resolve(scene, rest), rhythm, *(Stance(pair).resolve(scene, rest) for pair in pairs), *hangs)
 
 
 def seated(scene: Surroundings, terms: Sequence[Constraint | Goal]) -> tuple[str, ...]:
     """The persons who sit on something, by what their names begin with."""
     return tuple(body for term in terms if isinstance(term, Sit)
                  if (body := inputs.body_of(scene, [term.frame])) is not None)  # fmt: skip
+
+
+def free_arms(
+    scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound]
+) -> tuple[str, ...]:
+    """The upper arms that no term moves, of persons who stand or kneel and do not sit."""
+    figure, sits = scene.figure, seated(scene, terms)
+    told = [inputs.body_of(scene, term.feet) for term in terms if isinstance(term, (Balance, LoadedBalance, Stand))]
+    up = {body for body in (*told, *standing(scene, start, terms, bounds)) if body is not None and body not in sits}
+    groups = [f"{body}{side}" for body in figure.bodies if body in up for side in ("left", "right")]
+    arms = {arm: frozenset(inputs.once(scene, ("dofs", arm), partial(figure.dofs, f"{arm}_arm")).tolist())
+            for arm in groups if f"{arm}_arm" in figure.groups}  # fmt: skip
+    if not arms:
+        return ()
+    moved = {int(place) for bound in bounds for place in figure.dofs(getattr(bound, "joints", ()))}
+    for term in terms:
+        moved.update(_moved(scene, start, term))
+    return tuple(f"{arm}_upper_arm" for arm, dofs in arms.items() if moved.isdisjoint(dofs))
+
+
+def _moved(scene: Surroundings, start: Array, term: Constraint | Goal) -> Set[int]:
+    """Places in the tangent on which a resolved term depends; of a balance, which all masses move, what bears it."""
+    if isinstance(term, (Balance, LoadedBalance, Stand)):
+        loads = term.loads.places if isinstance(term, LoadedBalance) else ()
+        bearing = [inputs.find_place(scene, foot, "").joint for foot in term.feet] + [one.joint for one in loads]
+    else:
+        owner = getattr(term, "residual", term)
+        known = (getattr(owner, "place", None), getattr(owner, "base", None))
+        bearing = [one.joint for one in known if isinstance(one, inputs.Place)]
+    if not bearing:
+        state = State(scene.model).update(start)
+        return {*np.flatnonzero(state.dense_jacobian(term.jacobian(state)).any(axis=0)).tolist()}
+    return {place for joint in bearing for place in inputs.once(scene, ("chain", joint), partial(_chain, scene, joint))}
+
+
+def _chain(scene: Surroundings, joint: int) -> frozenset[int]:
+    """Places in the tangent of the joints that carry a joint, and of itself."""
+    joints = [scene.model.joints[one] for one in scene.model.supports[joint]]
+    return frozenset(place for one in joints for place in range(one.idx_v, one.idx_v + one.nv))
 
 
 def stances(scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal]) -> tuple[tuple[str, ...], ...]:

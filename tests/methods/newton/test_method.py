@@ -252,7 +252,7 @@ def test_joints_that_move_together_take_few_iterations() -> None:
     found = [wb.solve(problem, method=method) for method in (wb.methods.Newton(tolerance=1e-8), wb.methods.QP())]
     assert [solution.status for solution in found] == ["solved", "solved"]
     assert found[0].iterations < 60
-    assert found[1].iterations < 10
+    assert found[1].iterations <= 10
     assert found[0].assessment.measure == pytest.approx(found[1].assessment.measure, rel=1e-5)
 
 
