@@ -433,7 +433,6 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "check_derivatives", Call(wb.check_derivatives, checked, str)
     yield "simplify", Call(wb.simplify, {"problem": ask})
     part = wb.simplify(ask)
-    yield "Simplified.posture", Call(part.posture, {"q": part.problem.start})
     yield "Solution.plot", Call(wb.solve(part.problem).plot, {})
     yield "Simplified.restored", Call(part.restored, {"solution": wb.solve(part.problem)})
     judged = wb.assess(ask, q)

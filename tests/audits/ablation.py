@@ -194,7 +194,7 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         "warm start from the last active set": (WorkingSet, "_corrected", cold),
         "seeds of arms": (qp, "from_seeds", lambda *given: None),
         "before contact": (multistart, "before_contact", lambda *given: iter(())),
-        "feasibility first": (search, "feasibility_first", lambda self, start: self._directly(start)),
+        "feasibility first": (search, "feasibility_first", lambda self, start: self.directly(start)),
         "turning on to the other limit": (Feasibility, "_turned_on", lambda self, here, program, step, wrapped: None),
         "contradictions of goals": (multistart, "contradictions", lambda problem, workspace: ()),
         "hooked hands": (multistart, "hooked_hands", lambda problem, state, start: iter(())),

@@ -184,7 +184,7 @@ def test_planes_hold_where_a_contact_is_made_and_bend_as_spheres_do() -> None:
     np.testing.assert_allclose(bend.T @ bend, row.T @ across @ row / apart, atol=0.02)
 
 
-@pytest.mark.parametrize(("name", "number", "seed"), [("passage", 4, 1), ("self_contact", 14, 2)])
+@pytest.mark.parametrize(("name", "number", "seed"), [("passage", 4, 1), ("passage", 17, 0)])
 def test_where_things_make_an_answer_dear_a_lower_minimum_is_sought(name: str, number: int, seed: int) -> None:
     from wholebody.bench.suite.problem_sets.registry import problem_set
 

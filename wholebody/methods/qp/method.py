@@ -48,9 +48,8 @@ class QP(Settings, Descends):
             about a millisecond.
         restarts: most seeded starts that are tried.
         restarts_for_measure: how many more descents look for a lower minimum of the measures once the goals are met;
-            four times as many feasible postures are found first, and the best of them are descended from. With
-            0, time comes first: one more descent is made where things in the way cost half as much again as the
-            measures without them, else the answer is the minimum that the first descent leads to.
+            four times as many feasible postures are found first, and the best of them are descended from. With 0, time
+            comes first: one more descent is made where things double the measures, else the first one's end counts.
         seed: of the restarts.
         measures: whether the measures are to be least. Without, the first posture is the answer that meets the goals
             with everything held, which is there in a fifth to nine tenths of the time. This is for `solve`.
@@ -131,7 +130,7 @@ class QP(Settings, Descends):
             start = posture(given, problem.scene.model.nq, "QP.minima: a start")
             with Control(self.time_limit, None, self.longest) as control, problem.borrow() as workspace:
                 search = Multistart(problem, workspace, self._qp_solver(), alone, control)
-                end = search.feasibility_first(start)
+                end = search.feasibility_first(start) or search.directly(start)
             ending = Ending(
                 end.q, end.converged, search.spent, tuple(search.trace), search.how,
                 programs=search.solver.counted(),

@@ -85,10 +85,9 @@ class Multistart:
         for q in near:
             self._accept(self._ran(self._closest(self._at_most(SEARCH.coming_near)), q), self.how)
         if other is not None:
-            self._accept(self._directly(other), "directly")
+            self._accept(self.directly(other), "directly")
         self._find_closest()
-        count = max(self.settings.restarts_for_measure, SEARCH.poor if self._descend_again() else 0)
-        self._restart_for_measure(count or int(self._is_dear()))
+        self._seek_lower(max(self.settings.restarts_for_measure, SEARCH.poor if self._descend_again() else 0))
         if self.best.violation.worst <= self.settings.tolerance:
             self.contradictions = ()  # by less than the tolerance
         if self._out_of_reach:  # although a closer posture may be near
@@ -107,9 +106,9 @@ class Multistart:
     def _attempts(self, begin: Array) -> Iterator[Attempt]:
         """The attempts in their order; each is decided on when those before it failed."""
         start, state = self._start, self.lineariser.state
-        yield Attempt([begin], self._directly, "directly")
+        yield Attempt([begin], self.directly, "directly")
         rests = (term.distance.reference for term in self.problem.measures if type(term) is Effort)
-        yield Attempt((q for q in rests if (q != start).any()), self._directly, "from the posture of least effort")
+        yield Attempt((q for q in rests if (q != start).any()), self.directly, "from the posture of least effort")
         self._first = len(self.trace)
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
         least = least_left(self.contradictions)
@@ -120,8 +119,6 @@ class Multistart:
         yield Attempt([start], self._closing, "by feasibility first")
         # hands that are alike are no random starts
         self._minima, self._relaxed_minima, self._without_gain = Minima(), Minima(), 0
-        near = self.best.violation.left <= SEARCH.relaxation_depth  # as far as limbs in the way keep goals off
-        yield Attempt(self._while_open([start] if near else []), self._relaxed, "from another start")
         self._out_of_reach = self._known_out_of_reach(self.best.q)
         if self._out_of_reach:
             return
@@ -137,7 +134,7 @@ class Multistart:
         if few := self._moving() < SEARCH.few:
             self._minima, self._relaxed_minima = Minima(SEARCH.fewest_descents), Minima(SEARCH.fewest_descents)
         others = (throughout if few else restarts)(self.problem, state, start, rng, count)
-        starts = self.lineariser.defined(chain([] if near else [start], self._through, others))
+        starts = self.lineariser.defined(chain(self._through, others))
         yield Attempt(self._while_open(starts), self._relaxed, "from another start")
 
     def _while_open(self, starts: Iterable[Array]) -> Iterator[Array]:
@@ -156,19 +153,28 @@ class Multistart:
             self.spent += local.iterations
             yield local.q
 
-    def _directly(self, start: Array) -> LocalSolution:
+    def directly(self, start: Array) -> LocalSolution:
         """A descent; without measures by whole steps as long as these gain much."""
         return self._ran(self._descent(self.settings.iterations, None, "", full_step=not self.settings.measures), start)
 
-    def feasibility_first(self, start: Array) -> LocalSolution:
-        """Find a feasible posture without measures, and descend with measures from there."""
-        local = self._ran(self._feasibility(self.lineariser, self.settings.iterations, "feasibility"), start)
-        if local.violation.worst > self.settings.tolerance or not self.settings.measures:
+    def feasibility_first(self, start: Array) -> LocalSolution | None:
+        """Find a feasible posture without measures, and descend from there; None where the goals are out of reach."""
+        local = self._through_things(start, "feasibility")
+        if local is None or local.violation.worst > self.settings.tolerance or not self.settings.measures:
             return local
         self._accept(local, "by feasibility first")
         return self._descend(local.q)
 
-    def _closing(self, start: Array) -> LocalSolution:
+    def _through_things(self, start: Array, note: str) -> LocalSolution | None:
+        """Feasibility with pairs relaxed by a depth, then with the true clearances; None where out of reach."""
+        most, relaxed = self._at_most(SEARCH.probe_programs), self.lineariser.relaxed(SEARCH.start_depth)
+        through = self._ran(self._feasibility(relaxed, most, note), start)
+        self._nearest_through = min(self._nearest_through, through.violation.total)
+        if through.violation.worst > SEARCH.reached * self.settings.tolerance:
+            return None
+        return self._ran(self._feasibility(self.lineariser, most, note), through.q)
+
+    def _closing(self, start: Array) -> LocalSolution | None:
         """Close hands around bars: from hooked fingers by relaxed probes, then, or without such hands, as they are."""
         for q in self.lineariser.defined(hooked_hands(self.problem, self.lineariser.state, start)):
             local = self._relaxed(q)
@@ -201,9 +207,9 @@ class Multistart:
             return False
         tolerance, workspace, before = self.settings.tolerance, self.lineariser.workspace, self.best.measure
         search = Multistart(there, workspace, self.solver, self.settings, self.control)
-        local = search._directly(self._start)
+        local = search.directly(self._start)
         if local.violation.worst > tolerance:
-            local = search.feasibility_first(self._start)
+            local = search.feasibility_first(self._start) or local
         self.spent += search.spent
         self.trace += search.trace
         if local.violation.worst <= tolerance and local.measure < SEARCH.lower * before:
@@ -233,32 +239,30 @@ class Multistart:
                 self._accept(local, self.how)
         return assess(problem, self.best.q).optimality > SEARCH.optimal
 
-    def _is_dear(self) -> bool:
-        """Whether all is met, and a descent from there through everything leads to measures that are much less."""
-        tolerance, best = self.settings.tolerance, self.best
-        if not (self.settings.restarts and self.settings.measures and best.violation.worst <= tolerance):
-            return False
+    def _starts_for_measure(self, count: int) -> Iterable[Array]:
+        """For `count` minima the start and random postures (nq,); for none two ways around things that are dear."""
+        begin, tolerance, most = self._start, self.settings.tolerance, self._at_most(SEARCH.probe_programs)
+        if count:
+            rng = np.random.default_rng([self.settings.seed, count])
+            others = restarts(self.problem, self.lineariser.state, begin, rng, SEARCH.screened * count - 1)
+            return chain([begin], others)
+        if not self.settings.restarts:
+            return []
         alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
-        through = self._ran(SQP(alone, tolerance, self._at_most(SEARCH.probe_programs), "through things"), best.q)
-        return through.violation.worst <= tolerance and best.measure > SEARCH.dear * through.measure
+        through = self._ran(SQP(alone, tolerance, most, "through things"), self.best.q)
+        dear = through.violation.worst <= tolerance and self.best.measure > SEARCH.dear * through.measure
+        return [through.q, begin] if dear else []
 
-    def _restart_for_measure(self, count: int) -> None:
-        """Where all is met, seek a lower minimum from the best of some feasible postures, of few programs each."""
-        tolerance = self.settings.tolerance
-        if not (count and self.settings.measures and self.best.violation.worst <= tolerance):
+    def _seek_lower(self, count: int) -> None:
+        """Where all is met, seek `count` lower minima, or one, from the best of feasible postures of few programs."""
+        tolerance, found = self.settings.tolerance, list[LocalSolution]()
+        if not self.settings.measures or self.best.violation.worst > tolerance:
             return
-        rng, screened = np.random.default_rng([self.settings.seed, count]), SEARCH.screened * count
-        others = restarts(self.problem, self.lineariser.state, self._start, rng, screened - 1)
-        found = list[LocalSolution]()
-        for q in chain([self._start], others):
-            if self.control.over:
-                break
-            local = self._ran(
-                self._feasibility(self.lineariser, self._at_most(SEARCH.probe_programs), "for measure"), q
-            )
-            if local.violation.worst <= tolerance:
+        for q in self._starts_for_measure(count):
+            local = None if self.control.over else self._through_things(q, "for measure")
+            if local is not None and local.violation.worst <= tolerance:
                 found.append(local)
-        for local in sorted(found, key=lambda each: each.measure)[:count]:
+        for local in sorted(found, key=lambda each: each.measure)[: max(count, 1)]:
             self._accept(self._descend(local.q, note="for measure"), "from a start for the measures")
 
     def _probe(self, start: Array, depth: float) -> LocalSolution:
