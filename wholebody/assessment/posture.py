@@ -170,15 +170,17 @@ def _judged(problem: Problem, pairs: AllPairs, q: Array, began: float) -> Assess
 
 def goal_errors(problem: Problem, state: State) -> tuple[float, float, tuple[float, ...]]:
     """The largest distance [m] and the largest angle [rad] of goals from their targets, and the larger of each goal."""
-    distances, angles, each = [0.0], [0.0], []
-    for goal in problem.goals:
-        error = _values(goal, goal.error, state)
-        angular = np.zeros(error.shape, dtype=bool) | goal.angular
-        far, turned = error[~angular], error[angular]
-        distances.append(sqrt(far.dot(far)))
-        angles.append(sqrt(turned.dot(turned)))
-        each.append(max(distances[-1], angles[-1]))
-    return max(distances), max(angles), tuple(each)
+    found = [distance_and_angle(goal, state) for goal in problem.goals]
+    distances, angles = ([error[part] or 0.0 for error in found] for part in (0, 1))
+    return max(distances, default=0.0), max(angles, default=0.0), tuple(map(max, distances, angles))
+
+
+def distance_and_angle(goal: Goal, state: State) -> tuple[float | None, float | None]:
+    """Distance [m] and angle [rad] of a goal from its target; None for a goal without a position or a direction."""
+    error = _values(goal, goal.error, state)
+    angular = np.zeros(error.shape, dtype=bool) | goal.angular
+    far, turned = error[~angular], error[angular]
+    return sqrt(far.dot(far)) if len(far) else None, sqrt(turned.dot(turned)) if len(turned) else None
 
 
 def largest_violation(problem: Problem, state: State) -> float:

@@ -11,8 +11,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from wholebody.assessment.posture import distance_and_angle
 from wholebody.figures.state import State
-from wholebody.taskfile.result import goals_left
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -118,10 +118,14 @@ def judgement(made: Table, judged: Assessment) -> Table:
 
 def _goals(task: Task, solution: Solution) -> Table:
     made = table("goal", "distance", "angle")
-    for goal in goals_left(task, solution.q):
-        distance = "" if goal.distance is None else f"{1e3 * goal.distance:.3f} mm"
-        angle = "" if goal.angle is None else f"{math.degrees(goal.angle):.3f} deg"
-        made.add_row(escape(goal.name), distance, angle)
+    state = State(task.problem.scene.model).update(solution.q)
+    for name, goal in zip(task.goal_names, task.problem.goals, strict=True):
+        distance, angle = distance_and_angle(goal, state)
+        made.add_row(
+            escape(name),
+            "" if distance is None else f"{1e3 * distance:.3f} mm",
+            "" if angle is None else f"{math.degrees(angle):.3f} deg",
+        )
     return made
 
 

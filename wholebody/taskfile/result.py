@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wholebody.base.arrays import Array, as_dict, brief
+from wholebody.assessment.posture import distance_and_angle
+from wholebody.base.arrays import Array, brief
 from wholebody.base.checks import instance, posture
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, one_line
@@ -23,31 +24,14 @@ from wholebody.tasks.base import Measure
 from wholebody.version import __version__
 
 
-class GoalLeft(NamedTuple):
-    """Remaining error of one goal."""
-
-    name: str  # its type and its frame
-    distance: float | None  # metres; None for a goal without a position
-    angle: float | None  # radians; None for a goal without a direction
-
-
-def goals_left(task: Task, q: Array) -> list[GoalLeft]:
-    """Remaining error of every goal at the posture q, shape (nq,)."""
-    state = State(task.problem.scene.model).update(q)
-    found = []
-    for name, goal in zip(task.goal_names, task.problem.goals, strict=True):
-        error = goal.error(state)
-        angular = np.broadcast_to(goal.angular, error.shape)
-        parts = [float(np.linalg.norm(error[mask])) if mask.any() else None for mask in (~angular, angular)]
-        found.append(GoalLeft(name, *parts))
-    return found
-
-
 def describe(task: Task, solution: Solution, folder: Path) -> dict[str, Any]:
     """Return the content of result.json."""
     figure, q = task.problem.scene.figure, solution.q
     state = State(figure.model).update(q)
     places = {name: int(figure.model.joints[joint].idx_q) for name, joint in figure.roots.items()}
+    errors = [
+        (name, *distance_and_angle(goal, state)) for name, goal in zip(task.goal_names, task.problem.goals, strict=True)
+    ]
     roots = {name: q[first : first + 7].tolist() for name, first in places.items()}
     return {
         "wholebody": __version__,
@@ -60,7 +44,7 @@ def describe(task: Task, solution: Solution, folder: Path) -> dict[str, Any]:
         "seconds": solution.seconds,
         "iterations": solution.iterations,
         "programs": dict(solution.programs),
-        "goals": [as_dict(goal) for goal in goals_left(task, q)],
+        "goals": [{"name": name, "distance": distance, "angle": angle} for name, distance, angle in errors],
         "measures": _values(task.problem.measures, state),
         "assessment": solution.assessment.summary(),
         "root": roots.get("root", roots or None),

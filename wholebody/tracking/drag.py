@@ -86,39 +86,44 @@ class ProblemDrag:
         problem: to be solved; its goals are replaced as they move.
         q: (nq,) the present posture.
         tracker: the method's tracker of these goals.
+        workspace: distances and sweeps of its frames.
     """
 
     def __init__(self, problem: Problem, method: str | Method, *, goal: int, dt: float, budget: float) -> None:
         self.problem, self.dt = copied(problem), time_step(dt, "dt")
         self.method = method_for_motions(method)
         self.tracker = self.method.tracker(self.problem, self.dt)
-        self._workspace = self.tracker.workspace
+        self.workspace = self.tracker.workspace
         self._alone = OneAtATime("drag")
         moving_goal(problem, goal)
         self._number, self._seconds, self._moves = goal, budget, GoalMoves(budget)
         self._motion: FrameMotion | None = None
         self.q: Array = problem.scene.figure.clamp(problem.start)
 
+    def place(self, q: Array) -> None:
+        """Go on from a posture (nq,)."""
+        self.q = np.array(posture(q, self.problem.scene.model.nq, "Drag: q"))
+
     def to(self, target: Any) -> DragFrame:
         """See `Drag.to`."""
         began = time.perf_counter()
         with self._alone, within_budget(self._moves.budget):
             retarget(self.problem, self._number, target)
-            self._workspace.refresh()
+            self.workspace.refresh()
             collisions, path = tuple[Collision, ...](), tuple[tuple[float, Array], ...]()
             if np.isinf(self.tracker.unswept):
                 step = self.tracker.frame(self.q) if self._seconds == np.inf else next(self._frames())
                 self.q, iterations = step.q, step.iterations
                 collisions, path = getattr(step, "collisions", ()), getattr(step, "path", ())
             else:
-                before, self._motion = self.q, self._workspace.next_frame(self.q)
+                before, self._motion = self.q, self.workspace.next_frame(self.q)
                 iterations = self._followed()
                 if self._motion is not None:
-                    collisions = judged(self._workspace, self._motion, before, self.q)
+                    collisions = judged(self.workspace, self._motion, before, self.q)
                     path = ((0.0, before), (1.0, self.q))
             if self._seconds < np.inf:
                 self._moves.end(self._left()[1])
-            error = goal_error(self.problem, self._workspace, self.q)
+            error = goal_error(self.problem, self.workspace, self.q)
             return DragFrame(self.q, error, iterations, time.perf_counter() - began, collisions, path)
 
     def finish(self) -> Solution:
@@ -133,7 +138,7 @@ class ProblemDrag:
         spent, tried, deep = 0, list[Array](), self._came_in()
         for step in self._frames():
             spent, q = spent + step.iterations, step.q
-            if self._is_free(q, self.tracker.unswept) and (not deep or _depth(self._workspace, q) <= GRAZE):
+            if self._is_free(q, self.tracker.unswept) and (not deep or _depth(self.workspace, q) <= GRAZE):
                 self.q = q
                 break
             tried.append(q)
@@ -154,24 +159,24 @@ class ProblemDrag:
 
     def _left(self) -> tuple[Array, float]:
         """The error of the moving goal at the present posture, and its length, metres or radians."""
-        left = moving_goal(self.problem, self._number).error(self._workspace.state.update(self.q))
+        left = moving_goal(self.problem, self._number).error(self.workspace.state.update(self.q))
         return left, max(float(np.linalg.norm(left[:3])), float(np.linalg.norm(left[3:])))
 
     def _is_free(self, q: Array, unswept: float) -> bool:
         """Whether the motion to the posture q (nq,) is free, with things that move meanwhile; see `is_free`."""
         if self._motion is not None:
             return self._motion.first_contact(self.q, q, GRAZE) is None
-        return is_free(self._workspace, self.q, q, unswept, budget_for_sweep())
+        return is_free(self.workspace, self.q, q, unswept, budget_for_sweep())
 
     def _came_in(self) -> float:
         """Depth of overlap of the figure, metres; 0 if it is small, or if the tracker itself leads out."""
-        deep = 0.0 if self.tracker.leaves_overlap else _depth(self._workspace, self.q)
+        deep = 0.0 if self.tracker.leaves_overlap else _depth(self.workspace, self.q)
         return deep if deep > GRAZE else 0.0
 
     def _leave(self, tried: list[Array], deep: float) -> None:
         """Move out of an overlap of `deep` metres: by a free motion, else to the shallower end."""
         ends = [*self.tracker.overlap_resolutions(self.q), *tried]
-        depths = [_depth(self._workspace, q) for q in ends]
+        depths = [_depth(self.workspace, q) for q in ends]
         out = [
             (not self._is_free(q, 0.0), depth, number)
             for number, (depth, q) in enumerate(zip(depths, ends, strict=True))
@@ -197,18 +202,27 @@ class AssemblyDrag:
 
     def __init__(self, assembly: Assembly, goal: int, seconds: float) -> None:
         self._goal, self._moves = assembly.goal_index(goal), GoalMoves(seconds)
-        self.assembly = assembly.prepare()
+        self.problem, self.tracker = assembly.prepare(), None
+
+    @property
+    def workspace(self) -> Workspace | None:
+        """Distances and sweeps of its frames; None where no shapes can touch."""
+        return self.problem.workspace
 
     @property
     def q(self) -> Array:
         """(nq,) the placements of the bodies as a posture of the assembly's `scene`."""
-        return self.assembly.q
+        return self.problem.q
+
+    def place(self, _: Array) -> None:
+        """Refuse: an assembly is placed by its own variables."""
+        raise InputError("Drag: the posture of an assembly is set by assembly.place(variables)")
 
     def to(self, target: Any) -> DragFrame:
         """Make one frame towards a position, placement or orientation; raises InputError where the target is none."""
         began, spent, collisions = time.perf_counter(), 0, tuple[Collision, ...]()
         path: tuple[tuple[float, Array], ...] = ()
-        made, goal = self.assembly, self._goal
+        made, goal = self.problem, self._goal
         made.retarget(goal, target)
         error, before = made.goal_error(goal), made.variables()
         with within_budget(self._moves.budget):
@@ -232,7 +246,7 @@ class AssemblyDrag:
 
     def finish(self) -> AssemblySolution:
         """Meet the present goals with full accuracy."""
-        return self.assembly.solve()
+        return self.problem.solve()
 
 
 class Drag(NotCopyable, Generic[Answer]):
@@ -312,25 +326,22 @@ class Drag(NotCopyable, Generic[Answer]):
 
     @q.setter
     def q(self, q: Array) -> None:
-        if isinstance(self._run, AssemblyDrag):
-            raise InputError("Drag: the posture of an assembly is set by assembly.place(variables)")
-        self._run.q = np.array(posture(q, self._run.problem.scene.model.nq, "Drag: q"))
+        self._run.place(q)
 
     @property
     def problem(self) -> Problem | Assembly:
         """The problem, whose goals are replaced as they move; or the assembly."""
-        return self._run.assembly if isinstance(self._run, AssemblyDrag) else self._run.problem
+        return self._run.problem
 
     @property
     def workspace(self) -> Workspace | None:
         """Distances and sweeps of its frames; None for an assembly in which no shapes can touch."""
-        run = self._run
-        return run.assembly.workspace if isinstance(run, AssemblyDrag) else run.tracker.workspace
+        return self._run.workspace
 
     @property
     def tracker(self) -> Tracker | None:
         """The method's tracker of the problem's goals; None for an assembly."""
-        return self._run.tracker if isinstance(self._run, ProblemDrag) else None
+        return self._run.tracker
 
     def to(self, target: Any) -> DragFrame:
         """Move the goal to a position, placement or orientation, as its kind has it, and make one frame towards it.

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from wholebody.assessment.posture import distance_and_angle
 from wholebody.base.arrays import Array
 from wholebody.base.checks import a
 from wholebody.base.errors import InputError
@@ -131,13 +132,9 @@ def _target(goal: Any, here: pin.SE3 | None, state: State, scene: ViewedScene) -
 
 def left(goal: Any, state: State) -> str:
     """Remaining error of a goal in words: "3.2 mm", "1.5°", or both."""
-    error = np.atleast_1d(goal.error(state))
-    angular = np.broadcast_to(goal.angular, error.shape)
-    parts: Iterable[str] = (
-        f"{1000 * np.linalg.norm(error[~angular]):.1f} mm" if (~angular).any() else "",
-        f"{np.degrees(np.linalg.norm(error[angular])):.1f}°" if angular.any() else "",
-    )
-    return "  ".join(part for part in parts if part)
+    distance, angle = distance_and_angle(goal, state)
+    parts = [] if distance is None else [f"{1000 * distance:.1f} mm"]
+    return "  ".join(parts if angle is None else [*parts, f"{np.degrees(angle):.1f}°"])
 
 
 def mark_axes(keyframe: Keyframe, path: str, place: pin.SE3, length: float) -> None:
