@@ -55,7 +55,6 @@ WRITERS: dict[str, tuple[Callable[[Path], Any], tuple[str, ...]]] = {
     "write_filmstrip": (lambda path: write_filmstrip(shown(), list(postures()), path), (".png",)),
     "Records.chart": (lambda path: Records([]).chart(path), (".png",)),
     "Records.to_csv": (lambda path: Records([]).to_csv(path), (".csv",)),
-    "Records.to_parquet": (lambda path: Records([]).to_parquet(path), (".parquet", ".pq")),
     "ReachMap.save": (lambda path: reached().save(path), (".npz",)),
     "ReachMap.to_vtk": (lambda path: reached().to_vtk(path), (".vtk",)),
     "ReachMap.picture": (lambda path: reached().picture(path), (".png",)),

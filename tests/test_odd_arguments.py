@@ -433,7 +433,6 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "check_derivatives", Call(wb.check_derivatives, checked, str)
     yield "simplify", Call(wb.simplify, {"problem": ask})
     part = wb.simplify(ask)
-    yield "Simplified.posture", Call(part.posture, {"q": part.problem.start})
     yield "Solution.plot", Call(wb.solve(part.problem).plot, {})
     yield "Simplified.restored", Call(part.restored, {"solution": wb.solve(part.problem)})
     judged = wb.assess(ask, q)
@@ -887,7 +886,7 @@ ANSWERS = (
     "InteractionScene", "Wrench", "Recording.of", "Scene.of_parts", "ClipCheck", "Beyond", "Avoided",
     "AvoidanceReport", "Contact", "Sliding", "Deviation", "Torques", "SphereFilling", "AssemblySolution",
     "AssemblyStep", "SolveRecord", "SolveRecord.of", "SolveRecord.row", "SolveRecord.as_json",
-    "SolveRecord.from_json", "SolveProgress", "Records.to_parquet", "ReachMap", "Accommodation", "Ergonomics",
+    "SolveRecord.from_json", "SolveProgress", "ReachMap", "Accommodation", "Ergonomics",
     "BodyAngles", "Rula", "Reba", "StaticTorques", "Sight", "Result", "Contacts.joined", "DerivativeCheck",
     "AvoidedCase", "BatchProgress", "Ground", "Plan", "WorldFrame", "Overlap", "EngineFrame", "Event",
 )  # fmt: skip

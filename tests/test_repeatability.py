@@ -128,7 +128,7 @@ def test_forgotten_guesses_are_those_of_a_new_run(monkeypatch: pytest.MonkeyPatc
     expected = distances(new, q)
     for seen in (True, False):
         if not seen:
-            monkeypatch.setattr("wholebody.geometry.pair_distances.guess_views", lambda requests: None)
+            monkeypatch.setattr("wholebody.geometry.pair_distances.guess_view", lambda requests: None)
         used = PairDistances(geometry, pairs)
         for posture in ("standing", "t_pose"):
             distances(used, scene.figure.posture(posture))

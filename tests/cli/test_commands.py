@@ -363,3 +363,23 @@ def test_a_package_that_is_missing_is_named(
         command = ["drag", str(root / "examples" / "tasks" / "shelf.toml"), "--live", "--out", str(tmp_path)]
     assert main(command) == 2
     assert f"{package}, which is not installed; run: pip install 'wholebody[" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["clip", "check", "walk.npz"],
+        ["clip", "avoid", "walk.npz"],
+        ["clip", "retarget", "walk.bvh"],
+        ["study", "study.toml"],
+        ["reach", "task.toml", "--frame", "tip", "--low", "0,0,0", "--high", "1,1,1"],
+        ["bench", "compare"],
+    ],
+    ids=" ".join,
+)
+def test_a_cluster_that_does_not_answer_is_refused_even_for_one_case(
+    command: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("distributed")
+    assert main([*command, "--cluster", "not an address"]) == 2
+    assert "no dask scheduler answers at not an address" in capsys.readouterr().err

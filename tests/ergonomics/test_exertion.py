@@ -79,16 +79,19 @@ def test_the_disc_bears_what_levers_say(person: wb.Figure) -> None:
     assert loaded - empty == pytest.approx(196.2 * lever / 0.06 + 196.2, rel=0.03)
 
 
-def test_who_pushes_leans_forward(person: wb.Figure) -> None:
+@pytest.mark.parametrize("slide", [False, True])
+def test_who_pushes_leans_forward(person: wb.Figure, slide: bool) -> None:
     goals = [wb.Point("left_palm", (0.5, 0.2, 1.0)), wb.Point("right_palm", (0.5, -0.2, 1.0))]
-    loaded = LoadedBalance(PUSHED)
-    solution = wb.solve(wb.Problem(wb.Scene(person), goals=goals, constraints=[*FEET, loaded]))
+    feet = [wb.Stand("floor", balance=False)] if slide else FEET
+    scene = wb.Scene(person).add(wb.HalfSpace(), name="floor")
+    solution = wb.solve(wb.Problem(scene, goals=goals, constraints=[*feet, LoadedBalance(PUSHED)]))
     assert solution.solved
-    heel = person.placement(solution.q, "left_heel").translation[0]
+    heel, toe = (person.placement(solution.q, f"left_{end}").translation[0] for end in ("heel", "toe_tip"))
     center = pin.centerOfMass(person.model, person.model.createData(), solution.q)[0]
     weight = 9.81 * pin.computeTotalMass(person.model)
-    # About the heels the weight has at least the moment of 200 N one metre high.
+    # About the heels the weight has at least the moment of 200 N one metre high; about the toes it has no more.
     assert weight * (center - heel) >= 200.0 * 1.0
+    assert weight * (center - toe) <= 200.0 * 1.0
 
 
 def test_a_bound_on_the_back_is_kept(person: wb.Figure) -> None:

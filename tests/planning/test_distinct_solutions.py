@@ -85,17 +85,22 @@ def test_what_is_in_the_way_leaves_the_others(arm: wb.Figure) -> None:
     assert same([answer.q for answer in wb.solutions(problem)], np.array(free))
 
 
-def test_whole_turns_are_no_other_answers() -> None:
-    """A UR5 with joints of two turns has up to eight branches (Hawkins 2013); each is found once."""
+def test_an_arm_with_a_closed_form_has_all_of_its_branches() -> None:
+    """A UR5 with joints of two turns has up to eight branches (Hawkins 2013); each is found once, and no other is."""
     figure, ready = known_arm("ur5")
     tool = figure.placement(np.array((0.4, -1.2, 1.4, -1.1, -1.3, 0.2)), "tool")
     problem = wb.Problem(wb.Scene(figure), ready, goals=[wb.Frame("tool", tool)])
-    found = wb.solutions(problem, most=100, starts=120)
-    assert 2 <= len(found) <= 8
-    for k, one in enumerate(found):
-        for other in found[:k]:
-            apart = (one.q - other.q + np.pi) % (2.0 * np.pi) - np.pi
-            assert np.abs(apart).max() > 0.2
+    found = wb.solutions(problem, most=100)
+    assert len(found) == found.starts == 8
+    assert found.complete
+
+    def apart(one: np.ndarray, other: np.ndarray) -> float:
+        return float(np.abs((one - other + np.pi) % (2.0 * np.pi) - np.pi).max())
+
+    assert all(apart(one.q, other.q) > 0.2 for k, one in enumerate(found) for other in found[:k])
+    for answer in wb.methods.QP().minima(problem, np.random.default_rng(2).uniform(-6.2, 6.2, (30, 6))):
+        assert not answer.solved or min(apart(answer.q, one.q) for one in found) < 1e-3
+    assert not wb.solutions(problem, starts=5).complete
 
 
 def test_out_of_reach_there_are_none(arm: wb.Figure) -> None:

@@ -153,12 +153,6 @@ def test_records_are_written_as_a_table(arm: wb.Figure, tmp_path: Path) -> None:
     assert [line.split(",")[:2] for line in lines[1:]] == [["near", "solved"], ["far", "unreachable"]]
     assert records.solved == 0.5
     assert "1 solved, 1 unreachable" in repr(records)
-    try:
-        import pyarrow  # noqa: F401
-    except ImportError:
-        with pytest.raises(wb.MissingPackageError, match="pyarrow"):
-            records.to_parquet(tmp_path / "a.parquet")
-        assert not (tmp_path / "a.parquet").exists()
 
 
 def test_what_is_not_solved_from_its_own_start_is_tried_from_the_answers_of_neighbours(arm: wb.Figure) -> None:

@@ -7,7 +7,6 @@ serves one job after the other and is replaced after it ended. It ends by itself
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import pickle
 import resource
@@ -49,7 +48,7 @@ class EndedError(WholebodyError):
     Attributes:
         overtime: whether the deadline ended it.
         code: its exit code; the negative number of the signal that ended it.
-        said: the last line that it wrote; "" if it wrote none, or was forked.
+        said: the last line that it wrote; "" if it wrote none.
     """
 
     def __init__(self, code: int, said: str = "") -> None:
@@ -95,9 +94,9 @@ class Started(NamedTuple):
 class Child:
     """A child process that does one job at a time; a new one replaces it when it has ended."""
 
-    def __init__(self, environment: Mapping[str, str] | None = None, forked: bool = False) -> None:
-        """Prepare, with `environment` in place of this process's; `forked`: a fork a job, which needs no imports."""
-        self._environment, self._forked = dict(environment or {}), forked
+    def __init__(self, environment: Mapping[str, str] | None = None) -> None:
+        """Prepare, with variables of `environment` in place of this process's."""
+        self._environment = dict(environment or {})
         self._process: subprocess.Popen[bytes] | BaseProcess | None = None
         self._output: IO[bytes] | None = None
         self._connection: Connection | None = None
@@ -132,9 +131,6 @@ class Child:
     def begin(self, job: Job) -> None:
         """Send a job; `listen` returns its outcome."""
         self._job, self._notes = job, []
-        if self._forked:
-            self._fork(job)
-            return
         if self._process is None:
             self._process, self._connection, self._output = start_process(os.environ | self._environment)
         try:
@@ -154,8 +150,6 @@ class Child:
             self._notes.append(value)
             return None
         job, self._job = self._job, None
-        if self._forked:
-            self.close()
         return Outcome(job, tuple(self._notes), value, None)
 
     def close_if_full(self) -> None:
@@ -173,21 +167,14 @@ class Child:
                 stream.close()
         self._process = self._output = self._connection = self._job = None
 
-    def _fork(self, job: Job) -> None:
-        context = multiprocessing.get_context("fork")
-        self._connection, theirs = context.Pipe()
-        self._process = context.Process(target=_serve_one, args=(theirs, job, self._environment), daemon=True)
-        self._process.start()
-        theirs.close()
-
     def _ended(self) -> EndedError:
         assert self._process is not None
-        code, said = _wait_for(self._process), ""
-        if self._output is not None:
-            self._output.seek(0)
-            lines = self._output.read().decode("utf-8", errors="replace").strip().splitlines()
-            # most characters kept of the last line that a process wrote
-            said = lines[-1].strip()[:200] if lines else ""
+        assert self._output is not None
+        code = _wait_for(self._process)
+        self._output.seek(0)
+        lines = self._output.read().decode("utf-8", errors="replace").strip().splitlines()
+        # most characters kept of the last line that a process wrote
+        said = lines[-1].strip()[:200] if lines else ""
         self.close()
         return EndedError(code, said)
 
@@ -285,7 +272,8 @@ def serve(descriptor: int, parent: int) -> None:
     """Do jobs until the parent, a process id, has ended; the main loop of a process of `Child`."""
     global _parent
     _parent = Connection(descriptor)
-    _end_at_alarms()
+    for alarm in (signal.SIGALRM, signal.SIGPROF):
+        signal.signal(alarm, signal.SIG_DFL)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with(parent)
     try:
@@ -298,21 +286,6 @@ def serve(descriptor: int, parent: int) -> None:
             _parent.send((True, answer))
     except (EOFError, BrokenPipeError, ConnectionResetError):
         return
-
-
-def _serve_one(parent: Connection, job: Job, environment: Mapping[str, str]) -> None:
-    global _parent
-    _parent = parent
-    os.environ.update(environment)
-    _end_at_alarms()
-    allow(job.seconds)
-    parent.send((True, job.function(*job.arguments)))
-    _exit(0)  # the process must not close resources of the parent
-
-
-def _end_at_alarms() -> None:
-    for alarm in (signal.SIGALRM, signal.SIGPROF):
-        signal.signal(alarm, signal.SIG_DFL)
 
 
 def _wait_for(process: subprocess.Popen[bytes] | BaseProcess) -> int:

@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 
 from wholebody.base.checks import is_number
 from wholebody.base.errors import InputError, UnknownNameError, suggestion
-from wholebody.cli.command import Option, count, flag, option
+from wholebody.cli.command import Option, checked, count, flag, option
 
 JOINED = "X,Y,Z"
 """How the help shows numbers that are joined by commas."""
@@ -79,17 +79,18 @@ def person_options(arguments: argparse.Namespace) -> dict[str, Any]:
     return given
 
 
+def _at_once(arguments: argparse.Namespace) -> None:
+    from wholebody.base.batches import threads
+
+    arguments.at_once = arguments.jobs or (threads(arguments.cluster) if arguments.cluster else 1)
+
+
 JOBS: tuple[Option, ...] = (
     count("--jobs", None, "cases at a time (default: 1, or all of the cluster)"),
     option("--cluster", metavar="ADDRESS", help="of a dask scheduler, such as tcp://10.0.0.1:8786"),
+    checked(_at_once),
 )
-
-
-def jobs_of(arguments: argparse.Namespace) -> int:
-    """How many cases are done at a time; raises WholebodyError for a cluster that does not answer."""
-    from wholebody.base.batches import threads
-
-    return int(arguments.jobs or (threads(arguments.cluster) if arguments.cluster else 1))
+"""How many cases are done `at_once`, and where; a cluster that does not answer is refused before anything is done."""
 
 
 def scene_options(scene: str, overlap: str, out: str) -> tuple[Option, ...]:

@@ -17,6 +17,8 @@ FLAGS = {
     "arms_supported": "the arms rest on something",
     "walking": "the person walks",
 }
+OF_SCORES = {*FLAGS, "load", "coupling", "seated", "sex", "percentile"}
+"""Options that only the scores of ergonomics read."""
 
 
 @command(
@@ -27,16 +29,19 @@ Judge the posture of a result.json that `wholebody pose` wrote: goals, overlaps,
 print RULA, REBA, OWAS and the torques against published strength too; --json prints all of it.""",
     option("result", type=Path, metavar="RESULT.json", help="the result"),
     flag("--ergonomics", "score the ergonomics of a person"),
-    option("--load", type=float, default=0.0, metavar="KG", help="mass in both hands (default: 0)"),
-    option("--coupling", default="good", metavar="WORD", help="grip: good, fair, poor, unacceptable"),
-    *(flag(f"--{name.replace('_', '-')}", says) for name, says in FLAGS.items()),
+    option("--load", type=float, metavar="KG", help="mass in both hands (default: 0)"),
+    option("--coupling", metavar="WORD", help="grip: good (default), fair, poor, unacceptable"),
+    *(
+        option(f"--{name.replace('_', '-')}", action="store_const", const=True, help=says)
+        for name, says in FLAGS.items()
+    ),
     option(
         "--seated",
         choices=("yes", "no"),
         help="whether the person sits (default: told by what is below, or the posture)",
     ),
-    option("--sex", default="male", metavar="SEX", help="of the strength: male or female (default: male)"),
-    option("--percentile", type=float, default=50.0, metavar="P", help="of the strength, 5 to 95 (default: 50)"),
+    option("--sex", metavar="SEX", help="of the strength: male or female (default: male)"),
+    option("--percentile", type=float, metavar="P", help="of the strength, 5 to 95 (default: 50)"),
     flag("--json", "print JSON instead of tables"),
     epilog="""\
 examples:
@@ -46,7 +51,11 @@ exit code: 1 if the posture violates a limit, a constraint or a clearance by mor
 )
 def run(arguments: argparse.Namespace) -> int:
     """Judge and print; 1 if the posture violates something."""
-    _check_options(arguments)
+    given = {name: value for name, value in vars(arguments).items() if name in OF_SCORES and value is not None}
+    if given and not arguments.ergonomics:
+        raise InputError(
+            f"--{next(iter(given)).replace('_', '-')} is read by the scores of ergonomics alone; add --ergonomics"
+        )
     from wholebody.assessment.posture import assess
     from wholebody.taskfile import result
 
@@ -62,26 +71,16 @@ def run(arguments: argparse.Namespace) -> int:
         from wholebody.motion.strength import Strength
 
         check_person(task.problem.scene.figure, "--ergonomics")
-        told = {name: getattr(arguments, name) for name in FLAGS}
-        seated = None if arguments.seated is None else arguments.seated == "yes"
-        work = Work(arguments.load, coupling=arguments.coupling, seated=seated, **told)
-        scores = ergonomics_of(task.problem.scene, q, work, Strength(arguments.percentile, arguments.sex))
+        strength = Strength(**{name: given.pop(name) for name in ("percentile", "sex") if name in given})
+        if "seated" in given:
+            given["seated"] = given["seated"] == "yes"
+        scores = ergonomics_of(task.problem.scene, q, Work(**given), strength)
         described["ergonomics"] = scores.summary()
     if arguments.json:
         print(result.as_json(described), end="")
     else:
         _show(judged, scores)
     return 0 if judged.holds(1e-4) else 1  # m, rad: of limits, constraints and clearances
-
-
-def _check_options(arguments: argparse.Namespace) -> None:
-    """Refuse options that only the scores of ergonomics read, where these are not asked for."""
-    usual = {"load": 0.0, "coupling": "good", "seated": None, "sex": "male", "percentile": 50.0} | dict.fromkeys(
-        FLAGS, False
-    )
-    given = [name for name, value in usual.items() if getattr(arguments, name) != value]
-    if given and not arguments.ergonomics:
-        raise InputError(f"--{given[0].replace('_', '-')} is read by the scores of ergonomics alone; add --ergonomics")
 
 
 def _show(judged: Any, scores: Any) -> None:

@@ -41,16 +41,14 @@ class Command:
         parser = commands.add_parser(
             self.name, help=self.help, description=self.description, epilog=self.epilog, formatter_class=shape
         )
-        parser.set_defaults(run=self.run, counted=())
+        parser.set_defaults(run=self.run, checks=())
         for add in self.options:
             add(parser)
 
     def run(self, arguments: argparse.Namespace) -> int:
-        """Run it, and return the exit code; raises InputError where an option of `count` is below its least."""
-        for flag, least in arguments.counted:
-            number = getattr(arguments, flag.removeprefix("--").replace("-", "_"))
-            if number is not None and number < least:
-                raise InputError(f"{flag} is {number}; give {least} or more")
+        """Check the options that have checks of their own, run it, and return the exit code."""
+        for check in arguments.checks:
+            check(arguments)
         return self.measure(arguments) or 0
 
 
@@ -94,8 +92,18 @@ def count(name: str, default: int | None, help: str, least: int = 1) -> Option:
     """An option that counts things to do, `least` or more; the help says the default."""
 
     def add(parser: argparse.ArgumentParser) -> None:
+        def check(arguments: argparse.Namespace) -> None:
+            number = getattr(arguments, name.removeprefix("--").replace("-", "_"))
+            if number is not None and number < least:
+                raise InputError(f"{name} is {number}; give {least} or more")
+
         said = help if default is None or "(default" in help else f"{help} (default: {default})"
         parser.add_argument(name, type=int, default=default, metavar="N", help=said)
-        parser.set_defaults(counted=(*parser.get_default("counted"), (name, least)))
+        checked(check)(parser)
 
     return add
+
+
+def checked(check: Callable[[argparse.Namespace], None]) -> Option:
+    """No option, but a check of those that were given, which comes before the command runs."""
+    return lambda parser: parser.set_defaults(checks=(*parser.get_default("checks"), check))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from wholebody.cli.arguments import JOBS, JOINED, jobs_of
-from wholebody.cli.command import command, flag, option
+from wholebody.cli.arguments import JOBS, JOINED
+from wholebody.cli.command import command, option
 
 
 @command(
@@ -26,7 +26,6 @@ goals, and write into a folder:
     option("--high", required=True, metavar=JOINED, help="greatest corner"),
     option("--step", default="0.1", metavar="M", help="metres between places, or X,Y,Z (default: 0.1)"),
     *JOBS,
-    flag("--goals", "meet the task's goals at every place too"),
     option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-TASK)"),
     epilog="""\
 examples:
@@ -44,13 +43,12 @@ def run(arguments: argparse.Namespace) -> int:
     low, high = _numbers(arguments.low, "--low"), _numbers(arguments.high, "--high")
     step = _numbers(arguments.step, "--step") if "," in arguments.step else _numbers(arguments.step, "--step", 1)[0]
     task = read_task(arguments.task)
-    if not arguments.goals:
-        task.problem.retarget([])
+    task.problem.retarget([])
     out = arguments.out or Path("out") / arguments.task.stem
     make_folder(out)
     with Console(stderr=True).status("searching") as status:
         found = reach_map(
-            task.problem, arguments.frame, low, high, step, jobs=jobs_of(arguments), cluster=arguments.cluster,
+            task.problem, arguments.frame, low, high, step, jobs=arguments.at_once, cluster=arguments.cluster,
             progress=lambda done, total: status.update(f"{done} of {total} places"),
         )  # fmt: skip
     print(found)

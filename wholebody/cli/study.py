@@ -6,8 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from wholebody.cli.arguments import JOBS, jobs_of
-from wholebody.cli.command import command, flag, option
+from wholebody.cli.arguments import JOBS
+from wholebody.cli.command import command, option
 
 
 @command(
@@ -21,7 +21,6 @@ Solve the task of a study file for each person, with each target, in each layout
     option("study", type=Path, metavar="FILE.toml", help="the study file"),
     option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-FILE)"),
     *JOBS,
-    flag("--parquet", "write cases.parquet too (needs pyarrow)"),
     epilog="""\
 a study file:
   task = "shelf.toml"                     # relative to the study file
@@ -41,7 +40,7 @@ a study file:
 
 examples:
   wholebody study shelf-study.toml --jobs 2
-  wholebody study shelf-study.toml --out results/study --parquet""",
+  wholebody study shelf-study.toml --out results/study""",
 )
 def run(arguments: argparse.Namespace) -> int:
     """Solve, report and write; 1 if a case is not solved."""
@@ -58,7 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
     with Console(stderr=True).status("solving") as status:
         records = study(
             asked.task, people=asked.people, targets=asked.targets, layouts=asked.layouts, method=asked.method,
-            warm_start=asked.warm_start, jobs=jobs_of(arguments), cluster=arguments.cluster, folder=out,
+            warm_start=asked.warm_start, jobs=arguments.at_once, cluster=arguments.cluster, folder=out,
             progress=lambda told: status.update(f"{told.done} of {told.total}"),
         )  # fmt: skip
     made = table("case", "outcome", "goal error", "overlap", "time")
@@ -72,6 +71,4 @@ def run(arguments: argparse.Namespace) -> int:
         if one.q is None:
             print(f"{one.name}: {one.message}", file=sys.stderr)
     print(f"wrote {records.to_csv(out / 'cases.csv')}")
-    if arguments.parquet:
-        print(f"wrote {records.to_parquet(out / 'cases.parquet')}")
     return 0 if all(one.solved for one in records) else 1

@@ -72,18 +72,10 @@ def use_tool(name: str) -> str:
     return path
 
 
-def list_methods(_: str) -> str:
-    """Names of the methods whose packages are installed, separated by spaces."""
-    from wholebody.methods import installed_methods
-
-    return " ".join(installed_methods())
-
-
 CHECKS: dict[str, Callable[[str], str]] = {
     "import": lambda name: str(import_module(name).__file__),
     "program": solve_program,
     "pose": pose_person,
-    "methods": list_methods,
     "tool": use_tool,
 }
 

@@ -11,6 +11,7 @@ from typing import Literal
 from wholebody.doctor import checks, packages
 from wholebody.doctor.packages import EXTRAS, MODULES, Distribution
 from wholebody.methods import EXTRAS as OF_METHODS
+from wholebody.methods import installed_methods
 
 State = Literal["works", "absent", "broken"]
 
@@ -101,11 +102,7 @@ def _solvers(have: Mapping[str, Distribution]) -> Iterator[Entry]:
 
 
 def _methods() -> Iterator[Entry]:
-    listed = checks.run("methods", [""])[""]
-    if not listed.works:
-        yield Entry("method", "all", "broken", listed.detail, repair=AGAIN)
-        return
-    for name, outcome in checks.run("pose", listed.detail.split()).items():
+    for name, outcome in checks.run("pose", installed_methods()).items():
         if outcome.works:
             yield Entry("method", name, "works", outcome.detail)
         else:

@@ -89,11 +89,10 @@ class Statics(NamedTuple):
         moves = [point_rows(state, sole, one.joint) for sole, one in zip(soles, self.feet, strict=True)]
         middle, d_middle = np.mean(soles, axis=0), np.mean(moves, axis=0)
         height = float(middle[2])
-        at, d_at = pressure(state, self.loads, self.body, height)
+        at, d_at = pressure(state, self.loads, self.body, height, d_middle[2])
         carried = self.body or range(1, state.model.njoints)
         weight = GRAVITY * sum(state.model.inertias[k].mass for k in carried)
         whole = np.array((0.0, 0.0, weight)) - self.loads.vectors.sum(axis=0)
-        d_at += np.outer(whole[:2] / whole[2], d_middle[2])  # of where it presses at another height
         at, d_at = np.append(at, height), np.vstack([d_at, d_middle[2]])
         if len(soles) == 1:
             return [(self.feet[0].joint, at, d_at, whole, np.zeros_like(d_at))]

@@ -80,11 +80,11 @@ def read_result(result: Any) -> Array:
     return np.concatenate([[result.min_distance], result.normal, result.getNearestPoint1(), result.getNearestPoint2()])
 
 
-def guess_views(requests: Any) -> tuple[NDArray[np.float64], NDArray[np.int32]] | None:
-    """Views of coal's guesses, (n, 3) directions and (n, 2) vertices; None if their layout is not as expected."""
+def guess_view(requests: Any) -> Array | None:
+    """View of coal's guesses (n, 4): directions, and in 8 bytes two vertices; None if laid out otherwise."""
     count = len(requests)
     if count == 0:
-        return np.zeros((0, 3)), np.zeros((0, 2), dtype=np.int32)
+        return np.zeros((0, 4))
     direction, vertices = requests[0].cached_gjk_guess, requests[0].cached_support_func_guess
     base = address(direction)
     if vertices.dtype != np.int32 or vertices.shape != (2,) or direction.shape != (3,):
@@ -95,10 +95,7 @@ def guess_views(requests: Any) -> tuple[NDArray[np.float64], NDArray[np.int32]] 
         # bytes from the guessed direction to the guessed vertices of the two shapes
         if address(requests[k].cached_support_func_guess) != base + REQUEST_STRIDE * k + 24:
             return None
-    return (
-        np.lib.stride_tricks.as_strided(direction, (count, 3), (REQUEST_STRIDE, 8)),
-        np.lib.stride_tricks.as_strided(vertices, (count, 2), (REQUEST_STRIDE, 4)),
-    )
+    return np.lib.stride_tricks.as_strided(direction, (count, 4), (REQUEST_STRIDE, 8))
 
 
 def fix_box_inflation() -> None:

@@ -13,7 +13,7 @@ from wholebody.geometry.memory_views import (
     RESULT_FIELDS,
     computed_first,
     fields,
-    guess_views,
+    guess_view,
     placement_view,
     read_result,
     result_view,
@@ -25,7 +25,7 @@ KEPT = 30_000
 
 ROOM = 64  # results that are read at once
 AWAY = 10.0  # m: between pieces that stand anywhere
-FIRST_DIRECTION = (1.0, 0.0, 0.0)  # coal's own guess for a pair it has not seen
+FIRST_GUESS = np.array([1.0, 0.0, 0.0, 0.0])  # coal's own for a pair it has not seen: a direction, two vertices zero
 
 
 class PairDistances:
@@ -61,7 +61,7 @@ class PairDistances:
         for number in computed_first(len(data.distanceResults)):
             pin.computeDistance(geometry, data, number)
         self.results = result_view(data.distanceResults)
-        self._guesses = guess_views(data.distanceRequests)
+        self._guesses = guess_view(data.distanceRequests)
         self._single = SinglePairs(geometry)
 
     def _copied(self) -> Array:
@@ -70,10 +70,10 @@ class PairDistances:
     def reset(self) -> None:
         """Reset the guess of every pair to coal's initial guess."""
         if self._guesses is not None:
-            self._guesses[0][:], self._guesses[1][:] = FIRST_DIRECTION, 0
+            self._guesses[:] = FIRST_GUESS
             return
         for request in self.data.distanceRequests:
-            request.cached_gjk_guess = np.array(FIRST_DIRECTION)
+            request.cached_gjk_guess = FIRST_GUESS[:3]
             request.cached_support_func_guess = np.zeros(2, dtype=np.int32)
 
     def place(self, model: pin.Model, data: Any) -> None:

@@ -76,122 +76,162 @@ def _patch_ends(
     """Ends of the patches of the contacts `wide`, at most `most_ends` each: contact (m,), point (m, 3) and gap (m,)."""
     pair, distance, normal, point_a, point_b, _, placement = contacts
     points, first_point, faces, first_face, radius, axis = shapes
-    band, inset, shortest, accuracy, setback = lengths[1], lengths[2], lengths[3], lengths[5], lengths[6]
+    most, most_points = _room(wide, pair, first_point)
+    contact = np.empty(most, dtype=np.intp)
+    place = np.empty((most, 3))
+    gap = np.empty(most)
+    drop, share, sag = np.empty(most_points), np.empty(most_points), np.empty(most_points)
+    lever, along = np.empty((3, most_points)), np.empty((3, most_points))
+    outward = np.empty(3)
+    filled = 0
+    for c in wide:
+        first_begun = filled
+        for side in range(2):
+            own, other = pair[c, side], pair[c, 1 - side]
+            for k in range(3):
+                outward[k] = normal[c, k] if side == 0 else -normal[c, k]
+            witness, facing = (point_a[c], point_b[c]) if side == 0 else (point_b[c], point_a[c])
+            own_points = points[first_point[own] : first_point[own + 1]]
+            count = _in_band(own_points, placement[own], witness, outward, (radius[own], lengths[1]), (drop, lever))
+            surface = (placement[other], faces[first_face[other] : first_face[other + 1]], radius[other], axis[other])
+            whole = _over_surface(surface, facing, outward, (lengths[2], lengths[5]), count, (lever, along, share, sag))
+            begun = filled
+            for e in range(count):
+                long = np.sqrt(lever[0, e] * lever[0, e] + lever[1, e] * lever[1, e] + lever[2, e] * lever[2, e])
+                if long * share[e] > lengths[3]:
+                    contact[filled] = c
+                    for k in range(3):
+                        place[filled, k] = witness[k] + share[e] * lever[k, e]
+                    gap[filled] = distance[c] + share[e] * drop[e] + sag[e]
+                    filled += 1
+            if whole and count > 0:  # this side is the patch: the other side's points add nothing
+                for row in range(filled - begun):
+                    for k in range(3):
+                        place[first_begun + row, k] = place[begun + row, k]
+                    gap[first_begun + row] = gap[begun + row]
+                filled = first_begun + filled - begun
+                break
+        if filled - first_begun > most_ends:
+            _farthest_first(
+                place[first_begun:filled], gap[first_begun:filled], point_a[c], distance[c], lengths[6], most_ends
+            )  # fmt: skip
+            filled = first_begun + most_ends
+    return contact[:filled], place[:filled], gap[:filled]
+
+
+@compiled(inner=True)
+def _room(wide: Indices, pair: Indices, first_point: Indices) -> tuple[int, int]:
+    """How many points the pieces of some contacts have in all, and the most of one piece."""
     most, most_points = 0, 0
     for c in wide:
         for side in range(2):
             points_of_one = first_point[pair[c, side] + 1] - first_point[pair[c, side]]
             most += points_of_one
             most_points = max(most_points, points_of_one)
-    contact = np.empty(most, dtype=np.intp)
-    place = np.empty((most, 3))
-    gap = np.empty(most)
-    # of the points of one side that are in the band
-    drop, length, worst = np.empty(most_points), np.empty(most_points), np.empty(most_points)
-    sagging = np.empty(most_points)  # how far the other piece falls below the plane until there, as it begins to
-    lever, along = np.empty((3, most_points)), np.empty((3, most_points))
-    filled = 0
-    base, down, shift = np.empty(3), np.empty(3), np.empty(3)
-    for c in wide:
-        first_begun, first_whole = filled, False
-        for side in range(2):
-            own, other = pair[c, side], pair[c, 1 - side]
-            sign = 1.0 if side == 0 else -1.0
-            witness = point_a[c] if side == 0 else point_b[c]
-            facing = point_b[c] if side == 0 else point_a[c]
-            capsule = axis[other, 0] != 0.0 or axis[other, 1] != 0.0 or axis[other, 2] != 0.0
-            begun = filled
-            whole = True
-            half_width = np.sqrt(2.0 * radius[other] * inset)
-            above = 0.0
-            for k in range(3):
-                shift[k] = facing[k] + inset * sign * normal[c, k] - placement[other, 3, k]
-                above += (placement[own, 3, k] - witness[k]) * sign * normal[c, k]
-            _to_frame(placement[other], shift, 1.0, base)
-            _to_frame(placement[own], normal[c], sign, down)
-            count = 0
-            longest = 0.0
-            for number in range(first_point[own], first_point[own + 1]):
-                height = above + points[number, 0] * down[0] + points[number, 1] * down[1] + points[number, 2] * down[2]
-                if -height - radius[own] >= band:
-                    continue
-                drop[count] = max(-height - radius[own], 0.0)
-                square = 0.0
-                for k in range(3):
-                    step = placement[own, 3, k] - witness[k] - height * sign * normal[c, k]
-                    for i in range(3):
-                        step += points[number, i] * placement[own, i, k]
-                    lever[k, count] = step
-                    square += step * step
-                length[count] = np.sqrt(square)
-                longest = max(longest, length[count])
-                worst[count] = 1.0
-                count += 1
+    return most, most_points
+
+
+@compiled(inner=True)
+def _in_band(
+    points: Array,
+    placement: Array,
+    witness: Array,
+    outward: Array,
+    size: tuple[float, float],
+    found: tuple[Array, Array],
+) -> int:
+    """Points of a piece that lie in the band below the plane of contact: how many there are.
+
+    `size`: its radius and the width of the band. Of each point it writes by how much it lies below the plane (n,), and
+    its lever (3, n): the way from the witness point to it within the plane.
+    """
+    radius, band = size
+    drop, lever = found
+    down = np.empty(3)
+    above = 0.0
+    for k in range(3):
+        above += (placement[3, k] - witness[k]) * outward[k]
+    _to_frame(placement, outward, 1.0, down)
+    count = 0
+    for number in range(len(points)):
+        height = above + points[number, 0] * down[0] + points[number, 1] * down[1] + points[number, 2] * down[2]
+        if -height - radius >= band:
+            continue
+        drop[count] = max(-height - radius, 0.0)
+        for k in range(3):
+            step = placement[3, k] - witness[k] - height * outward[k]
             for i in range(3):
-                for e in range(count):
-                    along[i, e] = (
-                        placement[other, i, 0] * lever[0, e]
-                        + placement[other, i, 1] * lever[1, e]
-                        + placement[other, i, 2] * lever[2, e]
-                    )
-            for f in range(first_face[other], first_face[other + 1] if count else 0):
-                x, y, z = faces[f, 0], faces[f, 1], faces[f, 2]
-                room = faces[f, 3] - x * base[0] - y * base[1] - z * base[2]
-                if room < longest:  # else no lever leads out of this face
-                    share = 1.0 / max(room, 1e-12)
-                    for e in range(count):
-                        climb = share * (x * along[0, e] + y * along[1, e] + z * along[2, e])
-                        if climb > worst[e]:
-                            worst[e] = climb
-            _to_frame(placement[other], normal[c], sign, shift)
+                step += points[number, i] * placement[i, k]
+            lever[k, count] = step
+        count += 1
+    return count
+
+
+@compiled(inner=True)
+def _over_surface(
+    surface: tuple[Array, Array, float, Array], facing: Array, outward: Array, depths: tuple[float, float], count: int,
+    found: tuple[Array, Array, Array, Array],
+) -> bool:  # fmt: skip
+    """How far levers stay over the other piece, whose witness point is `facing`; whether all of them do to their ends.
+
+    `surface`: placement, faces, radius and axis of that piece; `depths`: the inset, by which its surface may fall below
+    the plane, and the accuracy. Of `found`, levers (3, n) are read; it writes them in the axes of the piece, the share
+    (n,) of each that stays over it, and how far the surface falls there (n,).
+    """
+    placement, faces, radius, axis = surface
+    inset, accuracy = depths
+    lever, along, share, sag = found
+    base, up, shift = np.empty(3), np.empty(3), np.empty(3)
+    for k in range(3):
+        shift[k] = facing[k] + inset * outward[k] - placement[3, k]
+    _to_frame(placement, shift, 1.0, base)
+    _to_frame(placement, outward, 1.0, up)
+    longest = 0.0
+    for i in range(3):
+        for e in range(count):
+            along[i, e] = placement[i, 0] * lever[0, e] + placement[i, 1] * lever[1, e] + placement[i, 2] * lever[2, e]
+    for e in range(count):
+        longest = max(longest, lever[0, e] * lever[0, e] + lever[1, e] * lever[1, e] + lever[2, e] * lever[2, e])
+        share[e], sag[e] = 1.0, 0.0
+    longest = np.sqrt(longest)
+    for f in range(len(faces) if count else 0):
+        x, y, z = faces[f, 0], faces[f, 1], faces[f, 2]
+        room = faces[f, 3] - x * base[0] - y * base[1] - z * base[2]
+        if room < longest:  # else no lever leads out of this face
+            scale = 1.0 / max(room, 1e-12)
             for e in range(count):
-                sagging[e] = 0.0
-            for f in range(first_face[other], first_face[other + 1] if count else 0):
-                x, y, z = faces[f, 0], faces[f, 1], faces[f, 2]
-                slope = -(x * shift[0] + y * shift[1] + z * shift[2])
-                room = faces[f, 3] - x * base[0] - y * base[1] - z * base[2]
-                if slope > 0.0 and room - inset * slope < accuracy:  # the witness point is on this face
-                    for e in range(count):
-                        climb = x * along[0, e] + y * along[1, e] + z * along[2, e]
-                        sagging[e] = max(sagging[e], climb / slope)
+                climb = scale * (x * along[0, e] + y * along[1, e] + z * along[2, e])
+                if climb > share[e]:
+                    share[e] = climb
+        slope = -(x * up[0] + y * up[1] + z * up[2])
+        if slope > 0.0 and room - inset * slope < accuracy:  # the witness point is on this face
             for e in range(count):
-                reach = 1.0 / worst[e]
-                sag = min(reach * sagging[e], inset)
-                if capsule:
-                    across0 = axis[other, 1] * shift[2] - axis[other, 2] * shift[1]
-                    across1 = axis[other, 2] * shift[0] - axis[other, 0] * shift[2]
-                    across2 = axis[other, 0] * shift[1] - axis[other, 1] * shift[0]
-                    norm = max(np.sqrt(across0 * across0 + across1 * across1 + across2 * across2), 1e-9)
-                    offset = abs(across0 * along[0, e] + across1 * along[1, e] + across2 * along[2, e]) / norm
-                    if offset > half_width:
-                        reach = min(reach, half_width / max(offset, 1e-12))
-                    sag = (reach * offset) ** 2 / (2.0 * radius[other])
-                if reach < 1.0:
-                    whole = False
-                if length[e] * reach > shortest:
-                    contact[filled] = c
-                    for k in range(3):
-                        place[filled, k] = witness[k] + reach * lever[k, e]
-                    gap[filled] = distance[c] + reach * drop[e] + sag
-                    filled += 1
-            if side == 0:
-                first_whole = whole and count > 0
-                if first_whole:
-                    break  # this side is the patch: the other side's points add nothing
-            elif whole and count > 0:
-                rows = filled - begun
-                for row in range(rows):
-                    contact[first_begun + row] = contact[begun + row]
-                    for k in range(3):
-                        place[first_begun + row, k] = place[begun + row, k]
-                    gap[first_begun + row] = gap[begun + row]
-                filled = first_begun + rows
-        if filled - first_begun > most_ends:
-            _farthest_first(
-                place[first_begun:filled], gap[first_begun:filled], point_a[c], distance[c], setback, most_ends
-            )  # fmt: skip
-            filled = first_begun + most_ends
-    return contact[:filled], place[:filled], gap[:filled]
+                sag[e] = max(sag[e], (x * along[0, e] + y * along[1, e] + z * along[2, e]) / slope)
+    round_ = axis[0] != 0.0 or axis[1] != 0.0 or axis[2] != 0.0
+    whole = True
+    for e in range(count):
+        share[e] = 1.0 / share[e]
+        sag[e] = min(share[e] * sag[e], inset)
+        if round_:
+            share[e], sag[e] = _across_capsule(radius, axis, up, along[:, e], inset, share[e])
+        whole = whole and share[e] >= 1.0
+    return whole
+
+
+@compiled(inner=True)
+def _across_capsule(
+    radius: float, axis: Array, up: Array, along: Array, inset: float, share: float
+) -> tuple[float, float]:
+    """The share of a lever that stays over a capsule, and how far its surface falls there; all in its axes."""
+    across0 = axis[1] * up[2] - axis[2] * up[1]
+    across1 = axis[2] * up[0] - axis[0] * up[2]
+    across2 = axis[0] * up[1] - axis[1] * up[0]
+    norm = max(np.sqrt(across0 * across0 + across1 * across1 + across2 * across2), 1e-9)
+    offset = abs(across0 * along[0] + across1 * along[1] + across2 * along[2]) / norm
+    half_width = np.sqrt(2.0 * radius * inset)
+    if offset > half_width:
+        share = min(share, half_width / max(offset, 1e-12))
+    return share, (share * offset) ** 2 / (2.0 * radius)
 
 
 @compiled(inner=True)

@@ -1,23 +1,47 @@
-"""The protocols of methods, trackers and steps, and functions that several methods share."""
+"""The protocols of methods, trackers and steps; ranges of settings, and functions that several methods share."""
 
 from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Annotated, Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
 from wholebody.base.arrays import Array, with_values
-from wholebody.base.checks import posture, time_step
+from wholebody.base.checks import instance, posture, time_step
 from wholebody.base.errors import InputError
+from wholebody.base.fields import Range
 from wholebody.methods.control import Progress
-from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import Collision, FrameMotion
 from wholebody.scene.workspace import NotCopyable, Workspace
 from wholebody.solution import Solution
 from wholebody.tasks.bounds import at_speeds, shortened
+
+TOLERANCE = Range(1e-10, 0.1)
+"""Metres and radians to which goals are met: smaller ones are below rounding, larger ones are meaningless."""
+
+CCD_TOLERANCE = Range(1e-6, 0.1)
+"""The same for cyclic coordinate descent, which converges slowly."""
+
+ITERATIONS = Range(1, 100_000, whole=True)
+BUDGET = Range(0, 1_000_000, whole=True)
+RESTARTS = Range(0, 1000, whole=True)
+SEED = Range(0, 2**32 - 1, whole=True)
+DAMPING = Range(1e-9, 1e3)
+TIME_LIMIT = Range(1e-9, 1e9, "s", endless=True)
+
+Tolerance: TypeAlias = Annotated[float, TOLERANCE]
+Iterations: TypeAlias = Annotated[int, ITERATIONS]
+Restarts: TypeAlias = Annotated[int, RESTARTS]
+Seed: TypeAlias = Annotated[int, SEED]
+TimeLimit: TypeAlias = Annotated[float, TIME_LIMIT] | None
+
+
+def check_problem(problem: object, what: str) -> Problem:
+    """A problem; an error if it is something else."""
+    return instance(problem, Problem, what, "state one with wb.Problem(scene, goals=[...])")
 
 
 class Step(Protocol):

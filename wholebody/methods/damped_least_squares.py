@@ -26,12 +26,19 @@ from wholebody.assessment.posture import goal_errors
 from wholebody.base.arrays import Array
 from wholebody.base.fields import Checked
 from wholebody.figures.state import State
-from wholebody.methods.base import UnsupportedTermError, refusal
+from wholebody.methods.base import (
+    DAMPING,
+    Iterations,
+    TimeLimit,
+    Tolerance,
+    UnsupportedTermError,
+    check_problem,
+    refusal,
+)
 from wholebody.methods.conclusion import Ending
 from wholebody.methods.control import Control
 from wholebody.methods.descents import Descends
 from wholebody.methods.differential import REST
-from wholebody.methods.inputs import DAMPING, Iterations, TimeLimit, Tolerance, check_problem
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry

@@ -7,10 +7,9 @@ from dataclasses import replace
 from typing import Any, Generic, TypeVar
 
 from wholebody.base.arrays import Array
-from wholebody.methods.base import SolvedStep, SolvingTracker
+from wholebody.methods.base import TOLERANCE, SolvedStep, SolvingTracker, check_problem
 from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import LONGEST, Control, Progress
-from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import Solution

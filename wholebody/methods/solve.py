@@ -16,9 +16,8 @@ import numpy as np
 from wholebody.base.checks import function, shown
 from wholebody.base.errors import InputError, UnknownNameError, one_line
 from wholebody.methods import METHODS
-from wholebody.methods.base import Method
+from wholebody.methods.base import Method, check_problem
 from wholebody.methods.control import Progress
-from wholebody.methods.inputs import check_problem
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 

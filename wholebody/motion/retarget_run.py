@@ -23,7 +23,8 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.figures.figure import Figure
-from wholebody.motion.held_points import HeldPoint, Holds
+from wholebody.motion.held_points import HeldPoint
+from wholebody.motion.holds import Holds
 from wholebody.motion.posture_fit import Fitter, Goals, Layout
 from wholebody.motion.retarget_targets import LIMBS, Targets, has_trunk, known_bones
 from wholebody.motion.roles import Roles
@@ -34,6 +35,7 @@ FIRST, FREE, PASS, SWEEP = 60, 2, 3, 1  # most steps of a first frame, a free on
 EVERY, WORTH = 10, 0.8  # frames after which a free posture is sought anew, and the share of the cost that it is for
 SLOWING = 8  # frames before it would be too fast in which a joint begins to move
 JUMP = 0.5  # rad, m: postures of neighbouring frames that are farther apart were found otherwise
+FIRST_STEP = 0.1  # rad, m: largest change in a step of the first frame; with more, steps at things are too long
 STARTS = 4  # how often the first frame is solved, each time from where soles came down beside each other
 SWEEPS = (1.8, 1.7, 1.6, 1.4, 1.2, 1.0)  # omega of each; more: less jerk, and slower by a tenth each
 ANCHOR = 0.3  # weight of the place of the hips; 1 is that of a bone
@@ -274,9 +276,10 @@ class Run:
             held = holds.goals(k, self._paths, shift)
             goals = self._goals(k, reference, CHANGE * self.levers, held)
             q = self._settled(q, goals, before)
-            if holds.lost(k, self.fitter.held(q), held):
+            if holds.lost(k, q, self.fitter.held(q), held):
                 q = self._settled(self._reached(before, reference), goals, before)
-            holds.landed(k, self.fitter.held(q))
+            holds.touch(k, q, self.fitter.held(q), held)
+            holds.landed(k, self.fitter.held(q), held)
         self._first[k] = np.asarray(pin.difference(model, free, q))
         self._latest = self._first[k], self._first[k] - deviation if k else change
 
@@ -313,12 +316,13 @@ class Run:
             if number >= SWEEP and not (self.fitter.outside(q) or self.fitter.overlaps(q)):
                 break
             q = self.fitter.step(q, goals, most=self._room(q, before))
+        self.holds.touch(k, q, self.fitter.held(q), self._held[k])
         self._found[k], self._deviation[k] = q, np.asarray(pin.difference(self.model, self._free[k], q))
 
-    def _room(self, q: Array, before: Array | None) -> Array | None:
+    def _room(self, q: Array, before: Array | None) -> Array:
         """Least and greatest displacement (2, nv) of q that joints reach from the posture before in time."""
         if before is None:
-            return None
+            return np.asarray(FIRST_STEP * np.outer((-1.0, 1.0), np.ones(self.model.nv)))
         return np.asarray(self.reach - pin.difference(self.model, before, q))
 
     def _reached(self, before: Array | None, q: Array) -> Array:

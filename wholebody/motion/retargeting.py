@@ -15,7 +15,8 @@ from wholebody.figures.loading import one_figure
 from wholebody.geometry.placement import PlacementLike
 from wholebody.geometry.shapes import HalfSpace
 from wholebody.motion.clip import Clip
-from wholebody.motion.held_points import Holds, Touched, held_points, touching_points
+from wholebody.motion.held_points import held_points, touching_points
+from wholebody.motion.holds import Holds, Touched
 from wholebody.motion.retarget_run import Run, Wanted, wanted_of
 from wholebody.motion.retarget_targets import LIMBS, Proportions, known_bones, soled, soles, standing_places
 from wholebody.motion.roles import Roles, matched, skeleton_roles

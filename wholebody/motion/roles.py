@@ -40,7 +40,7 @@ def matched(
     """The roles that skeleton and figure have in common, by `names` (tables `skeleton` and `figure`) or structure."""
     given = _given(names)
     table, found, more, said = _joints(motion, given)
-    frames = _frames(figure)
+    frames = figure_roles(figure)
     frames |= {
         role: frame
         for role, frame in _checked(given.get("figure", {}), None, "frame").items()
@@ -121,7 +121,7 @@ def _column(title: str) -> dict[str, str]:
     return {row["role"]: row[title] for row in ROWS if row[title]}
 
 
-def _frames(figure: Figure) -> dict[str, str]:
+def figure_roles(figure: Figure) -> dict[str, str]:
     """Frames of a figure by role: those of the person, or of a robot whose joints are named after parts of a body."""
     known = {*figure.frames, *figure.segments, *figure.joints}
     person = _column("person")

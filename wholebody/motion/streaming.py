@@ -14,7 +14,8 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
 from wholebody.geometry.shapes import HalfSpace
 from wholebody.motion.footholds import LiveRests
-from wholebody.motion.held_points import Holds, held_points
+from wholebody.motion.held_points import held_points
+from wholebody.motion.holds import Holds
 from wholebody.motion.retarget_run import EVERY, SLOWING, Run, wanted_of
 from wholebody.motion.retarget_targets import Proportions
 from wholebody.motion.retargeting import checked_ground, same_figure

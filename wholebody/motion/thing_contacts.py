@@ -25,6 +25,9 @@ from wholebody.scene.scene import Scene
 NEAR = {"hand": 0.05, "wrist": 0.06, "elbow": 0.07, "knee": 0.09, "pelvis": 0.16}
 """Metres from a joint of these parts to what touches the skin over it, at most; feet stand on the ground."""
 
+SHARES = (1.0, 0.5)
+"""Places of a hand that touch, from its wrist at 0 to its joint, which may be at the knuckles or beyond the fingers."""
+
 GOES_ON = 1.4  # times as far away as a contact may begin, it ends
 THICKEST = 0.25  # m: of a part from its joint to its skin
 
@@ -39,6 +42,7 @@ class ThingContact(NamedTuple):
     thing: str
     place: Array  # (3,) on the thing's surface, in its axes, metres
     normal: Array  # (3,) of unit length, out of the thing, in its axes
+    share: float = 1.0  # of a hand: where between its wrist and its joint it touches
 
 
 def still_things(scene: Scene) -> list[str]:
@@ -97,6 +101,16 @@ class Things:
         """Where the things that move are in a frame."""
         return {name: track[frame] for name, track in self._moving.items()}
 
+    def gap(self, name: str, frame: int, pieces: Sequence[tuple[coal.CollisionGeometry, pin.SE3]]) -> float:
+        """Signed distance of shapes in the world to a thing in a frame, metres."""
+        at, best = self.at(name, frame), np.inf
+        for own, where in pieces:
+            for shape, local, _ in self._pieces[name]:
+                ours, theirs = (coal.Transform3s(one.rotation, one.translation) for one in (where, at * local))
+                self._result.clear()
+                best = min(best, float(coal.distance(own, ours, shape, theirs, self._request, self._result)))
+        return best
+
     def contacts(self, motion: SkeletonMotion, joints: Mapping[str, str]) -> list[ThingContact]:
         """What the skeleton touches; `joints` are those of roles."""
         found = []
@@ -105,15 +119,22 @@ class Things:
             if part not in NEAR or (part == "wrist" and role.replace("wrist", "hand") in joints):
                 continue
             path = motion.positions[:, motion.names.index(joint)]
+            wrist = joints.get(role.replace("hand", "wrist"), joint)
+            start = motion.positions[:, motion.names.index(wrist)]
+            shares = SHARES if wrist != joint else SHARES[:1]
             free: Mask = np.ones(len(motion), dtype=bool)
             for name, pieces in self._pieces.items():
-                places = [self.at(name, frame).actInv(place) for frame, place in enumerate(path)]
-                local = np.array(places).reshape(-1, 3)
-                mask = self._touching(pieces, local, NEAR[part], motion.dt) & free
+                at = [self.at(name, frame) for frame in range(len(motion))]
+                local = [
+                    np.array([here.actInv(one) for here, one in zip(at, start + share * (path - start), strict=True)])
+                    for share in shares
+                ]
+                mask = np.any([self._touching(pieces, each, NEAR[part], motion.dt) for each in local], axis=0) & free
                 for run in runs(long_runs(mask, max(1, round(RestLimits().least / motion.dt)))):
-                    middle = local[run.first : run.end].mean(axis=0)
-                    _, place, normal = self._nearest(pieces, middle, np.inf)
-                    found.append(ThingContact(role, *run, name, place, normal))
+                    middles = [each[run.first : run.end].mean(axis=0) for each in local]
+                    nearest = [self._nearest(pieces, middle, np.inf) for middle in middles]
+                    share, (_, place, normal) = min(zip(shares, nearest, strict=True), key=lambda one: abs(one[1][0]))
+                    found.append(ThingContact(role, *run, name, place, normal, share))
                     free[run.first : run.end] = False
         return sorted(found, key=lambda one: one.first)
 
@@ -143,13 +164,14 @@ class Things:
 
 def thickness(pieces: Sequence[pin.GeometryObject], start: Array, along: Array) -> float:
     """Metres from a place (3,) in a joint's axes along a direction (3,) to where the last of its pieces ends."""
-    ball, request, result = coal.Sphere(1e-6), coal.DistanceRequest(), coal.DistanceResult()
+    ball, request = coal.Sphere(1e-6), coal.DistanceRequest()
     last = 0.0
     for piece in pieces:
         where, far = coal.Transform3s(piece.placement.rotation, piece.placement.translation), 0.0
         while far < THICKEST:  # advances by the distance to the surface, inside and outside, so it misses no thick part
             center = coal.Transform3s(np.eye(3), start + far * along)
-            gap = float(coal.distance(ball, center, piece.geometry, where, request, result))
+            # a result that is used again keeps the least distance of all
+            gap = float(coal.distance(ball, center, piece.geometry, where, request, coal.DistanceResult()))
             if gap < 0.0:
                 last = max(last, far - gap)
             far += max(abs(gap), 1e-3)
@@ -167,21 +189,22 @@ def surface_of(scene: Scene, moving: Collection[str]) -> Callable[[Array], float
         for piece, owner in zip(geometry.geometryObjects, owners, strict=True)
         if owner in scene.objects and scene.objects[owner].segment is None and owner not in moving
     ]
-    ball, request, result = coal.Sphere(1e-4), coal.DistanceRequest(), coal.DistanceResult()
+    ball, request = coal.Sphere(1e-6), coal.DistanceRequest()
 
     def height(place: Array) -> float | None:
-        at = np.array(place)
-        for _ in range(100):  # goes down by the least distance, so it passes nothing
-            center = coal.Transform3s(np.eye(3), at)
-            gap = min(
-                (float(coal.distance(ball, center, shape, where, request, result)) for shape, where in still),
-                default=np.inf,
-            )
-            if gap < 1e-5:
-                return float(at[2] - 1e-4)
-            at[2] -= gap
-            if not at[2] > place[2] - 2.0:
-                break
-        return None
+        found = list[float]()
+        for shape, where in still:
+            at = np.array(place)
+            while at[2] > place[2] - 2.0:
+                result = coal.DistanceResult()
+                gap = float(coal.distance(ball, coal.Transform3s(np.eye(3), at), shape, where, request, result))
+                if gap < 1e-5:
+                    found.append(float(at[2]))
+                    break
+                down = -float(result.normal[2])  # a convex piece is beyond the plane through its nearest point
+                if not down > 1e-6:
+                    break
+                at[2] -= max(gap / down, 1e-6)
+        return max(found, default=None)
 
     return height

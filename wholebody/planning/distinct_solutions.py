@@ -13,7 +13,8 @@ import pinocchio as pin
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array
-from wholebody.methods.inputs import TIME_LIMIT, check_problem
+from wholebody.methods.base import TIME_LIMIT, check_problem
+from wholebody.methods.qp.chain import closed_form_postures
 from wholebody.methods.qp.method import QP
 from wholebody.methods.starts import all_found, restarts, throughout
 from wholebody.problem import Problem
@@ -32,7 +33,8 @@ class Solutions(Sequence[Solution]):
         found: how many distinct answers there were, those that were not asked for too.
         descents: how many descents ended in a posture that solves the problem.
         starts: how many were made.
-        complete: whether all answers count as found, by the rule of `methods.starts.all_found`: an estimate, no proof.
+        complete: whether all answers count as found, by the rule of `methods.starts.all_found`: an estimate, no proof;
+            of an arm of six joints with a closed form, whether all of its branches were descended from.
 
     Examples:
         >>> found = wb.solutions(problem, most=2, starts=4)
@@ -77,9 +79,10 @@ def solutions(
 ) -> Solutions:
     """Return distinct answers of a problem: local minima of its measures that meet its goals and keep what must hold.
 
-    Descents begin at the problem's start and at random postures, for up to 20 degrees of freedom all over the limits
-    (a Latin hypercube), otherwise as far from the start as other starts of `QP`. Measures count from the problem's
-    start. The search ends where all answers count as found, or after as many starts or seconds.
+    Descents begin at the branches of the closed form of an arm of six joints that has one. Otherwise they begin at the
+    problem's start and at random postures, for up to 20 degrees of freedom all over the limits (a Latin hypercube),
+    else as far from the start as other starts of `QP`. Measures count from the problem's start. The search ends where
+    all answers count as found, or after as many starts or seconds.
 
     Args:
         problem: as for `wb.solve`.
@@ -106,15 +109,17 @@ def solutions(
     ends = np.inf if time_limit is None else time.perf_counter() + TIME_LIMIT(time_limit, "solutions: time_limit")
     known: list[Solution] = []
     begun = descents = 0
-    for answer in method.minima(problem, _starts(problem, starts, seed)):
+    branches, complete = closed_form_postures(problem), False
+    for answer in method.minima(problem, _starts(problem, starts, seed) if branches is None else branches[:starts]):
         begun += 1
         if answer.solved:
             descents += 1
             known = _with(problem, known, answer, apart)
-        if all_found(len(known), descents, LEAST) or time.perf_counter() > ends:
+        complete = all_found(len(known), descents, LEAST) if branches is None else begun == len(branches)
+        if complete or time.perf_counter() > ends:
             break
     ordered = sorted(known, key=lambda answer: answer.assessment.measure)
-    return Solutions(tuple(ordered[:most]), len(known), descents, begun, all_found(len(known), descents, LEAST))
+    return Solutions(tuple(ordered[:most]), len(known), descents, begun, complete)
 
 
 def _starts(problem: Problem, count: int, seed: int) -> Iterator[Array]:

@@ -13,9 +13,8 @@ from wholebody.base import checks
 from wholebody.base.arrays import brief
 from wholebody.base.batches import JobOptions, Jobs, fingerprint, run_batch, shared
 from wholebody.base.runner import EndedError, Job
-from wholebody.methods.base import Method
+from wholebody.methods.base import Method, check_problem
 from wholebody.methods.control import ctrl_c_ends_all
-from wholebody.methods.inputs import check_problem
 from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
 from wholebody.studies.neighbours import Family, Work, lower, name_changes, solve_from_neighbours

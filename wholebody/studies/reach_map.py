@@ -14,8 +14,7 @@ from wholebody.base.batches import JobOptions, Jobs, spread
 from wholebody.base.errors import InputError
 from wholebody.base.runner import packed
 from wholebody.geometry.placement import FARTHEST
-from wholebody.methods.base import Method
-from wholebody.methods.inputs import check_problem
+from wholebody.methods.base import Method, check_problem
 from wholebody.methods.qp.method import QP
 from wholebody.methods.simplification.reach import beyond_reach
 from wholebody.methods.solve import as_method

@@ -14,7 +14,6 @@ import numpy as np
 from wholebody.base import checks
 from wholebody.base.arrays import Array, brief
 from wholebody.base.charts import Shown, png
-from wholebody.base.errors import MissingPackageError
 from wholebody.base.files import checked_target, csv_text, write
 from wholebody.base.records import RecordFile
 from wholebody.solution import Solution
@@ -161,17 +160,8 @@ class Records(Shown, Sequence[SolveRecord]):
         return sum(one.solved for one in self._records) / len(self) if len(self) else 0.0
 
     def rows(self) -> list[dict[str, Any]]:
-        """The records as plain dictionaries, without postures."""
+        """The records as plain dictionaries, without postures, as `pandas.DataFrame` takes them."""
         return [one.row() for one in self._records]
-
-    @property
-    def table(self) -> Any:
-        """A pandas DataFrame where pandas is installed, otherwise the rows."""
-        try:
-            import pandas
-        except ImportError:
-            return self.rows()
-        return pandas.DataFrame(self.rows())
 
     def plot(self) -> Any:
         """Draw the outcomes as a table, a matplotlib figure.
@@ -195,20 +185,6 @@ class Records(Shown, Sequence[SolveRecord]):
         """Write the rows as CSV; returns the path."""
         file = checked_target(path, "to_csv: path", "a table", (".csv",))
         return write(file, csv_text(self.rows()))
-
-    def to_parquet(self, path: str | os.PathLike[str]) -> Path:
-        """Write the rows as Parquet; returns the path; a MissingPackageError without pyarrow."""
-        file = checked_target(path, "to_parquet: path", "a table", (".parquet", ".pq"))
-        try:
-            import pyarrow
-            import pyarrow.parquet
-        except ImportError:
-            raise MissingPackageError(
-                "Parquet files need pyarrow; install it with: pip install pyarrow, or write with to_csv"
-            ) from None
-        sink = pyarrow.BufferOutputStream()
-        pyarrow.parquet.write_table(pyarrow.Table.from_pylist(self.rows()), sink)
-        return write(file, sink.getvalue().to_pybytes())
 
 
 class KeptRecords(RecordFile[SolveRecord]):

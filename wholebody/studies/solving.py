@@ -17,8 +17,7 @@ from wholebody.base.arrays import Array, as_dict
 from wholebody.base.batches import shared
 from wholebody.base.errors import WholebodyError, one_line
 from wholebody.base.runner import Job, packed
-from wholebody.methods.base import Method
-from wholebody.methods.inputs import check_problem
+from wholebody.methods.base import Method, check_problem
 from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene

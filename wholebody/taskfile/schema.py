@@ -12,7 +12,7 @@ from wholebody.figures.anthropometry import AGE, MASS, PERCENTILE, STATURE
 from wholebody.figures.link_pieces import CONCAVITY
 from wholebody.geometry import shapes
 from wholebody.geometry.pieces import SMALLEST
-from wholebody.methods.inputs import BUDGET, CCD_TOLERANCE, DAMPING, ITERATIONS, RESTARTS, SEED, TIME_LIMIT, TOLERANCE
+from wholebody.methods.base import BUDGET, CCD_TOLERANCE, DAMPING, ITERATIONS, RESTARTS, SEED, TIME_LIMIT, TOLERANCE
 from wholebody.motion.strength import Strength
 from wholebody.problem import CLEARANCE
 from wholebody.scene.matter.body import BallJoint, Body, Hinge

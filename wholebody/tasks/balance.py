@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from functools import partial
 from itertools import pairwise
@@ -12,11 +12,11 @@ from typing import Annotated, Any, NamedTuple, TypeAlias
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Names, Range
 from wholebody.figures.state import State
-from wholebody.geometry.pieces import SweptPoints, swept_points
+from wholebody.geometry.pieces import swept_points
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Constraint, Surroundings, filled
 from wholebody.tasks.surfaces import outermost
@@ -34,35 +34,63 @@ came 20 to 59 % less far from the middle of the stance than the edges are (Forth
 33: 715, its abstract); here it is 30 %."""
 
 DOWN = np.array((0.0, 0.0, -1.0))
+FAR_INSIDE = 1.0  # m: value of a row whose corner is no corner of the polygon
 NEAREST = 1e-5  # Distance [m] below which two points count as one corner
+
+
+class _Soles(NamedTuple):
+    """Points of the pieces of feet, and of what is beyond them, in the axes of their joints."""
+
+    joints: list[int]
+    points: Array  # (n, 3) swept points; of an ellipsoid its middle
+    radii: Array  # (n,) around them
+    carrier: Indices  # (n,) place in `joints`
+    begin: Indices  # (feet,) first point of each foot
+    foot: Indices  # (n,) which foot a point is of
+    ellipsoids: list[tuple[int, Any, pin.SE3]]  # place of the point, shape, and where it is
 
 
 def standing_points(scene: Surroundings, q: Array, feet: Sequence[str]) -> Array:
     """Points (n, 3) on which the feet, toes included, stand at q: the lowest corners of their pieces."""
-    soles = []
-    for foot in feet:
-        joint = inputs.find_place(scene, foot, "Balance").joint
-        soles.append(inputs.once(scene, ("pieces", joint), partial(_pieces_of, scene, joint)))
-        if not soles[-1] or joint == 0:
-            raise InputError(f"Balance: {foot!r} has no pieces to stand on; name segments with geometry as feet")
-    places = scene.figure.joint_placements(q, {joint for pieces in soles for joint, *_ in pieces})
-    points = []
-    for pieces in soles:
-        lows = np.concatenate(
-            [outermost(shape, places[joint] * placed, DOWN, swept) for joint, placed, shape, swept in pieces]
-        )
-        height = lows[:, 2]
-        points.append(lows[height <= height.min() + STANDING_HEIGHT])
-    return np.concatenate(points)
+    return standing_corners(scene, q, feet)[0]
 
 
-def _pieces_of(scene: Surroundings, joint: int) -> list[tuple[int, pin.SE3, Any, SweptPoints]]:
-    """Joint, placement in it, shape and swept points of each piece on a joint and beyond it."""
-    pieces = [piece for piece in scene.geometry.geometryObjects if joint in scene.model.supports[piece.parentJoint]]
-    return [
-        (int(piece.parentJoint), pin.SE3(piece.placement), piece.geometry, swept_points(piece.geometry))
-        for piece in pieces
-    ]
+def standing_corners(scene: Surroundings, q: Array, feet: Sequence[str]) -> tuple[Array, Indices]:
+    """The same, and the joints (n,) that carry them."""
+    soles = inputs.once(scene, ("soles", tuple(feet)), partial(_soles_of, scene, feet))
+    placed = scene.figure.joint_placements(q, soles.joints)
+    places = np.array([placed[joint].homogeneous for joint in soles.joints])[soles.carrier]
+    points = np.einsum("nij,nj->ni", places[:, :3, :3], soles.points)
+    points += places[:, :3, 3]
+    points[:, 2] -= soles.radii
+    for number, shape, local in soles.ellipsoids:
+        points[number] = outermost(shape, placed[soles.joints[soles.carrier[number]]] * local, DOWN)[0]
+    height = points[:, 2]
+    low = height <= np.minimum.reduceat(height, soles.begin)[soles.foot] + STANDING_HEIGHT
+    return points[low], np.array(soles.joints, dtype=np.intp)[soles.carrier[low]]
+
+
+def _soles_of(scene: Surroundings, feet: Sequence[str]) -> _Soles:
+    joints: dict[int, int] = {}
+    points, radii, carrier, begin, foot = list[Array](), list[float](), list[int](), list[int](), list[int]()
+    ellipsoids: list[tuple[int, Any, pin.SE3]] = []
+    for number, name in enumerate(feet):
+        joint = inputs.find_place(scene, name, "Balance").joint
+        begin.append(len(radii))
+        for piece in scene.geometry.geometryObjects if joint else ():
+            if joint in scene.model.supports[piece.parentJoint]:
+                swept, local = swept_points(piece.geometry), piece.placement
+                if not len(swept.points):
+                    ellipsoids.append((len(radii), piece.geometry, pin.SE3(local)))
+                own = swept.points if len(swept.points) else np.zeros((1, 3))
+                points.append(own @ local.rotation.T + local.translation)
+                radii += [swept.radius] * len(own)
+                carrier += [joints.setdefault(int(piece.parentJoint), len(joints))] * len(own)
+        foot += [number] * (len(radii) - begin[-1])
+        if len(radii) == begin[-1]:
+            raise InputError(f"Balance: {name!r} has no pieces to stand on; name segments with geometry as feet")
+    at, first, of = (np.array(each, dtype=np.intp) for each in (carrier, begin, foot))
+    return _Soles([*joints], np.concatenate(points), np.array(radii), at, first, of, ellipsoids)
 
 
 class Polygon(NamedTuple):
@@ -76,7 +104,7 @@ class Polygon(NamedTuple):
 
 def convex_polygon(points: Array) -> Polygon:
     """The convex hull of points (n, 2)."""
-    flat = np.round(points[:, :2], 6)
+    flat = points[:, :2].round(6)
     found = polygon(flat[hull_corners(flat)].reshape(-1, 2))
     if found.width < 1e-4:  # Width [m] below which a polygon counts as a line.
         raise InputError(
@@ -88,23 +116,25 @@ def convex_polygon(points: Array) -> Polygon:
 def hull_corners(points: Array) -> list[int]:
     """Indices of the convex hull's corners of points (n, 2), anticlockwise; none on a line."""
     # Andrew's monotone chain (1979), on micrometres: an edge that is rounding alone would have no direction.
-    places = points[:, :2].tolist()
-    order = np.lexsort(np.round(points[:, 1::-1], 6).T).tolist()
+    places, rounded = points[:, :2].tolist(), points[:, :2].round(6).tolist()
+    order = sorted(range(len(places)), key=rounded.__getitem__)
 
-    def half(indices: list[int]) -> list[int]:
+    def half(indices: Iterable[int]) -> list[int]:
         chain: list[int] = []
         for k in indices:
+            x, y = places[k]
             while len(chain) > 1:
-                (ax, ay), (bx, by), (x, y) = places[chain[-2]], places[chain[-1]], places[k]
+                (ax, ay), (bx, by) = places[chain[-2]], places[chain[-1]]
+                along, across = x - ax, y - ay
                 # Height [m] of a corner over the line through its neighbours below which it is no corner.
-                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 1e-6 * hypot(x - ax, y - ay):
+                if (bx - ax) * across - (by - ay) * along > 1e-6 * hypot(along, across):
                     break
                 chain.pop()
             if not chain or dist(places[k], places[chain[-1]]) > NEAREST:
                 chain.append(k)
         return chain
 
-    lower, upper = half(order), half(order[::-1])
+    lower, upper = half(order), half(reversed(order))
     corners = list(dict.fromkeys(lower[:-1] + upper[:-1]))
     return corners if len(corners) > 2 else []
 
@@ -138,6 +168,62 @@ def shrunk(whole: Polygon, margin: float) -> Array:
                 kept.append(rest[i])
         rest = np.array(kept).reshape(-1, 2)
     return rest
+
+
+class SolePolygon(NamedTuple):
+    """The convex hull of points of the feet, seen from above; row i is for the edge that begins at point i.
+
+    With e = b - a the edge from a to b, anticlockwise, n its inward normal and s = (e . (c - a)) / |e|^2, the distance
+    d = n . (c - a) of the centre of mass c changes by n . (dc - (1 - s) da - s db): n turns with the edge.
+    """
+
+    points: Array  # (m, 3) in the axes of their joints [m]
+    joints: Indices  # (m,) joint that carries each
+    mass: range | None  # joints of the figure whose centre of mass it is; None for all
+
+    @property
+    def in_radians(self) -> tuple[bool, ...]:
+        """None is."""
+        return (False,) * len(self.joints)
+
+    def corners(self, state: State) -> Array:
+        """Corners (k, 2) of the polygon, anticlockwise."""
+        points = self._placed(state)[:, :2]
+        return points[hull_corners(points)]
+
+    def _placed(self, state: State) -> Array:
+        """The points (m, 3) in the world."""
+        placed = [state.data.oMi[joint] for joint in self.joints.tolist()]
+        return np.array([place.act(point) for place, point in zip(placed, self.points, strict=True)])
+
+    def rows(self, state: State) -> tuple[Array, Array]:
+        """Distances (m,) inside the edges and their derivative (m, nv); `FAR_INSIDE` and zero for no corner."""
+        return self.inside(state, state.center_of_mass(self.mass), state.center_of_mass_jacobian(self.mass))
+
+    def height(self, state: State) -> tuple[float, Array]:
+        """Mean height of the points [m] and its derivative (nv,)."""
+        points, up = self._placed(state), np.zeros((len(self.joints), 6))
+        up[:, 2], up[:, 3], up[:, 4] = 1.0, points[:, 1], -points[:, 0]
+        return float(points[:, 2].mean()), state.rows(up, self.joints, np.zeros_like(self.joints)).mean(axis=0)
+
+    def inside(self, state: State, center: Array, moves: Array) -> tuple[Array, Array]:
+        """The same of another point (2,) or (3,) than the centre of mass, with its derivative."""
+        points = self._placed(state)
+        values, rows = np.full(len(points), FAR_INSIDE), np.zeros((len(points), state.model.nv))
+        begin = np.array(hull_corners(points[:, :2]), dtype=np.intp)
+        if not len(begin):
+            return values, rows
+        end = np.roll(begin, -1)
+        edge, arm = (points[end] - points[begin])[:, :2], center[:2] - points[begin, :2]
+        length = np.hypot(edge[:, 0], edge[:, 1])
+        normals = np.column_stack([-edge[:, 1], edge[:, 0], np.zeros(len(edge))]) / length[:, None]
+        share = np.einsum("ij,ij->i", edge, arm) / length**2
+        values[begin] = np.einsum("ij,ij->i", normals[:, :2], arm)
+        rows[begin] = normals[:, :2] @ moves[:2]
+        for corner, part in ((begin, 1.0 - share), (end, share)):
+            wrench = np.hstack([normals, cross(points[corner], normals)])
+            rows[begin] -= part[:, None] * state.rows(wrench, self.joints[corner], np.zeros_like(corner))
+        return values, rows
 
 
 Feet: TypeAlias = Annotated[Sequence[str], Names("['left_foot', 'right_foot']")]

@@ -15,7 +15,7 @@ from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
-from wholebody.tasks.balance import Balance, Feet, Margin, standing_points
+from wholebody.tasks.balance import Balance, Feet, Margin, SolePolygon, standing_corners
 from wholebody.tasks.base import Constraint, Surroundings, filled
 
 GRAVITY = 9.81
@@ -88,8 +88,13 @@ def point_rows(state: State, point: Array, joint: int) -> Array:
     return state.rows(wrench, np.full(3, joint, dtype=np.intp), np.zeros(3, dtype=np.intp))
 
 
-def pressure(state: State, loads: Loads, mass: range | None, height: float) -> tuple[Array, Array]:
-    """The point (2,) about which weight and forces have no moment but a vertical one, and its derivative."""
+def pressure(
+    state: State, loads: Loads, mass: range | None, height: float, rises: Array | float = 0.0
+) -> tuple[Array, Array]:
+    """The point (2,) about which weight and forces have no moment but a vertical one, and its derivative.
+
+    It is at a height [m], whose derivative (nv,) is `rises`.
+    """
     model = state.model
     weight = GRAVITY * sum(model.inertias[k].mass for k in (mass or range(1, model.njoints)))
     center, moved = state.center_of_mass(mass)[:2], state.center_of_mass_jacobian(mass)[:2]
@@ -103,7 +108,7 @@ def pressure(state: State, loads: Loads, mass: range | None, height: float) -> t
         )
     f = loads.vectors
     arm = np.einsum("k,ki->i", -f[:, 2], points[:, :2]) + np.einsum("k,ki->i", points[:, 2] - height, f[:, :2])
-    turn = np.einsum("k,kij->ij", -f[:, 2], rows[:, :2]) + np.einsum("kj,ki->ij", rows[:, 2], f[:, :2])
+    turn = np.einsum("k,kij->ij", -f[:, 2], rows[:, :2]) + np.einsum("kj,ki->ij", rows[:, 2] - rises, f[:, :2])
     return (weight * center + arm) / down, (weight * moved + turn) / down
 
 
@@ -112,7 +117,8 @@ class LoadedBalance(Constraint):
     """Keep the balance under forces: the ground presses within the support polygon of the feet.
 
     As `Balance`, which it takes the place of, but of the point where the ground presses in place of the centre of mass:
-    who pushes leans forward, and who carries leans back. There is a row for each edge [m].
+    who pushes leans forward, and who carries leans back. The polygon goes with the feet, which may slide: that of the
+    points on which they stand at the start, a row for each [m]; `tasks.balance.FAR_INSIDE` for one that is no corner.
 
     Attributes:
         forces: on the figure beside its weight.
@@ -134,16 +140,17 @@ class LoadedBalance(Constraint):
     margin: Margin | None = None
     keeps: float = field(init=False, repr=False)
     loads: Loads = field(init=False, repr=False)
-    polygon: Balance = field(init=False, repr=False)
-    height: float = field(init=False, repr=False)
+    soles: SolePolygon = field(init=False, repr=False)
 
     def resolve(self, scene: Surroundings, start: Array) -> LoadedBalance:
-        """Compute the support polygon at the start."""
-        points = standing_points(scene, start, self.feet)
-        polygon = Balance(self.feet, margin=self.margin or 0.0).on_points(points, scene, self.margin is None)
-        loads, height = resolved(self.forces, scene, "LoadedBalance: forces"), float(points[:, 2].min())
-        pressure(State(scene.model).update(start), loads, polygon.joints, height)  # forces that lift are refused here
-        return filled(self, loads=loads, polygon=polygon, keeps=polygon.margin, height=height)
+        """Find the points on which the feet stand at the start."""
+        points, joints = standing_corners(scene, start, self.feet)
+        whole = Balance(self.feet, margin=self.margin or 0.0).on_points(points, scene, self.margin is None)
+        loads, state = resolved(self.forces, scene, "LoadedBalance: forces"), State(scene.model).update(start)
+        own = [state.data.oMi[joint].actInv(point) for joint, point in zip(joints.tolist(), points, strict=True)]
+        soles = SolePolygon(np.array(own), joints, whole.joints)
+        pressure(state, loads, whole.joints, 0.0)  # forces that lift are refused here
+        return filled(self, loads=loads, soles=soles, keeps=whole.margin)
 
     @property
     def lower(self) -> Array:
@@ -160,6 +167,5 @@ class LoadedBalance(Constraint):
 
     def value_and_jacobian(self, state: State, value: Callable[[State], Array]) -> tuple[Array, Array]:
         """Both from one look at the forces."""
-        point, rows = pressure(state, self.loads, self.polygon.joints, self.height)
-        normals = self.polygon.normals
-        return np.asarray(normals @ point - self.polygon.offsets), np.asarray(normals @ rows)
+        point, rows = pressure(state, self.loads, self.soles.mass, *self.soles.height(state))
+        return self.soles.inside(state, point, rows)

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices, cross
+from wholebody.base.arrays import Array, cross
 from wholebody.base.checks import shown, some
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Names
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
-from wholebody.tasks.balance import STANDING_HEIGHT, STEADY, Feet, Margin, hull_corners, polygon
+from wholebody.tasks.balance import FAR_INSIDE, STANDING_HEIGHT, STEADY, Feet, Margin, SolePolygon, polygon
 from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.contact_parts import Facing, Gap, Over, Part, TermOfParts, between, owner_pairs, through
 from wholebody.tasks.distance import SumOfSquares
@@ -24,7 +24,6 @@ from wholebody.tasks.surfaces import Surface, face, joined, outermost, segments_
 
 FLESH = 0.03  # m: how much farther ahead than the ankle a shin may be on which somebody kneels
 STANCE_WEIGHTS = np.array((60.0, 60.0, 4.0))  # of a `Stance`: 1/m^2, 1/m^2, 1/rad^2: ESTIMATE
-FAR_INSIDE = 1.0  # m: value of a row whose corner is no corner of the polygon
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,50 +185,3 @@ def _lows(bears: Surface, rest: State, under: Array, within: float) -> tuple[lis
         if point @ under >= deepest - within
     ]
     return [point for point, _ in pairs], [joint for _, joint in pairs]
-
-
-class SolePolygon(NamedTuple):
-    """The convex hull of points of the feet, seen from above; row i is for the edge that begins at point i.
-
-    With e = b - a the edge from a to b, anticlockwise, n its inward normal and s = (e . (c - a)) / |e|^2, the distance
-    d = n . (c - a) of the centre of mass c changes by n . (dc - (1 - s) da - s db): n turns with the edge.
-    """
-
-    points: Array  # (m, 3) in the axes of their joints [m]
-    joints: Indices  # (m,) joint that carries each
-    mass: range | None  # joints of the figure whose centre of mass it is; None for all
-
-    @property
-    def in_radians(self) -> tuple[bool, ...]:
-        """None is."""
-        return (False,) * len(self.joints)
-
-    def corners(self, state: State) -> Array:
-        """Corners (k, 2) of the polygon, anticlockwise."""
-        points = self._placed(state)[:, :2]
-        return points[hull_corners(points)]
-
-    def _placed(self, state: State) -> Array:
-        """The points (m, 3) in the world."""
-        placed = [state.data.oMi[joint] for joint in self.joints.tolist()]
-        return np.array([place.act(point) for place, point in zip(placed, self.points, strict=True)])
-
-    def rows(self, state: State) -> tuple[Array, Array]:
-        """Distances (m,) inside the edges and their derivative (m, nv); `FAR_INSIDE` and zero for no corner."""
-        points = self._placed(state)
-        center, moves = state.center_of_mass(self.mass), state.center_of_mass_jacobian(self.mass)
-        values, rows = np.full(len(points), FAR_INSIDE), np.zeros((len(points), state.model.nv))
-        begin = np.array(hull_corners(points[:, :2]), dtype=np.intp)
-        if not len(begin):
-            return values, rows
-        end = np.roll(begin, -1)
-        edge, arm = (points[end] - points[begin])[:, :2], center[:2] - points[begin, :2]
-        length = np.hypot(edge[:, 0], edge[:, 1])
-        normals = np.column_stack([-edge[:, 1], edge[:, 0], np.zeros(len(edge))]) / length[:, None]
-        share = np.einsum("ij,ij->i", edge, arm) / length**2
-        values[begin] = np.einsum("ij,ij->i", normals[:, :2], arm)
-        rows[begin] = normals @ moves
-        for corner, part in ((begin, 1.0 - share), (end, share)):
-            wrench = np.hstack([normals, cross(points[corner], normals)])
-            rows[begin] -= part[:, None] * state.rows(wrench, self.joints[corner], np.zeros_like(corner))
-        return values, rows

@@ -30,6 +30,9 @@ from wholebody.terms.residual_kernel import axis_errors, cones, planes, residual
 Plan: TypeAlias = tuple[Array, Integers, Integers, NDArray[np.int8]]
 """Floats, integers, layout and support of a `TermPlan`."""
 
+Tree: TypeAlias = tuple[Array, Integers, Integers]
+"""Columns of the joint Jacobian (n, 6), the degree of freedom of each, and the parents of the bodies."""
+
 NearArrays: TypeAlias = tuple[Array, Array, Indices, Indices, Array, Array, Array, Indices, Indices, Array]
 """Room for contacts and their rows; see `linearise`."""
 
@@ -100,14 +103,29 @@ def linearise(
     for r in range(gaps):
         gap_clearance[r] = least[gap_contact[r]]
     wrench, value, jacobian, box, measure, squares = room
-    floats, integers, layout, support = plan
-    nv = jacobian.shape[1]
+    floats, integers, layout, _ = plan
     terms = len(value)
     column, bodies = _integers(integers, layout, kinds.COLUMN), _integers(integers, layout, kinds.BODY)
+    tree = (columns, column, bodies)
     jacobian[:terms] = 0.0
     wrench[:] = 0.0
-    poses, pose_entries = _floats(floats, layout, kinds.RESIDUAL), _integers(integers, layout, kinds.RESIDUAL)
-    residuals(poses, pose_entries, joints, wrench, value)
+    _wrench_terms(plan, joints, tree, wrench, value, jacobian)
+    for r in range(gaps):
+        jacobian[terms + r] = 0.0
+        _row(gap_wrench[r], gap_joints[r, 1], gap_joints[r, 0], columns, bodies, column, jacobian[terms + r])
+    _coordinate_terms(plan, joints, tree, q, value, jacobian)
+    limits, limit_places = _table(plan, kinds.LIMIT)
+    _box(limits, limit_places, _floats(floats, layout, kinds.BOX), q, box)
+    _measures(plan, joints, tree, q, measure, squares)
+    return known, gaps, False
+
+
+@compiled(inner=True)
+def _wrench_terms(plan: Plan, joints: Array, tree: Tree, wrench: Array, value: Array, jacobian: Array) -> None:
+    """Terms whose rows are wrenches on one or two bodies."""
+    floats, integers, layout, _ = plan
+    columns, column, bodies = tree
+    residuals(*_table(plan, kinds.RESIDUAL), joints, wrench, value)
     if layout[kinds.PLANE, 1]:
         planes(*_table(plan, kinds.PLANE), joints, wrench, value)
     if layout[kinds.AXIS, 1]:
@@ -124,11 +142,14 @@ def linearise(
             count = 3 * (entries[e, 3] + entries[e, 4]) if table == kinds.RESIDUAL else rows
             for r in range(entries[e, 0], entries[e, 0] + count):
                 _row(wrench[r], entries[e, 1], against, columns, bodies, column, jacobian[r])
-    for r in range(gaps):
-        jacobian[terms + r] = 0.0
-        _row(gap_wrench[r], gap_joints[r, 1], gap_joints[r, 0], columns, bodies, column, jacobian[terms + r])
+
+
+@compiled(inner=True)
+def _coordinate_terms(plan: Plan, joints: Array, tree: Tree, q: Array, value: Array, jacobian: Array) -> None:
+    """Terms of the centre of mass and of coordinates, which write their Jacobian rows themselves."""
+    floats, _, layout, _ = plan
     if layout[kinds.MASS_CENTER, 1]:
-        masses, tree = _floats(floats, layout, kinds.BODY), (columns, column, bodies)
+        masses = _floats(floats, layout, kinds.BODY)
         _mass_centers(_table(plan, kinds.MASS_CENTER), masses, joints, tree, value, jacobian)
     if layout[kinds.COORDINATE, 1]:
         coordinates(*_table(plan, kinds.COORDINATE), q, value, jacobian)
@@ -140,18 +161,23 @@ def linearise(
         coupled_ranges(*_table(plan, kinds.COUPLED), q, value, jacobian)
     if layout[kinds.ELLIPSE, 1]:
         elliptic_ranges(*_table(plan, kinds.ELLIPSE), q, value, jacobian)
-    limits, limit_places = _floats(floats, layout, kinds.LIMIT), _integers(integers, layout, kinds.LIMIT)
-    _box(limits, limit_places, _floats(floats, layout, kinds.BOX), q, box)
+
+
+@compiled(inner=True)
+def _measures(plan: Plan, joints: Array, tree: Tree, q: Array, measure: Array, squares: Array) -> None:
+    """Gradient, value and curvature of the measures, and rows of those that are sums of squares."""
+    floats, _, layout, support = plan
+    columns, column, _ = tree
     constant = _floats(floats, layout, kinds.CURVATURE)
+    nv = measure.shape[1] - 1
     for v in range(nv):
         measure[0, v] = 0.0
         measure[1, v] = constant[0, v]
     measure[0, nv] = measure[1, nv] = 0.0
     if len(squares):
         measure[2] = 0.0
-    distances, distance_places = _floats(floats, layout, kinds.DISTANCE), _integers(integers, layout, kinds.DISTANCE)
-    limited, limited_places = _floats(floats, layout, kinds.DISCOMFORT), _integers(integers, layout, kinds.DISCOMFORT)
-    _measures(distances, distance_places, limited, limited_places, q, measure)
+    _distances(*_table(plan, kinds.DISTANCE), q, measure)
+    _discomforts(*_table(plan, kinds.DISCOMFORT), q, measure)
     if layout[kinds.ROOT_DISTANCE, 1]:
         root_distances(*_table(plan, kinds.ROOT_DISTANCE), q, measure)
     if layout[kinds.ELEVATION, 1] + layout[kinds.LUMBAR, 1]:
@@ -161,7 +187,6 @@ def linearise(
         balls(*_table(plan, kinds.BALL), q, measure, squares, first)
     if layout[kinds.HEIGHT, 1]:
         heights(*_table(plan, kinds.HEIGHT), joints, columns, support, column, measure)
-    return known, gaps, False
 
 
 @compiled(error_model="numpy")
@@ -197,20 +222,11 @@ def _row(
             against = bodies[at, 0]
 
 
-@compiled(inner=True, error_model="numpy")
-def _mass_centers(
-    table: tuple[Array, Integers],
-    bodies: Array,
-    joints: Array,
-    tree: tuple[Array, Integers, Integers],
-    value: Array,
-    jacobian: Array,
-) -> None:
-    """Rows of the centre of mass of one figure or all: each column needs its subtree's moment."""
-    tables, entries = table
-    columns, column, parents = tree
+@compiled(inner=True)
+def _moments(bodies: Array, joints: Array, parents: Integers) -> Array:
+    """Mass of each subtree, and its mass times its centre in the world (njoints, 4)."""
     count = len(bodies)
-    moment = np.zeros((count, 4))  # mass, and mass times centre in the world
+    moment = np.zeros((count, 4))
     for j in range(1, count):
         mass = bodies[j, 0]
         moment[j, 0] = mass
@@ -222,6 +238,23 @@ def _mass_centers(
     for j in range(count - 1, 0, -1):
         for i in range(4):
             moment[parents[j, 0], i] += moment[j, i]
+    return moment
+
+
+@compiled(inner=True, error_model="numpy")
+def _mass_centers(
+    table: tuple[Array, Integers],
+    bodies: Array,
+    joints: Array,
+    tree: Tree,
+    value: Array,
+    jacobian: Array,
+) -> None:
+    """Rows of the centre of mass of one figure or all: each column needs its subtree's moment."""
+    tables, entries = table
+    columns, column, parents = tree
+    count = len(bodies)
+    moment = _moments(bodies, joints, parents)
     whole = np.empty(4)
     begin = 0
     while begin < len(tables):
@@ -270,17 +303,21 @@ def _box(limits: Array, places: Integers, boxes: Array, q: Array, box: Array) ->
 
 
 @compiled(inner=True)
-def _measures(
-    distances: Array, distance_places: Integers, joints: Array, joint_places: Integers, q: Array, measure: Array
-) -> None:
-    """See `tasks.distance.SquaredDistance` and `tasks.Discomfort`."""
+def _distances(distances: Array, places: Integers, q: Array, measure: Array) -> None:
+    """See `tasks.distance.SquaredDistance`."""
     last = measure.shape[1] - 1
     for e in range(len(distances)):
-        away = q[distance_places[e, 0]] - distances[e, 1]
+        away = q[places[e, 0]] - distances[e, 1]
         measure[0, last] += distances[e, 0] * away * away
-        measure[0, distance_places[e, 1]] += 2.0 * distances[e, 0] * away
+        measure[0, places[e, 1]] += 2.0 * distances[e, 0] * away
+
+
+@compiled(inner=True)
+def _discomforts(joints: Array, places: Integers, q: Array, measure: Array) -> None:
+    """See `tasks.Discomfort`."""
+    last = measure.shape[1] - 1
     for e in range(len(joints)):
-        at, v = q[joint_places[e, 0]], joint_places[e, 1]
+        at, v = q[places[e, 0]], places[e, 1]
         factor, away, own = joints[e, 0], at - joints[e, 1], joints[e, 2]
         measure[0, last] += factor * own * away * away
         slope, bend = 2.0 * own * away, 0.0

@@ -147,6 +147,22 @@ def planes(tables: Array, entries: Integers, joints: Array, wrench: Array, value
 
 
 @compiled(inner=True, error_model="numpy")
+def _wanted(given: Array, place: Array, toward: int, direction: Array) -> float:
+    """Write the direction (3,) that is given, or that from a place towards a given one, whose distance it returns."""
+    distance = 0.0 if toward else np.inf
+    for i in range(3):
+        direction[i] = given[i]
+        if toward:
+            direction[i] -= place[i]
+            distance += direction[i] * direction[i]
+    if toward:
+        distance = np.sqrt(distance)
+        for i in range(3):
+            direction[i] /= max(distance, TOUCHING)
+    return distance
+
+
+@compiled(inner=True, error_model="numpy")
 def axis_errors(tables: Array, entries: Integers, joints: Array, wrench: Array, value: Array) -> None:
     """See `tasks.Axis`."""
     frame, axes, direction = np.empty((4, 3)), np.empty((3, 3)), np.empty(3)
@@ -155,17 +171,7 @@ def axis_errors(tables: Array, entries: Integers, joints: Array, wrench: Array, 
     for e in range(len(tables)):
         row = entries[e, 0]
         _placed(joints, entries[e, 1], tables, e, 0, frame)
-        distance = np.inf
-        for i in range(3):
-            direction[i] = tables[e, 21 + i]
-        if entries[e, 2]:
-            distance = 0.0
-            for i in range(3):
-                direction[i] -= place[i]
-                distance += direction[i] * direction[i]
-            distance = np.sqrt(distance)
-            for i in range(3):
-                direction[i] /= max(distance, TOUCHING)
+        distance = _wanted(tables[e, 21:24], place, entries[e, 2], direction)
         if distance < TOUCHING:
             value[row] = value[row + 1] = 0.0
             continue

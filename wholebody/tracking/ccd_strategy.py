@@ -15,6 +15,7 @@ from wholebody.geometry.penetration import global_depth
 from wholebody.methods.ccd.frames import resolve_overlap
 from wholebody.scene.scene import Scene
 from wholebody.tracking.frame import Resolution
+from wholebody.tracking.qp_strategy import largest_motions
 
 
 class CCDStrategy:
@@ -24,12 +25,9 @@ class CCDStrategy:
 
     def __init__(self, scene: Scene, shown: Array, dt: float, seed: int) -> None:
         self.scene = scene
-        # largest velocity, rad/s, with which a joint moves away from the tracked one or returns to it: fast
+        # largest velocity, rad/s and m/s, with which a joint moves away from the tracked one or returns to it: fast
         # enough to return from 2 rad in half a second, and slow enough not to look like a jump
-        self._largest_motion = np.full(scene.model.nv, 4.0 * dt)
-        for root in scene.figure.roots.values():
-            first = int(scene.model.joints[root].idx_v)
-            self._largest_motion[first : first + 3] = 2.0 * dt  # root speed, m/s
+        self._largest_motion = largest_motions(scene, 4.0 * dt, 2.0 * dt)
         self._tracked = shown
         self._rng = np.random.default_rng(seed)
 

@@ -22,8 +22,7 @@ from wholebody.base.errors import InputError
 from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.geometry.proximity import PENETRATION
-from wholebody.methods.base import judged
-from wholebody.methods.inputs import SEED
+from wholebody.methods.base import SEED, judged
 from wholebody.methods.qp.method import QP
 from wholebody.motion.clip import Clip, same_joints
 from wholebody.problem import Problem

@@ -14,8 +14,7 @@ from wholebody.base.checks import whole
 from wholebody.base.errors import InputError
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
-from wholebody.methods.base import Tracker
-from wholebody.methods.inputs import check_problem
+from wholebody.methods.base import Tracker, check_problem
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.tasks import Frame, Orientation, Point

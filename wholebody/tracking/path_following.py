@@ -14,8 +14,7 @@ from wholebody.base.checks import array, is_number, number, shown, time_step, wh
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, InputError
 from wholebody.base.files import read_text
-from wholebody.methods.base import Method
-from wholebody.methods.inputs import check_problem
+from wholebody.methods.base import Method, check_problem
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.assembly_solution import AssemblySolution
 from wholebody.methods.solve import method_for_motions

@@ -82,7 +82,8 @@ class QPStrategy:
 
     def __init__(self, scene: Scene, start: Array, dt: float, rigid: bool, touching: Sequence[str] = ()) -> None:
         self.scene, self.dt = scene, dt
-        most = largest_motions(scene, dt)
+        # rad/s, above that of people, and m/s: a released figure returns soon but does not jump
+        most = largest_motions(scene, 8.0 * dt, 3.0 * dt)
         self._motion_limit = FrameMotionLimit(scene.model, most)
         self._attraction = Attraction(start, weights(scene, rigid))
         cones = [ReachCones()] if scene.figure.cones else []
@@ -141,12 +142,12 @@ def weights(scene: Scene, rigid: bool) -> Array:
     return result
 
 
-def largest_motions(scene: Scene, dt: float) -> Array:
-    """Largest motion of every degree of freedom in a frame, (nv,): a released figure returns soon but does not jump."""
-    result = np.full(scene.model.nv, 8.0 * dt)  # rad/s: above that of people
+def largest_motions(scene: Scene, turn: float, shift: float) -> Array:
+    """Largest motion of every degree of freedom (nv,): `turn` [rad], and `shift` [m] of where a free root is."""
+    result = np.full(scene.model.nv, turn)
     for root in scene.figure.roots.values():
         first = int(scene.model.joints[root].idx_v)
-        result[first : first + 3] = 3.0 * dt  # m/s
+        result[first : first + 3] = shift
     return result
 
 

@@ -23,7 +23,7 @@ from wholebody.figures import load
 from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
 from wholebody.geometry import shapes
-from wholebody.methods.inputs import SEED
+from wholebody.methods.base import SEED
 from wholebody.motion.clip import MOST_FRAMES, Clip
 from wholebody.scene.matter.body import BallJoint, Body, Hinge
 from wholebody.scene.scene import Scene

@@ -13,7 +13,7 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State
 from wholebody.methods.simplification.simplify import Simplified
-from wholebody.tasks.base import Constraint, Goal, Measure
+from wholebody.tasks.base import Measure
 
 FEET = [wb.Hold("left_foot"), wb.Hold("right_foot")]
 TARGET = (0.45, -0.25, 1.1)
@@ -29,73 +29,24 @@ def standing(human: Figure, **more: object) -> wb.Problem:
 FROZEN = [wb.Freeze("root", "legs", "spine", "neck", "left_arm")]
 
 
-def test_frozen_joints_and_pairs_between_them_are_left_out(human: Figure) -> None:
-    whole = standing(human, constraints=[*FEET, *FROZEN], measures=[wb.Effort(), wb.tasks.Discomfort()])
-    part = wb.simplify(whole)
-    model = part.problem.scene.model
-    assert {*part.left_out.joints, *model.names} == {*human.model.names}
-    assert part.left_out.counts["degrees of freedom"] == (55, model.nv)
-    assert part.problem.constraints == ()  # nothing moves the feet any more
+def test_pairs_that_frozen_joints_keep_apart_or_in_place_are_left_out(human: Figure) -> None:
+    box = wb.Box((0.1, 0.1, 0.1))
+
+    def beside(constraints: list[object]) -> Simplified:
+        whole = standing(human, constraints=constraints)
+        whole.scene.add(box, name="box", at=(0.3, 0.9, 1.0))  # within reach of the left hand alone
+        return wb.simplify(wb.Problem(whole.scene, "standing", goals=whole.goals, constraints=constraints))
+
+    free, part = beside(FEET), beside([*FEET, *FROZEN])
+    assert (free.left_out.things, part.left_out.things) == ((), ("floor", "box"))
     assert part.left_out.rigid > 100
-    owners = [[part.problem.scene.piece_owner[k] for k in pair] for pair in part.problem.scene.pair_table.pairs]
+    scene = part.problem.scene
+    assert scene.figure is human
+    owners = [[scene.piece_owner[k] for k in pair] for pair in scene.pair_table.pairs]
     assert all(any(name.startswith("right_") for name in pair) for pair in owners)
-    here, there = State(model), State(human.model)
-    for q in random_postures(model, 3, 0):
-        here.update(q), there.update(part.posture(q))
-        for one, other in zip(part.problem.goals, whole.goals, strict=True):
-            np.testing.assert_allclose(one.error(here), other.error(there), atol=1e-9)
-        slopes = [sum(term.weight * term.gradient(at) for term in of) for of, at in (
-            (part.problem.measures, here), (whole.measures, there))]  # fmt: skip
-        moved = [human.model.joints[human.model.getJointId(name)].idx_v for name in list(model.names)[1:]]
-        np.testing.assert_allclose(slopes[0], slopes[1][moved], atol=1e-9)
-
-
-class Lean(Constraint):
-    """A term of a user's own that asks the whole posture by index."""
-
-    def value(self, state: State) -> np.ndarray:
-        return np.array([state.q[52] - state.q[49] ** 2])
-
-    def jacobian(self, state: State) -> np.ndarray:
-        row = np.zeros((1, state.model.nv))
-        row[0, 51], row[0, 48] = 1.0, -2.0 * state.q[49]
-        return row
-
-
-@pytest.mark.parametrize("term", [wb.Posture(np.zeros(56), joints=["right_arm"]), Lean()])
-def test_frozen_joints_stay_where_a_term_needs_the_whole_figure(human: Figure, term: Goal | Constraint) -> None:
-    if isinstance(term, Goal):
-        whole = standing(human, goals=[wb.Posture(human.posture("standing"), joints=["right_arm"])], constraints=FROZEN)
-    else:
-        whole = standing(human, constraints=[*FROZEN, term])
-    part = wb.simplify(whole)
-    assert part.left_out.joints == ()
-    assert part.problem.scene.figure is human
-    assert [type(bound) for bound in part.problem.bounds] == [wb.Freeze]
-
-
-class Behind(Constraint):
-    """The right palm stays behind a plane, as a hinge that is level where the palm is."""
-
-    lower, upper = np.array([-np.inf]), np.array([0.0])
-
-    def value(self, state: State) -> np.ndarray:
-        return np.array([max(0.0, self._palm(state).translation[0] - 0.4)])
-
-    def jacobian(self, state: State) -> np.ndarray:
-        data, palm = state.model.createData(), state.model.getFrameId("right_palm")
-        row = pin.computeFrameJacobian(state.model, data, state.q, palm, pin.LOCAL_WORLD_ALIGNED)[:1]
-        return row * (self.value(state)[0] > 0.0)
-
-    def _palm(self, state: State) -> pin.SE3:
-        return state.frame(state.model.getFrameId("right_palm"))
-
-
-def test_a_constraint_of_ones_own_that_does_not_act_at_the_start_stays(human: Figure) -> None:
-    goals = [wb.Point("right_index_tip", (0.6, -0.2, 1.2))]
-    part, answer = solved(standing(human, goals=goals, constraints=[*FROZEN, Behind()]))
-    assert [type(term) for term in part.problem.constraints] == [Behind]
-    assert answer.status == "unreachable"
+    assert [type(term) for term in (*part.problem.constraints, *part.problem.bounds)].count(wb.Freeze) == 1
+    left = {"pairs": (len(part.whole.scene.pair_table.pairs), len(scene.pair_table.pairs))}
+    assert part.left_out.counts.items() >= left.items()
 
 
 def solved(problem: wb.Problem) -> tuple[Simplified, wb.Solution]:
@@ -146,7 +97,7 @@ def test_an_answer_that_does_not_hold_in_the_whole_problem_is_not_called_solved(
     assert part.restored(answer).status == "solved"
     crowded = wb.Scene(human).add(wb.Sphere(0.1), name="late", at=TARGET)
     late = wb.Problem(crowded, "standing", goals=[wb.Point("right_index_tip", TARGET)], constraints=FEET)
-    stale = Simplified(part.problem, late, part.left_out, part._part)
+    stale = Simplified(part.problem, late, part.left_out)
     assert stale.restored(answer).status == "infeasible"
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from wholebody.base.errors import InputError
 from wholebody.bench.tables import machine, write_rows, write_text
-from wholebody.cli.arguments import JOBS, jobs_of
+from wholebody.cli.arguments import JOBS
 from wholebody.cli.bench.command import folders, listed, quick, seed
 from wholebody.cli.command import command, count, flag, option
 
@@ -56,7 +56,7 @@ def compare(arguments: argparse.Namespace) -> int:
     from wholebody.bench.suite.compare.summary import advice
     from wholebody.cli.tables import bar
 
-    jobs = jobs_of(arguments)
+    jobs = arguments.at_once
     settings = _settings(arguments)
     with bar("starting") as tell:
         store = comparison.run(
@@ -143,7 +143,7 @@ def _again(arguments: argparse.Namespace) -> int:
 
     published = read_lock(arguments.again)
     settings = published.settings()
-    jobs = jobs_of(arguments)
+    jobs = arguments.at_once
     store = comparison.run(settings, arguments.out, jobs, None, lambda progress: print(progress.said))
     facts = _facts(f"{jobs} on this machine")
     found = locked(publish(settings, store, arguments.out, facts, missing()))

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 @measuring(
     "stability",
     "hard cases by methods: where each fails, and how",
-    "Ask every method every hard case, each in a process of its own, and judge the answers: solved, an "
+    "Ask every method every hard case, in processes that may crash, and judge the answers: solved, an "
     "honest best effort, a clear refusal, or WRONG.",
     listed("--methods", "methods, such as qp, newton or qp/daqp; all for every one (default: one of each algorithm)"),
     listed("--cases", "cases (default: all; with --quick a few)"),

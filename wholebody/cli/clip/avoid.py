@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.arguments import JOBS, jobs_of
+from wholebody.cli.arguments import JOBS
 from wholebody.cli.clip.arguments import (
     EQUIPMENT,
     MOTIONS,
@@ -47,8 +47,6 @@ batch continues.""",
     ),
     EQUIPMENT,
     SCENE,
-    flag("--no-feet", "let standing feet slide; otherwise they are held"),
-    flag("--keep-ends", "keep the first and the last posture where free"),
     flag("--dynamics", "keep torques within the strength of a median person, and the balance within the feet"),
     option(
         "--stretch",
@@ -84,7 +82,6 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.motion.worn_equipment import put_on
 
     (file,) = arguments.files
-    jobs_of(arguments)  # one case needs no jobs; what is wrong with them is said all the same
     out = check_writable(check_ending(arguments.out or file.with_name(f"{file.stem}-free.npz")), [file])
     if arguments.html is not None:
         checked_target(arguments.html, "--html", "a page", (".htm", ".html"))
@@ -93,14 +90,8 @@ def run(arguments: argparse.Namespace) -> int:
     method, scene = _method(methods[0], arguments), put_on(scene_of(arguments), worn[0])
     clip = read_clip(file, scene.figure)
     with bar(clip.name) as tell:
-        avoided = avoid(
-            clip,
-            scene,
-            method=method,
-            hold_feet=not arguments.no_feet,
-            keep_ends=arguments.keep_ends,
-            progress=lambda told: bool(tell(told.share, told.note)),  # it goes on: a bar says nothing
-        )
+        # it goes on: a bar says nothing
+        avoided = avoid(clip, scene, method=method, progress=lambda told: bool(tell(told.share, told.note)))
     _tell(avoided, avoided.clip.write(out))
     if arguments.html is not None:
         from wholebody.view.motion_curves import motion_curves
@@ -165,7 +156,6 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
     from wholebody.base.errors import InputError
     from wholebody.cli.tables import bar
     from wholebody.motion.batch import BatchProgress, avoid_many
-    from wholebody.motion.measures import MotionBounds
 
     if arguments.html is not None:
         raise InputError("--html is for one motion with one equipment by one method; give one of each")
@@ -182,9 +172,8 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
                 tell(now.done, done)
 
             rows = avoid_many(
-                arguments.files, folder, figure=figure_of(arguments), equipment=worn,
-                methods=ways, constraints=[MotionBounds(keep_ends=True)] if arguments.keep_ends else (),
-                hold_feet=not arguments.no_feet, jobs=jobs_of(arguments), cluster=arguments.cluster, progress=said,
+                arguments.files, folder, figure=figure_of(arguments), equipment=worn, methods=ways,
+                jobs=arguments.at_once, cluster=arguments.cluster, progress=said,
             )  # fmt: skip
     except KeyboardInterrupt:
         print(f"ended; {folder} keeps what is done, and the same command goes on")

@@ -7,14 +7,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wholebody.cli.arguments import JOBS, jobs_of
+from wholebody.cli.arguments import JOBS
 from wholebody.cli.clip.arguments import EQUIPMENT, MOTIONS, SCENE, scene_of
 from wholebody.cli.command import command, flag, option
 
 if TYPE_CHECKING:
     from wholebody.motion.checking import ClipCheck
-    from wholebody.motion.clip import Clip
-    from wholebody.scene.scene import Scene
 
 MOST = 20  # lines of a table
 WIDE = 110  # letters that its lines need
@@ -50,20 +48,21 @@ def run(arguments: argparse.Namespace) -> int:
     from rich.console import Console
 
     from wholebody.base.files import checked_target, write
-    from wholebody.motion.checking import DEPTH
+    from wholebody.cli.tables import bar
+    from wholebody.motion.checking import DEPTH, check
     from wholebody.motion.reading import read_clip
     from wholebody.motion.worn_equipment import NOTHING, put_on
 
     depth = DEPTH if arguments.depth is None else 1e-3 * arguments.depth
     if len(arguments.files) * max(1, len(arguments.equipment)) > 1:
         return _many(arguments, depth)
-    jobs_of(arguments)  # one case needs no jobs; what is wrong with them is said all the same
     if arguments.html is not None:
         checked_target(arguments.html, "--html", "a page", (".htm", ".html"))
     (file,), worn = arguments.files, (*arguments.equipment, NOTHING)[0]
     scene = put_on(scene_of(arguments), worn)
     clip = read_clip(file, scene.figure)
-    found = checked(clip, scene, depth)
+    with bar(said := "checking every pair", len(clip)) as tell:
+        found = check(clip, scene, depth=depth, progress=lambda done: tell(done, said))
     if arguments.json:
         print(json.dumps(found.as_dict(), indent=1))
     else:
@@ -75,15 +74,6 @@ def run(arguments: argparse.Namespace) -> int:
             page = timeline(found, scene)
         print(f"wrote {write(arguments.html, page)}", file=sys.stderr if arguments.json else sys.stdout)
     return 0 if found.free and not found.limits else 1
-
-
-def checked(clip: Clip, scene: Scene, depth: float) -> ClipCheck:
-    """Check, with a progress bar."""
-    from wholebody.cli.tables import bar
-    from wholebody.motion.checking import check
-
-    with bar("checking every pair", len(clip)) as tell:
-        return check(clip, scene, depth=depth, progress=lambda done: tell(done, "checking every pair"))
 
 
 def _many(arguments: argparse.Namespace, depth: float) -> int:
@@ -109,7 +99,7 @@ def _many(arguments: argparse.Namespace, depth: float) -> int:
     work = (Job(case, _check_one, (arguments, *case, depth), 0.0) for case in cases)
     found: dict[tuple[Path, str], dict[str, Any]] = {}
     with bar("checking", len(cases)) as tell:
-        for outcome in run_batch(work, jobs_of(arguments), arguments.cluster):
+        for outcome in run_batch(work, arguments.at_once, arguments.cluster):
             found[outcome.job.name] = outcome.answer or {"refused": str(outcome.error)}
             tell(len(found), str(outcome.job.name[0].name))
     if arguments.json:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.arguments import JOBS, jobs_of
+from wholebody.cli.arguments import JOBS
 from wholebody.cli.clip.arguments import MOTIONS, ONE_MOTION, PAGE, SCENE, clip_of, figure_of, scene_of
 from wholebody.cli.command import command, flag, option
 
@@ -222,7 +222,7 @@ def _many(arguments: argparse.Namespace) -> int:
     figure, count = figure_of(arguments), len(arguments.files)
     with bar("retargeting", count) as tell:
         found = read_many(
-            arguments.files, arguments.out, figure, jobs=jobs_of(arguments), cluster=arguments.cluster,
+            arguments.files, arguments.out, figure, jobs=arguments.at_once, cluster=arguments.cluster,
             progress=lambda done, said: tell(done, said),
         )  # fmt: skip
     for name, made in found.items():

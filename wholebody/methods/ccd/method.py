@@ -14,7 +14,15 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import posture
 from wholebody.base.fields import Checked
 from wholebody.geometry.continuous.passing_through import last_free
-from wholebody.methods.base import UnsupportedTermError
+from wholebody.methods.base import (
+    CCD_TOLERANCE,
+    Iterations,
+    Restarts,
+    Seed,
+    TimeLimit,
+    UnsupportedTermError,
+    check_problem,
+)
 from wholebody.methods.ccd.reaching import Reach
 from wholebody.methods.ccd.resolver import PERTURBATIONS, TOLERANCE, OverlapResolver
 from wholebody.methods.ccd.terms import Request, read
@@ -22,7 +30,6 @@ from wholebody.methods.conclusion import Ending
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
 from wholebody.methods.control import Control
 from wholebody.methods.descents import Descends, DescentTracker
-from wholebody.methods.inputs import CCD_TOLERANCE, Iterations, Restarts, Seed, TimeLimit, check_problem
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace

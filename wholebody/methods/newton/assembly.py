@@ -16,8 +16,8 @@ from wholebody.base.errors import InputError
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
 from wholebody.geometry.placement import PlacementLike
+from wholebody.methods.base import ITERATIONS, TOLERANCE
 from wholebody.methods.control import budget_for_sweep
-from wholebody.methods.inputs import ITERATIONS, TOLERANCE
 from wholebody.methods.newton.assembly_joints import AssemblyJoints
 from wholebody.methods.newton.assembly_solution import (
     AssemblyGoal,

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from wholebody.methods.base import UnsupportedTermError
+from wholebody.methods.base import UnsupportedTermError, check_problem
 from wholebody.methods.conclusion import Ending
 from wholebody.methods.control import Control
 from wholebody.methods.descents import Descends
-from wholebody.methods.inputs import check_problem
 from wholebody.methods.newton.multistart import Search, Settings
 from wholebody.methods.newton.settings import STARTS
 from wholebody.methods.newton.terms import FigureSystem, state_equations

@@ -13,9 +13,9 @@ from wholebody.assessment.posture import Assessment, assess
 from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import known
 from wholebody.base.fields import Checked
+from wholebody.methods.base import Iterations, Restarts, Seed, TimeLimit, Tolerance
 from wholebody.methods.conclusion import Ending, assessed_tolerance, meets
 from wholebody.methods.contradictions import Contradiction, contradictions, least_left
-from wholebody.methods.inputs import Iterations, Restarts, Seed, TimeLimit, Tolerance
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.linear_algebra import NAMES

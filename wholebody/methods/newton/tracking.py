@@ -10,10 +10,9 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import posture
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT
-from wholebody.methods.base import Method, SolvingTracker
+from wholebody.methods.base import TOLERANCE, Method, SolvingTracker
 from wholebody.methods.conclusion import concluded
 from wholebody.methods.control import BUDGET, Control
-from wholebody.methods.inputs import TOLERANCE
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.multistart import Search, Settings
 from wholebody.methods.newton.settings import FRAMES, STARTS

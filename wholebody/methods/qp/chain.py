@@ -73,12 +73,7 @@ def from_seeds(problem: Problem, workspace: Workspace, settings: Settings, contr
         chain = chains.carrying(entries)
         if chain is None:
             return None
-        at = problem.scene.figure.clamp(problem.start)
-        distance = distance_of(problem, chain) if settings.measures else None
-        nearest = np.array([chain.angles(at if distance is None else distance.reference), np.zeros(len(chain.idx_v))])
-        if distance is not None:
-            nearest[1] = distance.weights[chain.idx_v]
-        asked = Asked(chain.goals(entries), at, nearest, problem.clearances)
+        asked, distance = Asked.by(problem, chain, entries, settings.measures)
         rule = Rule.of(chain, asked.goals, settings, distance is not None)
         return Descents(asked, chain, rule, workspace, settings, control).run()
 
@@ -90,6 +85,32 @@ class Asked(NamedTuple):
     at: Array  # (nq,) its start, within limits
     nearest: Array  # (2, n) posture from which the measure is a squared distance, and weights; zeros for none
     clearances: Array  # (pairs,) metres
+
+    @classmethod
+    def by(
+        cls, problem: Problem, chain: PlainChain, entries: list[Entry], measures: bool = True
+    ) -> tuple[Asked, SquaredDistance | None]:
+        """What a problem with these entries asks, and its measure where that is a squared distance."""
+        at = problem.scene.figure.clamp(problem.start)
+        distance = distance_of(problem, chain) if measures else None
+        nearest = np.array([chain.angles(at if distance is None else distance.reference), np.zeros(len(chain.idx_v))])
+        if distance is not None:
+            nearest[1] = distance.weights[chain.idx_v]
+        return cls(chain.goals(entries), at, nearest, problem.clearances), distance
+
+
+def closed_form_postures(problem: Problem) -> Array | None:
+    """All postures (k, nq) of six joints that meet a placement, free or not; None without a closed form of them."""
+    entries = goal_entries(problem)
+    with chains_of(problem).borrow() as chains:
+        chain = None if entries is None else chains.carrying(entries)
+        if entries is None or chain is None or chain.held >= 0 or len(chain.idx_v) < problem.scene.model.nv:
+            return None
+        asked, _ = Asked.by(problem, chain, entries)
+        if not chain.is_exact(asked.goals):
+            return None
+        values = chain.branches(asked.goals, asked.nearest).least
+        return chain.posture(values, np.tile(asked.at, (len(values), 1))) if len(values) else None
 
 
 class Descents:

@@ -9,10 +9,10 @@ from wholebody.assessment.posture import assess
 from wholebody.base.arrays import Array
 from wholebody.base.checks import posture, shown
 from wholebody.base.errors import InputError
+from wholebody.methods.base import check_problem
 from wholebody.methods.conclusion import Ending, concluded, meets
 from wholebody.methods.control import Control
 from wholebody.methods.descents import Descends
-from wholebody.methods.inputs import check_problem
 from wholebody.methods.qp.chain import from_seeds
 from wholebody.methods.qp.chain_batch import Batch, batches
 from wholebody.methods.qp.multistart import Multistart

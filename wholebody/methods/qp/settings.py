@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
 from wholebody.base.fields import Checked
-from wholebody.methods.inputs import BUDGET, Iterations, Restarts, Seed, TimeLimit, Tolerance
+from wholebody.methods.base import BUDGET, Iterations, Restarts, Seed, TimeLimit, Tolerance
 
 
 @dataclass(frozen=True)

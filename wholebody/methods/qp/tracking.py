@@ -13,9 +13,8 @@ from wholebody.base.checks import flag, posture
 from wholebody.base.errors import TermError
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
-from wholebody.methods.base import Method, SolvingTracker, begun, goal_error, nearest_to
+from wholebody.methods.base import TOLERANCE, Method, SolvingTracker, begun, goal_error, nearest_to
 from wholebody.methods.control import BUDGET, budget_for_sweep
-from wholebody.methods.inputs import TOLERANCE
 from wholebody.methods.qp.escaping import ProjectionRows, free_end, projection_rows
 from wholebody.methods.qp.escaping import compiled_kernel as compiled_escape
 from wholebody.methods.qp.settings import ESCAPE, TRACKING

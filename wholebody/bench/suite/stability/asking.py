@@ -1,10 +1,11 @@
-"""Asks methods hard questions, each in a process of its own, and measures the answers on questions made anew."""
+"""Asks methods hard questions in child processes, and measures the answers on questions made anew."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from wholebody.assessment.motion import depth_between, velocities
 from wholebody.assessment.posture import Assessment, assess
 from wholebody.base.compiled import compile_all
 from wholebody.base.errors import WholebodyError
-from wholebody.base.runner import BY_THE_CLOCK, Child, EndedError, Job, allow_processor, run_jobs, tell
+from wholebody.base.runner import ONE_THREAD, Child, EndedError, Job, allow_processor, run_jobs, tell
 from wholebody.bench.suite.adapters.base import Adapter
 from wholebody.bench.suite.stability.catalogue import NOTHING, Answer, HardCase, Nonsense, Posed, Stream, cases
 from wholebody.problem import Problem
@@ -119,17 +120,21 @@ class Cell:
 
 def run(asked: Iterable[tuple[HardCase, Adapter]], jobs: int = 1, cap: float = 20.0) -> Iterator[Cell]:
     """Cases as they end, each by a method, in `jobs` processes; over `cap` s of the processor a method hangs."""
-    _warm()
-    left = (Job((case, adapter.name), _cell, (case, adapter, cap), BY_THE_CLOCK * cap) for case, adapter in asked)
-    for outcome in run_jobs(lambda: next(left, None), [Child(forked=True) for _ in range(jobs)]):
+    # Half an hour for the first case of a process, which may compile everything.
+    left = (Job((case, adapter.name), _cell, (case, adapter, cap), 1800.0) for case, adapter in asked)
+    children = [Child(ONE_THREAD) for _ in range(jobs)]
+    for outcome in run_jobs(lambda: next(left, None), children):
         case, method = outcome.job.name
         answer = outcome.notes[0] if outcome.notes else Answer(NOTHING)
         if outcome.error is not None:
             failure = "its answer cannot be judged" if outcome.notes else _failure(outcome.error, cap)
             answer = Answer(NOTHING, failure=failure)
         yield Cell(case, method, answer, outcome.answer or Judged())
+    for child in children:
+        child.close()
 
 
+@cache
 def _warm() -> None:
     """Import and compile in this process what most cells need, so that no cell is timed with it."""
     from wholebody.methods.qp.method import QP
@@ -143,6 +148,7 @@ def _warm() -> None:
 
 def _cell(case: HardCase, adapter: Adapter, cap: float) -> Judged:
     """Ask, send the answer, then judge it: the time of the method ends with the answer."""
+    _warm()
     allow_processor(cap)
     answer = ask(case, adapter, lambda: allow_processor(cap))
     allow_processor(120.0)  # s of the processor: a judgement of many frames, all pairs of each

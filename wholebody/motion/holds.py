@@ -1,0 +1,318 @@
+"""Where points of a figure rest, as those of a skeleton rest, frame by frame.
+
+A point goes over to the place where it rests before it does, and away from it afterwards. The sole of a rigid foot
+keeps its length: of heel and toes, what rests first says where the other one comes down. What touches a thing goes
+with it.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array, Mask, with_values
+from wholebody.figures.figure import Figure
+from wholebody.motion.held_points import HeldPoint
+from wholebody.motion.posture_fit import CLEARANCE
+from wholebody.motion.standing_ground import MOST_FRAMES, Foothold, Ground
+from wholebody.motion.thing_contacts import ThingContact, Things, thickness
+from wholebody.motion.windows import long_runs, runs
+
+FIRM, STRONG = 24.0, 48.0  # s, weights of what rests, over the time step, in the first pass and later; 1 of a bone
+NEARING, SWING = 30.0, 0.3  # weights of what nearly rests, and of a sole between
+TOUCH = 200.0  # of what touches a thing
+LANDING = 3.0  # weight in the frame in which a point comes down, where contact decides
+BESIDE = np.array([0.1, 0.1, 1.0])  # shares of that weight: soles that meet come down beside each other
+STEP = 0.3  # m: a surface higher than this above the recording's ground is not what a sole comes down on
+FACING = 0.3  # least cosine of the angle from up to the normal of a sole that faces the ground
+FOLLOW = 0.8  # share of the body's shift that a new place keeps; the rest goes back with time
+NEARLY = 3e-4  # m: by which the goal of a part that touches a thing is not moved
+LOST = 0.02  # m: points farther than this from their place on a thing cannot reach it
+OVER = 0.2  # s: in which a point goes over to where it rests
+AHEAD = 0.4  # s before a rest in which it is known: more leads longer swings to it, and postures come out later
+
+
+class Touched:
+    """What a figure touches, and with which side."""
+
+    def __init__(self, figure: Figure, things: Things, contacts: Sequence[ThingContact]) -> None:
+        self.things, self.contacts, self._figure = things, contacts, figure
+        self._data = figure.model.createData()
+
+    def held(self, contact: ThingContact, point: HeldPoint, q: Array) -> Array:
+        """(3,) where a point is held in a thing's axes, by the thickness of the part on the side that touches it."""
+        pin.forwardKinematics(self._figure.model, self._data, q)
+        at = self._data.oMi[point.joint]
+        into = at.rotation.T @ self.things.at(contact.thing, contact.first).rotation @ -contact.normal
+        pieces = [piece for piece in self._figure.geometry.geometryObjects if piece.parentJoint == point.joint]
+        return contact.place + (thickness(pieces, point.place, into) + CLEARANCE) * contact.normal
+
+    def gap(self, contact: ThingContact, point: HeldPoint, frame: int, q: Array) -> float:
+        """Signed distance of a point's part, with what its joint carries, to a thing at a posture (nq,), metres."""
+        model, geometry = self._figure.model, self._figure.geometry.geometryObjects
+        pin.forwardKinematics(model, self._data, q)
+        own = [
+            (piece.geometry, self._data.oMi[piece.parentJoint] * piece.placement)
+            for piece in geometry
+            if point.joint in model.supports[piece.parentJoint]
+        ]
+        return self.things.gap(contact.thing, frame, own)
+
+
+class Holds:
+    """Where each of `points` is to be in each frame, and with which weight."""
+
+    def __init__(
+        self,
+        points: list[HeldPoint],
+        ground: Ground,
+        scale: float,
+        dt: float,
+        surface: Callable[[Array], float | None] | None,
+        touched: Touched | None = None,
+    ) -> None:
+        """Take the points that rest at some time, the ground that says when, and what is touched."""
+        # `scale` are metres of the figure for each metre of height of the recording's ground; `surface` is the height
+        # of the highest surface below a place (3,), None for the recording's ground.
+        self.points, self._scale, self._surface, self._touched = points, scale, surface, touched
+        self.over, self.ahead = max(1, round(OVER / dt)), max(1, round(AHEAD / dt))
+        self._dt = dt
+        contacts = () if touched is None else touched.contacts
+        # a part that touches a thing while it seems to rest on the ground rests on the thing
+        apart = [
+            rest
+            for rest in ground.footholds
+            if not any(one.role == rest.role and rest.first < one.end and one.first < rest.end for one in contacts)
+        ]
+        self._stands: list[list[Foothold | ThingContact]] = [
+            [one for one in contacts if (one.role, one.share) == (point.role, point.share)]
+            if point.thing
+            else [rest for rest in apart if rest.role == point.role]
+            for point in points
+        ]
+        feet = sorted({point.foot for point in points if point.foot})
+        self._soles = [[k for k, point in enumerate(points) if point.foot == foot] for foot in feet]
+        self._ways: dict[tuple[int, int], Array] = {}  # by point and frame the place of the free fit
+        self._places: dict[tuple[int, int], Array] = {}
+        self._gone: set[tuple[int, int]] = set()  # points and frames in which they do not reach their things
+
+    def lost(self, frame: int, q: Array, places: Array, held: tuple[Array, Array]) -> bool:
+        """Whether points (h, 3) are too far from the things that they are to touch; these are let go of in the frame.
+
+        `held` are the goals and weights of the frame; those of what is let go of become zero.
+        """
+        self._gone -= {each for each in self._gone if each[1] == frame}
+        for number, stand in self._touches(frame, held[1]):
+            normal, gap = self._gap(number, stand, frame, q)
+            off = places[number] - held[0][number]
+            if np.hypot(np.linalg.norm(off - (off @ normal) * normal), gap) > LOST:
+                held[1][number] = 0.0
+                self._gone.add((number, frame))
+        return any(each[1] == frame for each in self._gone)
+
+    def touch(self, frame: int, q: Array, places: Array, held: tuple[Array, Array]) -> None:
+        """Move goals along the normals of things to where the points (h, 3) of a posture would be if parts touched.
+
+        How thick a part is there depends on how it is turned; it turns little if goals move no more than they need to.
+        """
+        for number, stand in self._touches(frame, held[1]):
+            normal, gap = self._gap(number, stand, frame, q)
+            off = float(normal @ (places[number] - held[0][number])) + CLEARANCE - gap
+            spare = 0.0 if frame == stand.first else NEARLY
+            held[0][number] += (off - min(max(off, -spare), spare)) * normal
+
+    def _touches(self, frame: int, weights: Array) -> list[tuple[int, ThingContact]]:
+        """Points that are held at things in a frame, by their numbers, and where."""
+        return [
+            (number, stand)
+            for number, stands in enumerate(self._stands)
+            for stand in stands
+            if isinstance(stand, ThingContact) and stand.first <= frame < stand.end and weights[number, 0] == TOUCH
+        ]
+
+    def _gap(self, number: int, stand: ThingContact, frame: int, q: Array) -> tuple[Array, float]:
+        """The normal (3,) of a contact in the world in a frame, and the distance of the part to the thing, metres."""
+        assert self._touched is not None
+        normal = self._touched.things.at(stand.thing, frame).rotation @ stand.normal
+        return normal, self._touched.gap(stand, self.points[number], frame, q)
+
+    def give_up(self) -> str:
+        """Split the contacts with things where points were let go of; says which, or nothing."""
+        told, places = [], dict[tuple[int, int], Array]()
+        for number, stands in enumerate(self._stands):
+            kept = list[Foothold | ThingContact]()
+            for stand in stands:
+                reached = np.array([(number, frame) not in self._gone for frame in range(stand.first, stand.end)])
+                if not isinstance(stand, ThingContact) or reached.all():
+                    kept.append(stand)
+                    continue
+                lost = stand.first + np.flatnonzero(~reached)
+                told.append(
+                    f"{self.points[number].role} does not reach {stand.thing} in frames {lost[0]} to {lost[-1]}"
+                )
+                own = self._places[number, stand.first]
+                for part in runs(long_runs(reached, self.over)):
+                    first = stand.first + part.first
+                    kept.append(with_values(stand, first=first, end=stand.first + part.end))
+                    places[number, first] = own.copy()  # each part lands by itself
+            self._stands[number] = kept
+        self._gone.clear()
+        self._places = places if told else self._places  # recompute where feet come down
+        return "; ".join(told)
+
+    def rest(self, role: str, frame: int) -> None:
+        """Points of a role rest on the lowest level from a frame on, of a stream."""
+        for point, stands in zip(self.points, self._stands, strict=True):
+            if point.role == role:
+                stands.append(Foothold(role, frame, MOST_FRAMES, np.zeros(3), 0.0))
+
+    def leave(self, role: str, frame: int) -> None:
+        """They rest no more, from a frame on."""
+        for point, stands in zip(self.points, self._stands, strict=True):
+            if point.role == role:
+                stands[-1] = with_values(stands[-1], end=frame)
+
+    def finish(self, count: int) -> None:
+        """No frame comes from `count` on: what rests there begins no more, and other rests end there."""
+        self._stands = [
+            [with_values(each, end=count) if each.end > count else each for each in stands if each.first < count]
+            for stands in self._stands
+        ]
+
+    def moved(self, frame: int) -> Mapping[str, pin.SE3]:
+        """Where the things that move are in a frame."""
+        return {} if self._touched is None else self._touched.things.moved(frame)
+
+    def begin(self, free: Mapping[int, Array]) -> None:
+        """Take the postures (nq,) of the free fit by frame, which say which side of a part touches a thing."""
+        self._free = free
+
+    def goals(self, frame: int, paths: Mapping[int, Array], shift: Array, again: bool = False) -> tuple[Array, Array]:
+        """Goals and weights (h, 3) of a frame; `paths` (h, 3) by frame without holds, `shift` (3,) of the body."""
+        down, strong = self._facing_down(paths[frame]), (STRONG if again else FIRM) / self._dt
+        goals, weights = np.array(paths[frame]), np.zeros((len(self.points), 3))
+        for number, stands in enumerate(self._stands):
+            after = bisect_right([stand.first for stand in stands], frame)
+            around = [each for each in stands[max(0, after - 1) : after + 1] if each.first <= frame + self.ahead]
+            if not around:
+                continue
+            nearest = [min(max(frame, stand.first), stand.end - 1) for stand in around]
+            places = [
+                self._place(number, stand, paths, shift, near) for stand, near in zip(around, nearest, strict=True)
+            ]
+            if around[0].first <= frame < around[0].end:
+                goals[number] = places[0]
+                if self.points[number].thing:
+                    weights[number] = 0.0 if again and (number, frame) in self._gone else TOUCH
+                else:
+                    weights[number] = LANDING * BESIDE if frame == around[0].first and not again else strong
+            else:
+                goals[number], share = self._swing(number, frame, nearest, places, paths)
+                weights[number] = (
+                    BESIDE * (SWING + (NEARING - SWING) * share) if self.points[number].foot else NEARING * share
+                )
+            if self.points[number].edge:
+                weights[number, :2] = 0.0
+            if not (down[number] or self.points[number].thing):
+                weights[number, 2] = 0.0  # contact says how high
+        return goals, weights
+
+    def _swing(
+        self, number: int, frame: int, nearest: list[int], places: list[Array], paths: Mapping[int, Array]
+    ) -> tuple[Array, float]:
+        """Where a point (3,) is to be between rests, and how near in time it is to one, from 0 to 1.
+
+        Its way is led from one rest to the next; it comes to rest, and starts, slowly. `nearest` are their frames.
+        """
+        for near in nearest:
+            if (number, near) not in self._ways:
+                self._ways[number, near] = np.array(paths[near][number])
+        led = [self._ways[number, near] for near in nearest]
+        beside = [place - start for place, start in zip(places, led, strict=True)]
+        gone = 0.0
+        if len(nearest) == 2:
+            start = max(nearest[0], nearest[1] - self.ahead)
+            part = max(frame - start, 0) / (nearest[1] - start)
+            gone = part * part * (3.0 - 2.0 * part)
+        way = paths[frame][number]
+        goal, most = way + (1.0 - gone) * beside[0] + gone * beside[-1], 0.0
+        for near, start_of in zip(nearest, led, strict=True):
+            share = 0.5 + 0.5 * np.cos(np.pi * min(abs(frame - near) / self.over, 1.0))
+            goal, most = goal - share * (way - start_of), max(most, share)
+        return goal, most
+
+    def _facing_down(self, places: Array) -> Mask:
+        """(h,) whether a point, at places (h, 3), is of a sole that faces the ground."""
+        found = np.zeros(len(places), dtype=bool)
+        for own in self._soles:
+            back, left, right, front = places[own[:4]]
+            (x, y, z), (u, v, w) = (front - back).tolist(), (left - right).tolist()
+            up = x * v - y * u  # of the normal, the cross product of both
+            found[own] = up > FACING * ((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + up**2) ** 0.5
+        return found
+
+    def landed(self, frame: int, places: Array, held: tuple[Array, Array]) -> None:
+        """Keep points where they came down, (h, 3), if a rest begins in this frame: contact may have kept them off.
+
+        What touches a thing goes on where the goals of the frame say.
+        """
+        for number, stands in enumerate(self._stands):
+            stand = next((each for each in stands if each.first == frame), None)
+            if isinstance(stand, Foothold):
+                self._places[number, frame][:2] = places[number, :2]
+        for number, contact in self._touches(frame, held[1]):
+            assert self._touched is not None
+            at = self._touched.things.at(contact.thing, frame)
+            self._places[number, contact.first] = np.array(at.actInv(held[0][number]))
+
+    def _place(
+        self, number: int, stand: Foothold | ThingContact, paths: Mapping[int, Array], shift: Array, frame: int
+    ) -> Array:
+        """(3,) where a point rests, decided when it is first asked for; on a thing, where that is in the frame."""
+        known = self._places.get((number, stand.first))
+        if isinstance(stand, ThingContact):
+            assert self._touched is not None
+            if known is None:
+                known = self._touched.held(stand, self.points[number], self._free[stand.first])
+                self._places[number, stand.first] = known
+            return np.asarray(self._touched.things.at(stand.thing, frame).act(known))
+        if known is not None:
+            return known
+        frames = range(stand.first, min(stand.end, stand.first + self.over))
+        place: Array = np.mean([paths[frame][number] for frame in frames], axis=0) + FOLLOW * shift
+        point = self.points[number]
+        if point.edge:
+            place[2] = self._height(place, stand)
+        elif point.foot:
+            for other, stands in enumerate(self._stands):
+                before = [
+                    each
+                    for each in stands
+                    if isinstance(each, Foothold)
+                    and each.first <= stand.first < each.end
+                    and (other, each.first) in self._places
+                ]
+                if (
+                    self.points[other].foot == point.foot
+                    and self.points[other].role != point.role
+                    and not self.points[other].edge
+                    and before
+                ):
+                    pivot = self._places[other, before[-1].first]
+                    along = np.mean([paths[frame][number] - paths[frame][other] for frame in frames], axis=0)
+                    length = float(np.linalg.norm(paths[frames[0]][number] - paths[frames[0]][other]))
+                    rise = self._scale * (stand.height - before[-1].height)
+                    flat = np.sqrt(max(length**2 - rise**2, 0.0)) / max(float(np.linalg.norm(along[:2])), 1e-9)
+                    place = np.array([*(pivot[:2] + flat * along[:2]), 0.0])
+            place[2] = self._height(place, stand)
+        self._places[number, stand.first] = place
+        return place
+
+    def _height(self, place: Array, stand: Foothold) -> float:
+        """Height at which a point of a sole comes down, metres."""
+        told = self._scale * stand.height
+        below = None if self._surface is None else self._surface(np.array([place[0], place[1], told + STEP]))
+        return CLEARANCE + (told if below is None else below)
