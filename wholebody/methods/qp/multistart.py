@@ -117,8 +117,7 @@ class Multistart:
         yield Attempt(self._before_contact(), lambda q: self._descend(q, full_step=True), "from before contact")
         yield Attempt(self._before_contact(grips=True), self._closing, "from before a grip")
         yield Attempt([start], self._closing, "by feasibility first")
-        # hands that are alike are no random starts
-        self._minima, self._relaxed_minima, self._without_gain = Minima(), Minima(), 0
+        self._minima, self._relaxed_minima, self._without_gain = Minima(), Minima(), 0  # hands are no random starts
         self._out_of_reach = self._known_out_of_reach(self.best.q)
         if self._out_of_reach:
             return
@@ -241,17 +240,16 @@ class Multistart:
 
     def _starts_for_measure(self, count: int) -> Iterable[Array]:
         """For `count` minima the start and random postures (nq,); for none two ways around things that are dear."""
-        begin, tolerance, most = self._start, self.settings.tolerance, self._at_most(SEARCH.probe_programs)
+        here, tolerance, most = self._start, self.settings.tolerance, self._at_most(SEARCH.probe_programs)
         if count:
             rng = np.random.default_rng([self.settings.seed, count])
-            others = restarts(self.problem, self.lineariser.state, begin, rng, SEARCH.screened * count - 1)
-            return chain([begin], others)
+            return chain([here], restarts(self.problem, self.lineariser.state, here, rng, SEARCH.screened * count - 1))
         if not self.settings.restarts:
             return []
         alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
         through = self._ran(SQP(alone, tolerance, most, "through things"), self.best.q)
         dear = through.violation.worst <= tolerance and self.best.measure > SEARCH.dear * through.measure
-        return [through.q, begin] if dear else []
+        return [through.q, here] if dear else []
 
     def _seek_lower(self, count: int) -> None:
         """Where all is met, seek `count` lower minima, or one, from the best of feasible postures of few programs."""
