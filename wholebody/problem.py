@@ -141,11 +141,13 @@ class Problem(checks.FixedAttributes):
             _plan=None,
         )
         stated = self._resolved([given[place] for place in self._places])
+        terms = *stated, *self.goals
+        stands = standing(scene, q, terms, self.bounds)
         if measured is None:
-            measures = usual_measures(scene, q, (*stated, *self.goals), self.bounds, ranges=self.range_of_motion)
+            measures = usual_measures(scene, q, terms, self.bounds, stands, ranges=self.range_of_motion)
         else:
             measures = tuple([m.resolve(scene, q) for m in measured])
-        defaults, left_out = self._usual_constraints(stated)
+        defaults, left_out = self._usual_constraints(stated, stands)
         constraints = (*stated, *defaults)
         vars(self).update(measures=measures, constraints=constraints, defaults=defaults, left_out=left_out)
         if self.bounds or any(map(is_own, (*self.goals, *constraints, *measures))):
@@ -163,12 +165,14 @@ class Problem(checks.FixedAttributes):
             return tuple(found)
         return tuple(found) if not terms or any(map(is_own, terms)) else once(self.scene, key, partial(tuple, found))
 
-    def _usual_constraints(self, stated: Sequence[Constraint]) -> tuple[tuple[Constraint, ...], str]:
+    def _usual_constraints(
+        self, stated: Sequence[Constraint], stands: tuple[str, ...]
+    ) -> tuple[tuple[Constraint, ...], str]:
         scene, start, ranges = self.scene, self.start, self.range_of_motion
         if not (scene.figure.ranges or self.balance):
             return (), ""  # no person
         known = frozenset(map(type, stated))
-        steady = standing(scene, start, (*stated, *self.goals), self.bounds) if self.balance is None else ()
+        steady = stands if self.balance is None else ()
         steady = balancing(scene, stated) if (required := self.balance is True) else steady
         if not (steady or (ranges and scene.figure.ranges)):
             return (), ""

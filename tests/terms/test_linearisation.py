@@ -348,10 +348,15 @@ class OwnEffort(wb.tasks.RotationEffort):
     """The same measure as a class that the compiled pass does not know."""
 
 
+class OwnHang(wb.tasks.Hang):
+    """The same of arms that hang."""
+
+
 @pytest.mark.parametrize("seed", [0, 1])
-def test_ball_joints_are_compiled_as_their_class_says(problem, seed):
+@pytest.mark.parametrize("kinds", [(wb.tasks.RotationEffort, OwnEffort), (wb.tasks.Hang, OwnHang)])
+def test_ball_joints_and_arms_are_compiled_as_their_classes_say(problem, kinds, seed):
     scene, q = problem.scene, posture(problem, seed)
-    made = [wb.Problem(scene, measures=[kind(2.0), wb.tasks.Rhythm()]) for kind in (wb.tasks.RotationEffort, OwnEffort)]
+    made = [wb.Problem(scene, measures=[kind(weight=2.0), wb.tasks.Rhythm()]) for kind in kinds]
     known, own = (each.lineariser(each.workspace()).at(q, 0.0) for each in made)
     assert known.measure == pytest.approx(own.measure)
     np.testing.assert_allclose(known.gradient, own.gradient, atol=1e-9)

@@ -32,11 +32,18 @@ _effort = Effort()
 
 
 def usual_measures(
-    scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound], *, ranges: bool
-) -> tuple[Measure, ...]:
-    """The measures of a problem that states none, for its resolved terms; the same ones of the same scene are known."""
+    scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound],
+    stands: Sequence[str], *, ranges: bool,
+) -> tuple[Measure, ...]:  # fmt: skip
+    """The measures of a problem that states none, for its resolved terms; the same ones of the same scene are known.
+
+    `stands` are the persons of `standing`.
+    """
     feet, sits = stances(scene, start, terms), seated(scene, terms)
-    arms = free_arms(scene, start, terms, bounds) if ranges and scene.figure.ranges else ()
+    arms = ()
+    if ranges and scene.figure.ranges:
+        told = [inputs.body_of(scene, term.feet) for term in terms if isinstance(term, (Balance, LoadedBalance, Stand))]
+        arms = free_arms(scene, start, terms, bounds, {*told, *stands} - {None, *sits})
     make = partial(default_measures, scene, start, feet, sits, arms, ranges=ranges)
     found: tuple[Measure, ...] = scene.built.known(("measures", ranges, feet, sits, arms, start.tobytes()), make)
     return found
@@ -76,12 +83,10 @@ def seated(scene: Surroundings, terms: Sequence[Constraint | Goal]) -> tuple[str
 
 
 def free_arms(
-    scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound]
+    scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound], up: Set[str | None]
 ) -> tuple[str, ...]:
-    """The upper arms that no term moves, of persons who stand or kneel and do not sit."""
-    figure, sits = scene.figure, seated(scene, terms)
-    told = [inputs.body_of(scene, term.feet) for term in terms if isinstance(term, (Balance, LoadedBalance, Stand))]
-    up = {body for body in (*told, *standing(scene, start, terms, bounds)) if body is not None and body not in sits}
+    """The upper arms that no term moves, of the persons `up` who stand or kneel."""
+    figure = scene.figure
     groups = [f"{body}{side}" for body in figure.bodies if body in up for side in ("left", "right")]
     arms = {arm: frozenset(inputs.once(scene, ("dofs", arm), partial(figure.dofs, f"{arm}_arm")).tolist())
             for arm in groups if f"{arm}_arm" in figure.groups}  # fmt: skip

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array
 from wholebody.base.compiled import compiled
 from wholebody.terms.entries import Integers
-from wholebody.terms.residual_kernel import SMALL, inverse_left, rotation_vector
+from wholebody.terms.residual_kernel import SMALL, equidistant, inverse_left, rotation_vector
 
 
 @compiled(inner=True)
@@ -271,3 +271,37 @@ def heights(
         for v in range(nv):
             measure[0, v] += 2.0 * weight * rise * row[v]
             measure[1, v] += 2.0 * weight * row[v] * row[v]
+
+
+@compiled(inner=True)
+def hangs(
+    table: tuple[Array, Integers],
+    joints: Array,
+    tree: tuple[Array, Integers, NDArray[np.int8]],
+    measure: Array,
+    squares: Array,
+    first: int,
+) -> None:
+    """See `tasks.Hang`; `tree` is columns of the joint Jacobian, their places, and which of them move a joint."""
+    tables, entries = table
+    columns, column, support = tree
+    nv = measure.shape[1] - 1
+    row, at, way, turn = np.empty(nv), np.arange(nv), np.empty(3), np.empty(3)
+    error, change = np.empty(2), np.empty((2, 3))
+    for e in range(len(tables)):
+        joint = entries[e, 0]
+        for i in range(3):
+            way[i] = 0.0
+            for k in range(3):
+                way[i] += joints[joint, k, i] * tables[e, 1 + k]
+        equidistant(way[0], way[1], -way[2], error, change)
+        for r in range(2):
+            change[r, 2] = -change[r, 2]
+            for i in range(3):
+                j, k = (i + 1) % 3, (i + 2) % 3
+                turn[i] = way[j] * change[r, k] - way[k] * change[r, j]
+            row[:] = 0.0
+            for c in range(len(columns)):
+                if support[joint, c]:
+                    row[column[c, 0]] += turn[0] * columns[c, 3] + turn[1] * columns[c, 4] + turn[2] * columns[c, 5]
+            _square(tables[e, 0], error[r], row, at, measure, squares, first + 2 * e + r)

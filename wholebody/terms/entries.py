@@ -20,7 +20,7 @@ RESIDUAL, PLANE, AXIS, MASS_CENTER, COORDINATE, TURN, ROOT, CONE, COUPLED, ELLIP
 """The tables of goals and constraints, by what a row of them stands for."""
 
 DISTANCE, DISCOMFORT, HEIGHT, BOX, LIMIT, BODY, CURVATURE, COLUMN = range(11, 19)
-ROOT_DISTANCE, ELEVATION, LUMBAR, BALL, EDGE = range(19, 24)
+ROOT_DISTANCE, ELEVATION, LUMBAR, BALL, HANG, EDGE = range(19, 25)
 """The other tables of a plan: of measures, of bounds, of the model, and of the edges of reach cones."""
 
 WIDTHS = {

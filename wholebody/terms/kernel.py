@@ -18,6 +18,7 @@ from wholebody.terms.coordinate_kernel import (
     coordinates,
     coupled_ranges,
     elliptic_ranges,
+    hangs,
     heights,
     rhythms,
     root_distances,
@@ -182,9 +183,12 @@ def _measures(plan: Plan, joints: Array, tree: Tree, q: Array, measure: Array, s
         root_distances(*_table(plan, kinds.ROOT_DISTANCE), q, measure)
     if layout[kinds.ELEVATION, 1] + layout[kinds.LUMBAR, 1]:
         rhythms(*_table(plan, kinds.ELEVATION), *_table(plan, kinds.LUMBAR), q, measure, squares)
+    first = layout[kinds.ELEVATION, 1] + layout[kinds.LUMBAR, 1]
     if layout[kinds.BALL, 1]:
-        first = layout[kinds.ELEVATION, 1] + layout[kinds.LUMBAR, 1]
         balls(*_table(plan, kinds.BALL), q, measure, squares, first)
+    if layout[kinds.HANG, 1]:
+        first += 3 * layout[kinds.BALL, 1]
+        hangs(_table(plan, kinds.HANG), joints, (columns, column, support), measure, squares, first)
     if layout[kinds.HEIGHT, 1]:
         heights(*_table(plan, kinds.HEIGHT), joints, columns, support, column, measure)
 

@@ -63,7 +63,8 @@ class TermPlan(NamedTuple):
     @property
     def squares(self) -> int:
         """Number of squares that built-in measures are the sum of."""
-        return int(self.layout[kinds.ELEVATION, 1] + self.layout[kinds.LUMBAR, 1] + 3 * self.layout[kinds.BALL, 1])
+        rows = ((kinds.ELEVATION, 1), (kinds.LUMBAR, 1), (kinds.BALL, 3), (kinds.HANG, 2))
+        return sum(count * int(self.layout[table, 1]) for table, count in rows)
 
     def with_terms(
         self, goals: Sequence[Goal], model: pin.Model, constraints: Sequence[Constraint] | None = None
@@ -240,6 +241,10 @@ def _measures(
                 masses.joints.tolist(), masses.centres, masses.weights, masses.heights, strict=True
             ):
                 parts[kinds.HEIGHT].append(((joint,), np.array([*centre, term.weight * weight, height])))
+        elif type(term) is tasks.Hang:
+            curvature += term.weight * LEAST_CURVATURE
+            for place, down in zip(term.places, term.down, strict=True):
+                parts[kinds.HANG].append(((place.joint,), np.array([term.weight, *down])))
         elif type(term) is tasks.Rhythm:
             curvature += term.weight * LEAST_CURVATURE
             for part in (*term.girdles, *term.knees):

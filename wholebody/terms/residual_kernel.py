@@ -163,11 +163,28 @@ def _wanted(given: Array, place: Array, toward: int, direction: Array) -> float:
 
 
 @compiled(inner=True, error_model="numpy")
+def equidistant(x: float, y: float, along: float, error: Array, change: Array) -> None:
+    """Write `tasks.axis.equidistant_error` (2,) and `equidistant_jacobian` (2, 3)."""
+    sine = np.hypot(x, y)
+    angle = np.arctan2(sine, along)
+    if sine < NO_ANGLE:
+        error[0], error[1] = angle, 0.0
+        gain = 1.0 if along > 0.0 else STEEPEST
+    else:
+        error[0], error[1] = x * angle / sine, y * angle / sine
+        gain = min(angle / sine, STEEPEST)
+    ux, uy = (x / sine, y / sine) if sine > NO_ANGLE else (1.0, 0.0)
+    fall = along - gain
+    change[0, 0], change[0, 1], change[0, 2] = gain + fall * ux * ux, fall * ux * uy, -x
+    change[1, 0], change[1, 1], change[1, 2] = fall * ux * uy, gain + fall * uy * uy, -y
+
+
+@compiled(inner=True, error_model="numpy")
 def axis_errors(tables: Array, entries: Integers, joints: Array, wrench: Array, value: Array) -> None:
     """See `tasks.Axis`."""
     frame, axes, direction = np.empty((4, 3)), np.empty((3, 3)), np.empty(3)
     turn, place = frame[:3].T, frame[3]
-    change, move = np.empty((2, 3)), np.empty((2, 3))
+    error, change, move = np.empty(2), np.empty((2, 3)), np.empty((2, 3))
     for e in range(len(tables)):
         row = entries[e, 0]
         _placed(joints, entries[e, 1], tables, e, 0, frame)
@@ -183,18 +200,8 @@ def axis_errors(tables: Array, entries: Integers, joints: Array, wrench: Array, 
         x = axes[0, 0] * direction[0] + axes[0, 1] * direction[1] + axes[0, 2] * direction[2]
         y = axes[1, 0] * direction[0] + axes[1, 1] * direction[1] + axes[1, 2] * direction[2]
         along = axes[2, 0] * direction[0] + axes[2, 1] * direction[1] + axes[2, 2] * direction[2]
-        sine = np.hypot(x, y)
-        angle = np.arctan2(sine, along)
-        if sine < NO_ANGLE:
-            value[row], value[row + 1] = angle, 0.0
-            gain = 1.0 if along > 0.0 else STEEPEST
-        else:
-            value[row], value[row + 1] = x * angle / sine, y * angle / sine
-            gain = min(angle / sine, STEEPEST)
-        ux, uy = (x / sine, y / sine) if sine > NO_ANGLE else (1.0, 0.0)
-        fall = along - gain
-        change[0, 0], change[0, 1], change[0, 2] = gain + fall * ux * ux, fall * ux * uy, -x
-        change[1, 0], change[1, 1], change[1, 2] = fall * ux * uy, gain + fall * uy * uy, -y
+        equidistant(x, y, along, error, change)
+        value[row], value[row + 1] = error[0], error[1]
         for r in range(2):
             inner = 0.0
             for j in range(3):
