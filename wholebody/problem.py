@@ -141,7 +141,7 @@ class Problem(checks.FixedAttributes):
             _plan=None,
         )
         stated = self._resolved([given[place] for place in self._places])
-        terms = *stated, *self.goals
+        terms: list[Constraint | Goal] = [*stated, *self.goals]
         stands = standing(scene, q, terms, self.bounds)
         if measured is None:
             measures = usual_measures(scene, q, terms, self.bounds, stands, ranges=self.range_of_motion)

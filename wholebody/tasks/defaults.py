@@ -40,7 +40,7 @@ def usual_measures(
     `stands` are the persons of `standing`.
     """
     feet, sits = stances(scene, start, terms), seated(scene, terms)
-    arms = ()
+    arms: tuple[str, ...] = ()
     if ranges and scene.figure.ranges:
         told = [inputs.body_of(scene, term.feet) for term in terms if isinstance(term, (Balance, LoadedBalance, Stand))]
         arms = free_arms(scene, start, terms, bounds, {*told, *stands} - {None, *sits})
