@@ -122,6 +122,7 @@ class Holds:
         self.over, self.ahead = max(1, round(OVER / dt)), max(1, round(AHEAD / dt))
         self._dt = dt
         contacts = () if touched is None else touched.contacts
+        self.touches = bool(contacts)  # whether parts touch things, or each other
         # a part that touches a thing while it seems to rest on the ground rests on the thing
         apart = [
             rest

@@ -36,7 +36,7 @@ FIRST, FREE, PASS, SWEEP = 60, 2, 3, 1  # most steps of a first frame, a free on
 EVERY, WORTH = 10, 0.8  # frames after which a free posture is sought anew, and the share of the cost that it is for
 SLOWING = 8  # frames before it would be too fast in which a joint begins to move
 JUMP = 0.5  # rad, m: postures of neighbouring frames that are farther apart were found otherwise
-FIRST_STEP = 0.1  # rad, m: largest change in a step of the first frame; with more, steps at things are too long
+FIRST_STEP = 0.1  # rad, m: largest change in a step of a first frame whose parts touch things; longer ones miss these
 STARTS = 4  # how often the first frame is solved, each time from where soles came down beside each other
 SPAN = 0.034  # s between the frames of the first sweeps at most: more lets feet slide, less leaves jerk
 SWEEPS: tuple[float, ...] = (1.8, 1.7, 1.6, 1.4, 1.2, 1.0)  # omega of each; more: less jerk, and slower by a tenth each
@@ -316,10 +316,11 @@ class Run:
         self.holds.touch(k, q, self.fitter.held(q), held)
         self._found[k], self._deviation[k] = q, np.asarray(pin.difference(self.model, self._free[k], q))
 
-    def _room(self, q: Array, before: Array | None, span: int = 1) -> Array:
+    def _room(self, q: Array, before: Array | None, span: int = 1) -> Array | None:
         """Least and greatest displacement (2, nv) of q that joints reach from the posture before in time."""
         if before is None:
-            return np.asarray(FIRST_STEP * np.outer((-1.0, 1.0), np.ones(self.model.nv)))
+            touches = self.holds is not None and self.holds.touches
+            return FIRST_STEP * np.outer((-1.0, 1.0), np.ones(self.model.nv)) if touches else None
         return np.asarray(span * self.reach - pin.difference(self.model, before, q))
 
     def _reached(self, before: Array | None, q: Array, span: int = 1) -> Array:
