@@ -28,7 +28,7 @@ NEAR = {"hand": 0.05, "wrist": 0.06, "elbow": 0.07, "knee": 0.09, "pelvis": 0.16
 SHARES = (1.0, 0.5)
 """Places of a hand that touch, from its wrist at 0 to its joint, which may be at the knuckles or beyond the fingers."""
 
-BODY = {"hand": 0.08, "head": 0.18, "knee": 0.13}
+BODY = {"hand": 0.08, "head": 0.18}
 """Metres from a hand to other joints of its body, at most, where it touches the skin over them."""
 
 STAYS = 0.6  # s: a hand that is near other parts than a hand for a shorter time may pass them
