@@ -247,7 +247,8 @@ class Problem(checks.FixedAttributes):
     def retarget(self, goals: Iterable[Goal]) -> None:
         """Replace the goals, for a goal that moves from frame to frame; everything else stays.
 
-        The new goals are checked like the first ones. If one is refused, the old goals stay.
+        The measures by default stay too: `Hang` is of the arms that no goal moved at first. The new goals are checked
+        like the first ones. If one is refused, the old goals stay.
 
         Raises:
             InputError: not a list of goals, or a goal with a value of the wrong kind, shape or range.

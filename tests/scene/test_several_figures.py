@@ -67,7 +67,7 @@ def test_each_keeps_its_own_defaults(pair: wb.Scene) -> None:
     assert [term.feet for term in stated.defaults if isinstance(term, Balance)] == [
         ("anna/left_foot", "anna/right_foot")
     ]
-    assert [type(term).__name__ for term in both.measures] == ["Effort", "Rhythm"]
+    assert [type(term).__name__ for term in both.measures] == ["Effort", "Rhythm", "Hang"]
 
 
 def test_measures_and_ranges_are_sums_and_rows_of_each(anna: wb.Figure) -> None:

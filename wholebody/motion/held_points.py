@@ -65,8 +65,7 @@ def touching_points(
     found, data, own = [], figure.model.createData(), figure_roles(figure)
     pin.framesForwardKinematics(figure.model, data, upright(figure))
     places = {role: np.array(data.oMf[figure.frame_id(frame)].translation) for role, frame in roles.frames.items()}
-    parts = [(one.thing, one.share) for one in contacts if one.ways is not None]
-    for role, share in dict.fromkeys([*((one.role, one.share) for one in contacts), *parts]):
+    for role, share in dict.fromkeys((one.role, one.share) for one in contacts):
         elbow, wrist, hand = (f"{role.split('_')[0]}_{part}" for part in ("elbow", "wrist", "hand"))
         carrier = role if role in places else wrist
         joint = int(figure.model.frames[figure.frame_id(roles.frames[carrier])].parentJoint)

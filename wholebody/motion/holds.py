@@ -46,18 +46,13 @@ class Touched:
         self._data = figure.model.createData()
         self.free: Mapping[int, Array] = {}  # postures of the free fit by frame
         self._middles = dict[int, Array]()
-        self._parts = {(point.role, point.share): point for point in points}  # of the body, which hands touch
+        self._parts = {(point.role, point.share): point for point in points}  # hands that touch each other
 
     def at(self, contact: ThingContact, frame: int) -> pin.SE3:
-        """Where a thing is in a frame; a part of the body where it was last, z along the contact's normal.
-
-        Hands meet in the middle between them in the free fit.
-        """
+        """Where a thing is in a frame; of two hands the middle between them in the free fit, z along the normal."""
         if contact.ways is None:
             return self.things.at(contact.thing, frame)
         turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), contact.ways[frame]).matrix()
-        if not contact.meets:
-            return pin.SE3(turn, self.part(contact))
         pair = [self._parts[role, contact.share] for role in (contact.role, contact.thing)]
         if frame not in self._middles:
             data = self._figure.model.createData()
@@ -65,8 +60,8 @@ class Touched:
             self._middles[frame] = np.mean([data.oMi[part.joint].act(part.place) for part in pair], axis=0)
         return pin.SE3(turn, self._middles[frame])
 
-    def part(self, contact: ThingContact) -> Array:
-        """Where the part of the body that a hand touches was last, (3,) in the world."""
+    def other(self, contact: ThingContact) -> Array:
+        """Where the hand that a hand touches was last, (3,) in the world."""
         part = self._parts[contact.thing, contact.share]
         return np.array(self._data.oMi[part.joint].act(part.place))
 
@@ -74,13 +69,8 @@ class Touched:
         """(3,) where a point is held in a thing's axes, by the thickness of the part on the side that touches it."""
         pin.forwardKinematics(self._figure.model, self._data, q)
         normal = self.at(contact, contact.first).rotation @ contact.normal
-        sides = [(point, -normal)]
-        if contact.ways is not None and not contact.meets:  # from within the other part, through both
-            sides.append((self._parts[contact.thing, contact.share], normal))
-        away = CLEARANCE
-        for part, along in sides:
-            pieces = [piece for piece in self._figure.geometry.geometryObjects if piece.parentJoint == part.joint]
-            away += thickness(pieces, part.place, self._data.oMi[part.joint].rotation.T @ along)
+        pieces = [piece for piece in self._figure.geometry.geometryObjects if piece.parentJoint == point.joint]
+        away = CLEARANCE + thickness(pieces, point.place, -self._data.oMi[point.joint].rotation.T @ normal)
         return contact.place + away * contact.normal
 
     def gap(self, contact: ThingContact, point: HeldPoint, frame: int, q: Array) -> float:
@@ -164,7 +154,7 @@ class Holds:
             off, start = float(normal @ way) + CLEARANCE - gap, held[0][number]
             if stand.ways is not None:
                 assert self._touched is not None
-                start, off = self._touched.at(stand, frame).translation, off * (0.5 if stand.meets else 1.0)
+                start, off = self._touched.at(stand, frame).translation, 0.5 * off
             elif frame != stand.first:
                 off -= min(max(off, -NEARLY), NEARLY)
             held[0][number] = start + off * normal
@@ -188,7 +178,7 @@ class Holds:
         assert self._touched is not None
         gap = self._touched.gap(stand, self.points[number], frame, q)
         normal = self._touched.at(stand, frame).rotation @ stand.normal
-        start = goals[number] if stand.ways is None else self._touched.part(stand)
+        start = goals[number] if stand.ways is None else self._touched.other(stand)
         return normal, gap, places[number] - start
 
     def give_up(self) -> str:

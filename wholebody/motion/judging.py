@@ -244,7 +244,7 @@ def _feet(terms: FrameTerms, was: ClipCheck) -> str:
     if not told:
         return ""
     return (
-        f"{', '.join(told)}, and is held there; let feet slide by hold_feet=False (or --no-feet), or retarget "
+        f"{', '.join(told)}, and is held there; let feet slide by hold_feet=False, or retarget "
         "the recording with this scene, which puts feet on what is below them"
     )
 

@@ -320,7 +320,7 @@ class Run:
         """Least and greatest displacement (2, nv) of q that joints reach from the posture before in time."""
         if before is None:
             touches = self.holds is not None and self.holds.touches
-            return FIRST_STEP * np.outer((-1.0, 1.0), np.ones(self.model.nv)) if touches else None
+            return np.asarray(FIRST_STEP * np.outer((-1.0, 1.0), np.ones(self.model.nv))) if touches else None
         return np.asarray(span * self.reach - pin.difference(self.model, before, q))
 
     def _reached(self, before: Array | None, q: Array, span: int = 1) -> Array:

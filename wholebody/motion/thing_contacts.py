@@ -28,10 +28,7 @@ NEAR = {"hand": 0.05, "wrist": 0.06, "elbow": 0.07, "knee": 0.09, "pelvis": 0.16
 SHARES = (1.0, 0.5)
 """Places of a hand that touch, from its wrist at 0 to its joint, which may be at the knuckles or beyond the fingers."""
 
-BODY = {"hand": 0.08, "head": 0.18}
-"""Metres from a hand to other joints of its body, at most, where it touches the skin over them."""
-
-STAYS = 0.6  # s: a hand that is near other parts than a hand for a shorter time may pass them
+MEETING = 0.08  # m between hands that touch each other, at most
 
 GOES_ON = 1.4  # times as far away as a contact may begin, it ends
 THICKEST = 0.25  # m: of a part from its joint to its skin
@@ -48,12 +45,7 @@ class ThingContact(NamedTuple):
     place: Array  # (3,) on the thing's surface, in its axes, metres
     normal: Array  # (3,) of unit length, out of the thing, in its axes
     share: float = 1.0  # of a hand: where between its wrist and its joint it touches
-    ways: Array | None = None  # (n, 3) normals of unit length, in the world, where the thing is a part of the body
-
-    @property
-    def meets(self) -> bool:
-        """Whether both are hands, which give way alike."""
-        return self.ways is not None and self.thing.endswith(("hand", "wrist"))
+    ways: Array | None = None  # (n, 3) normals of unit length, in the world, where the thing is the other hand
 
 
 def still_things(scene: Scene) -> list[str]:
@@ -182,28 +174,23 @@ class Things:
 
 
 def meetings(motion: SkeletonMotion, joints: Mapping[str, str], others: Sequence[ThingContact]) -> list[ThingContact]:
-    """Where hands touch each other or another part of their body, and no thing; `joints` are those of roles."""
+    """The contacts known, and where both hands touch each other and nothing else; `joints` are those of roles."""
     at, found = {role: motion.positions[:, motion.names.index(joint)] for role, joint in joints.items()}, list(others)
     hands = [f"{side}_hand" if f"{side}_hand" in at else f"{side}_wrist" for side in ("left", "right")]
     share = 0.5 if hands[0].endswith("hand") else 1.0
-    at |= {role: at[role] + share * (at[role.replace("hand", "wrist")] - at[role]) for role in hands if role in at}
-    for hand in (role for role in hands if role in at):
-        own, z = hand.split("_")[0], np.array([0.0, 0.0, 1.0])
-        free: Mask = np.ones(len(motion), dtype=bool)
-        for one in (one for one in found if one.role.replace("hand", "wrist") == hand.replace("hand", "wrist")):
+    if not at.keys() >= {*hands}:
+        return found
+    left, right = (at[role] + share * (at[role.replace("hand", "wrist")] - at[role]) for role in hands)
+    free: Mask = np.ones(len(motion), dtype=bool)
+    for one in others:
+        if one.role.endswith(("hand", "wrist")):
             free[one.first : one.end] = False
-        parts = [role for role in at if role.split("_")[-1] in BODY and role not in (hand, f"{own}_elbow")]
-        for part in sorted(parts, key=lambda role: role not in hands):
-            way = at[hand] - at[part]
-            far = np.linalg.norm(way, axis=1)
-            mask = slow(way, motion.dt, RestLimits()) & (far <= BODY[part.split("_")[-1]]) & (far > 1e-3) & free
-            least = RestLimits().least if part in hands else STAYS
-            for run in runs(long_runs(mask, max(1, round(least / motion.dt)))):
-                ways = way / (far[:, None] + 1e-9)
-                found.append(ThingContact(hand, *run, part, np.zeros(3), z, share, ways))
-                if part in hands:
-                    found.append(ThingContact(part, *run, hand, np.zeros(3), z, share, -ways))
-                free[run.first : run.end] = False
+    far = np.linalg.norm(left - right, axis=1)
+    ways, z = (left - right) / (far[:, None] + 1e-9), np.array([0.0, 0.0, 1.0])
+    mask = slow(left - right, motion.dt, RestLimits()) & (far <= MEETING) & (far > 1e-3) & free
+    for run in runs(long_runs(mask, max(1, round(RestLimits().least / motion.dt)))):
+        for (hand, other), sign in ((hands, 1.0), (hands[::-1], -1.0)):
+            found.append(ThingContact(hand, *run, other, np.zeros(3), z, share, sign * ways))
     return sorted(found, key=lambda one: one.first)
 
 

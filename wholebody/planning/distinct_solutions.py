@@ -22,6 +22,7 @@ from wholebody.solution import Solution
 
 FEW = 20  # degrees of freedom up to which starts are spread over the whole range of every joint at once
 LEAST = 12  # descents before a search counts as complete
+SINGULAR = 1e-3  # m or rad per rad: least singular value of the goals at a branch of a closed form that stands alone
 
 
 @dataclass(frozen=True)
@@ -79,10 +80,10 @@ def solutions(
 ) -> Solutions:
     """Return distinct answers of a problem: local minima of its measures that meet its goals and keep what must hold.
 
-    Descents begin at the branches of the closed form of an arm of six joints that has one. Otherwise they begin at the
-    problem's start and at random postures, for up to 20 degrees of freedom all over the limits (a Latin hypercube),
-    else as far from the start as other starts of `QP`. Measures count from the problem's start. The search ends where
-    all answers count as found, or after as many starts or seconds.
+    Descents begin at the branches of the closed form of an arm of six joints that has one, if none is singular.
+    Otherwise they begin at the problem's start and at random postures, for up to 20 degrees of freedom all over the
+    limits (a Latin hypercube), else as far from the start as other starts of `QP`. Measures count from the problem's
+    start. The search ends where all answers count as found, or after as many starts or seconds.
 
     Args:
         problem: as for `wb.solve`.
@@ -109,7 +110,7 @@ def solutions(
     ends = np.inf if time_limit is None else time.perf_counter() + TIME_LIMIT(time_limit, "solutions: time_limit")
     known: list[Solution] = []
     begun = descents = 0
-    branches, complete = closed_form_postures(problem), False
+    branches, complete = _branches(problem), False
     for answer in method.minima(problem, _starts(problem, starts, seed) if branches is None else branches[:starts]):
         begun += 1
         if answer.solved:
@@ -120,6 +121,17 @@ def solutions(
             break
     ordered = sorted(known, key=lambda answer: answer.assessment.measure)
     return Solutions(tuple(ordered[:most]), len(known), descents, begun, complete)
+
+
+def _branches(problem: Problem) -> Array | None:
+    """The postures (k, nq) of a closed form; None where there is none, or neighbours of one meet the goals."""
+    found = closed_form_postures(problem)
+    with problem.borrow() as workspace:
+        lineariser = problem.lineariser(workspace)
+        for q in () if found is None else found:
+            if np.linalg.svd(lineariser.at(q, 0.0).goal_jacobian, compute_uv=False)[-1] < SINGULAR:
+                return None
+    return found
 
 
 def _starts(problem: Problem, count: int, seed: int) -> Iterator[Array]:

@@ -252,6 +252,7 @@ class _Search:
         metres (as in anytime RRTs, Ferguson and Stentz 2006).
         """
         start, model, rounds = self._problem.start, self._problem.scene.model, 0
+        self._straight = False
         trees = RRTConnect(self._local, model, start)
         ends = [q for q in self._reached if self._apart(start, q) < most]
         for reached in ends:

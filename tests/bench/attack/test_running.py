@@ -16,7 +16,6 @@ import pytest
 
 import wholebody as wb
 from wholebody.base.errors import UnknownNameError
-from wholebody.base.runner import Child
 from wholebody.bench.attack import running
 from wholebody.bench.attack.inputs import mutated
 from wholebody.bench.attack.judging import KINDS, PATTERN, Case, Verdict, kind_of
@@ -75,13 +74,19 @@ def test_mutations_change_text_and_keep_to_their_seed() -> None:
     assert found[7] == mutated(text, np.random.default_rng(7))
 
 
+attacked = running._attacked
+
+
+def by_script(case: Case, deadline: float) -> Verdict:
+    """In a child, run `scripted` in place of a real case."""
+    running.CASES["solve"], running._prepare = scripted, lambda: None
+    Case.rng = lambda case: case.number  # type: ignore[assignment,method-assign,return-value]
+    return attacked(case, deadline)
+
+
 @pytest.fixture
 def in_place_of_cases(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let children run `scripted` in place of real cases; forked, they have this from their parent."""
-    monkeypatch.setattr(running, "Child", lambda environment: Child(environment, forked=True))
-    monkeypatch.setattr(Case, "rng", lambda case: case.number)
-    monkeypatch.setitem(running.CASES, "solve", scripted)
-    monkeypatch.setattr(running, "_prepare", lambda: None)
+    monkeypatch.setattr(running, "_attacked", by_script)
 
 
 @pytest.mark.usefixtures("in_place_of_cases")
