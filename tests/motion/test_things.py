@@ -222,6 +222,7 @@ def test_hands_that_meet_in_the_recording_meet(stature: float | None, tmp_path: 
     assert apart.min() > 0.0
     assert apart.max() < 1e-3
     assert wb.check(clip).colliding == 0
+    assert np.ptp(clip.q[:, :3], axis=0).max() < 5e-3  # who stands still in the recording does so
     alone = hand_distance(wb.retarget(motion, figure, ground=None), "wrist_yaw" if stature is None else "hand")
     assert np.abs(alone).min() > 2e-3
 

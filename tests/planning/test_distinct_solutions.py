@@ -103,6 +103,15 @@ def test_an_arm_with_a_closed_form_has_all_of_its_branches() -> None:
     assert not wb.solutions(problem, starts=5).complete
 
 
+def test_parallel_axes_of_a_wrist_leave_postures_between_the_branches() -> None:
+    """With the fifth joint at 0 the fourth and the sixth turn about parallel lines, so postures form a curve."""
+    figure, ready = known_arm("ur5")
+    tool = figure.placement(np.array((0.4, -1.2, 1.4, -1.1, 0.0, 0.2)), "tool")
+    found = wb.solutions(wb.Problem(wb.Scene(figure), ready, goals=[wb.Frame("tool", tool)]), starts=24)
+    assert found.starts == 24
+    assert not found.complete
+
+
 def test_out_of_reach_there_are_none(arm: wb.Figure) -> None:
     problem = wb.Problem(wb.Scene(arm), goals=[wb.Point("tip", (2.0, 0.0, 0.5))])
     found = wb.solutions(problem, starts=10)
