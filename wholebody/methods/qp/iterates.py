@@ -145,8 +145,8 @@ def held(local: LocalSolution, tolerance: float) -> bool:
     return broken(local) <= tolerance
 
 
-def better(one: LocalSolution, other: LocalSolution, tolerance: float) -> bool:
-    """Whether one descent ended better: where all is met, then in the constraints, the goals, the measures."""
+def better(one: LocalSolution, other: LocalSolution, tolerance: float, *, measures: bool) -> bool:
+    """Whether one descent ended better: where all is met, then in constraints, goals and, if these count, measures."""
     met = one.violation.worst <= tolerance
     if met != (other.violation.worst <= tolerance):
         return met
@@ -157,7 +157,7 @@ def better(one: LocalSolution, other: LocalSolution, tolerance: float) -> bool:
         left, right = max(left, tolerance), max(right, tolerance)
         if abs(left - right) > max(alike, 1e-5 * min(left, right)):
             return left < right
-    return one.measure < other.measure
+    return measures and one.measure < other.measure
 
 
 def broken(local: LocalSolution) -> float:

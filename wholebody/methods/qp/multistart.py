@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from itertools import chain, takewhile
 from typing import NamedTuple
 
@@ -56,6 +57,7 @@ class Multistart:
         self._start = problem.scene.figure.clamp(problem.start)
         self._first: int | None = None  # programs of the first attempt, once it is made
         self._without_gain = 0  # probes in a row that came no nearer, without contacts or relaxed
+        self._least_probed = np.inf  # least residual of the goals of these
         self._least = 0.0  # lower bound of the goals' residual, metres
         self._minima = Minima()  # where relaxed probes ended after the true clearances were required
         self._relaxed_minima = Minima()  # where the others ended
@@ -81,7 +83,7 @@ class Multistart:
         """The best of attempts from `begin` (nq,) and a descent from `other`; out of reach, the closest to `near`."""
         self._out_of_reach = bool(near)
         if not near:
-            self._search(self._start if begin is None else begin)
+            self._search(self._attempts(self._start if begin is None else begin))
         for q in near:
             self._accept(self._ran(self._closest(self._at_most(SEARCH.coming_near)), q), self.how)
         if other is not None:
@@ -94,35 +96,44 @@ class Multistart:
             self._best = with_values(self.best, converged=True)
         return with_values(self.best, converged=False) if self.control.reason else self.best
 
-    def _search(self, begin: Array) -> None:
-        for attempt in self._attempts(begin):
+    def _search(self, attempts: Iterable[Attempt]) -> None:
+        for attempt in attempts:
             for q in attempt.starts:
                 local = attempt.stage(q)
-                if local is not None and self._accept(local, attempt.how):
+                if local is not None and self._accept(local, attempt.how or self.how):
                     return
                 if self.control.over or self._left < 0 or self._proven():
                     return
 
     def _attempts(self, begin: Array) -> Iterator[Attempt]:
         """The attempts in their order; each is decided on when those before it failed."""
-        start, state = self._start, self.lineariser.state
+        start = self._start
         yield Attempt([begin], self.directly, "directly")
         rests = (term.distance.reference for term in self.problem.measures if type(term) is Effort)
         yield Attempt((q for q in rests if (q != start).any()), self.directly, "from the posture of least effort")
-        self._first = len(self.trace)
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
         least = least_left(self.contradictions)
         if least is None:
             return
+        self._least = least
+        if self._proven():
+            return
+        if self.settings.measures:
+            yield Attempt([start], self._without_measures, "")
+        else:
+            yield from self._attempts_for_feasibility()
+
+    def _attempts_for_feasibility(self) -> Iterator[Attempt]:
+        """Those in which measures do not count."""
+        start, state, least = self._start, self.lineariser.state, self._least
+        self._first = len(self.trace)
         yield Attempt(self._before_contact(), lambda q: self._descend(q, full_step=True), "from before contact")
         yield Attempt(self._before_contact(grips=True), self._closing, "from before a grip")
         yield Attempt([start], self._closing, "by feasibility first")
-        self._minima, self._relaxed_minima, self._without_gain = Minima(), Minima(), 0  # hands are no random starts
+        # hands are no random starts
+        self._minima, self._relaxed_minima, self._without_gain, self._least_probed = Minima(), Minima(), 0, np.inf
         self._out_of_reach = self._known_out_of_reach(self.best.q)
-        if self._out_of_reach:
-            return
-        self._least = least
-        if self._proven():
+        if self._out_of_reach or self._proven():
             return
         if not held(self.best, self.settings.tolerance):
             apart = posture_apart(self.problem, self.lineariser.workspace, self.best.q)
@@ -135,6 +146,18 @@ class Multistart:
         others = (throughout if few else restarts)(self.problem, state, start, rng, count)
         starts = self.lineariser.defined(chain(self._through, others))
         yield Attempt(self._while_open(starts), self._relaxed, "from another start")
+
+    def _without_measures(self, start: Array) -> LocalSolution:
+        """The search for a feasible posture, and a descent from there: no measure changes what counts as reached."""
+        settings = replace(self.settings, measures=False)
+        found = Multistart(self.problem, self.lineariser.workspace, self.solver, settings, self.control)
+        found.contradictions, found._least = self.contradictions, self._least
+        found._accept(found._ran(found._feasibility(found.lineariser, 0, ""), start), self.how)
+        found._search(found._attempts_for_feasibility())
+        self.spent += found.spent
+        self.trace += found.trace
+        self._out_of_reach = found._out_of_reach
+        return self._descend(found.best.q) if self._accept(found.best, found.how) else found.best
 
     def _while_open(self, starts: Iterable[Array]) -> Iterator[Array]:
         """Starts of relaxed probes, until enough say that the goals are out of reach, or the budget is spent."""
@@ -186,8 +209,9 @@ class Multistart:
         tolerance = self.settings.tolerance
         relaxed = self._probe(start, SEARCH.relaxation_depth)
         self._nearest_through = min(self._nearest_through, relaxed.violation.total)
-        nearer = relaxed.violation.left < (1.0 - SEARCH.nearer) * self.best.violation.left
+        nearer = relaxed.violation.left < (1.0 - SEARCH.nearer) * self._least_probed
         self._without_gain = 0 if nearer else self._without_gain + 1
+        self._least_probed = min(self._least_probed, relaxed.violation.left)
         if relaxed.violation.worst > SEARCH.reached * tolerance:
             self._relaxed_minima.add(relaxed.violation.total, relaxed.converged)
             return None
@@ -327,8 +351,8 @@ class Multistart:
             most = SEARCH.agree * least + tolerance
             if sum(end.violation.total <= most for end in ends) == agreeing:
                 return True
-        near = (1.0 - SEARCH.nearer) * self.best.violation.left
-        self._without_gain = sum(end.violation.left >= near for end in ends)  # as relaxed probes count
+        self._least_probed = min((end.violation.left for end in ends), default=np.inf)
+        self._without_gain = len(ends)  # as relaxed probes count
         return False
 
     def _moving(self) -> int:
@@ -381,7 +405,7 @@ class Multistart:
         local = self._ran(self._descent(iterations, None, note, measures=measures, full_step=full_step), start)
         if (most is None or local.iterations < most) and not held(local, self.settings.tolerance):
             stayed = self._stay(local)
-            local = stayed if better(stayed, local, self.settings.tolerance) else local
+            local = stayed if self._better(stayed, local) else local
         return local
 
     def _descent(
@@ -391,8 +415,11 @@ class Multistart:
         tolerance, measures = tolerance or self.settings.tolerance, measures and self.settings.measures
         return SQP(self._shared, tolerance, iterations, note, offset, measures, full_step)
 
+    def _better(self, one: LocalSolution, other: LocalSolution) -> bool:
+        return better(one, other, self.settings.tolerance, measures=self.settings.measures)
+
     def _accept(self, local: LocalSolution, how: str) -> bool:
         """Keep the better one; whether the problem is solved now."""
-        if self._best is None or better(local, self._best, self.settings.tolerance):
+        if self._best is None or self._better(local, self._best):
             self._best, self.how = local, how
         return self.best.violation.worst <= self.settings.tolerance
