@@ -24,7 +24,7 @@ from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace, borrowed
 from wholebody.tasks.answers import in_words, is_own
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
-from wholebody.tasks.checks import KINDS, check_measure, check_rows, checked_terms, owner_pair
+from wholebody.tasks.checks import KINDS, check_frozen, check_own, checked_terms, owner_pair
 from wholebody.tasks.defaults import alike, balancing, default_constraints, standing, usual_measures
 from wholebody.tasks.inputs import once
 from wholebody.terms.linearisation import Lineariser
@@ -151,8 +151,8 @@ class Problem(checks.FixedAttributes):
         vars(self).update(constraints=self._resolved([given[place] for place in self._places]))
         vars(self).update(self._by_default(self.goals))
         if self.bounds or any(map(is_own, (*self.goals, *self.constraints, *self.measures))):
-            self._check_frozen(state := scene.state(q))
-            _check_own(state, goals=self.goals, constraints=self.constraints, measures=self.measures)
+            check_frozen(self.bounds, scene, state := scene.state(q))
+            check_own(state, goals=self.goals, constraints=self.constraints, measures=self.measures)
         vars(self).update(clearances=self._clearances(self.goals))
 
     def _by_default(self, goals: tuple[Goal, ...]) -> dict[str, Any]:
@@ -274,7 +274,7 @@ class Problem(checks.FixedAttributes):
         resolved = tuple(goal.resolve(self.scene, self.start) for goal in listed)
         if any(map(is_own, resolved)):
             with self.borrow() as workspace:
-                _check_own(workspace.state.update(self.start), goals=resolved)
+                check_own(workspace.state.update(self.start), goals=resolved)
         found: dict[str, Any] = {"goals": resolved}
         if not alike(resolved, self.goals):
             found = self._by_default(resolved)
@@ -363,17 +363,6 @@ class Problem(checks.FixedAttributes):
             wrong = int(np.argmin((asked >= 0.0) & (asked <= CLEARANCE.high)))
             raise InputError(f"clearances[{wrong}] is {asked[wrong]}; give numbers between {CLEARANCE}")
 
-    def _check_frozen(self, state: State) -> None:
-        """Raise InputError if a bound keeps a joint out of its limits."""
-        least, most = self.scene.figure.tangent_bounds(self.start)
-        for bound in self.bounds:
-            low, high = bound.bounds(state, None)
-            wrong = np.flatnonzero((high < least) | (low > most))
-            if len(wrong):
-                joint = next(j for j in self.scene.model.joints if j.idx_v <= wrong[0] < j.idx_v + j.nv)
-                told = f"{type(bound).__name__} keeps {self.scene.model.names[joint.id]} where it starts"
-                raise InputError(f"{told}, out of its limits; start it within them")
-
     def _clearances(self, goals: tuple[Goal, ...]) -> Array:
         """(pairs,) the clearance of each with these goals, as it follows from what was stated."""
         built = self.scene.built
@@ -393,16 +382,6 @@ class Problem(checks.FixedAttributes):
             near = workspace.near_views(self._rest, self.clearance + 1e-9)
             resting = near.distance >= -1e-6
             return near.number[resting], np.maximum(near.distance[resting], 0.0)
-
-
-def _check_own(state: State, **groups: Iterable[Any]) -> None:
-    """Evaluate terms of one's own at the start; those of the package find mistakes when they are resolved."""
-    for name, terms in groups.items():
-        for number, term in enumerate(terms):
-            if is_own(term) and name == "measures":
-                check_measure(f"{name}[{number}]", term, state)
-            elif is_own(term):
-                check_rows(f"{name}[{number}]", term, term.error if name == "goals" else term.value, state)
 
 
 def _start(scene: Scene, start: Array | str | Mapping[str, Array | str] | None) -> Array:
