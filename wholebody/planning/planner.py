@@ -39,6 +39,7 @@ OVER = 1.001  # of the limits of velocity and acceleration: the last slowing may
 ENDS = 8  # postures that meet goals; more = ends that are reached more easily, for a solve each
 ENOUGH = 600  # samples of trees that look for a shorter motion after the first; more = shorter motions, later
 NEARER = 0.95  # of the length of the best motion: what others are shorter than
+SEARCHED = 0.75  # of the time limit: for searches; the rest is for shortcuts, as long motions take longer to judge
 ROUNDS = 50  # of the trees, until they get another end
 
 
@@ -226,7 +227,7 @@ class _Search:
     def shortest(self) -> tuple[list[Array] | None, str]:
         """The shortest of some paths, with shortcuts, and how it was found; or None and why there is none."""
         model, best, most, samples, runs = self._problem.scene.model, None, np.inf, 0, 0
-        while not runs or (runs < self._local.searches and samples < ENOUGH and not BUDGET.over):
+        while not runs or (runs < self._local.searches and samples < ENOUGH and BUDGET.spent < SEARCHED):
             path, trees = self._path(NEARER * most, np.inf if not runs else ENOUGH - samples)
             runs, samples = runs + 1, samples + trees.samples * (runs > 0)
             if path is None:
@@ -238,7 +239,7 @@ class _Search:
                 best, most = path, found
         if best is not None:
             return best, f"the shortest of {runs} searches"
-        if not self._reached and not BUDGET.over:
+        if not self._reached and BUDGET.spent < SEARCHED:
             return None, f"no posture meets the goals: {self._said}"
         return None, "no motion was found within the time limit"
 
@@ -254,7 +255,7 @@ class _Search:
         ends = [q for q in self._reached if self._apart(start, q) < most]
         for reached in ends:
             trees.add_end(reached)
-        while rounds < samples and not (self._begun and BUDGET.over):
+        while rounds < samples and (BUDGET.spent < SEARCHED or not self._begun):
             self._begun = True
             if rounds % ROUNDS == 0 or not ends:
                 end = next(self._ends, None)
