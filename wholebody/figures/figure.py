@@ -16,7 +16,7 @@ from wholebody.base.pool import Pool
 from wholebody.figures.body_spec import geometry_of
 from wholebody.figures.description import Description, Place, followers_of, is_root, limits_of
 from wholebody.figures.joining import mounted_parts, posture_of_all
-from wholebody.figures.model_check import LARGEST, Turning, check_model
+from wholebody.figures.model_check import LARGEST, Turning, check_model, with_joint_frames
 from wholebody.figures.postures import grounded
 from wholebody.figures.reduction import reduced_parts
 from wholebody.figures.state import Posed, free_roots, root_freedoms
@@ -96,6 +96,7 @@ class Figure(checks.FixedAttributes):
             InputError: a mass, a position or a limit of the model is not finite or is impossible.
         """
         check_model(model, name)
+        model = with_joint_frames(model)
         self.name, self.model, self.geometry, self.detail = name, model, geometry, detail
         self.visual = geometry if visual is None else visual
         self.groups = MappingProxyType(dict(description.groups))
@@ -387,7 +388,7 @@ class Figure(checks.FixedAttributes):
         checks.instance(other, Figure, "mounted: other", "load one with wb.load('hand')")
         frame, prefix = self.frame_id(on), checks.text(other.name if name is None else name, "mounted: name")
         if "/" in prefix or prefix in {*self.groups, *self.joints}:
-            raise InputError(f"mounted: {self.name} has a part {prefix!r}, or it has a slash; give name=")
+            raise InputError(f"mounted: {self.name} has a part {prefix!r}, or it has a slash; give it another name")
         parts = mounted_parts(self, other, frame, f"{prefix}/", placement(at, "mounted: at"))
         return Figure(f"{self.name} with {prefix}", *parts[:2], "own", *parts[2:])
 
