@@ -31,7 +31,7 @@ def _joints_of(names: Sequence[str], prefix: str) -> range:
     return range(found[0], found[-1] + 1) if found else range(0)
 
 
-copyreg.pickle(pin.Model, reduced)  # type: ignore[arg-type]
+copyreg.pickle(pin.Model, reduced)
 
 
 class Figure(checks.FixedAttributes):

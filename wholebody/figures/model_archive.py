@@ -16,7 +16,7 @@ LIMITS = ("lowerPositionLimit", "upperPositionLimit", "velocityLimit", "effortLi
 class _Follower(NamedTuple):
     """A joint that follows another one (mimic)."""
 
-    index: int
+    number: int
     leader: int
     slope: float
     offset: float
@@ -29,12 +29,12 @@ def reduced(model: pin.Model) -> tuple[Any, ...]:
     finite, joints, followers = pin.Model(model), list(model.joints), list[_Follower]()
     for name, values in limits.items():
         setattr(finite, name, np.nan_to_num(values))
-    for index, joint in enumerate(joints):
+    for number, joint in enumerate(joints):
         if joint.shortname() == "JointModelMimic":
             law = joint.extract()
             leader = next(k for k, other in enumerate(joints) if other.nq and other.idx_q == law.idx_q)
             axis = np.asarray(joint.createData().S, dtype=float).ravel() / law.scaling
-            followers.append(_Follower(index, leader, float(law.scaling), float(law.offset), axis))
+            followers.append(_Follower(number, leader, float(law.scaling), float(law.offset), axis))
     return _restored, (finite.saveToString(), limits, followers)
 
 
@@ -45,11 +45,11 @@ def _restored(archive: str, limits: dict[str, Array], followers: list[_Follower]
     for name, values in limits.items():
         setattr(model, name, values)
     for one in followers:  # archives of Pinocchio 3.8 leave out how many columns of the Jacobian they have
-        joint, leader, read = _along(one.axis), model.joints[one.leader], model.joints[one.index].extract()
+        joint, leader, read = _along(one.axis), model.joints[one.leader], model.joints[one.number].extract()
         joint.setIndexes(leader.id, leader.idx_q, leader.idx_v, leader.idx_vExtended)
         made = pin.JointModelMimic(pin.JointModel(joint), one.slope, one.offset)
-        made.setIndexes(one.index, read.idx_q, read.idx_v, read.idx_vExtended)
-        model.joints[one.index] = pin.JointModel(made)
+        made.setIndexes(one.number, read.idx_q, read.idx_v, read.idx_vExtended)
+        model.joints[one.number] = pin.JointModel(made)
     return model
 
 
