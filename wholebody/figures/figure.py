@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copyreg
 from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
@@ -16,6 +17,7 @@ from wholebody.base.pool import Pool
 from wholebody.figures.body_spec import geometry_of
 from wholebody.figures.description import Description, Place, followers_of, is_root, limits_of
 from wholebody.figures.joining import mounted_parts, posture_of_all
+from wholebody.figures.model_archive import reduced
 from wholebody.figures.model_check import LARGEST, Turning, check_model, with_joint_frames
 from wholebody.figures.postures import grounded
 from wholebody.figures.reduction import reduced_parts
@@ -29,11 +31,7 @@ def _joints_of(names: Sequence[str], prefix: str) -> range:
     return range(found[0], found[-1] + 1) if found else range(0)
 
 
-def _with_limits(made_from: tuple[Any, ...], limits: Mapping[str, Array]) -> Figure:
-    """A figure that was pickled."""
-    for name, values in limits.items():
-        setattr(made_from[1], name, values)
-    return Figure(*made_from)
+copyreg.pickle(pin.Model, reduced)
 
 
 class Figure(checks.FixedAttributes):
@@ -146,15 +144,8 @@ class Figure(checks.FixedAttributes):
             name: dict(part) if isinstance(part, Mapping) else part for name, part in parts.items()
         }
         visual = None if self.visual is self.geometry else self.visual
-        made_from = (self.name, pin.Model(self.model), self.geometry, self.detail, Description(**known), visual)
-        # Of a model: infinite values, which Pinocchio's archives write and cannot read, are pickled beside it.
-        limits = {
-            name: np.array(getattr(self.model, name))
-            for name in ("lowerPositionLimit", "upperPositionLimit", "velocityLimit", "effortLimit")
-        }
-        for name, values in limits.items():
-            setattr(made_from[1], name, np.nan_to_num(values))
-        return _with_limits, (made_from, limits), {"loaded_as": self.loaded_as}
+        made_from = (self.name, self.model, self.geometry, self.detail, Description(**known), visual)
+        return Figure, made_from, {"loaded_as": self.loaded_as}
 
     @property
     def outer(self) -> tuple[pin.GeometryObject, ...]:
