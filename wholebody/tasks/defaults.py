@@ -104,7 +104,7 @@ def free_arms(
 def _free_arms(scene: Surroundings, up: Set[str | None], bearing: Set[int], moved: Set[int]) -> tuple[str, ...]:
     """The upper arms of persons without the joints that carry some joints, and without some places in the tangent."""
     figure, joints = scene.figure, [scene.model.joints[one] for joint in bearing for one in scene.model.supports[joint]]
-    moved = moved.union(*(range(one.idx_v, one.idx_v + one.nv) for one in joints))
+    moved = set(moved).union(*(range(one.idx_v, one.idx_v + one.nv) for one in joints))
     groups = [f"{body}{side}" for body in figure.bodies if body in up for side in ("left", "right")]
     known = (arm for arm in groups if f"{arm}_arm" in figure.groups)
     return tuple(f"{arm}_upper_arm" for arm in known if moved.isdisjoint(figure.dofs(f"{arm}_arm").tolist()))

@@ -16,9 +16,9 @@ from wholebody.methods.contradictions import NEAREST, Contradiction, contradicti
 from wholebody.methods.control import Control
 from wholebody.methods.qp.before_contact import at_its_place, before_contact
 from wholebody.methods.qp.cancelling import posture_apart
-from wholebody.methods.qp.closest import ENDLESS, Closest
+from wholebody.methods.qp.closest import ENDLESS, Closest, reach_trials
 from wholebody.methods.qp.feasibility import Feasibility
-from wholebody.methods.qp.iterates import LocalSolution, Run, better, held
+from wholebody.methods.qp.iterates import LocalSolution, Run, better, held, moving
 from wholebody.methods.qp.settings import SEARCH, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP
@@ -112,8 +112,7 @@ class Multistart:
         rests = (term.distance.reference for term in self.problem.measures if type(term) is Effort)
         yield Attempt((q for q in rests if (q != start).any()), self.directly, "from the posture of least effort")
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
-        least = least_left(self.contradictions)
-        if least is None:
+        if (least := least_left(self.contradictions)) is None:
             return
         self._least = least
         if self._proven():
@@ -141,7 +140,7 @@ class Multistart:
             yield Attempt(starts, lambda q: self._probe(q, 0.0), "from where contacts that cancel are left")
         rng = np.random.default_rng(self.settings.seed)
         count = min(self.settings.restarts, SEARCH.inside_probes) if least else self.settings.restarts
-        if few := self._moving() < SEARCH.few:
+        if few := moving(self._shared, self.best.q) < SEARCH.few:
             self._minima, self._relaxed_minima = Minima(SEARCH.fewest_descents), Minima(SEARCH.fewest_descents)
         others = (throughout if few else restarts)(self.problem, state, start, rng, count)
         starts = self.lineariser.defined(chain(self._through, others))
@@ -308,7 +307,10 @@ class Multistart:
         if self.control.over:
             return
         if self._out_of_reach:
-            self._approach(self.best.q)
+            local = self._ran(self._closest(self._at_most(SEARCH.coming_near)), self.best.q)
+            if not held(local, tolerance) and local.violation.total < self.best.violation.total:
+                local = self._descend(local.q, note="nearest", measures=False, most=SEARCH.coming_near)
+            self._accept(local, self.how)
         if not held(self.best, tolerance):
             self._accept(self._stay(self.best), self.how)
         if not self._out_of_reach and self.best.violation.worst > tolerance:
@@ -327,38 +329,21 @@ class Multistart:
 
     def _known_out_of_reach(self, q: Array) -> bool:
         """Whether the goals are out of reach of q (nq,): descents through everything all rest at the same distance."""
-        # It is then the least that limits and constraints allow, if no relaxed probe came nearer. Local minima differ.
         if not (self.problem.goals and self.problem.scene.model.nv):
             return False
-        tolerance, ends = self.settings.tolerance, list[LocalSolution]()
         given = (self.problem, self.lineariser.state, self._start, np.random.default_rng(self.settings.seed))
-        agreeing = SEARCH.agreeing_few if (few := self._moving() < SEARCH.few) else SEARCH.agreeing
+        agreeing = SEARCH.agreeing_few if (few := moving(self._shared, self.best.q) < SEARCH.few) else SEARCH.agreeing
         starts = throughout(*given, SEARCH.reach_trials_few - 1) if few else None
-        others = starts or restarts(*given, SEARCH.reach_trials - 1, SEARCH.far)
-        enough, programs = SEARCH.reached * tolerance, self._at_most(SEARCH.reach_trial_programs)
+        starts = chain([q], self.lineariser.defined(starts or restarts(*given, SEARCH.reach_trials - 1, SEARCH.far)))
+        enough, programs = SEARCH.reached * self.settings.tolerance, self._at_most(SEARCH.reach_trial_programs)
         alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
         reach = Closest(alone, enough, programs, problem=self.problem, contacts=False)
-        for begin in chain([q], self.lineariser.defined(others)):
-            local = self._ran(reach, begin)
-            if local.violation.worst <= enough or self.control.over:
-                if local.violation.worst <= enough and begin is not q:
-                    self._through = [local.q]
-                return False
-            if local.violation.hold > SEARCH.held * local.violation.left:
-                continue  # from there the constraints alone are too far
-            ends.append(local)
-            least = min(self._nearest_through, *(end.violation.total for end in ends))
-            most = SEARCH.agree * least + tolerance
-            if sum(end.violation.total <= most for end in ends) == agreeing:
-                return True
-        self._least_probed = min((end.violation.left for end in ends), default=np.inf)
-        self._without_gain = len(ends)  # as relaxed probes count
-        return False
-
-    def _moving(self) -> int:
-        """How many degrees of freedom move a goal at the best posture."""
-        rows = self.subproblem.rows(self.lineariser.at(self.best.q, 0.0))
-        return int(rows.soft[: rows.goals].any(axis=0).sum())
+        found = reach_trials(reach, starts, self._nearest_through, agreeing, self.settings.tolerance)
+        self.spent += found.spent
+        self._through = [] if found.reached is None else [found.reached]
+        self._least_probed = min((end.violation.left for end in found.ends), default=np.inf)
+        self._without_gain = len(found.ends)  # as relaxed probes count
+        return found.out_of_reach
 
     def _closest_from_best(self) -> None:
         """Find the closest posture from the best one."""
@@ -368,14 +353,6 @@ class Multistart:
             nearest = self._descend(self.best.q, note="nearest", measures=False)
         self._accept(nearest, self.how)
         self._best = with_values(self.best, converged=self.best.converged or nearest.converged)
-
-    def _approach(self, begin: Array) -> None:
-        """Find the closest posture from one (nq,); where constraints do not hold then, restore them."""
-        tolerance = self.settings.tolerance
-        local = self._ran(self._closest(self._at_most(SEARCH.coming_near)), begin)
-        if not held(local, tolerance) and local.violation.total < self.best.violation.total:
-            local = self._descend(local.q, note="nearest", measures=False, most=SEARCH.coming_near)
-        self._accept(local, self.how)
 
     def _at_most(self, programs: int) -> int:
         """The smaller of this number of programs and that of one descent."""
@@ -405,7 +382,7 @@ class Multistart:
         local = self._ran(self._descent(iterations, None, note, measures=measures, full_step=full_step), start)
         if (most is None or local.iterations < most) and not held(local, self.settings.tolerance):
             stayed = self._stay(local)
-            local = stayed if self._better(stayed, local) else local
+            local = stayed if better(stayed, local, self.settings) else local
         return local
 
     def _descent(
@@ -415,11 +392,8 @@ class Multistart:
         tolerance, measures = tolerance or self.settings.tolerance, measures and self.settings.measures
         return SQP(self._shared, tolerance, iterations, note, offset, measures, full_step)
 
-    def _better(self, one: LocalSolution, other: LocalSolution) -> bool:
-        return better(one, other, self.settings.tolerance, measures=self.settings.measures)
-
     def _accept(self, local: LocalSolution, how: str) -> bool:
         """Keep the better one; whether the problem is solved now."""
-        if self._best is None or self._better(local, self._best):
+        if self._best is None or better(local, self._best, self.settings):
             self._best, self.how = local, how
         return self.best.violation.worst <= self.settings.tolerance
