@@ -107,19 +107,16 @@ class Multistart:
 
     def _attempts(self, begin: Array) -> Iterator[Attempt]:
         """The attempts in their order; each is decided on when those before it failed."""
-        start = self._start
         yield Attempt([begin], self.directly, "directly")
         rests = (term.distance.reference for term in self.problem.measures if type(term) is Effort)
-        yield Attempt((q for q in rests if (q != start).any()), self.directly, "from the posture of least effort")
+        yield Attempt((q for q in rests if (q != self._start).any()), self.directly, "from the posture of least effort")
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
         if (least := least_left(self.contradictions)) is None:
             return
         self._least = least
-        if self._proven():
-            return
-        if self.settings.measures:
-            yield Attempt([start], self._without_measures, "")
-        else:
+        if self.settings.measures and not self._proven():
+            yield Attempt([self._start], self._without_measures, "")
+        elif not self._proven():
             yield from self._attempts_for_feasibility()
 
     def _attempts_for_feasibility(self) -> Iterator[Attempt]:
@@ -146,16 +143,18 @@ class Multistart:
         starts = self.lineariser.defined(chain(self._through, others))
         yield Attempt(self._while_open(starts), self._relaxed, "from another start")
 
-    def _without_measures(self, start: Array) -> LocalSolution:
-        """The search for a feasible posture, and a descent from there: no measure changes what counts as reached."""
+    def _without_measures(self, start: Array) -> LocalSolution | None:
+        """Seek a feasible posture so that no measure changes what is reached, and descend; None: nothing but start."""
         settings = replace(self.settings, measures=False)
         found = Multistart(self.problem, self.lineariser.workspace, self.solver, settings, self.control)
         found.contradictions, found._least = self.contradictions, self._least
-        found._accept(found._ran(found._feasibility(found.lineariser, 0, ""), start), self.how)
+        found._best = begin = found._ran(found._feasibility(found.lineariser, 0, ""), start)
         found._search(found._attempts_for_feasibility())
         self.spent += found.spent
         self.trace += found.trace
         self._out_of_reach = found._out_of_reach
+        if found.best is begin and begin.violation.worst > self.settings.tolerance:
+            return None
         return self._descend(found.best.q) if self._accept(found.best, found.how) else found.best
 
     def _while_open(self, starts: Iterable[Array]) -> Iterator[Array]:
