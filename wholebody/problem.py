@@ -183,10 +183,10 @@ class Problem(checks.FixedAttributes):
 
     def _told(self) -> tuple[str, dict[str, list[str]]]:
         things, pairs = len(self.scene.objects), len(self.clearances)
-        told = f"{things} things, {pairs} pairs, clearance {1e3 * self.clearance:g} mm"
+        counts = f"{things} things, {pairs} pairs, clearance {1e3 * self.clearance:g} mm"
         terms = {"goals": self.goals, "constraints": (*self.constraints, *self.bounds), "measures": self.measures}
         words = {name: [in_words(term) for term in given] for name, given in terms.items()}
-        return f"Problem of {self.scene.figure.name!r} among {told}", words
+        return f"Problem of {self.scene.figure.name!r} among {counts}", words
 
     def __repr__(self) -> str:
         heading, words = self._told()
@@ -242,7 +242,7 @@ class Problem(checks.FixedAttributes):
         names: list[tuple[str, object]] = [*zip(self.constraint_names, self.constraints, strict=True)]
         names += [(f"{what}[{n}] ({in_words(term)})", term) for what, terms in groups for n, term in enumerate(terms)]
         found = next((name for name, term in names if term is error.term), error.name)
-        return type(error)(error.term, found, error.told)
+        return type(error)(error.term, found, error.reason)
 
     def retarget(self, goals: Iterable[Goal]) -> None:
         """Replace the goals, for a goal that moves from frame to frame; everything else stays.
@@ -349,8 +349,8 @@ class Problem(checks.FixedAttributes):
             wrong = np.flatnonzero((high < least) | (low > most))
             if len(wrong):
                 joint = next(j for j in self.scene.model.joints if j.idx_v <= wrong[0] < j.idx_v + j.nv)
-                told = f"{type(bound).__name__} keeps {self.scene.model.names[joint.id]} where it starts"
-                raise InputError(f"{told}, out of its limits; start it within them")
+                message = f"{type(bound).__name__} keeps {self.scene.model.names[joint.id]} where it starts"
+                raise InputError(f"{message}, out of its limits; start it within them")
 
     def _clearances(self) -> Array:
         built = self.scene.built

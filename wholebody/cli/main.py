@@ -109,9 +109,9 @@ def _ready() -> bool:
     return True
 
 
-def _say(told: str) -> None:
+def _say(message: str) -> None:
     with suppress(OSError):
-        print(f"wholebody: {told}", file=sys.stderr, flush=True)
+        print(f"wholebody: {message}", file=sys.stderr, flush=True)
 
 
 def _discard_output() -> None:
@@ -122,7 +122,7 @@ def _discard_output() -> None:
 
 def _tell_progress() -> None:
     """Report long steps, such as the decomposition of a mesh, to stderr; the library itself only logs them."""
-    told = logging.getLogger("wholebody")
-    if not any(isinstance(handler, logging.StreamHandler) for handler in told.handlers):
-        told.addHandler(logging.StreamHandler())
-    told.setLevel(logging.INFO)
+    logger = logging.getLogger("wholebody")
+    if not any(isinstance(handler, logging.StreamHandler) for handler in logger.handlers):
+        logger.addHandler(logging.StreamHandler())
+    logger.setLevel(logging.INFO)

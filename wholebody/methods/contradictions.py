@@ -101,9 +101,9 @@ class _Finder:
         """Find pieces that cannot move and are nearer than their clearance."""
         table, geometry = self._workspace.table, self._workspace.geometry
         group = np.array([self._group[joint] for joint in table.joint.tolist()], dtype=np.intp)
-        told = np.isin(group, list(self._fixed))
+        known = np.isin(group, list(self._fixed))
         pairs = table.pairs
-        fixed = np.flatnonzero((told[pairs].all(axis=1)) | (group[pairs[:, 0]] == group[pairs[:, 1]]))
+        fixed = np.flatnonzero((known[pairs].all(axis=1)) | (group[pairs[:, 0]] == group[pairs[:, 1]]))
         if not len(fixed):
             return
         center = self._centers(group)
@@ -233,9 +233,9 @@ class _Finder:
     def _centers(self, group: NDArray[np.intp]) -> Array:
         """Origins (n, 3) of the pieces; those of fixed groups at their fixed placements."""
         center: Array = self._workspace.near(self._problem.start, 0.0).placements[:, 3].copy()
-        for told, (at, _) in self._fixed.items():
-            moved = at * self._start.oMi[told].inverse()
-            members = group == told
+        for joint, (at, _) in self._fixed.items():
+            moved = at * self._start.oMi[joint].inverse()
+            members = group == joint
             center[members] = center[members] @ moved.rotation.T + moved.translation
         return center
 

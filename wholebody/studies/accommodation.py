@@ -54,7 +54,7 @@ class Exclusion(NamedTuple):
     side: str  # "over" or "under"
     value: float  # metres (mass: kilograms) over or under which they are
     excluded: int  # how many are left out for it
-    told: float  # share of these that are on that side, less the share of those that are accommodated
+    lift: float  # share of these that are on that side, less the share of those that are accommodated
 
     def __str__(self) -> str:
         unit = "kg" if self.dimension == "mass" else "m"
@@ -176,7 +176,7 @@ class Accommodation(Shown):
             below = np.searchsorted(left, bounds) / len(left) - np.searchsorted(kept, bounds) / len(kept)
             for side, gain in (("under", below), ("over", -below)):
                 k = int(gain.argmax())
-                if gain[k] > best.told:
+                if gain[k] > best.lift:
                     best = Exclusion(sex, verdict, name, side, float(bounds[k]), len(out), float(gain[k]))
         return best
 
@@ -185,9 +185,9 @@ class Accommodation(Shown):
         words = ", ".join(f"{self._of_tried(values):.0%} {name}" for name, values in parts)
         shares = ", ".join(f"{sex} {share}" for sex, share in self.by_sex.items() if sex)
         counts = self.records.counts()
-        told = "".join(f", {counts[one]} more {one}" for one in (REFUSED, ENDED, CANCELLED) if one in counts)
+        others = "".join(f", {counts[one]} more {one}" for one in (REFUSED, ENDED, CANCELLED) if one in counts)
         lines = [
-            f"Accommodation of {sum(self.tried)} people{told}: {self.share:.0%}" + (f"; {shares}" if shares else "")
+            f"Accommodation of {sum(self.tried)} people{others}: {self.share:.0%}" + (f"; {shares}" if shares else "")
         ]
         lines += [f"  {words}{self.records.remarks()}", *(f"  {one}" for one in self.exclusions)]
         for name, values in self.settings.items():

@@ -151,8 +151,8 @@ def _by_name(contents: Contents, table: str) -> dict[str, Any] | None:
     for entry in contents.tables.get(table, ()):
         name = entry.values["name"]
         if name in found:
-            told = f"{shown(name)} is the name of another {table} too; give it another one"
-            raise entry.where.at("name").fault(told)
+            message = f"{shown(name)} is the name of another {table} too; give it another one"
+            raise entry.where.at("name").fault(message)
         rest = {key: value for key, value in entry.values.items() if key != "name"}
         found[name] = rest if table == "person" else next(iter(rest.values()))
     return found or None

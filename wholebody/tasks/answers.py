@@ -205,8 +205,8 @@ def _numbers(term: object, what: str, given: Any, wanted: str) -> Array:
         raise _wrong(term, str(error)) from None
 
 
-def _wrong(term: object, told: str) -> TermError:
-    return TermError(term, in_words(term), told)
+def _wrong(term: object, message: str) -> TermError:
+    return TermError(term, in_words(term), message)
 
 
 def _finite(term: object, what: str, found: Array) -> Array:
@@ -223,5 +223,5 @@ def _known(term: object, what: str, found: Array) -> Array:
 
 
 def _undefined(term: object, what: str, found: float) -> UndefinedTermError:
-    told = f"its {what} has {found:g} {UndefinedTermError.WHERE}, which is not finite; its formula must give finite"
-    return UndefinedTermError(term, in_words(term), f"{told} numbers at every posture")
+    message = f"its {what} has {found:g} {UndefinedTermError.WHERE}, which is not finite; its formula must give finite"
+    return UndefinedTermError(term, in_words(term), f"{message} numbers at every posture")
