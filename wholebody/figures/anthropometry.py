@@ -291,7 +291,6 @@ class Dimensions:
     """Sizes of one `Person`."""
 
     def __init__(self, person: Person) -> None:
-        """Compute the sizes of a person."""
         self.body = person
         self.stature = height = person.stature
         toe = self.joint("left_toe_extension")

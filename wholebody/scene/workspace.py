@@ -57,7 +57,6 @@ class Workspace(NotCopyable):
     """
 
     def __init__(self, built: SceneGeometry) -> None:
-        """Allocate, which takes some 3 ms for a person."""
         self._built = built
         self.model: pin.Model = built.model
         self.table: PairTable = built.table

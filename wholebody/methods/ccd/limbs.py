@@ -128,7 +128,6 @@ class CarriedFrame:
     """
 
     def __init__(self, limbs: Limbs, frame: int) -> None:
-        """Find the node that carries the frame of this index."""
         described = limbs.model.frames[frame]
         self._limbs, self._joint, self._fixed = limbs, int(described.parentJoint), described.placement
         self.node = limbs.carrier(self._joint)

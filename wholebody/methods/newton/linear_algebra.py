@@ -144,7 +144,6 @@ class Gram:
     """Lower triangle of J D^-1 J' + M as scipy's csc_matrix, whose data `refill` overwrites."""
 
     def __init__(self, pattern: Pattern) -> None:
-        """Pair the entries of J that share a column, and find the entries of their products."""
         from scipy.sparse import csc_matrix
 
         self.pattern = pattern

@@ -44,7 +44,6 @@ class Multistart:
     def __init__(
         self, problem: Problem, workspace: Workspace, solver: QPSolver, settings: Settings, control: Control
     ) -> None:
-        """Set up for a problem; `run` does it all."""
         self.problem, self.solver, self.settings, self.control = problem, solver, settings, control
         self.subproblem = Subproblem(problem, workspace.state)
         self.lineariser = problem.lineariser(workspace)
