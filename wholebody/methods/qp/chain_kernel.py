@@ -215,7 +215,11 @@ def _least_effort(
             found[0], found[2] = left, 1.0 if wrong < 0 else 0.0
             return count
         if count:
-            share = _secant_length(moved, before, dq)
+            square, bent = 0.0, 0.0
+            for i in range(size):
+                square += moved[i] * moved[i]
+                bent += moved[i] * (before[i] - dq[i])
+            share = min(max(square / bent, 0.05), 3.0) if bent > 0.0 else 1.0
         share = min(share, 0.3 / longest) if longest > 0.0 else share
         for i in range(size):
             moved[i], before[i] = share * dq[i], dq[i]
@@ -234,16 +238,6 @@ def _fill_normal(room: Room, weights: Array, damping: float, system: Array) -> N
                     total += room.jacobian[r, i] * room.jacobian[s, i] / weights[i]
             system[r, s] = total
         system[r, r] += damping
-
-
-@compiled(inner=True, error_model="numpy")
-def _secant_length(moved: Array, before: Array, dq: Array) -> float:
-    """Barzilai and Borwein's step length after a displacement (n,) between two programs' answers, within bounds."""
-    square, bent = 0.0, 0.0
-    for i in range(len(dq)):
-        square += moved[i] * moved[i]
-        bent += moved[i] * (before[i] - dq[i])
-    return min(max(square / bent, 0.05), 3.0) if bent > 0.0 else 1.0
 
 
 @compiled(inner=True)
