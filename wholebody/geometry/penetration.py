@@ -162,8 +162,8 @@ def least_separation(
     # Zero where nothing overlaps, and with ``separated=False`` where nothing separates (between two half-spaces).
     pairs = ObjectPair(pieces_a, pieces_b, allowed)
     escapes = pairs.escapes()
-    ways = [*escapes, *([] if (found := _depth_first(pairs, _ROOT)) is None else [found])]
-    best = min(ways, key=lambda way: float(way @ way), default=None)
+    translations = [*escapes, *([] if (found := _depth_first(pairs, _ROOT)) is None else [found])]
+    best = min(translations, key=lambda way: float(way @ way), default=None)
     least = False
     if not pairs.sampled:
         best, least = _search(pairs, best)
