@@ -223,7 +223,7 @@ class JobOptions(TypedDict, total=False):
 
 
 class Jobs(NamedTuple):
-    """How many jobs at a time, on which cluster, and who is told how many are done."""
+    """How many jobs at a time, on which cluster, and what is called with how many are done."""
 
     jobs: int
     cluster: str | None
