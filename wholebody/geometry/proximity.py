@@ -210,13 +210,13 @@ class Proximity:
         index, placed = self.ask(data, within, most)
         return self._gathered(ContactBuffer(len(index)), np.array(placed), index, within, most)
 
-    def query_views(self, data: Any, within: float, most: Array | None = None) -> Contacts:
+    def query_views(self, data: Any, within: float) -> Contacts:
         """What `query` returns, in arrays that the next call of this overwrites."""
-        index, placed = self.ask(data, within, most)
+        index, placed = self.ask(data, within)
         self._placed[:] = placed
         if len(index) > self._buffer.size:
             self._buffer = ContactBuffer(2 * len(index))
-        return self._gathered(self._buffer, self._placed, index, within, most)
+        return self._gathered(self._buffer, self._placed, index, within, None)
 
     def least(self, data: Any, within: float) -> Array:
         """Distances (pairs,) of pairs that may be nearer than `within` metres, and bounds from below of all others."""
