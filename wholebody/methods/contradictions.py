@@ -137,10 +137,11 @@ class _Finder:
             elif isinstance(term, ReachCones):
                 cones = self._problem.scene.figure.cones if term.names is None else term.names
                 for place, (limb, cone_name) in enumerate(zip(term.limbs, cones, strict=True)):
-                    self._turned(
-                        f"{name}, {cone_name!r}", limb.limb, limb.reference,
-                        lambda state, ask=term.value, row=place: float(ask(state)[row]),
-                    )  # fmt: skip
+
+                    def value(state: State, ask: Callable[[State], Array] = term.value, row: int = place) -> float:
+                        return float(ask(state)[row])
+
+                    self._turned(f"{name}, {cone_name!r}", limb.limb, limb.reference, value)
 
     def _reachable(self) -> tuple[Array, Array]:
         """Least and largest entries (nq,) of postures; infinite but for joints of one angle with limits."""
