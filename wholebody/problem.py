@@ -181,7 +181,7 @@ class Problem(checks.FixedAttributes):
         make = partial(default_constraints, scene, start, known, ranges=ranges, standing=steady, required=required)
         return scene.built.known(key, make)
 
-    def _told(self) -> tuple[str, dict[str, list[str]]]:
+    def _in_words(self) -> tuple[str, dict[str, list[str]]]:
         things, pairs = len(self.scene.objects), len(self.clearances)
         counts = f"{things} things, {pairs} pairs, clearance {1e3 * self.clearance:g} mm"
         terms = {"goals": self.goals, "constraints": (*self.constraints, *self.bounds), "measures": self.measures}
@@ -189,12 +189,12 @@ class Problem(checks.FixedAttributes):
         return f"Problem of {self.scene.figure.name!r} among {counts}", words
 
     def __repr__(self) -> str:
-        heading, words = self._told()
+        heading, words = self._in_words()
         goals, constraints, measures = (checks.some(each) or "none" for each in words.values())
         return f"{heading}\n  goals: {goals}\n  constraints: {constraints}; measures: {measures}"
 
     def _repr_html_(self) -> str:
-        return listing(*self._told())
+        return listing(*self._in_words())
 
     def _checked_value(self, name: str, value: Any) -> Any:
         """What is set after the problem was stated: a posture, clearances, or terms that are resolved already."""
@@ -237,7 +237,7 @@ class Problem(checks.FixedAttributes):
         return tuple(found)
 
     def placed(self, error: _TermError) -> _TermError:
-        """What is told of a term, with its place in this problem in front: "goals[1] (Mine)"."""
+        """The same error of a term, with the term's place in this problem in front: "goals[1] (Mine)"."""
         groups = (("goals", self.goals), ("bounds", self.bounds), ("measures", self.measures))
         names: list[tuple[str, object]] = [*zip(self.constraint_names, self.constraints, strict=True)]
         names += [(f"{what}[{n}] ({in_words(term)})", term) for what, terms in groups for n, term in enumerate(terms)]

@@ -97,6 +97,24 @@ def compiled(*, inner: bool = False, **options: Any) -> Callable[[F], F]:
     return decorate
 
 
+def with_loops(name: str) -> Callable[[Callable[[Any], None]], Callable[[], Any]]:
+    """Make of what calls the loops of a module with small arguments a function that returns the module.
+
+    Its first call compiles the loops or reads them back, so that this does not happen in the middle of a solve.
+    """
+
+    def decorate(call: Callable[[Any], None]) -> Callable[[], Any]:
+        @lru_cache(maxsize=1)
+        def module() -> Any:
+            found = import_module(name)
+            call(found)
+            return found
+
+        return module
+
+    return decorate
+
+
 def compile_all(names: Sequence[str] = LOOPS) -> None:
     """Compile all loops of these modules, or load them from the cache."""
     for name in names:

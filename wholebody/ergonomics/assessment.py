@@ -41,7 +41,7 @@ class Ergonomics:
         angles: of the body.
         rula, reba, owas: the scores.
         torques: static torques against strength.
-        seat: whether the person was taken to sit, and what told it.
+        seat: whether the person was taken to sit, and why.
 
     Examples:
         >>> wb.ergonomics.ergonomics_of(human, standing).rula.left.score

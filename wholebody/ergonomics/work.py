@@ -93,8 +93,8 @@ class Seen(NamedTuple):
 
     figure: Figure  # the person
     angles: BodyAngles  # of the body
-    work: Work  # with `seated` and `back_supported` told
-    seat: str  # words for how they were told
+    work: Work  # with `seated` and `back_supported` decided
+    seat: str  # words for how they were decided
 
 
 def seen(body: Figure | Scene, q: Array, work: Work | None, what: str) -> Seen:

@@ -72,12 +72,12 @@ def robot_figure(robot: Robot, samples: int) -> Figure:
         postures=postures,
         cones=robot.cones,
         excluded=(*excluded, *rest.excluded),
-        notes=(*robot.notes, *renamed, *_told(rest)),
+        notes=(*robot.notes, *renamed, *_notes_on(rest)),
     )
     return Figure(robot.name, model, geometry, "own", description, robot.visual)
 
 
-def _told(rest: RestPosture) -> list[str]:
+def _notes_on(rest: RestPosture) -> list[str]:
     """Sentences on overlaps at zero."""
     notes = []
     if rest.parted:

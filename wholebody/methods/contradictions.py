@@ -12,7 +12,6 @@ the point stays outside by the clearance, and the error is at least the clearanc
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any, Literal, NamedTuple
 
 import coal
@@ -138,7 +137,10 @@ class _Finder:
             elif isinstance(term, ReachCones):
                 cones = self._problem.scene.figure.cones if term.names is None else term.names
                 for place, (limb, cone_name) in enumerate(zip(term.limbs, cones, strict=True)):
-                    value = partial(_entry, term.value, place)
+
+                    def value(state: State, ask: Callable[[State], Array] = term.value, row: int = place) -> float:
+                        return float(ask(state)[row])
+
                     self._turned(f"{name}, {cone_name!r}", limb.limb, limb.reference, value)
 
     def _reachable(self) -> tuple[Array, Array]:
@@ -273,10 +275,6 @@ class _Finder:
                 else f"{owners[k]} (frozen)" for k in (a, b)]  # fmt: skip
         what = f"{-1e3 * distance:.3g} mm inside" if distance < 0.0 else f"{1e3 * distance:.3g} mm from"
         return f"{said[0]} is {what} {said[1]}" + (f", where {1e3 * asked:.3g} mm are required" if asked else "")
-
-
-def _entry(value: Callable[[State], Array], row: int, state: State) -> float:
-    return float(value(state)[row])
 
 
 def in_words(found: tuple[Contradiction, ...]) -> str:

@@ -69,7 +69,6 @@ class Geodesics:
     tries: ClassVar[int] = 30
 
     def __init__(self, problem: Problem, workspace: Workspace) -> None:
-        """Take a problem without constraints."""
         self._workspace, self._model = workspace, workspace.model
         self._clearance = problem.clearance
         self.partial = not problem.scene.figure.roots  # motions of free bodies became no shorter, but later
@@ -180,7 +179,6 @@ class TrackedMotions:
     tries: ClassVar[int] = 12
 
     def __init__(self, problem: Problem, workspace: Workspace) -> None:
-        """Take a problem whose constraints and bounds hold on the way."""
         self.geodesics = Geodesics(problem, workspace)
         self._problem = problem.with_start(problem.start)
         self._model = problem.scene.model

@@ -130,7 +130,7 @@ class Accommodation(Shown):
                 out = [k for k in own if good and not good[k]]
                 rest = [k for k in own if self.accommodated[k]]
                 if out and rest:
-                    found.append(self._told(sex, verdict, out, rest))
+                    found.append(self._exclusion(sex, verdict, out, rest))
         return tuple(sorted(found, key=lambda one: -one.excluded))
 
     def plot(self) -> Any:
@@ -164,7 +164,7 @@ class Accommodation(Shown):
         held = [one for one, tried in zip(good, self.tried, strict=True) if tried]
         return sum(held) / len(held) if held else math.nan
 
-    def _told(self, sex: str, verdict: str, out: list[int], rest: list[int]) -> Exclusion:
+    def _exclusion(self, sex: str, verdict: str, out: list[int], rest: list[int]) -> Exclusion:
         """The dimension and the bound with the greatest difference of shares beyond it (Youden 1950)."""
         best = Exclusion(sex, verdict, "", "over", math.nan, len(out), -1.0)
         for name in self.dimensions[out[0]]:

@@ -28,7 +28,6 @@ class TaskFile:
     """A task file of which variants are made; it can be sent to another process."""
 
     def __init__(self, path: Path) -> None:
-        """Read the file and check it."""
         self.path = path
         self._place = path.absolute()  # a process that reads it again may work in another folder
         self.contents = read_contents(path)

@@ -74,7 +74,6 @@ class Checked:
     """A method of a term whose answers are checked."""
 
     def __init__(self, term: object, what: str, found: Callable[..., Any], check: Check) -> None:
-        """Store the term, the method and its check."""
         self._term, self._what, self._found, self._check = term, what, found, check
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:

@@ -1,4 +1,4 @@
-"""What a problem of a person has without being told: ranges of motion, balance, and its measures."""
+"""What a problem of a person has by default: ranges of motion, balance, and its measures."""
 
 from __future__ import annotations
 

@@ -243,8 +243,8 @@ def _deeper(pairs: Pairs, scene: Scene, start: Array, end: Array, shares: Array)
     began = np.minimum(pairs.distances(start), 0.0)
     if not len(began):
         return np.zeros(len(shares))
-    ways = (np.asarray(pin.interpolate(scene.model, start, end, float(share))) for share in shares)
-    return np.array([float((began - pairs.distances(q)).max()) for q in ways])
+    postures = (np.asarray(pin.interpolate(scene.model, start, end, float(share))) for share in shares)
+    return np.array([float((began - pairs.distances(q)).max()) for q in postures])
 
 
 class Watch:

@@ -222,7 +222,6 @@ class MinkRetargeting:
     """Postures of a figure that follow a skeleton."""
 
     def __init__(self, motion: SkeletonMotion, figure: wb.Figure, roles: Roles) -> None:
-        """Make the model, the tasks and the targets of all frames."""
         try:
             import mink
             import mujoco

@@ -36,7 +36,6 @@ class Run:
     """
 
     def __init__(self, track: Track, name: str) -> None:
-        """Set the tool up, make a first step and go back to the start."""
         self.track, steps = track, len(track.targets)
         self.wall, self.cpu = np.zeros(steps), np.zeros(steps)
         self.postures = np.empty((steps, track.scene.model.nq))

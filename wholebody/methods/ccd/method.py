@@ -134,7 +134,6 @@ class CCDTracker(DescentTracker[CCD]):
     """Follows by searches; its ways out resolve overlap with things that were moved into the figure."""
 
     def __init__(self, method: CCD, problem: Problem, dt: float) -> None:
-        """Set up; arguments and errors as for `DescentTracker`."""
         super().__init__(method, problem, dt)
         self._shared = _Shared(problem.scene, self.workspace)
         self.overlap_resolutions(problem.start)  # makes its chains, which would take as long as ten frames

@@ -48,7 +48,6 @@ class Reach:
     """The joints of a request, and its goals."""
 
     def __init__(self, figure: Figure, request: Request, control: Control) -> None:
-        """Prepare the joints."""
         self._model = figure.model
         self.begin(request, control)
         self.limbs = Limbs(figure.model, request.joints)

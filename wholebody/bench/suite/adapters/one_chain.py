@@ -36,7 +36,6 @@ class Chain:
     solver: Any = None
 
     def __init__(self, model: pin.Model, frame: int) -> None:
-        """Look the joints up."""
         self.model = model
         self.joints = list(model.supports[model.frames[frame].parentJoint])[1:]
         self.places = np.array([model.joints[joint].idx_q for joint in self.joints])
