@@ -422,7 +422,6 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Problem", Call(wb.Problem, stated, wb.solve)
     yield "Problem(touching)", Call(lambda pair: wb.Problem(there, touching=[pair]), {"pair": ("link4", "ball")})
     yield "Problem.with_start", Call(ask.with_start, {"q": q}, wb.solve)
-    yield "Problem.on_scene", Call(ask.on_scene, {"scene": ask.scene, "clearances": ask.clearances}, wb.solve)
     yield "Problem.check_fresh", Call(ask.check_fresh, {})
     workspace = ask.workspace()
     yield "Problem.lineariser", Call(lambda dt: ask.lineariser(workspace, dt), {"dt": 0.1})

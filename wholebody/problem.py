@@ -276,27 +276,6 @@ class Problem(checks.FixedAttributes):
         self.scene.figure.warn_of_angles(result.start, "with_start: q")
         return result
 
-    def on_scene(self, scene: Scene, clearances: Array) -> Problem:
-        """Copy on another scene of the same figure, with clearances of its pairs (pairs,), metres.
-
-        Terms that were resolved stay, but for those that bring surfaces together.
-
-        Raises:
-            InputError: the scene is of another figure, or has another number of pairs.
-        """
-        if (
-            checks.instance(scene, Scene, "on_scene: scene", "make one with wb.Scene(figure)").figure
-            is not self.scene.figure
-        ):
-            raise InputError("on_scene: the scene is of another figure; state the problem anew")
-        result, asked = copy.copy(self), checks.array(clearances, "on_scene: clearances", "one number for each pair")
-        vars(result).update(scene=scene, _revision=scene.revision, _plan=None, clearances=asked)
-        result.check_fresh()
-        for name in ("goals", "constraints", "measures"):
-            terms = (term.resolve(scene, self.start) if term.touching else term for term in getattr(self, name))
-            setattr(result, name, tuple(terms))
-        return result
-
     def __getstate__(self) -> dict[str, Any]:
         """All but what a solve has added: a problem is the same problem before and after it."""
         return {**vars(self), "_plan": None}

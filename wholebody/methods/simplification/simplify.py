@@ -95,7 +95,11 @@ def simplify(problem: Problem) -> Simplified:
     moves = body[table.joint[table.pairs[:, 0]]] != body[table.joint[table.pairs[:, 1]]]
     numbers = np.flatnonzero(moves)
     numbers = numbers[reachable_pairs(problem, still, body == 0, numbers)]
-    small = problem.on_scene(_scene(problem, numbers), problem.clearances[numbers])
+    small, scene = problem.with_start(problem.start), _scene(problem, numbers)
+    for name in ("goals", "constraints", "measures"):  # what brings surfaces together reads the scene's pieces
+        terms = (term.resolve(scene, small.start) if term.touching else term for term in getattr(problem, name))
+        setattr(small, name, tuple(terms))
+    vars(small).update(scene=scene, clearances=problem.clearances[numbers])  # users state another problem instead
     counts = {
         "pairs": (len(table.pairs), len(numbers)),
         "pieces": (whole.geometry.ngeoms, small.scene.geometry.ngeoms),
@@ -122,4 +126,5 @@ def _scene(problem: Problem, numbers: Indices) -> Scene:
     known = whole.built.pieces_of
     places = {thing.name: [(int(place[old]), local) for old, local in known[thing.name]] for thing in objects}
     swept = [whole.pair_table.swept[old] for old in kept]
-    return Scene.of_parts(figure, objects, SceneGeometry(figure.model, made, owners, places, pairs, swept))
+    built = SceneGeometry(figure.model, made, owners, places, pairs, swept)
+    return Scene.of_parts(figure, objects, built, whole.revision)
