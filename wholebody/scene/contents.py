@@ -56,9 +56,10 @@ class SceneContents(checks.FixedAttributes):
         self._revision = 0
 
     @classmethod
-    def of_parts(cls, figure: Figure, objects: Iterable[SceneObject], built: SceneGeometry) -> Self:
+    def of_parts(cls, figure: Figure, objects: Iterable[SceneObject], built: SceneGeometry, revision: int = 0) -> Self:
         """A scene with a given geometry model and its own pairs; rebuilt after things were added or removed."""
         scene = cls(figure)
+        scene._revision = revision
         scene._objects = {thing.name: thing for thing in objects}
         scene._built = built
         return scene
