@@ -125,12 +125,12 @@ class ClipRun:
 
     def window(
         self, window: Window, found: Faults, cancel: Callable[[float], bool], begun: Array | None = None,
-        around: Array | None = None, whole: bool = True,
+        around: Array | None = None, whole: bool = True, patient: bool = True,
     ) -> WindowResult:  # fmt: skip
         """Free one window; a `cancel` that says so leaves it as it was.
 
         `begun` (n, nq) has postures to begin with, `around` those that stay beyond the window, the originals if
-        None; with `whole` false the last frame of a part is free.
+        None; with `whole` false the last frame of a part is free. What ended early goes on only if `patient`.
         """
         around = begun if around is None else around
         own = self._of(window, found, cancel, around, (window.first > 0, whole and window.end < len(self._reference)))
@@ -148,7 +148,7 @@ class ClipRun:
             attempt = self._attempt(start, own, objective, way)
             if attempt is None:
                 return WindowResult(own.chart.original, "")
-            if attempt.early:
+            if attempt.early and patient:
                 ended_early.append(attempt)
                 continue
             best = attempt if best is None or attempt.rank < best.rank else best
