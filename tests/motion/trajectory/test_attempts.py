@@ -244,7 +244,7 @@ def test_a_part_that_cannot_go_on_is_freed_with_the_one_before(
             seen.append((part.first, part.end))
             assert patient is (seen[-1] == (0, 100))
             free = ways_on(part) or patient
-            return window_run.WindowResult(np.full((len(part), 2), float(part.end)), "" if free else "something")
+            return window_run.WindowResult(np.full((len(part), 2), float(part.end)), "" if free else "something", free)
 
     with begun(wb.Clip(figure, np.zeros((100, 2)), 1 / 15), wb.Scene(figure)) as run:
         given: Any = (Window(0, 100), np.zeros((100, 2)), None, lambda _: False)

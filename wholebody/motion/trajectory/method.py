@@ -158,9 +158,12 @@ class Trajectory(Checked):
 def _in_parts(
     run: Run, windows: ClipRun, window: Window, reference: Array, faults: Faults, told: Callable[[float], bool]
 ) -> WindowResult:
-    """A window freed part by part, each from where the one before it is; with that one where a part is not freed."""
+    """A window freed part by part, each from where the one before it is; with that one where a part is not freed.
+
+    What is missed by little stays, for the repair; where nothing comes before, all is freed at once.
+    """
     length, shared = run.frames(LONG, 2), run.frames(LONG / 4.0, 1)
-    q, firsts, end = np.array(reference), [window.first], window.first
+    q, firsts, end, missed = np.array(reference), [window.first], window.first, list[str]()
 
     def part_told(done: float) -> bool:
         return told((firsts[-1] - window.first + done * (length - shared)) / len(window))
@@ -172,11 +175,12 @@ def _in_parts(
         if part == window:
             break
         freed = windows.window(part, faults, part_told, around=q, whole=last, patient=False)
-        if freed.missed:  # from there it cannot go on
+        if freed.missed and not freed.little:  # from there it cannot go on
             firsts.pop()
             continue
+        missed += [freed.missed] if freed.missed else []
         q[first:end] = freed.q
         if last:
-            return WindowResult(q[window.first : window.end], "")
+            return WindowResult(q[window.first : window.end], "; ".join(missed))
         firsts.append(end - shared)
     return windows.window(window, faults, told)
