@@ -303,14 +303,14 @@ class Run:
             self._found[k] = self.figure.clamp(pin.integrate(self.model, self._free[k], self._deviation[k]))
 
     def _near(self, k: int, span: int) -> Array:
-        """The deviation of every `span`-th frame; beyond the first and the last one it goes on as it goes there."""
+        """The deviation of every `span`-th frame; beyond the first and the last one it goes on half as fast."""
         last = (self._came - 1) // span * span
         inside = min(max(k, 0), last)
         found = self._deviation[inside]
         if inside == k or not last:
             return found
         return np.asarray(
-            found + abs(k - inside) / span * (found - self._deviation[inside + np.sign(inside - k) * span])
+            found + 0.5 * abs(k - inside) / span * (found - self._deviation[inside + np.sign(inside - k) * span])
         )
 
     def _swept(self, k: int, omega: float, span: int) -> None:
