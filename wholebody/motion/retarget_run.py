@@ -26,7 +26,7 @@ from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.figures.figure import Figure
 from wholebody.motion.held_points import HeldPoint
 from wholebody.motion.holds import Holds
-from wholebody.motion.posture_fit import Fitter, Goals, Layout
+from wholebody.motion.posture_fit import Fitter, Goals, Layout, levers
 from wholebody.motion.retarget_targets import LIMBS, Targets, Wanted, has_trunk, known_bones, parts_of
 from wholebody.motion.roles import Roles
 from wholebody.motion.structure import upright
@@ -48,8 +48,6 @@ BEND = 0.067  # s², weight of an acceleration of the deviation in sweeps, in me
 GOES_ON, RETURN = 0.32, 0.3  # s in which a change of the deviation ends, and a deviation that nothing needs
 EVEN, KEEP = 0.06, 0.1  # s over which what bones do not determine is smoothed; weight of it, in metres that limbs move
 CALM, SPREAD = 0.025, 0.06  # s over which the free fit and the deviation of the first pass are smoothed
-LEAST_LEVER = 0.1  # m
-WHOLE = 4.0, 2.0  # weights of a root's places and turns: they move the whole mass, so that legs give way first
 KEPT = 30  # frames before the last one that stay known, for what looks back
 SPARE = 0.9  # share of the speed limits that the free fit takes, so that there is some for what deviates from it
 BONES = {"hand": 0.5, "toe": 0.7, "head": 0.7}  # weights of bones by their far ends, where it is not 1
@@ -388,22 +386,3 @@ def normal(time: float, dt: float) -> Array:
     half = max(1, int(np.ceil(3.0 * time / dt)))
     weights = np.exp(-0.5 * (np.arange(-half, half + 1) * dt / time) ** 2)
     return np.asarray(weights / weights.sum())
-
-
-def levers(figure: Figure) -> Array:
-    """(nv,) by how many metres a degree of freedom moves what it moves farthest, a radian or metre; a root by more."""
-    model, data = figure.model, figure.model.createData()
-    pin.forwardKinematics(model, data, figure.neutral)
-    ends: list[list[Array]] = [[np.array(data.oMi[joint].translation)] for joint in range(model.njoints)]
-    for piece in figure.geometry.geometryObjects:
-        ends[piece.parentJoint].append(data.oMi[piece.parentJoint].act(piece.placement.translation))
-    found = np.full(model.nv, LEAST_LEVER)
-    for joint in range(model.njoints - 1, 0, -1):
-        ends[model.parents[joint]] += ends[joint]
-        reach = max(float(np.linalg.norm(end - data.oMi[joint].translation)) for end in ends[joint])
-        first = model.idx_vs[joint]
-        found[first : first + model.nvs[joint]] = max(reach, LEAST_LEVER)
-    if figure.root == "free":
-        found[:3] = 1.0
-        found[:6] *= np.repeat(WHOLE, 3)
-    return found
