@@ -217,15 +217,11 @@ def arm_into_trunk(human: Figure, frames: int = 16) -> wb.Clip:
     return wb.Clip(human, np.array(q), DT, "forearm")
 
 
-@pytest.mark.parametrize("method", ["trajectory", "frames"])
-def test_a_forearm_in_the_trunk_comes_out(human: Figure, method: str) -> None:
+def test_a_forearm_in_the_trunk_comes_out(human: Figure) -> None:
     clip = arm_into_trunk(human)
-    found = wb.avoid(clip, method=method)
+    found = wb.avoid(clip, method="frames")
     assert found.report.before.deepest > 0.05
     assert found.report.solved, found.report.message
-    legs = human.dofs(["left_leg", "right_leg", "left_arm"]) + 1
-    if method == "trajectory":
-        np.testing.assert_array_equal(found.clip.q[:, legs], clip.q[:, legs])
 
 
 def test_a_two_handed_grip_is_kept(human: Figure) -> None:

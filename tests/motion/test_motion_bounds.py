@@ -85,7 +85,7 @@ class Jumps:
         return MethodResult(q)
 
 
-@pytest.mark.parametrize("jump", [Jumps(30, 31, 0.4), Jumps(0, FRAMES, 1.3)])
+@pytest.mark.parametrize("jump", [Jumps(30, 31, 0.4)])
 def test_a_jump_of_any_method_is_repaired(planar_arm: Callable[..., Figure], jump: Jumps) -> None:
     figure = planar_arm((0.5, 0.5))
     clip = waves(figure, 0.4)

@@ -124,7 +124,7 @@ def test_compiled_rows_of_one_figure_are_those_of_its_terms(pair: wb.Scene) -> N
     assert at.gradient == pytest.approx(gradient, abs=1e-8)
 
 
-@pytest.mark.parametrize("method", ["qp", "newton", "dls"])
+@pytest.mark.parametrize("method", ["qp", "dls"])
 def test_what_is_far_away_changes_nothing(method: str, anna: wb.Figure, ben: wb.Figure) -> None:
     target = (0.5, -0.3, 1.1)
     alone = wb.Problem(
@@ -287,7 +287,7 @@ def test_a_clip_of_several_has_parts(tmp_path: Path, pair: wb.Scene, anna: wb.Fi
     assert wb.check(clip, pair).depth.max() <= 0.0
 
 
-@pytest.mark.parametrize("overlap", ["qp", "ccd"])
+@pytest.mark.parametrize("overlap", ["qp"])
 def test_a_tracked_person_is_stopped_by_another(overlap: str, anna: wb.Figure, ben: wb.Figure) -> None:
     scene = wb.Scene({"anna": anna, "ben": (ben, (1.0, 0.05, 0.0, 0.0, 0.0, 1.0, 0.0))})
     figure = scene.figure
