@@ -645,7 +645,14 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         "torques",
         Call(
             wb.motion.torques,
-            {"clip": clip, "friction": 0.5, "cutoff": 6.0, "strength": wb.motion.Strength(), "feet": ["link1"]},
+            {
+                "clip": clip,
+                "scene": wb.Scene(clip.figure),
+                "friction": 0.5,
+                "cutoff": 6.0,
+                "strength": wb.motion.Strength(),
+                "feet": ["link1"],
+            },
         ),
     )
     yield "Clip(frames)", Call(lambda frames: clip[frames], {"frames": slice(0, 1)})

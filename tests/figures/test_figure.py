@@ -7,6 +7,7 @@ import pytest
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures import Figure, load
 from wholebody.figures.denavit_hartenberg import denavit_hartenberg
+from wholebody.figures.description import Description
 
 HUMAN = load("human")
 BRANCHES = ("right_arm", "left_arm", "right_leg", "left_leg", "spine", "neck")
@@ -114,6 +115,18 @@ def test_reduction_can_be_repeated():
     q = part.with_joints(part.neutral, {"right_elbow_flexion": 1.0})
     expected = place(HUMAN, HUMAN.with_joints(HUMAN.neutral, {"right_elbow_flexion": 1.0}), "right_palm")
     assert place(part, q, "right_palm").homogeneous == pytest.approx(expected.homogeneous, abs=1e-12)
+
+
+def test_a_model_by_hand_has_the_frames_of_its_joints():
+    model = pin.Model()
+    first = model.addJoint(0, pin.JointModelRX(), pin.SE3.Identity(), "first")
+    model.addJoint(first, pin.JointModelRY(), pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.3])), "second")
+    named = Description({}, {}, (), (), {"zero": lambda figure: pin.neutral(figure.model)})
+    made = Figure("made", model, pin.GeometryModel(), "own", named)
+    assert model.nframes == 1  # the user's own model stays as it is
+    assert made.placement(made.neutral, "second").translation == pytest.approx((0.0, 0.0, 0.3))
+    assert made.reduced(["second"]).joints == ("second",)
+    assert made.mounted(made, on="second", name="more").joints == ("first", "second", "more/first", "more/second")
 
 
 @pytest.mark.parametrize("branch", BRANCHES)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable
 from pathlib import Path
 
@@ -181,3 +182,18 @@ def test_what_cannot_be_obeyed_is_told(load: Callable[..., wb.Figure]) -> None:
     floating = '<joint name="j" type="floating"><parent link="a"/><child link="b"/></joint>'
     with pytest.raises(FileFormatError, match="'k' mimics 'j', which is floating"):
         load(text(floating, joint("k", "b", "c", follow("j")), *chain[2:]))
+
+
+@pytest.mark.parametrize("content", [HAND, HAND.replace('axis xyz="0 0 1"', 'axis xyz="0 -0.6 0.8"')])
+def test_a_pickled_scene_moves_as_before(load: Callable[..., wb.Figure], content: str) -> None:
+    # Pinocchio's own archive of a model forgets how many columns a follower has, and cannot read infinite limits.
+    scene = wb.Scene(load(content.replace('velocity="3"', 'velocity="inf"') if content is not HAND else content))
+    model, other = scene.built.model, pickle.loads(pickle.dumps(scene)).built.model
+    assert other.nvExtended == sum(joint.nvExtended for joint in list(other.joints)[1:])
+    for q in np.random.default_rng(3).uniform(-1.0, 1.0, (4, model.nq)):
+        data, there = pin.Data(model), pin.Data(other)
+        before = pin.computeJointJacobians(model, data, q).copy()
+        assert np.array_equal(pin.computeJointJacobians(other, there, q), before)
+        for one, two in zip(data.oMi, there.oMi, strict=True):
+            assert np.array_equal(one.homogeneous, two.homogeneous)
+    assert np.array_equal(other.velocityLimit, model.velocityLimit)

@@ -155,8 +155,9 @@ def test_loads_are_drawn_beside_those_before(recorded: wb.Clip) -> None:
     before, after = ([line for line in chart.axes[1].lines if line.get_linestyle() == style] for style in ("--", "-"))
     assert len(before) == len(after) == len(public.feet)
     for foot, (old, new) in enumerate(zip(before, after, strict=True)):
-        np.testing.assert_allclose(old.get_ydata(), public.force[:, foot, 2])
-        np.testing.assert_allclose(new.get_ydata(), 2.0 * public.force[:, foot, 2])
+        force = np.linalg.norm(public.force[:, foot], axis=1)
+        np.testing.assert_allclose(old.get_ydata(), force)
+        np.testing.assert_allclose(new.get_ydata(), 2.0 * force)
         np.testing.assert_allclose(old.get_xdata(), recorded.times)
 
 

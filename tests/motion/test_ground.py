@@ -219,6 +219,19 @@ def test_feet_that_are_held_inside_the_floor_are_told_before(human: wb.Figure) -
     assert wb.avoid(clip, scene, method="frames", hold_feet=False).report.after.free
 
 
+def test_what_feet_and_hands_carry_into_things_is_told_before(human: wb.Figure) -> None:
+    floor = wb.Scene(human).add(wb.HalfSpace(), name="floor")
+    clip = wb.Clip(human, np.tile(human.grounded(human.posture("standing"), floor), (5, 1)), DT)
+    skate = wb.Box((0.2, 0.02, 0.04))
+    floor.attach(skate, to="left_foot", name="skate", at=(0.05, 0.0, -0.09), rests_on=["left_foot", "left_toes"])
+    with pytest.warns(UserWarning, match=r"skate stands up to \d+ mm inside floor.*hold_feet=False"):
+        wb.avoid(clip, floor, method="frames")
+    at = human.placement(clip.q[0], "right_palm").translation
+    beside = wb.Scene(human).add(wb.Box((0.1, 0.1, 0.1)), name="box", at=at)
+    with pytest.warns(UserWarning, match=r"right_hand is held up to \d+ mm inside box; leave that Hold out"):
+        wb.avoid(clip, beside, method="frames", constraints=[wb.Hold("right_palm")])
+
+
 def test_a_jump_that_collides_and_ends_that_overlap_are_told_before(human: wb.Figure) -> None:
     standing = human.posture("standing")
     inside = human.with_joints(standing, {"right_shoulder_abduction": -0.3})

@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.figures.postures import support
 from wholebody.motion.clip_torques import smoothed, torques
 from wholebody.motion.inverse_dynamics import ground_forces
 from wholebody.motion.strength import Strength
@@ -82,6 +83,68 @@ def test_forward_dynamics_gives_the_motion_back(human: wb.Figure) -> None:
         torque[:6] = 0.0
         gained = pin.aba(human.model, data, clip.q[k], v[k], torque, outer)
         np.testing.assert_allclose(gained, a[k], atol=0.01)
+
+
+def leaning(human: wb.Figure) -> tuple[wb.Clip, wb.Scene]:
+    """Somebody who leans forward by 0.3 rad about the ankles, with both hands just above a box."""
+    q = human.posture("arms_forward").copy()
+    heel = human.placement(q, "left_heel").translation.copy()
+    turn = pin.SE3(pin.utils.rotate("y", 0.3), np.zeros(3))
+    q[:7] = pin.SE3ToXYZQUAT(pin.SE3(np.eye(3), heel) * turn * pin.SE3(np.eye(3), -heel) * pin.XYZQUATToSE3(q[:7]))
+    for side in ("left", "right"):
+        q = human.with_joints(
+            q,
+            {
+                f"{side}_ankle_dorsiflexion": q[human.model.joints[human.joint_id(f"{side}_ankle_dorsiflexion")].idx_q]
+                + 0.2
+            },
+        )
+    state = wb.Scene(human).state(q)
+    low = min(
+        support(piece.geometry, state.data.oMi[piece.parentJoint] * piece.placement, np.array([0.0, 0.0, -1.0])) * -1.0
+        for piece in human.geometry.geometryObjects
+        if piece.name.startswith("left_hand") or "left_palm" in piece.name
+    )
+    scene = wb.Scene(human).add(wb.Box((0.6, 1.2, 0.1)), name="box", at=(0.9, 0.0, low - 0.051))
+    return wb.Clip(human, np.tile(q, (3, 1)), 0.1, "leaning"), scene
+
+
+def test_hands_on_a_box_bear_a_part_and_the_feet_the_rest(human: wb.Figure) -> None:
+    clip, scene = leaning(human)
+    alone, found = torques(clip), torques(clip, scene)
+    assert alone.feet == ("left_foot", "right_foot") == found.feet[:2]
+    hands = [k for k, name in enumerate(found.feet) if k > 1]
+    assert hands
+    assert found.stands[1, hands].any()
+    weight = GRAVITY * pin.computeTotalMass(human.model)
+    assert alone.outside[1] > 0.02  # the centre of mass is before the toes
+    assert np.linalg.norm(alone.missing[1]) > 20.0
+    np.testing.assert_allclose(found.force[1].sum(axis=0), [0.0, 0.0, weight], atol=0.02 * weight)
+    assert np.linalg.norm(found.missing[1]) < 0.02 * weight
+    assert found.outside[1] < 1e-3
+    assert found.force[1, hands, 2].sum() > 0.05 * weight
+    # at rest under torques, weight and these forces: forward dynamics gives no acceleration
+    data, none = human.model.createData(), np.zeros(human.model.nv)
+    pin.forwardKinematics(human.model, data, clip.q[1])
+    outer = pin.StdVec_Force([pin.Force.Zero() for _ in human.model.joints])
+    for number, name in enumerate(found.feet):
+        force, at = found.force[1, number], found.pressure[1, number]
+        joint = human.model.frames[human.frame_id(name)].parentJoint
+        outer[joint] += data.oMi[joint].actInv(pin.Force(force, found.moment[1, number] + np.cross(at, force)))
+    torque = found.torque[1].copy()
+    torque[:6] -= data.oMi[1].actInv(pin.Force(np.zeros(6))).vector
+    np.testing.assert_allclose(pin.aba(human.model, data, clip.q[1], none, torque, outer), 0.0, atol=1e-6)
+
+
+def test_a_hand_at_a_wall_is_pushed_out_of_it(human: wb.Figure) -> None:
+    """Two points that bear: the ground below, and a wall before it, which pushes back along its normal."""
+    points, ways = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 1.0]]), np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])
+    found = ground_forces(np.array([-50.0, 0.0, 600.0, 0.0, 0.0, 0.0]), np.array([0.2, 0.0, 0.9]), points, 0.5, ways)
+    normal = np.einsum("ij,ij->i", found.forces, ways)
+    across = np.linalg.norm(found.forces - normal[:, None] * ways, axis=1)
+    assert (normal >= 0.0).all()
+    assert normal[1] > 10.0
+    assert (across <= 0.5 * normal + 1e-9).all()
 
 
 def test_nothing_pushes_somebody_who_flies(human: wb.Figure) -> None:

@@ -15,7 +15,7 @@ import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.bench.suite.problem_sets.registry import problem_set
 from wholebody.planning import Pace, Plan
-from wholebody.planning.rrt_connect import Tree
+from wholebody.planning.rrt_connect import RRTConnect, Tree
 from wholebody.planning.sampling import Sampler
 from wholebody.planning.smoothing import length, shortcut
 
@@ -99,7 +99,7 @@ def test_a_joint_that_turns_back_on_the_way_moves_evenly_though_no_two_postures_
     model, share = planar_arm((0.5, 0.5)).model, np.linspace(0.0, 1.0, 41)
     path = list(np.stack([share, 0.5 * np.sin(5.0 * np.pi * share)], axis=1))
     local: Any = NothingButParts()
-    found = shortcut(model, path, local, np.random.default_rng(0), lambda: False)
+    found = shortcut(model, path, local, np.random.default_rng(0))
     straight = float(np.linalg.norm(path[-1] - path[0]))
     assert length(model, path) > 3.0 * straight
     assert length(model, found) < 1.1 * straight
@@ -212,6 +212,29 @@ def test_a_joint_without_limits_goes_the_long_way_round(tmp_path: Path, least_di
     check(found, figure.neutral, end, Pace())
     assert found.length == pytest.approx(2.0 * np.pi - 2.5, rel=0.05)
     assert least_along(scene, found.clip.q, least_distance) >= -1e-6
+
+
+class NoTrees(RRTConnect):
+    """Trees that never meet."""
+
+    def grow(self, sample: Array) -> list[Array] | None:
+        return None
+
+
+def test_steps_along_a_wall_from_the_end_find_the_way_that_steps_from_the_start_do_not(
+    free_bodies: Callable[..., wb.Figure], monkeypatch: pytest.MonkeyPatch, least_distance: Distance
+) -> None:
+    """A ball behind a wall is drawn along it past its edge; from the other side it is drawn to the wall's middle."""
+    monkeypatch.setattr("wholebody.planning.planner.RRTConnect", NoTrees)
+    figure = free_bodies(wb.Sphere(0.1))
+    scene = wb.Scene(figure).add(wb.Box((0.1, 2.0, 4.0)), name="wall")
+    beside, behind = np.array((-0.3, 1.2, 0.0)), np.array((0.3, 0.5, 0.0))  # the wall's edge is at y = 1
+    start, end = (np.concatenate([at, figure.neutral[3:]]) for at in (beside, behind))
+    found = wb.plan(scene, start, end)
+    check(found, start, end, Pace())
+    assert found.message != "the straight motion"
+    assert least_along(scene, found.clip.q, least_distance) >= -1e-6
+    assert not wb.plan(scene, end, start, time_limit=0.5).solved
 
 
 def test_a_free_root_keeps_to_the_usual_speed(free_bodies: Callable[..., wb.Figure]) -> None:

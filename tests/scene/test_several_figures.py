@@ -280,21 +280,47 @@ def test_a_clip_of_several_has_parts(tmp_path: Path, pair: wb.Scene, anna: wb.Fi
     again = wb.read_clip(clip.write(tmp_path / "both.npz"), figure)
     assert again.q == pytest.approx(clip.q)
     with pytest.raises(InputError, match=r"holds one figure.*clip\.part\('anna'\)"):
-        clip.write(tmp_path / "both.csv")
+        clip.write(tmp_path / "both.txt")
     with pytest.raises(InputError, match=r"clip\.part\('anna'\)"):
         wb.motion.torques(clip)
     assert wb.read_clip(part.write(tmp_path / "anna.csv"), part.figure).q == pytest.approx(part.q, abs=1e-8)
     assert wb.check(clip, pair).depth.max() <= 0.0
 
 
-@pytest.mark.parametrize("overlap", ["qp"])
-def test_a_tracked_person_is_stopped_by_another(overlap: str, anna: wb.Figure, ben: wb.Figure) -> None:
+@pytest.mark.parametrize("ending", [".csv", ".bvh", ".glb"])
+def test_a_file_holds_several_figures(tmp_path: Path, ending: str, pair: wb.Scene) -> None:
+    pair.add_figure(wb.load("hand"), name="hand", at=(0.3, 2.0, 1.0, 0.0, 0.0, 0.6, 0.8), root="fixed")
+    figure = pair.figure
+    turned = pin.integrate(figure.model, figure.neutral, 0.2 * np.random.default_rng(3).normal(size=figure.model.nv))
+    ways = [pin.interpolate(figure.model, figure.neutral, figure.clamp(turned), share) for share in (0.0, 0.4, 1.0)]
+    clip = wb.Clip(figure, np.array(ways), 0.1)
+    again = wb.read_clip(clip.write(tmp_path / f"all{ending}"), figure)
+    assert again.dt == pytest.approx(0.1)
+    for one, other in zip(again.q, clip.q, strict=True):  # a quaternion may have the other sign
+        assert np.abs(pin.difference(figure.model, one, other)).max() < 1e-6
+    one = clip.part("ben").write(tmp_path / f"one{ending}")
+    with pytest.raises((FileFormatError, UnknownNameError)):  # the file of one is none of all
+        wb.read_clip(one, figure)
+
+
+def test_a_foreign_reader_sees_every_figure_where_it_stands(tmp_path: Path, pair: wb.Scene) -> None:
+    trimesh = pytest.importorskip("trimesh")
+    figure = pair.figure
+    path = wb.Clip(figure, np.array([figure.neutral] * 2), 0.1).write(tmp_path / "both.glb")
+    read = trimesh.load(path)
+    for joint in ("anna/left_wrist_flexion", "ben/left_wrist_flexion"):
+        x, y, z = figure.placement(figure.neutral, joint).translation
+        assert read.graph.get(f"joint {joint}")[0][:3, 3] == pytest.approx((y, z, x), abs=1e-6)  # y up, z forward
+    assert {"body anna", "body ben"} <= set(read.graph.nodes)
+
+
+def test_a_tracked_person_is_stopped_by_another(anna: wb.Figure, ben: wb.Figure) -> None:
     scene = wb.Scene({"anna": anna, "ben": (ben, (1.0, 0.05, 0.0, 0.0, 0.0, 1.0, 0.0))})
     figure = scene.figure
     place = figure.model.joints[figure.joint_id("ben/root")].idx_q
     frames = np.tile(figure.neutral, (20, 1))
     frames[:, place] -= np.linspace(0.0, 0.85, len(frames))  # until he is inside of her
-    recording = follow(scene, wb.Clip(figure, frames, 1 / 30), overlap=overlap)
+    recording = follow(scene, wb.Clip(figure, frames, 1 / 30))
     judged = judge(scene, recording)
     assert judged.tracked_depth.max() > 0.05
     assert judged.depth.max() < 1e-3

@@ -116,6 +116,24 @@ def test_a_study_file_says_of_a_person_what_a_task_file_can_say(folder: Path) ->
     assert {"sex": "female", "percentile": 5.0, "age": 60.0, "proportions": {"span": 1.6}} in people.values()
 
 
+def test_a_person_takes_the_place_of_one_of_several_figures(folder: Path) -> None:
+    figures = (
+        '[[figure]]\nname = "human"\ncalled = "anna"\n[[figure]]\nname = "human"\ncalled = "ben"\nat = [0, 3, 0]\n'
+    )
+    held = "".join(hold(f"{name}/pelvis") for name in ("anna", "ben"))
+    (folder / "task.toml").write_text(figures + held + point("anna/right_index_tip", [3.0, -0.2, 1.2]))
+    people = [{"called": "anna", "stature": 1.6}, {"called": "anna", "stature": 1.9}, {"called": "ben", "stature": 1.9}]
+    low, high, other = wb.study(folder / "task.toml", people=people)
+    assert other.goal_error == pytest.approx(wb.study(folder / "task.toml", targets=[(3.0, -0.2, 1.2)])[0].goal_error)
+    assert high.goal_error < other.goal_error < low.goal_error  # the taller reaches farther
+    with pytest.raises(wb.InputError, match=r"several figures; say whose place.*'called': 'anna'"):
+        wb.study(folder / "task.toml", people=["F5"])
+    with pytest.raises(wb.UnknownNameError, match="no figure is called 'carl'; known: anna, ben"):
+        wb.study(folder / "task.toml", people=[{"called": "carl"}])
+    with pytest.raises(wb.InputError, match="the function knows them"):
+        wb.study(reach, people=[{"called": "anna"}])
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [

@@ -9,6 +9,7 @@ import pytest
 
 from tests.task_text import box, figure, hold, point, table
 from wholebody.base.errors import FileFormatError, WholebodyError
+from wholebody.figures import load
 from wholebody.taskfile import read_task
 
 GOOD = (
@@ -192,3 +193,28 @@ def test_a_fault_of_one_of_several_figures_is_told_there(tmp_path: Path, second:
     with pytest.raises(WholebodyError) as caught:
         read_task(tmp_path / "two.toml")
     assert str(caught.value).startswith(f"two.toml:4, {sentence}")
+
+
+HAND = '[[figure]]\nname = "hand"\nside = "right"\nat = [0.0, 0.0, 0.1]\non = '
+
+
+def test_a_figure_is_mounted_on_another_one(write: Callable[[str], Path]) -> None:
+    anna, ben = (
+        '[[figure]]\nname = "human"\n' + called for called in ('called = "anna"\n', 'called = "ben"\nat = [2, 0, 0]\n')
+    )
+    alone = read_task(write('[[figure]]\nname = "human"\n' + HAND + '"right_palm"\n')).problem.scene.figure
+    base = load("human")
+    made = base.mounted(load("hand", side="right"), on="right_palm", at=(0.0, 0.0, 0.1))
+    assert alone.joints == made.joints
+    tip = "right_hand/right_index_tip"
+    assert alone.placement(alone.neutral, tip).isApprox(made.placement(made.neutral, tip))
+    both = read_task(write(anna + ben + HAND + '"ben/right_palm"\ncalled = "tool"\n')).problem.scene.figure
+    assert both.members.keys() == {"anna", "ben"}
+    assert "ben/tool/right_index_tip" in both.frames
+    for text, said in (
+        (anna + HAND + '"anna/right_pal"', "figure 2.*right_palm"),
+        (anna + HAND + '"right_palm"', "figure 2, key on: no figure is called 'right_palm'; known: anna"),
+        (HAND + '"right_palm"', "figure 1, key on: no figure has the frame"),
+    ):
+        with pytest.raises(WholebodyError, match=said):
+            read_task(write(text))

@@ -12,10 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull, Delaunay
 
+import wholebody as wb
 from wholebody import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import Balance
-from wholebody.tasks.balance import DOWN, convex_polygon, polygon, shrunk
+from wholebody.tasks.balance import DOWN, convex_polygon, polygon, shrunk, standing_points
 from wholebody.tasks.surfaces import outermost
 
 
@@ -54,6 +55,16 @@ def test_the_margin_is_metres_from_the_edge(humanoid: Any) -> None:
     moved = q.copy()
     moved[0] += front - state.center_of_mass()[0] - 0.03
     np.testing.assert_allclose(balance.value(state.update(moved)).min(), 0.03, atol=2e-6)
+
+
+def test_nobody_stands_on_a_half_space_that_a_foot_carries() -> None:
+    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+    feet, q = ("left_foot", "right_foot"), scene.figure.neutral
+    alone = standing_points(scene, q, feet)
+    scene.attach(wb.HalfSpace(), to="left_foot", name="slope", at=(0.0, 0.0, -0.5))
+    np.testing.assert_array_equal(standing_points(scene, q, feet), alone)
+    scene.attach(wb.Box((0.3, 0.3, 0.1)), to="left_foot", name="clog", at=(0.0, 0.0, -0.3))
+    assert standing_points(scene, q, feet)[:, 2].min() < alone[:, 2].min() - 0.1
 
 
 def test_one_foot_is_a_smaller_polygon(humanoid: Any) -> None:

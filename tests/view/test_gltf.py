@@ -57,7 +57,7 @@ def bent(figure: wb.Figure, q: np.ndarray) -> np.ndarray:
     assert surface is not None
     pin.framesForwardKinematics(figure.model, data, q)
     placed = []
-    for bone, (joint, offset) in zip(surface.bones, surface.attached(figure), strict=True):
+    for bone, (joint, offset) in zip(surface.bones, surface.attached(figure, np.eye(4)), strict=True):
         placed.append(data.oMi[figure.model.getJointId(joint)].homogeneous @ offset)
         if bone.parent is not None:
             first = placed[[other.segment for other in surface.bones].index(bone.parent)]

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wholebody as wb
@@ -50,6 +51,11 @@ def test_the_lines_are_those_of_the_motions(page: str) -> None:
     feet = lines(page, "foot")
     assert max(feet["feet", "recording"]) == 0.0  # its feet stand
     assert max(value for value in feet["feet", "retargeted"] if value is not None) < 5.0
+    loads = [lines(page, title) for title in ("torque", "force", "zero moment point")]
+    assert [{of for _, of in each} for each in loads] == [{"retargeted", "freed"}] * 3
+    weight = 9.81 * pin.computeTotalMass(wb.load("human").model)
+    borne = sum(np.array(values) for (_, of), values in loads[1].items() if of == "retargeted")
+    assert np.median(borne) == pytest.approx(weight, rel=0.1)  # it stands, and lifts its arms slowly
     assert "http://" not in re.sub(r"http://www\.w3\.org/\S*", "", page.split("srcdoc=")[0])
 
 
@@ -57,7 +63,7 @@ def test_a_click_brings_the_film_there(browser: Any, page: str, tmp_path: Path) 
     file = tmp_path / "page.html"
     file.write_text(page, encoding="utf-8")
     browser.open(file.as_uri())
-    assert browser.evaluate("document.querySelectorAll('canvas').length") == 4
+    assert browser.evaluate("document.querySelectorAll('canvas').length") == 7
     browser.evaluate(
         "(() => { const chart = document.querySelector('canvas'), box = chart.getBoundingClientRect();"
         "chart.setPointerCapture = () => {};"

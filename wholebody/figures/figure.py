@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copyreg
 from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
@@ -16,7 +17,8 @@ from wholebody.base.pool import Pool
 from wholebody.figures.body_spec import geometry_of
 from wholebody.figures.description import Description, Place, followers_of, is_root, limits_of
 from wholebody.figures.joining import mounted_parts, posture_of_all
-from wholebody.figures.model_check import LARGEST, Turning, check_model
+from wholebody.figures.model_archive import reduced
+from wholebody.figures.model_check import LARGEST, Turning, check_model, with_joint_frames
 from wholebody.figures.postures import grounded
 from wholebody.figures.reduction import reduced_parts
 from wholebody.figures.state import Posed, free_roots, root_freedoms
@@ -29,11 +31,7 @@ def _joints_of(names: Sequence[str], prefix: str) -> range:
     return range(found[0], found[-1] + 1) if found else range(0)
 
 
-def _with_limits(made_from: tuple[Any, ...], limits: Mapping[str, Array]) -> Figure:
-    """A figure that was pickled."""
-    for name, values in limits.items():
-        setattr(made_from[1], name, values)
-    return Figure(*made_from)
+copyreg.pickle(pin.Model, reduced)
 
 
 class Figure(checks.FixedAttributes):
@@ -96,6 +94,7 @@ class Figure(checks.FixedAttributes):
             InputError: a mass, a position or a limit of the model is not finite or is impossible.
         """
         check_model(model, name)
+        model = with_joint_frames(model)
         self.name, self.model, self.geometry, self.detail = name, model, geometry, detail
         self.visual = geometry if visual is None else visual
         self.groups = MappingProxyType(dict(description.groups))
@@ -145,15 +144,8 @@ class Figure(checks.FixedAttributes):
             name: dict(part) if isinstance(part, Mapping) else part for name, part in parts.items()
         }
         visual = None if self.visual is self.geometry else self.visual
-        made_from = (self.name, pin.Model(self.model), self.geometry, self.detail, Description(**known), visual)
-        # Of a model: infinite values, which Pinocchio's archives write and cannot read, are pickled beside it.
-        limits = {
-            name: np.array(getattr(self.model, name))
-            for name in ("lowerPositionLimit", "upperPositionLimit", "velocityLimit", "effortLimit")
-        }
-        for name, values in limits.items():
-            setattr(made_from[1], name, np.nan_to_num(values))
-        return _with_limits, (made_from, limits), {"loaded_as": self.loaded_as}
+        made_from = (self.name, self.model, self.geometry, self.detail, Description(**known), visual)
+        return Figure, made_from, {"loaded_as": self.loaded_as}
 
     @property
     def outer(self) -> tuple[pin.GeometryObject, ...]:
@@ -387,7 +379,7 @@ class Figure(checks.FixedAttributes):
         checks.instance(other, Figure, "mounted: other", "load one with wb.load('hand')")
         frame, prefix = self.frame_id(on), checks.text(other.name if name is None else name, "mounted: name")
         if "/" in prefix or prefix in {*self.groups, *self.joints}:
-            raise InputError(f"mounted: {self.name} has a part {prefix!r}, or it has a slash; give name=")
+            raise InputError(f"mounted: {self.name} has a part {prefix!r}, or it has a slash; give it another name")
         parts = mounted_parts(self, other, frame, f"{prefix}/", placement(at, "mounted: at"))
         return Figure(f"{self.name} with {prefix}", *parts[:2], "own", *parts[2:])
 

@@ -40,6 +40,17 @@ def check_model(model: pin.Model, name: str) -> None:
         raise InputError(f"{name}, joint {model.names[joint.id]!r}: its velocity limit is {speed:g}; give 0 or more")
 
 
+def with_joint_frames(model: pin.Model) -> pin.Model:
+    """The model, or a copy with a frame for each joint that lacks one: joints have names that goals place."""
+    lacking = [k for k in range(1, model.njoints) if not model.existFrame(model.names[k], pin.FrameType.JOINT)]
+    if not lacking:
+        return model
+    model = pin.Model(model)
+    for joint in lacking:
+        model.addJointFrame(joint)
+    return model
+
+
 FAR_OUT = 1.0
 """Radians beyond a limit from which a value was probably meant in degrees."""
 

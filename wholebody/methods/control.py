@@ -35,6 +35,11 @@ class _Budget(threading.local):
             return 0.0
         return 1.0 - (self.until - _now("thread_time")) / self.seconds
 
+    @property
+    def over(self) -> bool:
+        """Whether all of it has passed."""
+        return self.spent > 1.0
+
 
 BUDGET = _Budget()
 
@@ -104,7 +109,7 @@ class Control:
         if not self.reason and may_be and self._passed > 1.0:
             limit, kind = (self._longest, " of processor time") if self._time_limit is None else (self._time_limit, "")
             self.reason = f"the time limit of {limit:g} s{kind} ended it"
-        return bool(self.reason) or BUDGET.spent > 1.0
+        return bool(self.reason) or BUDGET.over
 
     @property
     def seconds(self) -> float:

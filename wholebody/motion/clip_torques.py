@@ -1,8 +1,8 @@
-"""Torques of a clip: inverse dynamics, forces of the ground on feet that stand, centre of pressure, strength."""
+"""Torques of a clip: inverse dynamics, forces on feet that stand and on what touches things, strength."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,11 +13,13 @@ from wholebody.base.arrays import Array, Mask, cross
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
-from wholebody.motion.clip import Clip
-from wholebody.motion.inverse_dynamics import ROOT, InverseDynamics, foot_wrenches
-from wholebody.motion.stance import FEET, standing_feet
+from wholebody.motion.clip import Clip, same_joints
+from wholebody.motion.inverse_dynamics import ROOT, InverseDynamics, Touches, foot_wrenches
+from wholebody.motion.load_contacts import touching_parts
+from wholebody.motion.stance import FEET, own_feet, standing_feet
 from wholebody.motion.strength import Strength, torque_limits
 from wholebody.motion.thing_tracks import steady
+from wholebody.scene.scene import Scene
 
 CUTOFF = 6.0
 """Hz: noise of recordings lies above, most of walking below (D. A. Winter, "Biomechanics and motor control of human
@@ -33,17 +35,17 @@ class Torques:
         dt: seconds from frame to frame.
         torque: (n, nv) torque of each joint, N m (force of sliding joints, N), after the ground's forces; positive
             towards positive angles. The six columns of a free root hold what is missing (see there).
-        feet: names of the feet.
-        force: (n, feet, 3) force of the ground on each foot, N, in the world. It acts on the foot's segment; the
-            joint of the toes bears nothing.
-        moment: (n, feet, 3) moment of the ground on each foot about its centre of pressure, N m, in the world.
-        pressure: (n, feet, 3) centre of pressure of each foot, metres; zero where the foot bears nothing.
-        center_of_pressure: (n, 3) of both feet together, metres; zero where nothing bears.
-        stands: (n, feet) whether each foot stands in the frame.
+        feet: names of the feet, and after them of other segments that touch things.
+        force: (n, feet, 3) force of the ground or of things on each of these, N, in the world. It acts on the segment;
+            the joint of the toes bears nothing.
+        moment: (n, feet, 3) moment on each about its centre of pressure, N m, in the world.
+        pressure: (n, feet, 3) centre of pressure of each, metres; zero where it bears nothing.
+        center_of_pressure: (n, 3) of the feet together, metres; zero where none bears.
+        stands: (n, feet) whether each stands, or touches, in the frame.
         missing: (n, 6) what the ground cannot give of the wrench that the motion needs: force, N, and moment about the
             centre of mass, N m, in the world. Zero for a motion that is possible on these feet.
-        outside: (n,) by how far the zero moment point of the motion is outside of the support polygon, metres; 0
-            inside, where no foot stands, and in frames that press with less than a fifth of the weight.
+        outside: (n,) by how far the zero moment point of what the feet bear is outside of their support polygon,
+            metres; 0 inside, where no foot stands, and in frames that press with less than a fifth of the weight.
         lower: (nv,) least torque of each joint, N m: published strength of a person, effort limits of a robot; -inf
             where none is known.
         upper: (nv,) largest torque of each joint, N m; inf where none is known.
@@ -70,7 +72,7 @@ class Torques:
 
     @property
     def supported(self) -> Mask:
-        """(n,) whether a foot stands in the frame."""
+        """(n,) whether a foot stands, or something touches, in the frame."""
         return np.asarray(self.stands.any(axis=1))
 
     @property
@@ -131,6 +133,7 @@ class Torques:
 
 def torques(
     clip: Clip,
+    scene: Scene | None = None,
     *,
     feet: Sequence[str] = FEET,
     strength: Strength | None = None,
@@ -141,12 +144,16 @@ def torques(
 
     A figure with a free root stands on feet: the wrench that its motion needs at the root is split over the corners
     of the soles of the feet that stand, on level ground and with friction, and acts on the joints from there. In flight
-    the ground gives nothing.
+    the ground gives nothing. With a scene, other segments bear on the things that they touch, along the normals there
+    and within friction, at the nearest point of each piece. Where several splits give the wrench, the one with the
+    least sum of squares is taken.
 
     Args:
         clip: the motion.
-        feet: segments that may stand; the figure's own of these. A foot stands while its heel, ball or tip of the toes
-            is low and slow; without frames of such names, while its own frame is.
+        scene: things that hands and other parts may touch; they bear while they are within 5 mm of a thing that stands,
+            and slower there than 0.15 m/s.
+        feet: segments that may stand; left and right foot, or the ankles of a robot. A foot stands while its heel,
+            ball or tip of the toes is low and slow; without frames of such names, while its own frame is.
         strength: of the person, for `lower`, `upper` and `share`; a man of median strength if left out. For figures
             whose joints have no published strength, such as robots, the effort limits of their descriptions count.
         friction: coefficient of friction of the ground.
@@ -155,7 +162,8 @@ def torques(
 
     Raises:
         UnknownNameError: the figure has no such foot.
-        InputError: something else than a clip, a value out of range, or a figure without mass or feet.
+        InputError: something else than a clip or a scene, a scene of a figure with other joints, a value out of range,
+            or a figure without mass or feet.
 
     Examples:
         >>> needed = wb.motion.torques(clip, strength=wb.motion.Strength(50, "female"))
@@ -168,46 +176,49 @@ def torques(
     checks.instance(strength, Strength, "torques: strength", "give wb.motion.Strength(percentile=50, sex='female')")
     figure = one_figure(clip.figure, "torques: the clip's figure")
     if feet is FEET:
-        feet = [name for name in FEET if name in figure.segments]
+        feet = own_feet(figure)
     feet = checks.listed(feet, "torques: feet", "['left_foot', 'right_foot']")
     for name in feet:
         figure.frame_id(name)
     if not sum(inertia.mass for inertia in figure.model.inertias[1:]) > 0.0:
         raise InputError(f"torques: {figure.name} has no mass; give its segments masses")
-    return clip_torques(clip, standing_feet(clip, feet), strength, friction, cutoff)
-
-
-def clip_torques(
-    clip: Clip, stands: Mapping[str, Mask], strength: Strength, friction: float, cutoff: float | None
-) -> Torques:
-    """Torques of a clip that stands on given feet in given frames (foot -> (n,)); see `torques`."""
-    figure, calm = clip.figure, smoothed(clip, cutoff)
+    stands = standing_feet(clip, feet)
+    names, touches = tuple(stands), list[Touches]()
+    if scene is not None:
+        checks.instance(scene, Scene, "torques: scene", "make one with wb.Scene(clip.figure)")
+        same_joints(clip, scene.figure, "torques")
+        more, touches = touching_parts(clip, scene, names) if figure.root == "free" else ((), touches)
+        names += more
+    calm = smoothed(clip, cutoff)
     v, a = calm.velocities(), calm.accelerations()
-    dynamics = InverseDynamics(figure, tuple(stands), friction)
+    joints = [figure.model.frames[figure.frame_id(name)].parentJoint for name in names[len(stands) :]]
+    dynamics = InverseDynamics(figure, tuple(stands), friction, joints)
     count, nv = len(clip), figure.model.nv
     torque, missing = np.zeros((count, nv)), np.zeros((count, ROOT))
-    force, moment, pressure = (np.zeros((count, len(stands), 3)) for _ in range(3))
+    force, moment, pressure = (np.zeros((count, len(names), 3)) for _ in range(3))
     both, outside = np.zeros((count, 3)), np.zeros(count)
-    marks: Mask = np.array(list(stands.values()), dtype=bool).reshape(len(stands), count).T
+    marks: Mask = np.zeros((count, len(names)), dtype=bool)
+    marks[:, : len(stands)] = np.array(list(stands.values()), dtype=bool).reshape(len(stands), count).T
     for k in range(count):
-        stand = dynamics.stand(calm.q[k], marks[k].tolist())
+        stand = dynamics.stand(calm.q[k], marks[k, : len(stands)].tolist(), touches[k] if touches else None)
+        marks[k, stand.owner] = True
         loads = dynamics.loads(calm.q[k], v[k], a[k], stand)
         torque[k] = loads.torque
         if not dynamics.free:
             continue
         forces = loads.ground.forces
         missing[k] = loads.ground.missing
-        for foot, total in enumerate(foot_wrenches(forces, stand, dynamics.soles)):
+        pressed = np.einsum("ij,ij->i", forces, stand.ways)
+        for foot, total in enumerate(foot_wrenches(forces, stand, len(names))):
             mine = stand.owner == foot
             force[k, foot] = total[:3]
-            pressure[k, foot] = _pressure(forces[mine], stand.points[mine])
+            pressure[k, foot] = _pressure(pressed[mine], stand.points[mine])
             moment[k, foot] = total[3:] - cross(pressure[k, foot], total[:3])
-        both[k] = _pressure(forces, stand.points)
+        standing = stand.owner < len(stands)
+        both[k] = _pressure(pressed[standing], stand.points[standing])
         outside[k] = dynamics.outside(loads, stand)
     lower, upper = torque_limits(figure, strength)
-    return Torques(
-        figure, clip.dt, torque, tuple(stands), force, moment, pressure, both, marks, missing, outside, lower, upper
-    )
+    return Torques(figure, clip.dt, torque, names, force, moment, pressure, both, marks, missing, outside, lower, upper)
 
 
 def smoothed(clip: Clip, cutoff: float | None = CUTOFF) -> Clip:
@@ -231,10 +242,10 @@ def smoothed(clip: Clip, cutoff: float | None = CUTOFF) -> Clip:
     return clip.with_q(np.array([pin.normalize(clip.figure.model, posture) for posture in filtered]))
 
 
-def _pressure(forces: Array, points: Array) -> Array:
-    """Centre of pressure (3,) of forces on points: weighted by their vertical components; zero without load."""
-    load = float(forces[:, 2].sum())
+def _pressure(pressed: Array, points: Array) -> Array:
+    """Centre of pressure (3,) of normal forces (p,) on points; zero without load."""
+    load = float(pressed.sum())
     if load <= 0.0:
         return np.zeros(3)
-    found: Array = forces[:, 2] @ points / load
+    found: Array = pressed @ points / load
     return found

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices, cross
+from wholebody.base.arrays import Array, Indices, cross, with_values
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
@@ -76,8 +76,13 @@ class GroundForces(NamedTuple):
     split: Array  # (3 points, 6) derivative of the forces with respect to the wrench, while the same edges bear
 
 
-def ground_forces(wrench: Array, about: Array, points: Array, friction: float) -> GroundForces:
-    """Forces at points (p, 3) of soles, within cones of friction, that give a wrench (6,) about a point as nearly."""
+def ground_forces(
+    wrench: Array, about: Array, points: Array, friction: float, ways: Array | None = None
+) -> GroundForces:
+    """Forces at points (p, 3), within cones of friction about ways (p, 3), that give a wrench (6,) as nearly.
+
+    The wrench is about a point (3,); without ways the cones point up.
+    """
     # Least |wrench's error|^2 + (e |forces|)^2 over edges of pyramids (Lawson and Hanson 1974, chapter 23).
     if len(points) == 0:
         return GroundForces(np.zeros((0, 3)), wrench.copy(), np.zeros((0, 6)))
@@ -88,6 +93,9 @@ def ground_forces(wrench: Array, about: Array, points: Array, friction: float) -
     around = 2.0 * np.pi * np.arange(count) / count
     rims = np.column_stack([friction * np.cos(around), friction * np.sin(around), np.ones(count)])
     directions = np.tile(rims, (len(points), 1))
+    for number, way in enumerate(() if ways is None else ways):
+        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), way).toRotationMatrix()
+        directions[number * count : (number + 1) * count] = rims @ turn.T
     arms = np.repeat(points - about, count, axis=0)
     columns = np.hstack([directions, cross(arms, directions)]).T
     # scaled to the wrench, so that e means the same for a mouse and an elephant
@@ -104,16 +112,25 @@ def ground_forces(wrench: Array, about: Array, points: Array, friction: float) -
     return GroundForces(forces, wrench - columns @ (found * scale), split.reshape(-1, 6))
 
 
+class Touches(NamedTuple):
+    """Where a frame touches things with other parts than its feet."""
+
+    points: Array  # (t, 3) points, metres
+    owner: Indices  # (t,) number of the part of each, after the feet
+    ways: Array  # (t, 3) normals of unit length, out of the things
+
+
 class Stand(NamedTuple):
     """Where a frame stands."""
 
-    points: Array  # (p, 3) points of the soles that bear force, metres
-    owner: Indices  # (p,) number of the foot of each
+    points: Array  # (p, 3) points that bear force, metres: of the soles first, then those that touch things
+    owner: Indices  # (p,) number of the foot of each, or of the part that touches
     # (c, 2) of the support polygon, anticlockwise; both ends where the points lie on a line; none in flight
     corners: Array
     normals: Array  # (e, 2) inward normals of its edges; of a line of both sides and both ends
     offsets: Array  # (e,) inside, ``normals @ place >= offsets``, metres
     height: float  # of the ground, metres
+    ways: Array  # (p, 3) normals of unit length at the points, out of what bears
 
     def shifted(self, shifts: Sequence[Array]) -> Stand:
         """The same with each foot (3,) farther, metres."""
@@ -131,7 +148,7 @@ class Loads(NamedTuple):
     """Loads of one frame."""
 
     torque: Array  # (nv,) of the joints, N m, after the ground's forces; the root's part is what is missing
-    wrench: Array  # (6,) that the ground has to give: force N, and moment about the world's origin N m
+    wrench: Array  # (6,) that the feet's ground has to give: force N, and moment about the world's origin N m
     ground: GroundForces  # what it gives; about the centre of mass
     center: Array  # (3,) centre of mass, metres
 
@@ -144,27 +161,33 @@ class Derivatives(NamedTuple):
 
 
 class InverseDynamics:
-    """Loads of frames of one figure, with mass, on feet that may stand.
+    """Loads of frames of one figure, with mass, on feet that may stand, and on other joints that may touch things.
 
     Attributes:
         feet: names of the segments or frames that may stand; none for a root that is fixed.
         soles: of its feet.
+        joints: of the feet, and those that touch.
         weight: N.
     """
 
-    def __init__(self, figure: Figure, feet: Sequence[str], friction: float) -> None:
+    def __init__(self, figure: Figure, feet: Sequence[str], friction: float, touching: Sequence[int] = ()) -> None:
         one_figure(figure, "dynamics: the figure")
         self._model, self._data, self._friction = figure.model, figure.model.createData(), friction
         self.feet = tuple(feet)
         self.soles = Soles(figure, self.feet)
+        self.joints = [*self.soles.joints, *touching]
         self.weight = float(pin.computeTotalMass(self._model) * np.linalg.norm(self._model.gravity.linear))
         self.free = figure.root == "free"
 
-    def stand(self, q: Array, feet: Sequence[bool]) -> Stand:
-        """Where a posture (nq,) stands, on some of the feet."""
+    def stand(self, q: Array, feet: Sequence[bool], touches: Touches | None = None) -> Stand:
+        """Where a posture (nq,) stands, on some of the feet, and touches things."""
         pin.forwardKinematics(self._model, self._data, q)
         points, owner = self.soles.points(self._data, list(feet))
-        return _standing(points, owner)
+        found = _standing(points, owner)
+        if touches is None:
+            return found
+        both = (np.concatenate(pair) for pair in zip((points, owner, found.ways), touches, strict=True))
+        return with_values(found, **dict(zip(("points", "owner", "ways"), both, strict=True)))
 
     def loads(self, q: Array, v: Array, a: Array, stand: Stand) -> Loads:
         """Loads of a posture (nq,) with its velocity and acceleration (nv,)."""
@@ -176,8 +199,9 @@ class InverseDynamics:
         pin.computeJointJacobians(model, data, q)
         wrench = np.array(data.oMi[1].act(pin.Force(torque[:ROOT])).vector)
         ground = self.split(wrench, center, stand)
-        for joint, total in zip(self.soles.joints, foot_wrenches(ground.forces, stand, self.soles), strict=True):
-            torque -= pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.WORLD).T @ total
+        for part, total in enumerate(foot_wrenches(ground.forces, stand, len(self.joints))):
+            torque -= pin.getJointJacobian(model, data, self.joints[part], pin.ReferenceFrame.WORLD).T @ total
+            wrench -= total if part >= len(self.feet) else 0.0  # what things give
         return Loads(torque, wrench, ground, center)
 
     def free_torque(self, q: Array, v: Array, a: Array) -> Array:
@@ -195,7 +219,7 @@ class InverseDynamics:
         wrenches = np.array([data.oMi[1].act(pin.Force(part[:ROOT])).vector for part in torques])
         split = self.split(shares @ wrenches, center, stand).split
         left = torques.copy()
-        for foot, joint in enumerate(self.soles.joints):
+        for foot, joint in enumerate(self.joints):
             mine = stand.owner == foot
             if mine.any():
                 jacobian = pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.WORLD)
@@ -205,7 +229,7 @@ class InverseDynamics:
 
     def split(self, wrench: Array, center: Array, stand: Stand) -> GroundForces:
         """The ground's forces for a wrench (6,) about the world's origin."""
-        return ground_forces(moved(wrench, center), center, stand.points, self._friction)
+        return ground_forces(moved(wrench, center), center, stand.points, self._friction, stand.ways)
 
     def outside(self, loads: Loads, stand: Stand) -> float:
         """By how far the zero moment point is outside of where a frame stands, metres; 0 where that says little."""
@@ -236,8 +260,8 @@ class InverseDynamics:
             twist = pin.Motion(J[:, column])
             wrenches[0][:, column] += twist.cross(pin.Force(here.wrench)).vector
         shift = moving(here.center)
-        bent = foot_wrenches(here.ground.forces, stand, self.soles)
-        for foot, joint in enumerate(self.soles.joints):
+        bent = foot_wrenches(here.ground.forces, stand, len(self.joints))
+        for foot, joint in enumerate(self.joints):
             mine = np.repeat(stand.owner == foot, 3)
             if not mine.any():
                 continue
@@ -265,9 +289,10 @@ class InverseDynamics:
 
 def _standing(points: Array, owner: Indices) -> Stand:
     """Where points (p, 3) of feet stand."""
+    ways = np.tile([0.0, 0.0, 1.0], (len(points), 1))
     if not len(points):
-        return Stand(points, owner, np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), 0.0)
-    return Stand(points, owner, *_support(points[:, :2]), float(points[:, 2].min()))
+        return Stand(points, owner, np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), 0.0, ways)
+    return Stand(points, owner, *_support(points[:, :2]), float(points[:, 2].min()), ways)
 
 
 def _support(points: Array) -> tuple[Array, Array, Array]:
@@ -284,10 +309,10 @@ def _support(points: Array) -> tuple[Array, Array, Array]:
         return corners, normals, (corners @ normals.T).min(axis=0)
 
 
-def foot_wrenches(forces: Array, stand: Stand, soles: Soles) -> list[Array]:
-    """(6,) force and moment about the world's origin of the ground on each foot."""
+def foot_wrenches(forces: Array, stand: Stand, count: int) -> list[Array]:
+    """(6,) force and moment about the world's origin on each of so many feet and parts that touch."""
     found = []
-    for foot in range(len(soles.joints)):
+    for foot in range(count):
         mine = stand.owner == foot
         turning = cross(stand.points[mine], forces[mine]).sum(axis=0)
         found.append(np.concatenate([forces[mine].sum(axis=0), turning]))

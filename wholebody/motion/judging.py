@@ -22,6 +22,7 @@ from wholebody.motion.faults import DEPTH
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.load_change import LoadChange
 from wholebody.motion.measures import MotionBounds, excess
+from wholebody.tasks import Hold
 from wholebody.tasks.base import filled
 
 COLLISION = 1e-4  # m: a frame, or the motion between two, that is deeper collides
@@ -224,29 +225,36 @@ SUDDEN = 4.0  # a jump is so many times as long as the steps before and after it
 
 
 def foreseen(terms: FrameTerms, was: ClipCheck, keep_ends: bool) -> str:
-    """Sentences, each with its mend: feet held inside things, jumps that collide, ends that cannot be kept; or ""."""
-    return "; ".join(said for said in (_feet(terms, was), _jumps(was), _ends(was) if keep_ends else "") if said)
+    """Sentences with their mends: what is held inside things, jumps that collide, ends that cannot be kept; or ""."""
+    return "; ".join(said for said in (_held(terms, was), _jumps(was), _ends(was) if keep_ends else "") if said)
 
 
-def _feet(terms: FrameTerms, was: ClipCheck) -> str:
-    """Which feet are held where they are inside of a thing, so that no method can free them."""
-    figure, told = terms.scene.figure, list[str]()
-    joints = [{figure.model.frames[figure.frame_id(name)].parentJoint for name in names} for names in terms.stands]
+def _held(terms: FrameTerms, was: ClipCheck) -> str:
+    """What is held, with what it carries, where it is inside of a thing, so that no method can free it."""
+    figure, model, told, feet = terms.scene.figure, terms.scene.model, list[str](), False
+    carrier = {name: each.segment for name, each in terms.scene.objects.items() if each.segment is not None}
+    carrier |= {name: name for name in figure.segments}
+    stands = [{model.frames[figure.frame_id(name)].parentJoint for name in names} for names in terms.stands]
+    still = [term for term in terms.given if isinstance(term, Hold) and term.relative_to is None]
+    held = {model.frames[figure.frame_id(term.frame)].parentJoint for term in still}
     for contact in was.contacts:
-        segment, thing = contact.first, contact.second
-        segment, thing = (segment, thing) if segment in figure.segments else (thing, segment)
-        if contact.kind != "thing" or segment not in figure.segments:
+        part, thing = contact.first, contact.second
+        part, thing = (part, thing) if part in carrier else (thing, part)
+        if contact.kind != "thing" or part not in carrier:
             continue
-        joint = figure.model.frames[figure.frame_id(segment)].parentJoint
-        held = np.array([joint in here for here in joints]) & (contact.depth > HELD)
-        if held.any():
-            told.append(f"{segment} stands up to {1e3 * contact.depth[held].max():.0f} mm inside {thing}")
+        joint = model.frames[figure.frame_id(str(carrier[part]))].parentJoint
+        standing = np.array([joint in here for here in stands])
+        inside = (standing | (joint in held)) & (contact.depth > HELD)
+        if inside.any():
+            feet = feet or bool((standing & inside).any())
+            word = "stands" if standing.any() else "is held"
+            told.append(f"{part} {word} up to {1e3 * contact.depth[inside].max():.0f} mm inside {thing}")
     if not told:
         return ""
-    return (
-        f"{', '.join(told)}, and is held there; let feet slide by hold_feet=False, or retarget "
-        "the recording with this scene, which puts feet on what is below them"
+    mend = (
+        "let feet slide by hold_feet=False, or retarget the recording with this scene, which puts feet on what is below"
     )
+    return f"{', '.join(told)}, and is held there; {mend} them" if feet else f"{', '.join(told)}; leave that Hold out"
 
 
 def _jumps(was: ClipCheck) -> str:

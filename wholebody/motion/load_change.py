@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -102,35 +102,27 @@ class LoadChange:
         return said
 
     def plot(self) -> Any:
-        """Draw torques, forces of the ground and the zero moment point over time, a matplotlib figure.
+        """Draw the curves of `load_curves` over time, a matplotlib figure.
 
-        The torques are those of the four joints that come nearest to their strength, in parts of it. What was before is
-        dashed, at the times of the answer's frames.
+        What was before is dashed, at the times of the answer's frames.
         """
         chart, (axes,) = new_chart(1, 3, (12.0, 2.8))
-        shares = np.maximum(self.after.share.max(axis=0), self.before.share.max(axis=0))
-        joints = [k for k in np.argsort(-shares)[:4].tolist() if shares[k] > 0.0]
+        columns = telling((self.before, self.after))
         for loads, style, times in (
             (self.before, "--", np.interp(np.arange(len(self.before.torque)), self.times, np.arange(len(self.times)))),
             (self.after, "-", np.arange(len(self.times))),
         ):
-            t = times * self.after.dt
-            curves = [
-                [(loads.joint_of(k), loads.share[:, k]) for k in joints],
-                [(name, loads.force[:, k, 2]) for k, name in enumerate(loads.feet)],
-                [("", 1e3 * loads.outside)],
-            ]
-            for axis, each in zip(axes, curves, strict=True):
-                for number, (name, values) in enumerate(each):
-                    axis.plot(t, values, style, color=f"C{number}", label=plain(name) if style == "-" else None)
-        said = "torque / strength", "vertical force [N]", "outside of feet [mm]"
-        for axis, words in zip(axes, said, strict=True):
-            axis.set(xlabel="time [s]", ylabel=words)
+            for axis, drawn in zip(axes, load_curves(loads, columns), strict=True):
+                axis.set(xlabel="time [s]", ylabel=f"{drawn.title} [{drawn.unit}]")
+                for number, (name, values) in enumerate(drawn.lines):
+                    axis.plot(
+                        times * self.after.dt, values, style, color=f"C{number}",
+                        label=plain(name) if style == "-" else None,
+                    )  # fmt: skip
         for axis in axes[:2]:
             if axis.lines:
                 axis.legend(fontsize="x-small")
         axes[0].set_title("dashed: before", fontsize="small", loc="left")
-        axes[2].set_title("zero moment point", fontsize="small", loc="left")
         axes[2].set_ylim(0.0, max(1.0, 1.05 * axes[2].get_ylim()[1]))
         return chart
 
@@ -163,6 +155,35 @@ class LoadChange:
             f"most torque {was.largest_share:.0%} of a strength before, {now.largest_share:.0%} after; zero moment "
             f"point up to {1e3 * was.outside.max():.0f} mm outside before, {1e3 * now.outside.max():.0f} mm after"
         )
+
+
+class LoadCurves(NamedTuple):
+    """One chart: its title, the unit, and lines with a name and a value a frame (n,)."""
+
+    title: str
+    unit: str
+    lines: list[tuple[str, Array]]
+
+
+def telling(loads: Sequence[Torques]) -> list[int]:
+    """The columns of `torque` of four joints that come nearest to their strength, or else need the largest torques."""
+    most = np.max([each.share.max(axis=0) for each in loads], axis=0)
+    if not most.any():
+        most = np.max([np.abs(each.torque).max(axis=0) for each in loads], axis=0)
+        most[: 6 if loads[0].figure.root == "free" else 0] = 0.0  # what is missing
+    return [column for column in np.argsort(-most)[:4].tolist() if most[column] > 0.0]
+
+
+def load_curves(loads: Torques, columns: Sequence[int]) -> tuple[LoadCurves, LoadCurves, LoadCurves]:
+    """Torques of some columns, in parts of strength where one is known; forces on feet; the zero moment point."""
+    known = bool(columns) and bool(np.isfinite(loads.share[:, columns]).all() and loads.share[:, columns].any())
+    values, unit = (100.0 * loads.share, "% of strength") if known else (loads.torque, "N m")
+    forces = [(name, np.linalg.norm(loads.force[:, k], axis=1)) for k, name in enumerate(loads.feet)]
+    return (
+        LoadCurves("torque", unit, [(loads.joint_of(column), values[:, column]) for column in columns]),
+        LoadCurves("force", "N", forces),
+        LoadCurves("zero moment point outside of the feet", "mm", [("zero moment point", 1e3 * loads.outside)]),
+    )
 
 
 def load_change(

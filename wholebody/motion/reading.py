@@ -83,7 +83,7 @@ def read_clip(
     """
     path = checked_path(path, "path")
     check_figure(figure, "read_clip")
-    if path.suffix.lower() != ".npz":
+    if path.suffix.lower() == ".txt":
         one_figure(figure, f"read_clip: {path.name} holds one figure, and the figure")
     motion: SkeletonMotion | None = None
     degrees = flag(degrees, "read_clip: degrees")

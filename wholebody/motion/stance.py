@@ -24,6 +24,7 @@ from wholebody.figures.figure import Figure
 from wholebody.geometry.pieces import swept_points
 from wholebody.motion.clip import Clip
 from wholebody.motion.footholds import RestLimits, resting
+from wholebody.motion.roles import figure_roles
 from wholebody.motion.thing_contacts import least_distance
 from wholebody.motion.windows import Window, runs
 from wholebody.tasks import Hold
@@ -38,9 +39,18 @@ def foot_points(figure: Figure) -> tuple[str, ...]:
     return tuple(name for name in figure.frames if name.endswith(POINTS))
 
 
-def _usual(figure: Figure) -> tuple[str, ...]:
+def own_feet(figure: Figure) -> tuple[str, ...]:
+    """The feet of a figure by name, or the ankles of a robot by its structure; none where it has neither."""
     named = (f"{body}{foot}" for body in figure.bodies for foot in FEET)
-    return foot_points(figure) or tuple(name for name in named if name in (*figure.frames, *figure.segments))
+    found = tuple(name for name in named if name in (*figure.frames, *figure.segments))
+    if found or len(figure.bodies) > 1 or figure.root != "free":
+        return found
+    roles = figure_roles(figure)
+    return tuple(roles[role] for role in ("left_ankle", "right_ankle") if role in roles)
+
+
+def _usual(figure: Figure) -> tuple[str, ...]:
+    return foot_points(figure) or own_feet(figure)
 
 
 def has_feet(figure: Figure) -> bool:
@@ -112,9 +122,8 @@ def usual_feet(figure: Figure, constraints: Iterable[object]) -> tuple[str, ...]
     """The segments on which a figure with a free root stands, or else the frames that `StanceFeet` among terms name."""
     if figure.root != "free":
         return ()
-    found = tuple(name for name in FEET if name in figure.segments)
     given = [term for term in constraints if isinstance(term, StanceFeet) and term.feet is not None]
-    return found or tuple(name for term in given for name in term.names(figure))
+    return own_feet(figure) or tuple(name for term in given for name in term.names(figure))
 
 
 def standing_feet(clip: Clip, feet: Sequence[str]) -> dict[str, Mask]:

@@ -18,6 +18,7 @@ from wholebody.assessment.posture import largest_violation
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.errors import InputError
 from wholebody.geometry.continuous.motion_bounds import largest_approach
+from wholebody.methods.control import BUDGET
 from wholebody.methods.qp.method import QP
 from wholebody.planning.sampling import holds
 from wholebody.problem import Problem
@@ -228,7 +229,7 @@ class TrackedMotions:
         while left > REACHED:
             here, before, q = q, left, self._tracker.step(q).q
             left, gone = self._apart(q, target), gone + self._apart(here, q)
-            if left > max(before - GAIN, REACHED) or gone + left > most:
+            if left > max(before - GAIN, REACHED) or gone + left > most or BUDGET.over:
                 return way, False
             way.append(q)
         return way, True

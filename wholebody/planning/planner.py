@@ -5,7 +5,7 @@ ends -> straight motion, else steps along things, else two trees -> shortcuts ->
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -20,6 +20,7 @@ from wholebody.base.errors import InputError
 from wholebody.base.runner import processor_time
 from wholebody.geometry.continuous.sweep import Sweep
 from wholebody.methods.conclusion import meets
+from wholebody.methods.control import BUDGET, within_budget
 from wholebody.methods.qp.method import QP
 from wholebody.methods.simplification.reach import still_dofs
 from wholebody.motion.clip import Clip
@@ -38,6 +39,7 @@ OVER = 1.001  # of the limits of velocity and acceleration: the last slowing may
 ENDS = 8  # postures that meet goals; more = ends that are reached more easily, for a solve each
 ENOUGH = 600  # samples of trees that look for a shorter motion after the first; more = shorter motions, later
 NEARER = 0.95  # of the length of the best motion: what others are shorter than
+SEARCHED = 0.75  # of the time limit: for searches; the rest is for shortcuts, as long motions take longer to judge
 ROUNDS = 50  # of the trees, until they get another end
 
 
@@ -99,8 +101,9 @@ def plan(
         clearance: least distance of every pair, metres; pairs that are nearer at an end may be as near on the way.
         pace: limits of velocity and acceleration, and the time step; None for `wb.planning.Pace()`.
         seed: of the random postures.
-        time_limit: seconds of the processor after which the search ends. Free roots are looked for within a metre of
-            the way between the ends.
+        time_limit: seconds of the processor after which solves, searches, shortcuts and smoothing end; what was found
+            by then is judged, and straight motions are tried whatever it is. Free roots are looked for within a metre
+            of the way between the ends.
 
     Raises:
         InputError: the start or the goal overlaps something, or misses a limit or a constraint, or an argument is not
@@ -127,18 +130,14 @@ def plan(
         tracked = bool(problem.constraints or problem.bounds or scene.figure.followers)
         slides = TrackedMotions(problem, workspace)
         local: LocalPlanner = slides if tracked else slides.geodesics
-        ready = processor_time()  # what is compiled or built at the first plan is no part of the search
-
-        def ended() -> bool:
-            return processor_time() - ready > limit
-
-        search = _Search(problem, (local, slides), ends, (sampler, rng), ended)
-        path, message = search.shortest()
-        while path is not None:
-            found = _smoothed(problem, local, path, pace)
-            if found.solved or ended():
-                break
-            path, _ = search.shortest()
+        search = _Search(problem, (local, slides), ends, (sampler, rng))
+        with within_budget(max(limit, 1e-9)):  # what is compiled or built at the first plan is no part of it
+            path, message = search.shortest()
+            while path is not None:
+                found = _smoothed(problem, local, path, pace)
+                if found.solved or BUDGET.over:
+                    break
+                path, _ = search.shortest()
     if found is None:
         found = Plan(Clip(scene.figure, problem.start[None], pace.dt, "plan"), False, message)
     return replace(found, message=message if found.solved else found.message, seconds=processor_time() - began)
@@ -214,9 +213,8 @@ class _Search:
         planners: tuple[LocalPlanner, TrackedMotions],
         ends: Iterator[_End],
         random: tuple[Sampler, np.random.Generator],
-        ended: Callable[[], bool],
     ) -> None:
-        self._problem, self._ends, self._ended = problem, ends, ended
+        self._problem, self._ends, self._begun = problem, ends, False
         self._local, self._slides = planners
         self._sampler, self._rng = random
         self._reached: list[Array] = []
@@ -229,19 +227,19 @@ class _Search:
     def shortest(self) -> tuple[list[Array] | None, str]:
         """The shortest of some paths, with shortcuts, and how it was found; or None and why there is none."""
         model, best, most, samples, runs = self._problem.scene.model, None, np.inf, 0, 0
-        while not runs or (runs < self._local.searches and samples < ENOUGH and not self._ended()):
+        while not runs or (runs < self._local.searches and samples < ENOUGH and BUDGET.spent < SEARCHED):
             path, trees = self._path(NEARER * most, np.inf if not runs else ENOUGH - samples)
             runs, samples = runs + 1, samples + trees.samples * (runs > 0)
             if path is None:
                 break
             if self._straight:
                 return path, "the straight motion"
-            path = shortcut(model, path, self._local, self._rng, self._ended)
+            path = shortcut(model, path, self._local, self._rng)
             if (found := length(model, path)) < most:
                 best, most = path, found
         if best is not None:
             return best, f"the shortest of {runs} searches"
-        if not self._reached:
+        if not self._reached and BUDGET.spent < SEARCHED:
             return None, f"no posture meets the goals: {self._said}"
         return None, "no motion was found within the time limit"
 
@@ -257,7 +255,8 @@ class _Search:
         ends = [q for q in self._reached if self._apart(start, q) < most]
         for reached in ends:
             trees.add_end(reached)
-        while rounds == 0 or (rounds < samples and not self._ended()):
+        while rounds < samples and (BUDGET.spent < SEARCHED or not self._begun):
+            self._begun = True
             if rounds % ROUNDS == 0 or not ends:
                 end = next(self._ends, None)
                 if end is None and not ends:
@@ -306,8 +305,8 @@ def _smoothed(problem: Problem, local: LocalPlanner, path: list[Array], pace: Pa
     """The motion along a smooth path beside a free one; along the free one itself where that one fails."""
     figure = problem.scene.figure
     even = resampled(figure.model, path, int(np.clip(length(figure.model, path) / SPACING, 20, 1000)))
-    found = _judged(problem, smooth(figure.model, even, local), pace)
-    return found if found.solved else _judged(problem, local.settled(even)[0], pace)
+    found = None if BUDGET.over else _judged(problem, smooth(figure.model, even, local), pace)
+    return found if found is not None and found.solved else _judged(problem, local.settled(even)[0], pace)
 
 
 def _between(problem: Problem, end: Array) -> Problem:

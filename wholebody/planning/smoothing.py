@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -10,6 +10,7 @@ import pinocchio as pin
 from scipy.ndimage import gaussian_filter1d
 
 from wholebody.base.arrays import Array
+from wholebody.methods.control import BUDGET
 from wholebody.planning.local_planner import LocalPlanner
 
 WORTH = 0.98  # of the length of a part: a shortcut is at most as long
@@ -25,16 +26,14 @@ def length(model: pin.Model, path: Sequence[Array]) -> float:
     return float(sum(np.linalg.norm(pin.difference(model, *pair)) for pair in pairwise(path)))
 
 
-def shortcut(
-    model: pin.Model, path: list[Array], local: LocalPlanner, rng: np.random.Generator, ended: Callable[[], bool]
-) -> list[Array]:
+def shortcut(model: pin.Model, path: list[Array], local: LocalPlanner, rng: np.random.Generator) -> list[Array]:
     """A shorter path: until several tries in a row fail, parts of it are replaced by motions of the local planner.
 
     In every other try one degree of freedom moves evenly from one end of a part to the other, and the rest as before
     (partial shortcuts, Geraerts and Overmars 2007).
     """
     failed = 0
-    while failed < local.tries and len(path) > 2 and not ended():
+    while failed < local.tries and len(path) > 2 and not BUDGET.over:
         first, last = sorted(rng.choice(len(path), 2, replace=False).tolist())
         part = path[first : last + 1]
         most = WORTH * length(model, part)
@@ -85,7 +84,7 @@ def smooth(model: pin.Model, path: Array, local: LocalPlanner) -> Array:
     for _ in range(MIXTURES):
         share[[0, -1]] = 0.0
         found, blocked = local.settled(_postures(model, path, free + share[:, None] * (wide - free)))
-        if not blocked.any():
+        if not blocked.any() or BUDGET.over:
             break
         near = gaussian_filter1d(np.convolve(blocked, [1.0, 1.0]), 0.5 * SPREAD * len(path), mode="nearest")
         share *= 1.0 - 0.6 * near / near.max()

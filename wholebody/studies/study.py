@@ -52,8 +52,9 @@ def study(
     Args:
         task: a function of a figure, a target and a layout that returns a problem, or a task file. In a task file, a
             person replaces the figure's options by name, and sex, stature, mass, percentile, age and proportions all
-            together where it has one of them; a target (3,) replaces the place of the first goal of type point or
-            frame, and a layout the placements of things, by name.
+            together where it has one of them; of several figures they are of the one that its option `called` names. A
+            target (3,) replaces the place of the first goal of type point or frame, and a layout the placements of
+            things, by name.
         people: in a list, or by name in a mapping. A person is a design case of the anthropometric tables ("F5" to
             "M95", percentiles of women and men), a mapping of options of `wb.load("human")` such as `{"sex":
             "female", "stature": 1.6}`, or a figure (for functions).
@@ -114,6 +115,8 @@ def planned(
     if prod(len(values) or 1 for values in factors) > MOST_CASES:
         raise InputError(f"study: more than {MOST_CASES} cases; give fewer people, targets or layouts")
     factors[0] = {name: _person(person) for name, person in factors[0].items()}
+    if file is None and any(isinstance(person, Mapping) and "called" in person for person in factors[0].values()):
+        raise InputError("study: people have 'called', which names a figure of a task file; the function knows them")
     if file is not None:
         file.check(*(values.values() for values in factors))
     store = None if folder is None else KeptRecords(checks.path(folder, f"{what}: folder"))
@@ -190,7 +193,8 @@ def _person(given: Any) -> Any:
         return {"sex": body.sex, "stature": body.stature, "mass": body.mass}
     if isinstance(given, Mapping):
         # Wrong options are refused before anything is computed. A body takes a hundred times as long as who it is of.
-        size, rest = ({name: value for name, value in given.items() if (name in SIZE) is own} for own in (True, False))
+        named = {name: value for name, value in given.items() if name != "called"}
+        size, rest = ({name: value for name, value in named.items() if (name in SIZE) is own} for own in (True, False))
         try:
             loaded(_fixed(rest))
             make_person(**size)

@@ -37,7 +37,7 @@ class TaskFile:
     def check(self, people: Iterable[Mapping[str, Any]], targets: Iterable[Any], layouts: Iterable[Any]) -> None:
         """Check values of variants."""
         for person in people:
-            self._figure(person)
+            self._figures(person)
         for target in targets:
             self._goal()
             checks.numbers(target, (3,), "study: a target")
@@ -48,7 +48,7 @@ class TaskFile:
         """The problem of a variant."""
         tables = dict(self.contents.tables)
         if person is not None:
-            tables["figure"] = [self._figure(person)]
+            tables["figure"] = self._figures(person)
         if target is not None:
             tables["goal"] = list(tables["goal"])
             number = self._goal()
@@ -70,17 +70,25 @@ class TaskFile:
     def __reduce__(self) -> tuple[Any, ...]:
         return TaskFile, (self._place,)
 
-    def _figure(self, person: Mapping[str, Any]) -> Entry:
-        entry, *others = self.contents.tables["figure"]
-        if others:
-            raise InputError(f"study: {self.path.name} has several figures; people take the place of one: give one")
+    def _figures(self, person: Mapping[str, Any]) -> list[Entry]:
+        """The figures of the file, with a person in place of the only one, or of the one called so."""
+        entries = list(self.contents.tables["figure"])
+        known = {e.values.get("called", ""): place for place, e in enumerate(entries) if "on" not in e.values}
+        if len(known) > 1 and "called" not in person:
+            raise InputError(
+                f"study: {self.path.name} has several figures; say whose place a person takes: "
+                f"{{'called': {next(iter(known))!r}, 'stature': 1.6}}"
+            )
+        place = known[checks.known(person.get("called", next(iter(known))), known, "figure", "study: a person")]
+        entry = entries[place]
         for name in person:
             if name not in entry.keys:
                 raise UnknownNameError("option", name, entry.keys, "study: a person")
         kept = dict(entry.values)
         if SIZE & person.keys():  # a stature of the file does not belong to another person
             kept = {name: value for name, value in kept.items() if name not in SIZE}
-        return with_values(entry, values={**kept, **person})
+        entries[place] = with_values(entry, values={**kept, **person})
+        return entries
 
     def _goal(self) -> int:
         for number, entry in enumerate(self.contents.tables.get("goal", ())):
@@ -117,7 +125,7 @@ _TOP = (Key("task", Text(), True), Key("method", Choice(tuple(METHODS))), Key("w
 _NAME = Key("name", Text(), True)
 _PLACES = ByName(PLACEMENT, "things that move", "table = [0.6, 0.0, 0.4]", "m")
 _TABLES = {
-    "person": Table((_NAME, *FIGURES["human"].keys), True),
+    "person": Table((_NAME, Key("called", Text()), *FIGURES["human"].keys), True),
     "target": Table((_NAME, Key("at", POSITION, True)), True),
     "layout": Table((_NAME, Key("move", _PLACES, True)), True),
 }

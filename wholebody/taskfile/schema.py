@@ -217,7 +217,7 @@ TOP = _keys(
 
 TABLES = {
     "figure": Table(
-        _keys(joints=Several(GROUP), called=Text(), at=PLACEMENT),
+        _keys(joints=Several(GROUP), called=Text(), at=PLACEMENT, on=Text()),
         either=True,
         chooser="name",
         implied=(("path", "urdf"),),

@@ -13,6 +13,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import brief, with_values
+from wholebody.base.checks import known
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import UnknownNameError
 from wholebody.base.files import is_file, is_folder, title_of
@@ -123,23 +124,43 @@ def task_from(contents: Contents, file: Path) -> Task:
 
 
 def _figure(contents: Contents) -> Figure:
-    """The figure of the file, or its figures, each with what it is called."""
+    """The figure of the file, or its figures, each with what it is called; some may be mounted on others."""
     entries = contents.tables["figure"]
-    if not entries[0].where.number and not entries[0].values.keys() & {"called", "at"}:
-        return _loaded(entries[0])
+    mounts = [entry for entry in entries if "on" in entry.values]
+    standing = [entry for entry in entries if "on" not in entry.values]
+    if not standing:
+        raise mounts[0].where.at("on").fault("no figure has the frame; add the one that carries this one")
+    alone = len(standing) == 1 and (mounts or not standing[0].where.number)
+    if alone and not standing[0].values.keys() & {"called", "at"}:
+        figure = _loaded(standing[0])
+        for mount in mounts:
+            figure = _mounted(figure, mount, mount.values["on"])
+        return figure
     found: dict[str, tuple[Figure, Any]] = {}
-    for entry in entries:
+    for entry in standing:
         called = entry.values.get("called")
         if called is None or called in found:
             raise entry.where.fault('write called = "anna", another name for each figure: its parts begin with it')
         found[called] = _loaded(entry), entry.values.get("at", (0.0, 0.0, 0.0))
         with entry.where.named():
             member(called, found[called])
+    for mount in mounts:
+        called, _, frame = mount.values["on"].partition("/")
+        with mount.where.at("on").named():
+            figure, at = found[known(called, found, "figure")]
+        found[called] = _mounted(figure, mount, frame), at
     return join(found)
 
 
+def _mounted(figure: Figure, mount: Entry, on: str) -> Figure:
+    """A figure with that of an entry on a frame of it."""
+    other, at = _loaded(mount), mount.values.get("at", (0.0, 0.0, 0.0))
+    with mount.where.named():
+        return figure.mounted(other, on=on, name=mount.values.get("called"), at=at)
+
+
 def _loaded(entry: Entry) -> Figure:
-    options = {name: value for name, value in entry.values.items() if name not in ("called", "at")}
+    options = {name: value for name, value in entry.values.items() if name not in ("called", "at", "on")}
     joints = options.pop("joints", None)
     spec: str | Path = entry.name
     if entry.name == "urdf":

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from functools import partial
 from itertools import pairwise
-from math import dist, hypot
+from math import dist, hypot, isinf
 from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -80,6 +80,8 @@ def _soles_of(scene: Surroundings, feet: Sequence[str], bearing: Sequence[int]) 
         for piece in scene.geometry.geometryObjects if joint else ():
             if joint in scene.model.supports[piece.parentJoint]:
                 swept, local = swept_points(piece.geometry), piece.placement
+                if isinf(swept.reach):  # a half-space that a foot carries has no end to stand on
+                    continue
                 if not len(swept.points):
                     ellipsoids.append((len(radii), piece.geometry, pin.SE3(local)))
                 own = swept.points if len(swept.points) else np.zeros((1, 3))

@@ -63,7 +63,7 @@ class GoalMoves:
         self._error = error
         moves = (self._most, *(move for move in (0.01, 0.002) if move < self._most))  # m, rad
         for turn, move in enumerate(moves):
-            if turn == 0 or (move < error and BUDGET.spent < 1.0):
+            if turn == 0 or (move < error and not BUDGET.over):
                 yield min(1.0, move / error) if error else 1.0
 
     def end(self, error: float, *, cut: bool = False) -> None:
@@ -75,7 +75,7 @@ class GoalMoves:
             self._starved = 0
         if BUDGET.spent < 0.5 or self._error - error > 0.5 * asked:
             self._most *= 2.0
-        elif BUDGET.spent > 1.0:
+        elif BUDGET.over:
             self._most = max(0.5 * asked, 0.002)  # m, rad
 
 

@@ -17,7 +17,9 @@ from wholebody.base.files import Scratch, templates
 from wholebody.motion.checking import ClipCheck, check
 from wholebody.motion.clip import Clip
 from wholebody.motion.clip_contacts import Contact
+from wholebody.motion.clip_torques import torques
 from wholebody.motion.footholds import speeds
+from wholebody.motion.load_change import load_curves, telling
 from wholebody.motion.retargeting import bone_errors
 from wholebody.motion.roles import skeleton_roles
 from wholebody.motion.skeleton import SkeletonMotion
@@ -51,11 +53,13 @@ def motion_curves(
     first = next(iter(clips.values()))
     with Scratch() as folder, beside(motion, clips, scene, first.name) as viewer:
         page = viewer.save(folder / "film.html").read_text("utf-8")
+    loads, said = _loads(clips, scene)
     charts = [*_joints(clips), *_distances(clips, scene), *_slides(motion, clips, names), *_bones(motion, clips, names)]
+    charts += loads
     data = {"dt": first.dt, "frames": len(first), "charts": charts}
     named = ([] if motion is None else [RECORDING]) + list(clips)
     page_of = templates(Path(__file__).parent).get_template("motion_curves.html.jinja")
-    return page_of.render(clip=first, named=named, data=data, page=page)
+    return page_of.render(clip=first, named=named, said=said, data=data, page=page)
 
 
 def _chart(title: str, unit: str, lines: Sequence[tuple[str, str, Array]]) -> dict[str, Any]:
@@ -121,6 +125,20 @@ def _bones(motion: SkeletonMotion | None, clips: Mapping[str, Clip], names: Name
         errors = np.degrees(np.array(list(bone_errors(motion, clip, names).values())))
         lines += [("median", name, np.median(errors, axis=0)), ("greatest", name, errors.max(axis=0))]
     return [_chart("angle of bones to the recording's", "degrees", lines)]
+
+
+def _loads(clips: Mapping[str, Clip], scene: Scene) -> tuple[list[dict[str, Any]], str]:
+    """Charts of torques, forces and the zero moment point; or none, and why: a figure without mass, or without feet."""
+    try:
+        found = {name: torques(clip, scene) for name, clip in clips.items()}
+    except InputError as error:
+        return [], str(error)
+    columns = telling(list(found.values()))
+    charts = []
+    for each in zip(*(load_curves(loads, columns) for loads in found.values()), strict=True):
+        lines = [(line, name, values) for name, one in zip(found, each, strict=True) for line, values in one.lines]
+        charts += [_chart(each[0].title, each[0].unit, lines)] if lines else []
+    return charts, ""
 
 
 MOST_POSTURES = 1200

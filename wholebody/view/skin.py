@@ -33,10 +33,9 @@ class Skin:
     """
 
     def __init__(self, surface: Surface, figure: Any, at: Array) -> None:
-        """Find the bones of a figure; `at` (4, 4) is where its world is, on which those of a fixed root hang."""
+        """Find the bones of a figure; `at` (4, 4) is where its world is."""
         self.surface = surface
-        world = figure.model.names[0]
-        self.places = [(joint, at @ offset if joint == world else offset) for joint, offset in surface.attached(figure)]
+        self.places = surface.attached(figure, at)
         self.joints = tuple(dict.fromkeys(name for name, _ in self.places))
 
     def build(self, graph: SceneGraph, root: str, carriers: Mapping[str, str], color: Color | None) -> list[Skinned]:

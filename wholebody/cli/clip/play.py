@@ -63,12 +63,15 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.motion.reading import read_clip
     from wholebody.motion.worn_equipment import dressed
     from wholebody.view import Viewer
+    from wholebody.view.screenshot import check_movie
     from wholebody.view.side_by_side import write_filmstrip
 
     out: Path | None = arguments.out
     whole(arguments.pictures, "--pictures", 1, 100)
     if out is not None:
         checked_target(out, "--out", "a clip's picture", ENDINGS, [arguments.file, arguments.ghost, arguments.beside])
+        if out.suffix.lower() == ".mp4":
+            check_movie(out)
     clip = clip_of(arguments)
     ghost = None if arguments.ghost is None else read_clip(arguments.ghost, clip.figure)
     if ghost is not None and len(ghost) != len(clip):

@@ -47,15 +47,19 @@ class Surface(NamedTuple):
     bones: tuple[Bone, ...]
     patches: tuple[Patch, ...]
 
-    def attached(self, figure: Articulated) -> list[tuple[str, Array]]:
-        """The joint of a figure that carries each bone, and the bone in it (4, 4); some figures lack segments."""
+    def attached(self, figure: Articulated, at: Array) -> list[tuple[str, Array]]:
+        """The joint of a figure that carries each bone, and the bone in it (4, 4); some figures lack segments.
+
+        `at` (4, 4) is where the figure's world is, on which those of a fixed root hang.
+        """
         found = []
         for bone in self.bones:
             segment, extra = bone.segment, np.eye(4)
             if segment not in figure.segments and bone.instead is not None:
                 segment, extra = bone.instead, bone.rest
             frame = figure.model.frames[figure.frame_id(segment)]
-            found.append((str(figure.model.names[frame.parentJoint]), np.asarray(frame.placement.homogeneous) @ extra))
+            offset = np.asarray(frame.placement.homogeneous) @ extra
+            found.append((str(figure.model.names[frame.parentJoint]), offset if frame.parentJoint else at @ offset))
         return found
 
     @property

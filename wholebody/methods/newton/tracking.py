@@ -81,7 +81,7 @@ class NewtonTracker(SolvingTracker):
                 found = self._satisfied(active_system, q, enough, even=False)
                 spent += found.iterations
             # where the time of a frame was not enough to restore the constraints, the next goes on from here
-            cut = BUDGET.spent > 1.0 and not found.hard <= FRAMES.tolerance
+            cut = BUDGET.over and not found.hard <= FRAMES.tolerance
             end = q if cut else active_system.posture(found.x)
             return NewtonStep(end, spent, found.systems, active_system.structures)
 

@@ -91,7 +91,7 @@ class Placo(Checked, Descends):
             settings = Settings(self.tolerance, self.iterations, STEP, 0.75)
             run = Iteration(problem, workspace, stepper, settings, control)
             run.go()
-        if BUDGET.spent > 1.0:  # a frame that was cut off: its programs hold to first order only
+        if BUDGET.over:  # a frame that was cut off: its programs hold to first order only
             run.q = held(problem, workspace.state, run.q, self.tolerance)
         failure = f"placo gave up at program {run.steps} ({run.failure})" if run.failure else ""
         return Ending(run.q, run.converged, run.steps, tuple(run.trace), f"in {run.steps} programs", failure=failure)

@@ -59,7 +59,7 @@ def free_end(model: pin.Model, q: Array, out: float, rows_at: Callable[[Array], 
     for start in _starts(model, box):
         gone, least, weak = start, np.inf, 0
         for _ in range(ESCAPE.rounds):
-            if BUDGET.spent > 1.0:
+            if BUDGET.over:
                 return None
             here = np.asarray(pin.integrate(model, q, gone))
             at = rows_at(here)

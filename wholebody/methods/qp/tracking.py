@@ -124,7 +124,7 @@ class QPTracker(SolvingTracker):
             # what is held is missed by the square of a step, and each runs ahead of that as the one before was curved
             curved = exact and max(longest, way) ** 2 > enough
             met = error <= enough or error > TRACKING.worth * before
-            if (met and not curved) or BUDGET.spent > 1.0:
+            if (met and not curved) or BUDGET.over:
                 return FrameStep(last.q, spent)
             here, last = last.q, self.step(last.q, measures=False)
             if not is_free(self.workspace, q, last.q, SHORT, budget_for_sweep()):
@@ -146,7 +146,7 @@ class QPTracker(SolvingTracker):
         q = posture(q, model.nq)
         most = at_speeds(self.problem.bounds, workspace.state.update(q), self.dt)
         path, steps, before, depth = [(0.0, q)], list[QPStep](), np.inf, 0.0
-        while not steps or BUDGET.spent <= 1.0:
+        while not steps or not BUDGET.over:
             share, here = path[-1]
             if share < 1.0:
                 workspace.place(motion.placements(share))
@@ -196,7 +196,7 @@ class QPTracker(SolvingTracker):
         program = self._program
         at = self._linearised(q)
         answer = program.solve(at, measures)
-        if self._left is None and answer.missed > TRACKING.braked:
+        if self._brakes and self._left is None and answer.missed > TRACKING.braked:
             answer = program.solve(self._unbraked(at), measures)  # constraints come before soft stops
         motion = answer.motion
         if motion > 0.5 * self._query_distance and answer.worst > TRACKING.unseen:
@@ -247,7 +247,7 @@ class QPTracker(SolvingTracker):
         contacts, asked = at.contacts, at.clearance[: len(at.contacts.distance)]
         began, unseen = np.minimum(contacts.distance, asked), unseen_by_rows(asked)
         rows, groups = self._program.rows, None
-        for _ in range(TRACKING.corrections if BUDGET.spent <= 1.0 else 0):
+        for _ in range(0 if BUDGET.over else TRACKING.corrections):
             short, q = self._shortfall(
                 at, displacement, np.maximum(began, predicted_distances(rows, asked, displacement)), began, midway
             )
@@ -292,6 +292,7 @@ class QPTracker(SolvingTracker):
     def _set_up(self) -> None:
         """Take the problem's terms as they are now."""
         self._lineariser = self.problem.lineariser(self.workspace, self.dt)
+        self._brakes = any(type(bound) is StepLimit for bound in self.problem.bounds)
         self._lay_out()
 
     def _lay_out(self) -> None:

@@ -45,10 +45,10 @@ def write_motion(motion: Motion, path: str | os.PathLike[str], *, bare: bool = F
     """Write a clip in the format that the ending of the file's name says; see `Clip.write`."""
     path = check_ending(path, bare=bare)
     ending = path.suffix.lower()
-    if ending != ".npz":
+    if ending == ".txt":
         one_figure(motion.figure, f"{one_line(path.name)} holds one figure, and the clip's figure")
-        if motion.things:
-            warn(f"{one_line(path.name)} holds postures, without {', '.join(motion.things)}, which move; write .npz")
+    if ending != ".npz" and motion.things:
+        warn(f"{one_line(path.name)} holds postures, without {', '.join(motion.things)}, which move; write .npz")
     return columns.write(motion, path, bare=True) if bare else WRITERS[ending](motion, path)
 
 

@@ -36,7 +36,7 @@ def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> S
     parents = np.array([joint.parent for joint in found.joints], dtype=np.intp)
     if longest_way(parents, offsets) == 0.0:
         raise FileFormatError(f"{path.name}: all joints of the skeleton are at one place; give their offsets")
-    top = _moved_joint(found, parents, offsets)
+    top = 0 if ours else _moved_joint(found, parents, offsets)
     names = tuple(joint.name for joint in found.joints)
     if up is None:
         up = _up(names, parents, offsets, top)
@@ -213,14 +213,15 @@ MARK = "centimetres"  # before the name of a root, as a name space: an own file 
 def write(motion: Motion, path: Path) -> Path:
     """Write a clip as BVH: y up, z forward, centimetres, one joint for all of the figure's joints at one place."""
     nodes = nodes_of(motion.figure)
-    local, root = rotations(motion.figure, nodes, motion.q)
+    local, places = rotations(motion.figure, nodes, motion.q)
     back, scale = UP["y"].T, 1.0 / UNITS["centimetres"]  # six digits of which are 1e-8 m
     lines, order = ["HIERARCHY"], list[int]()
 
     def add(number: int, indent: str) -> None:
         node = nodes[number]
         order.append(number)
-        kind, channels = ("JOINT", "3") if indent else ("ROOT", "6 Xposition Yposition Zposition")
+        kind = "JOINT" if indent else "ROOT"
+        channels = "6 Xposition Yposition Zposition" if number in moved else "3"
         rotating = " ".join(f"{axis}rotation" for axis in ORDER)
         name = node.name if indent or plain else f"{MARK}:{node.name}"
         lines.extend([f"{indent}{kind} {name}", f"{indent}{{", offset(indent, node.offset)])
@@ -236,12 +237,13 @@ def write(motion: Motion, path: Path) -> Path:
         return f"{indent}\tOFFSET " + " ".join(f"{value:.6f}" for value in (scale * back @ place).tolist())
 
     angles = np.degrees(_angles(back @ local @ back.T))
-    plain = _recognised(nodes, scale * back, angles)
+    moved = [k for k, node in enumerate(nodes) if node.free or not k]
+    plain = len(moved) == 1 and _recognised(nodes, scale * back, angles)
     add(0, "")
     lines += ["MOTION", f"Frames: {len(motion.q)}", f"Frame Time: {motion.dt:.10g}", ""]
-    angles = angles[:, order]
+    values = [each for k in order for each in ([scale * places[:, k] @ back.T] if k in moved else []) + [angles[:, k]]]
     table = io.StringIO()
-    np.savetxt(table, np.column_stack([scale * root @ back.T, angles.reshape(len(angles), -1)]), fmt="%.6f")
+    np.savetxt(table, np.column_stack(values), fmt="%.6f")
     return write_file(path, "\n".join(lines) + table.getvalue())
 
 
@@ -266,14 +268,14 @@ def own(motion: SkeletonMotion, figure: Figure) -> Frames | None:
         return None
     at = [names[node.name] for node in nodes]
     for node, joint in zip(nodes, at, strict=True):
-        if np.abs(motion.offsets[joint] - node.offset).max() > OFF:
+        if not node.free and np.abs(motion.offsets[joint] - node.offset).max() > OFF:
             return None
         if node.parent >= 0 and motion.parents[joint] != at[node.parent]:
             return None
     world = motion.rotations[:, at]
     local = np.array(world)
     local[:, 1:] = np.swapaxes(world[:, [node.parent for node in nodes[1:]]], 2, 3) @ world[:, 1:]
-    q = postures(figure, nodes, local, motion.positions[:, at[0]])
+    q = postures(figure, nodes, local, motion.positions[:, at])
     return None if q is None else Frames(q, motion.dt, motion.name)
 
 

@@ -17,7 +17,7 @@ from wholebody.base.errors import FileFormatError, InputError
 from wholebody.base.files import read_text, title_of
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
-from wholebody.motion.clip import LARGEST, ROOT_SIZE
+from wholebody.motion.clip import LARGEST
 from wholebody.motion.files.base import LARGEST_FILE, Frames, Motion
 
 ROOT_COLUMNS = ("root_x", "root_y", "root_z", "root_qx", "root_qy", "root_qz", "root_qw")
@@ -40,17 +40,31 @@ def write(motion: Motion, path: Path, *, bare: bool = False) -> Path:
         raise InputError(f"CSV has one value for each joint, and {figure.name} has joints of several; give .npz")
     if len(q) < 2:
         raise InputError(f"{motion.name}: CSV says the time step by two frames or more; give .npz")
-    root = ROOT_COLUMNS if figure.root == "free" else ()
+    columns = _columns_of(figure)
     if figure.followers or any(figure.model.joints[figure.joint_id(name)].nq == 2 for name in figure.joints):
         angles = np.unwrap([list(figure.joint_values(each).values()) for each in q], axis=0)
-        q = np.hstack([q[:, : len(root)], angles])
+        column = dict(zip(figure.joints, angles.T, strict=True))
+        q = np.column_stack([column[name] if at is None else q[:, at] for name, at in columns.items()])
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n" if bare else "\r\n")
     if not bare:
-        writer.writerow([TIME, *root, *figure.joints])
+        writer.writerow([TIME, *columns])
     for frame, values in enumerate(q):
         writer.writerow([*([] if bare else [repr(frame * motion.dt)]), *map(repr, values.tolist())])
     return write_file(path, text.getvalue())
+
+
+def _columns_of(figure: Figure) -> dict[str, int | None]:
+    """The columns of a figure in the order of its model: of a free root each with its place in q, and its joints."""
+    roots = {joint: name.removesuffix("root") for name, joint in figure.roots.items()}
+    found: dict[str, int | None] = {}
+    for joint in range(1, figure.model.njoints):
+        if joint in roots:
+            at = int(figure.model.joints[joint].idx_q)
+            found.update({roots[joint] + column: at + k for k, column in enumerate(ROOT_COLUMNS)})
+        else:
+            found[figure.model.names[joint]] = None
+    return found
 
 
 def read(
@@ -76,13 +90,13 @@ def read(
         raise
     except InputError as error:
         raise FileFormatError(f"{error}" if path.name in str(error) else f"{path.name}: {error}") from None
-    root = ROOT_SIZE if figure.root == "free" else 0
     q = np.tile(figure.neutral, (len(values), 1))
-    q[:, :root] = values[:, :root]
-    for name, value in zip(figure.joints, values[:, root:].T, strict=True):
-        joint = figure.model.joints[figure.joint_id(name)]
-        if name in figure.followers:
+    for (name, at), value in zip(_columns_of(figure).items(), values.T, strict=True):
+        if at is not None:
+            q[:, at] = value
+        if at is not None or name in figure.followers:
             continue
+        joint = figure.model.joints[figure.joint_id(name)]
         if joint.nq == 2:
             q[:, joint.idx_q], q[:, joint.idx_q + 1] = np.cos(value), np.sin(value)
         else:
@@ -91,7 +105,7 @@ def read(
 
 
 def _values(path: Path, figure: Figure, columns: Mapping[str, str], degrees: bool) -> tuple[Array, float]:
-    """The root's seven values and one of each joint (n, 7 + joints) of a table, and its time step; see `read`."""
+    """The values (n, columns) of `_columns_of` in a table, and its time step; see `read`."""
     resting = figure.joint_values(figure.neutral)
     if len(resting) < len(figure.joints):
         joint = next(joint for joint in figure.joints if joint not in resting)
@@ -101,7 +115,8 @@ def _values(path: Path, figure: Figure, columns: Mapping[str, str], degrees: boo
     text = read_text(path, "table", LARGEST_FILE)
     lines = _lines(path, text)
     number, first = next(lines, (1, []))
-    wanted = [TIME, *(ROOT_COLUMNS if figure.root == "free" else ()), *figure.joints]
+    columns_of = _columns_of(figure)
+    wanted = [TIME, *columns_of]
     own = {column: joint for joint, column in columns.items()}
     given = [name.strip() for name in first]
     first = [own.get(name, name) for name in given]
@@ -124,8 +139,8 @@ def _values(path: Path, figure: Figure, columns: Mapping[str, str], degrees: boo
     if missing:
         more = f" and {len(missing) - 4} more" if len(missing) > 4 else ""
         warn(f"{path.name}: no column for {', '.join(missing[:4])}{more}; they stay as in the neutral posture")
-    root = figure.neutral[: len(wanted) - 1 - len(figure.joints)]
-    values = np.tile([*root, *resting.values()], (len(table), 1))
+    still = [resting[name] if at is None else figure.neutral[at] for name, at in columns_of.items()]
+    values = np.tile(still, (len(table), 1))
     for column, name in enumerate(wanted[1:]):
         if name in names:
             values[:, column] = table[:, names.index(name)]
@@ -173,17 +188,25 @@ def _columns(place: str, first: list[str], wanted: list[str]) -> list[str]:
     if twice:
         raise FileFormatError(f"{place}: the column {twice[0]} occurs twice; leave one out")
     missing = [name for name in wanted if name not in names]
-    root = [name for name in missing if name in ROOT_COLUMNS]
+    roots = [
+        {name.removesuffix(one) + column for column in ROOT_COLUMNS} for name in missing if (one := _of_root(name))
+    ]
     if TIME in missing:
         lacked = [TIME]
-    elif 0 < len(root) < len(ROOT_COLUMNS):
-        lacked = root
+    elif partly := next((root for root in roots if not root.issubset(missing)), None):
+        lacked = [name for name in missing if name in partly]
     else:
         lacked = missing if len(missing) == len(wanted) - 1 else []
     if lacked:
         more = f" and {len(lacked) - 4} more" if len(lacked) > 4 else ""
         raise InputError(f"{place}: the columns lack {', '.join(lacked[:4])}{more}; add them")
     return names
+
+
+def _of_root(name: str) -> str | None:
+    """What of a free root a column has; None of a joint's."""
+    column = name.rpartition("/")[2]
+    return column if column in ROOT_COLUMNS else None
 
 
 def _numbers(

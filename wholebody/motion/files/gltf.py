@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.base.files import write as write_file
+from wholebody.figures.description import Member
 from wholebody.figures.figure import Figure
 from wholebody.figures.joining import joint_in
 from wholebody.figures.link_pieces import Color, Drawn, drawn_of, triangles_of
@@ -73,14 +74,17 @@ class JointTree:
             self._nodes.append(self.builder.moving_node(JOINT + model.names[joint], parent, keys, self._times))
 
     def draw(self, figure: Figure) -> frozenset[str]:
-        """Add a figure's surface, or its visuals; the names of the links of which pieces need not be drawn."""
-        surface = surface_of(figure)
-        if surface is not None:
-            self.skin(figure.name, surface, surface.attached(figure))
-            return frozenset(figure.segments)
-        drawn = drawn_of(figure)
+        """Add surfaces of people, and visuals of others; the names of the links of which pieces need not be drawn."""
+        members = {f"{name}/": member for name, member in figure.members.items()}
+        covered = set[str]()
+        for prefix, (one, at) in (members or {"": Member(figure, pin.SE3.Identity())}).items():
+            surface = surface_of(one)
+            if surface is not None:
+                self.skin(prefix.strip("/") or figure.name, surface, surface.attached(one, at.homogeneous), prefix)
+                covered.update(prefix + segment for segment in one.segments)
+        drawn = [each for each in drawn_of(figure) if each.link not in covered]
         self.visuals(drawn)
-        return frozenset(one.link for one in drawn)
+        return frozenset(covered.union(each.link for each in drawn))
 
     def visuals(self, drawn: Iterable[Drawn], prefix: str = "", color: Color | None = None) -> None:
         """Add what is drawn of links; a prefix stands before their joints' names; all in a colour if there is one."""

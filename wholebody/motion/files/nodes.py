@@ -55,22 +55,32 @@ class Node:
     axes: Array  # (k, 3) their axes where the posture is zero
     tip: Array | None  # (3,) from its place to its end, or None where other nodes follow
 
+    @property
+    def free(self) -> bool:
+        """Whether it is a free root, which is moved too."""
+        return bool(self.joints) and not len(self.axes)
+
 
 def nodes_of(figure: Figure) -> list[Node]:
-    """The nodes of a figure, parents before children; a figure whose joints slide has none."""
+    """The nodes of a figure, parents before children; a figure whose joints slide has none.
+
+    Those of figures that were joined hang on a node "world".
+    """
     model = figure.model
     data = model.createData()
     columns = pin.computeJointJacobians(model, data, pin.neutral(model)).reshape(6, -1)
     pin.updateFramePlacements(model, data)
     places = [np.zeros(3)]
-    found = [Node(figure.segments[0] if figure.segments else "base", -1, np.zeros(3), (), np.zeros((0, 3)), None)]
-    node_of = {0: 0}
-    first = 1
-    if figure.root == "free":
-        found[0] = Node(found[0].name, -1, np.zeros(3), (1,), np.zeros((0, 3)), None)
-        node_of[1], first = 0, 2
-    for joint in range(first, model.njoints):
+    base = "world" if figure.root == "several" else figure.segments[0] if figure.segments else "base"
+    found = [Node(base, -1, np.zeros(3), (1,) if figure.root == "free" else (), np.zeros((0, 3)), None)]
+    node_of = {0: 0, 1: 0}
+    for joint in range(2 if figure.root == "free" else 1, model.njoints):
         parent = model.parents[joint]
+        if joint in figure.roots.values():
+            node_of[joint] = len(found)
+            found.append(Node(_segment(figure, joint), 0, np.zeros(3), (joint,), np.zeros((0, 3)), None))
+            places.append(np.zeros(3))
+            continue
         if model.joints[joint].nv != 1 or np.linalg.norm(columns[3:, model.joints[joint].idx_v]) < 0.5:
             raise InputError(
                 f"{figure.name}: joint {model.names[joint]!r} is no hinge, and files of skeletons hold rotations; "
@@ -81,7 +91,7 @@ def nodes_of(figure: Figure) -> list[Node]:
         at = node_of[parent]
         before = found[at]
         merges = (
-            at > 0
+            len(before.axes)
             and before.joints[-1] == parent
             and len(before.joints) < 3
             and np.linalg.norm(place - places[at]) < SAME_PLACE
@@ -108,43 +118,44 @@ def nodes_of(figure: Figure) -> list[Node]:
 
 
 def rotations(figure: Figure, nodes: list[Node], q: Array) -> tuple[Array, Array]:
-    """Rotation of each node in its parent (n, nodes, 3, 3), and the place of the root (n, 3), of postures (n, nq)."""
+    """Rotation of each node in its parent (n, nodes, 3, 3), and its place (n, nodes, 3), of postures (n, nq)."""
     model = figure.model
     data = model.createData()
     last = [node.joints[-1] if node.joints else 0 for node in nodes]
     pin.forwardKinematics(model, data, pin.neutral(model))
     rest = np.array([data.oMi[joint].rotation for joint in last])
-    world, root = np.empty((len(q), len(nodes), 3, 3)), np.empty((len(q), 3))
+    world, places = np.empty((len(q), len(nodes), 3, 3)), np.empty((len(q), len(nodes), 3))
     for k, posture in enumerate(q):
         pin.forwardKinematics(model, data, posture)
         world[k] = np.array([data.oMi[joint].rotation for joint in last])
-        root[k] = data.oMi[last[0]].translation
+        places[k] = [data.oMi[joint].translation for joint in last]
     world = world @ np.swapaxes(rest, 1, 2)
     parents = [node.parent for node in nodes]
     local = np.array(world)
     local[:, 1:] = np.swapaxes(world[:, parents[1:]], 2, 3) @ world[:, 1:]
-    return local, root
+    return local, places
 
 
-def postures(figure: Figure, nodes: list[Node], local: Array, root: Array) -> Array | None:
+def postures(figure: Figure, nodes: list[Node], local: Array, places: Array) -> Array | None:
     """Postures (n, nq) of rotations that `rotations` gave; None where the rotations are not the figure's."""
     model = figure.model
     q = np.tile(pin.neutral(model), (len(local), 1))
     for k, node in enumerate(nodes):
-        if k == 0:
-            if figure.root == "free":
-                q[:, :3] = root
-                q[:, 3:7] = Rotation.from_matrix(local[:, 0]).as_quat()
+        if node.free:
+            at = int(model.joints[node.joints[0]].idx_q)
+            q[:, at : at + 3] = places[:, k]
+            q[:, at + 3 : at + 7] = Rotation.from_matrix(local[:, k]).as_quat()
+        if not len(node.axes):
             continue
         angles = _angles(figure, node, local[:, k])
         if angles is None:
             return None
         for joint, values in zip(node.joints, angles.T, strict=True):
-            at = model.joints[joint]
-            if at.nq == 1:
-                q[:, at.idx_q] = values
+            made = model.joints[joint]
+            if made.nq == 1:
+                q[:, made.idx_q] = values
             else:
-                q[:, at.idx_q], q[:, at.idx_q + 1] = np.cos(values), np.sin(values)
+                q[:, made.idx_q], q[:, made.idx_q + 1] = np.cos(values), np.sin(values)
     return q
 
 

@@ -1,0 +1,63 @@
+"""Where the parts of a figure touch things that bear them, frame by frame: a hand on a rail, a pelvis on a seat.
+
+A part bears on a thing while it is as near to it as retargeting and `wb.avoid` bring what touches, and slow there.
+Feet are left out: they stand by height and speed, on whatever is below them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array
+from wholebody.geometry.proximity import Contacts
+from wholebody.motion.clip import Clip
+from wholebody.motion.footholds import RestLimits
+from wholebody.motion.inverse_dynamics import Touches
+from wholebody.scene.scene import Scene
+
+TOUCHING = 0.005  # m: the farthest of what touches; retargeted hands are up to 1 mm away, and avoiders keep a clearance
+
+
+def touching_parts(clip: Clip, scene: Scene, feet: Collection[str]) -> tuple[tuple[str, ...], list[Touches]]:
+    """Segments other than feet that touch things of a scene, and where they do in each frame.
+
+    Things that move in the clip bear nothing: what they weigh is not known.
+    """
+    figure, owners = clip.figure, scene.piece_owner
+    model, data = figure.model, figure.model.createData()
+    carrier = {name: name for name in figure.segments}
+    carrier |= {name: each.segment for name, each in scene.objects.items() if each.segment is not None}
+    joints = {name: int(model.frames[figure.frame_id(segment)].parentJoint) for name, segment in carrier.items()}
+    standing = {model.frames[figure.frame_id(name)].parentJoint for name in feet}
+    bearing = {name for name, joint in joints.items() if not standing & set(model.supports[joint])}
+    found = list[list[tuple[str, Array, Array]]]()
+    with scene.borrow() as workspace:
+        for q, v in zip(clip.q, clip.velocities(), strict=True):
+            pin.forwardKinematics(model, data, q, v)
+            here = list[tuple[str, Array, Array]]()
+            for first, second, way, point in _sides(workspace.near(q, TOUCHING)):
+                mine, other = owners[first], owners[second]
+                if mine in bearing and other not in carrier and other not in clip.things:
+                    twist = pin.getVelocity(model, data, joints[mine], pin.ReferenceFrame.WORLD)
+                    if np.linalg.norm(twist.linear + np.cross(twist.angular, point)) <= RestLimits().speed:
+                        here.append((carrier[mine], point, way))
+            found.append(here)
+    names = tuple(dict.fromkeys(segment for here in found for segment, _, _ in here))
+    return names, [
+        Touches(
+            np.array([point for _, point, _ in here]).reshape(-1, 3),
+            np.array([len(feet) + names.index(segment) for segment, _, _ in here], dtype=np.intp),
+            np.array([way for _, _, way in here]).reshape(-1, 3),
+        )
+        for here in found
+    ]
+
+
+def _sides(near: Contacts) -> Iterator[tuple[int, int, Array, Array]]:
+    """Of each pair both ways: a piece, the other one, the normal (3,) out of that, and the point (3,) of the first."""
+    for number, (first, second) in enumerate(near.pair.tolist()):
+        yield first, second, -near.normal[number], np.array(near.point_a[number])
+        yield second, first, np.array(near.normal[number]), np.array(near.point_b[number])
