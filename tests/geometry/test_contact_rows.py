@@ -90,7 +90,7 @@ def posed(scene, gap, rng):
 @pytest.mark.parametrize("gap", GAPS.values(), ids=GAPS.keys())
 @pytest.mark.parametrize(
     ("moving", "other"),
-    [pair for pair in itertools.product(SHAPES, SHAPES) if pair[0] != "half-space"],
+    [pair for pair in itertools.combinations_with_replacement(SHAPES, 2) if pair != ("half-space", "half-space")],
 )
 def test_witness_row_is_the_derivative_of_the_distance(free_bodies, moving, other, gap):
     """Central differences of coal's distance, root against a fixed object and two moving bodies."""

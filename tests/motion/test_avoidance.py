@@ -181,7 +181,7 @@ def test_joint_limits_hold_where_the_original_breaks_them(planar_arm: Callable[.
 
 
 def test_joints_become_no_faster_than_their_limit_or_the_original(planar_arm: Callable[..., Figure]) -> None:
-    clip, scene = arm_and_ball(planar_arm, 30)
+    clip, scene = arm_and_ball(planar_arm, 20)
     free = wb.avoid(clip, scene)
     limit = 0.85 * float(np.abs(np.diff(free.clip.q, axis=0)).max()) / DT
     found = wb.avoid(clip, scene, constraints=[wb.tasks.StepLimit(limit)])
