@@ -183,5 +183,6 @@ def chains_of(figure: Figure) -> Mapping[str, tuple[Sequence[int], int]]:
         if leaf not in parents:
             path = [int(joint) for joint in model.supports[leaf] if joint > 0 and movable(model, int(joint))]
             tips = [k for k, frame in enumerate(model.frames) if frame.parentJoint == leaf]
-            found[str(model.names[leaf])] = path, tips[-1]
+            of_links = [k for k in tips if model.frames[k].type != pin.FrameType.JOINT]
+            found[str(model.names[leaf])] = path, (of_links or tips)[-1]
     return found
