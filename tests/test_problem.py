@@ -120,6 +120,49 @@ def test_goals_are_replaced_and_the_rest_stays(scene):
         problem.retarget(GOAL)
 
 
+def _told(problem):
+    return repr(problem), [tuple(one.arms) for one in problem.measures if isinstance(one, wb.tasks.Hang)]
+
+
+@pytest.mark.parametrize(
+    "goals",
+    [
+        [wb.Point("left_index_tip", (0.5, 0.2, 1.0))],
+        [GOAL, wb.Frame("left_palm", (0.4, 0.2, 1.0))],
+        [],
+        [wb.Touch("left_index_tip", "table")],
+        [wb.Sit("stool")],
+    ],
+)
+def test_defaults_follow_the_goals(scene, goals):
+    """A problem that takes other goals has what one has that is stated with them: arms that hang, balance, contacts."""
+    scene.add(wb.Box((0.5, 1.0, 0.04)), name="table", at=(0.6, 0.0, 0.8))
+    scene.add(wb.Box((0.4, 0.4, 0.42)), name="stool", at=(-0.3, 0.0, 0.21))
+    feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]
+    moved, anew = (wb.Problem(scene, goals=one, constraints=feet, clearance=0.004) for one in ([GOAL], goals))
+    changed = 7
+    moved.clearances[changed] = 0.011
+    before = _told(moved), moved.clearances.copy()
+    moved.retarget(goals)
+    assert _told(moved) == _told(anew)
+    assert np.array_equal(np.delete(moved.clearances, changed), np.delete(anew.clearances, changed))
+    moved.retarget([GOAL])
+    assert (_told(moved), moved.clearances.tolist()) == (before[0], before[1].tolist())
+
+
+def test_other_goals_leave_what_was_stated_or_set(scene):
+    goals = [wb.Point("left_index_tip", (0.5, 0.2, 1.0))]
+    feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]
+    stated = wb.Problem(scene, goals=[GOAL], constraints=feet, measures=[wb.Effort()])
+    usual = wb.Problem(scene, goals=[GOAL], constraints=feet)
+    usual.measures, usual.constraints = usual.measures[:1], usual.constraints[:1]
+    for problem in (stated, usual):
+        measures, constraints = problem.measures, problem.constraints
+        problem.retarget(goals)
+        assert problem.measures is measures
+        assert problem.constraints is constraints
+
+
 def test_a_problem_is_tied_to_the_things_it_was_stated_with(scene):
     problem = wb.Problem(scene, goals=[GOAL])
     scene.add(wb.Sphere(0.1), name="ball", at=(1.0, 0.0, 1.0))

@@ -24,8 +24,8 @@ from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace, borrowed
 from wholebody.tasks.answers import in_words, is_own
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
-from wholebody.tasks.checks import KINDS, check_measure, check_rows, checked_terms, owner_pair
-from wholebody.tasks.defaults import balancing, default_constraints, standing, usual_measures
+from wholebody.tasks.checks import KINDS, check_frozen, check_own, checked_terms, owner_pair
+from wholebody.tasks.defaults import alike, balancing, default_constraints, standing, usual_measures
 from wholebody.tasks.inputs import once
 from wholebody.terms.linearisation import Lineariser
 from wholebody.terms.plan import TermPlan, Terms, make_plan
@@ -88,7 +88,11 @@ class Problem(checks.FixedAttributes):
     _plan: tuple[_Planned, TermPlan] | None
     """The terms as arrays, and the terms that they were made of; every solve begins with it."""
     _places: tuple[int, ...]
+    _rest: Array
+    """(nq,) the start that the problem was stated with, which the defaults are of."""
     _revision: int
+    _usual: tuple[Measure, ...] | None
+    """The measures by default; None where others were stated."""
 
     def __init__(
         self,
@@ -130,6 +134,7 @@ class Problem(checks.FixedAttributes):
             scene=scene,
             _revision=scene.revision,
             start=q,
+            _rest=q,
             clearance=CLEARANCE(clearance, "clearance"),
             measures_given=measures is not None,
             range_of_motion=checks.flag(range_of_motion, "range_of_motion"),
@@ -137,23 +142,33 @@ class Problem(checks.FixedAttributes):
             goals=tuple([goal.resolve(scene, q) for goal in listed]),
             bounds=tuple([term.resolve(scene, q) for term in given if isinstance(term, Bound)]),
             touching=tuple([owner_pair(scene, pair) for pair in pairs]),
+            measures=tuple([m.resolve(scene, q) for m in measured or ()]),
+            defaults=(),
+            _usual=None if measured is not None else (),
             _places=tuple([place for place, term in enumerate(given) if isinstance(term, Constraint)]),
             _plan=None,
         )
-        stated = self._resolved([given[place] for place in self._places])
-        terms: list[Constraint | Goal] = [*stated, *self.goals]
-        stands = standing(scene, q, terms, self.bounds)
-        if measured is None:
-            measures = usual_measures(scene, q, terms, self.bounds, stands, ranges=self.range_of_motion)
-        else:
-            measures = tuple([m.resolve(scene, q) for m in measured])
-        defaults, left_out = self._usual_constraints(stated, stands)
-        constraints = (*stated, *defaults)
-        vars(self).update(measures=measures, constraints=constraints, defaults=defaults, left_out=left_out)
-        if self.bounds or any(map(is_own, (*self.goals, *constraints, *measures))):
-            self._check_frozen(state := scene.state(q))
-            _check_own(state, goals=self.goals, constraints=constraints, measures=measures)
-        vars(self).update(clearances=self._clearances())
+        vars(self).update(constraints=self._resolved([given[place] for place in self._places]))
+        vars(self).update(self._by_default(self.goals))
+        if self.bounds or any(map(is_own, (*self.goals, *self.constraints, *self.measures))):
+            check_frozen(self.bounds, scene, state := scene.state(q))
+            check_own(state, goals=self.goals, constraints=self.constraints, measures=self.measures)
+        vars(self).update(clearances=self._clearances(self.goals))
+
+    def _by_default(self, goals: tuple[Goal, ...]) -> dict[str, Any]:
+        """Attributes that follow from the terms that were stated, with these resolved goals."""
+        scene, at, stated = self.scene, self._rest, self.stated
+        terms: list[Constraint | Goal] = [*stated, *goals]
+        stands = standing(scene, at, terms, self.bounds)
+        found: dict[str, Any] = {"goals": goals}
+        if self.measures is self._usual:
+            measures = usual_measures(scene, at, terms, self.bounds, stands, ranges=self.range_of_motion)
+            found.update(measures=measures, _usual=measures)
+        if len(stated) + len(self.defaults) == len(self.constraints):  # or constraints were set
+            defaults, left_out = self._usual_constraints(stated, stands)
+            constraints = self.constraints if defaults is self.defaults else (*stated, *defaults)
+            found.update(constraints=constraints, defaults=defaults, left_out=left_out)
+        return found
 
     def _resolved(self, terms: Sequence[Constraint]) -> tuple[Constraint, ...]:
         """Constraints that were stated, resolved; the same ones in the same scene at the same start are known."""
@@ -168,7 +183,7 @@ class Problem(checks.FixedAttributes):
     def _usual_constraints(
         self, stated: Sequence[Constraint], stands: tuple[str, ...]
     ) -> tuple[tuple[Constraint, ...], str]:
-        scene, start, ranges = self.scene, self.start, self.range_of_motion
+        scene, start, ranges = self.scene, self._rest, self.range_of_motion
         if not (scene.figure.ranges or self.balance):
             return (), ""  # no person
         known = frozenset(map(type, stated))
@@ -245,10 +260,11 @@ class Problem(checks.FixedAttributes):
         return type(error)(error.term, found, error.reason)
 
     def retarget(self, goals: Iterable[Goal]) -> None:
-        """Replace the goals, for a goal that moves from frame to frame; everything else stays.
+        """Replace the goals, for a goal that moves from frame to frame.
 
-        The measures by default stay too: `Hang` is of the arms that no goal moved at first. The new goals are checked
-        like the first ones. If one is refused, the old goals stay.
+        Where the new goals are of other kinds or frames, the defaults are found anew: a free arm hangs, who sits keeps
+        no balance, and pairs that a goal brings together have no clearance. What was stated or set stays. The new goals
+        are checked like the first ones. If one is refused, the old goals stay.
 
         Raises:
             InputError: not a list of goals, or a goal with a value of the wrong kind, shape or range.
@@ -258,8 +274,14 @@ class Problem(checks.FixedAttributes):
         resolved = tuple(goal.resolve(self.scene, self.start) for goal in listed)
         if any(map(is_own, resolved)):
             with self.borrow() as workspace:
-                _check_own(workspace.state.update(self.start), goals=resolved)
-        object.__setattr__(self, "goals", resolved)  # they need no other check
+                check_own(workspace.state.update(self.start), goals=resolved)
+        found: dict[str, Any] = {"goals": resolved}
+        if not alike(resolved, self.goals):
+            found = self._by_default(resolved)
+            if any(goal.touching for goal in (*resolved, *self.goals)):
+                stays = self.clearances != self._clearances(self.goals)  # which were set
+                found["clearances"] = np.where(stays, self.clearances, self._clearances(resolved))
+        vars(self).update(found)  # they need no other check
 
     def with_start(self, q: Array) -> Problem:
         """Copy with another start; terms that were resolved at the old start stay.
@@ -341,25 +363,15 @@ class Problem(checks.FixedAttributes):
             wrong = int(np.argmin((asked >= 0.0) & (asked <= CLEARANCE.high)))
             raise InputError(f"clearances[{wrong}] is {asked[wrong]}; give numbers between {CLEARANCE}")
 
-    def _check_frozen(self, state: State) -> None:
-        """Raise InputError if a bound keeps a joint out of its limits."""
-        least, most = self.scene.figure.tangent_bounds(self.start)
-        for bound in self.bounds:
-            low, high = bound.bounds(state, None)
-            wrong = np.flatnonzero((high < least) | (low > most))
-            if len(wrong):
-                joint = next(j for j in self.scene.model.joints if j.idx_v <= wrong[0] < j.idx_v + j.nv)
-                message = f"{type(bound).__name__} keeps {self.scene.model.names[joint.id]} where it starts"
-                raise InputError(f"{message}, out of its limits; start it within them")
-
-    def _clearances(self) -> Array:
+    def _clearances(self, goals: tuple[Goal, ...]) -> Array:
+        """(pairs,) the clearance of each with these goals, as it follows from what was stated."""
         built = self.scene.built
         asked = np.full(len(built.table.pairs), self.clearance)
-        brought = [pair for term in (*self.goals, *self.constraints, *self.measures) for pair in term.touching]
+        brought = [pair for term in (*goals, *self.constraints, *self.measures) for pair in term.touching]
         allowed = frozenset((*self.touching, *brought))
         if allowed:
             asked[built.known(("touching", allowed), partial(built.between, allowed))] = 0.0
-        number, kept = built.known(("resting", self.clearance, built.moves, self.start.tobytes()), self._resting)
+        number, kept = built.known(("resting", self.clearance, built.moves, self._rest.tobytes()), self._resting)
         if len(number):
             asked[number] = np.minimum(asked[number], kept)
         return asked
@@ -367,19 +379,9 @@ class Problem(checks.FixedAttributes):
     def _resting(self) -> tuple[Indices, Array]:
         """Pairs (k,) nearer than the clearance at the start that do not penetrate, and their distances (k,)."""
         with borrowed(self.scene.built) as workspace:
-            near = workspace.near_views(self.start, self.clearance + 1e-9)
+            near = workspace.near_views(self._rest, self.clearance + 1e-9)
             resting = near.distance >= -1e-6
             return near.number[resting], np.maximum(near.distance[resting], 0.0)
-
-
-def _check_own(state: State, **groups: Iterable[Any]) -> None:
-    """Evaluate terms of one's own at the start; those of the package find mistakes when they are resolved."""
-    for name, terms in groups.items():
-        for number, term in enumerate(terms):
-            if is_own(term) and name == "measures":
-                check_measure(f"{name}[{number}]", term, state)
-            elif is_own(term):
-                check_rows(f"{name}[{number}]", term, term.error if name == "goals" else term.value, state)
 
 
 def _start(scene: Scene, start: Array | str | Mapping[str, Array | str] | None) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.figures.measuring import measure
+from wholebody.studies.accommodation import Accommodation
 
 
 def upright(figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:
@@ -56,6 +58,19 @@ def test_those_who_do_not_fit_are_told_by_their_dimension() -> None:
     assert (drawn["male, accommodated"][:, 0] < 1.81).all()
     assert (drawn["male, left out"][:, 0] > 1.81).all()
     assert sum(map(len, drawn.values())) == 25
+
+
+def test_the_dimension_that_excludes_is_named_and_not_one_that_goes_with_it() -> None:
+    """Half of some women are left out for one dimension, and a little for what is not known of them."""
+    people = [{"stature": one["stature"], **one["proportions"]} for one in wb.people(60, "female", seed=3).values()]
+    rng, tried = np.random.default_rng(0), [SimpleNamespace(q=())] * len(people)
+    for name in people[0]:
+        values = np.array([one[name] for one in people])
+        score = values + 0.3 * values.std() * rng.normal(size=len(values))
+        fits = tuple((score <= np.median(score)).tolist())
+        found = Accommodation(tried, ("female",) * len(people), people, fits, (True,) * len(people), None)  # type: ignore[arg-type]
+        (told,) = found.exclusions
+        assert (told.dimension, told.side) == (name, "over")
 
 
 def standing(figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:

@@ -122,7 +122,7 @@ class Accommodation(Shown):
 
     @property
     def exclusions(self) -> tuple[Exclusion, ...]:
-        """The dimension that best tells those left out from the others, of each sex and verdict, the most first."""
+        """The dimension that best orders those left out and the others, of each sex and verdict, the most first."""
         found, tried = [], self.tried
         for sex in dict.fromkeys(self.sexes):
             for verdict, good in (("reach", self.reaches), ("fit", self.fits), ("see", self.sees or ())):
@@ -165,20 +165,23 @@ class Accommodation(Shown):
         return sum(held) / len(held) if held else math.nan
 
     def _exclusion(self, sex: str, verdict: str, out: list[int], rest: list[int]) -> Exclusion:
-        """The dimension and the bound with the greatest difference of shares beyond it (Youden 1950)."""
-        best = Exclusion(sex, verdict, "", "over", math.nan, len(out), -1.0)
-        for name in self.dimensions[out[0]]:
-            left, kept = (np.sort([self.dimensions[k][name] for k in who]) for who in (out, rest))
-            values = np.unique(np.concatenate([left, kept]))
-            bounds = 0.5 * (values[1:] + values[:-1])
-            if not len(bounds):
-                continue
-            below = np.searchsorted(left, bounds) / len(left) - np.searchsorted(kept, bounds) / len(kept)
-            for side, gain in (("under", below), ("over", -below)):
-                k = int(gain.argmax())
-                if gain[k] > best.lift:
-                    best = Exclusion(sex, verdict, name, side, float(bounds[k]), len(out), float(gain[k]))
-        return best
+        """The dimension that orders them best (Mann and Whitney 1947), and the bound that parts them (Youden 1950).
+
+        A bound alone is best by chance for a dimension that goes with the one that leaves people out.
+        """
+
+        def apart(name: str) -> float:
+            left, kept = ([self.dimensions[k][name] for k in who] for who in (out, rest))
+            return abs(float(np.sign(np.subtract.outer(left, kept)).mean()))
+
+        name = max(self.dimensions[out[0]], key=apart)
+        left, kept = (np.sort([self.dimensions[k][name] for k in who]) for who in (out, rest))
+        values = np.unique(np.concatenate([left, kept]))
+        bounds = 0.5 * (values[1:] + values[:-1]) if len(values) > 1 else values
+        below = np.searchsorted(left, bounds) / len(left) - np.searchsorted(kept, bounds) / len(kept)
+        side, gain = ("under", below) if below.max() >= -below.min() else ("over", -below)
+        k = int(gain.argmax())
+        return Exclusion(sex, verdict, name, side, float(bounds[k]), len(out), float(gain[k]))
 
     def __repr__(self) -> str:
         parts = [("reach", self.reaches), ("fit", self.fits), *([("see", self.sees)] if self.sees is not None else [])]

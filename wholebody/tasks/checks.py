@@ -13,7 +13,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError, TermError, UndefinedTermError, either
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks import answers
-from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
+from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings, Term
 
 _ASKED = (("error", 1), ("value", 1), ("jacobian", 1), ("gradient", 1), ("curvature", 1), ("squares", 1), ("bounds", 2))
 """What terms are asked at a state, and of how many arguments."""
@@ -114,3 +114,25 @@ def check_measure(where: str, measure: Measure, state: State) -> None:
         answers.weight(measure, "weight", measure.weight)
         for evaluate in (measure.value, measure.gradient, measure.curvature, measure.squares):
             evaluate(state)
+
+
+def check_own(state: State, **groups: Iterable[Any]) -> None:
+    """Evaluate terms of one's own at the start; those of the package find mistakes when they are resolved."""
+    for name, terms in groups.items():
+        for number, term in enumerate(terms):
+            if answers.is_own(term) and name == "measures":
+                check_measure(f"{name}[{number}]", term, state)
+            elif answers.is_own(term):
+                check_rows(f"{name}[{number}]", term, term.error if name == "goals" else term.value, state)
+
+
+def check_frozen(bounds: Iterable[Bound], scene: Surroundings, state: State) -> None:
+    """Raise InputError if a bound keeps a joint out of its limits where a state is."""
+    least, most = scene.figure.tangent_bounds(state.q)
+    for bound in bounds:
+        low, high = bound.bounds(state, None)
+        wrong = np.flatnonzero((high < least) | (low > most))
+        if len(wrong):
+            joint = next(j for j in scene.model.joints if j.idx_v <= wrong[0] < j.idx_v + j.nv)
+            message = f"{type(bound).__name__} keeps {scene.model.names[joint.id]} where it starts"
+            raise InputError(f"{message}, out of its limits; start it within them")

@@ -88,37 +88,51 @@ def free_arms(
     scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound], up: Set[str | None]
 ) -> tuple[str, ...]:
     """The upper arms that no term moves, of the persons `up` who stand or kneel."""
-    figure = scene.figure
-    groups = [f"{body}{side}" for body in figure.bodies if body in up for side in ("left", "right")]
-    arms = {arm: frozenset(inputs.once(scene, ("dofs", arm), partial(figure.dofs, f"{arm}_arm")).tolist())
-            for arm in groups if f"{arm}_arm" in figure.groups}  # fmt: skip
-    if not arms:
+    if not up:
         return ()
-    moved = {int(place) for bound in bounds for place in figure.dofs(getattr(bound, "joints", ()))}
+    bearing, moved = set[int](), set[int]()
+    for bound in bounds:
+        moved.update(scene.figure.dofs(getattr(bound, "joints", ())).tolist())
     for term in terms:
-        moved.update(_moved(scene, start, term))
-    return tuple(f"{arm}_upper_arm" for arm, dofs in arms.items() if moved.isdisjoint(dofs))
+        if borne := _bearing(scene, term):
+            bearing.update(borne)
+        else:
+            state = State(scene.model).update(start)
+            moved.update(np.flatnonzero(state.dense_jacobian(term.jacobian(state)).any(axis=0)).tolist())
+    key = "free arms", frozenset(up), frozenset(bearing), frozenset(moved)
+    return inputs.once(scene, key, partial(_free_arms, scene, up, bearing, moved))
 
 
-def _moved(scene: Surroundings, start: Array, term: Constraint | Goal) -> Set[int]:
-    """Places in the tangent on which a resolved term depends; of a balance, which all masses move, what bears it."""
+def _free_arms(scene: Surroundings, up: Set[str | None], bearing: Set[int], moved: Set[int]) -> tuple[str, ...]:
+    """The upper arms of persons without the joints that carry some joints, and without some places in the tangent."""
+    figure, joints = scene.figure, [scene.model.joints[one] for joint in bearing for one in scene.model.supports[joint]]
+    moved = set(moved).union(*(range(one.idx_v, one.idx_v + one.nv) for one in joints))
+    groups = [f"{body}{side}" for body in figure.bodies if body in up for side in ("left", "right")]
+    known = (arm for arm in groups if f"{arm}_arm" in figure.groups)
+    return tuple(f"{arm}_upper_arm" for arm in known if moved.isdisjoint(figure.dofs(f"{arm}_arm").tolist()))
+
+
+def _bearing(scene: Surroundings, term: Constraint | Goal) -> tuple[int, ...]:
+    """Joints that a resolved term moves; of a balance, which all masses move, what bears it. Empty: not known."""
     if isinstance(term, (Balance, LoadedBalance, Stand)):
         loads = term.loads.places if isinstance(term, LoadedBalance) else ()
-        bearing = [inputs.find_place(scene, foot, "").joint for foot in term.feet] + [one.joint for one in loads]
-    else:
-        owner = getattr(term, "residual", term)
-        known = (getattr(owner, "place", None), getattr(owner, "base", None))
-        bearing = [one.joint for one in known if isinstance(one, inputs.Place)]
-    if not bearing:
-        state = State(scene.model).update(start)
-        return {*np.flatnonzero(state.dense_jacobian(term.jacobian(state)).any(axis=0)).tolist()}
-    return {place for joint in bearing for place in inputs.once(scene, ("chain", joint), partial(_chain, scene, joint))}
+        return (*(inputs.find_place(scene, foot, "").joint for foot in term.feet), *(one.joint for one in loads))
+    return _placed(term)
 
 
-def _chain(scene: Surroundings, joint: int) -> frozenset[int]:
-    """Places in the tangent of the joints that carry a joint, and of itself."""
-    joints = [scene.model.joints[one] for one in scene.model.supports[joint]]
-    return frozenset(place for one in joints for place in range(one.idx_v, one.idx_v + one.nv))
+def _placed(term: Constraint | Goal) -> tuple[int, ...]:
+    """Joints of the frames between which a term places one; empty for others."""
+    owner = getattr(term, "residual", term)
+    known = (getattr(owner, "place", None), getattr(owner, "base", None))
+    return tuple(one.joint for one in known if isinstance(one, inputs.Place))
+
+
+def alike(goals: Sequence[Goal], before: Sequence[Goal]) -> bool:
+    """Whether resolved goals differ in their targets alone, as far as the defaults of a problem depend on them."""
+    return len(goals) == len(before) and all(
+        new is old or (type(new) is type(old) and bool(placed := _placed(new)) and placed == _placed(old))
+        for new, old in zip(goals, before, strict=True)
+    )
 
 
 def stances(scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal]) -> tuple[tuple[str, ...], ...]:

@@ -79,3 +79,30 @@ def test_a_start_that_fits_is_the_first_that_does(planar_arm):
     solution = wb.methods.QP(measures=False).solve(problem)
     assert solution.iterations == 0
     assert solution.q == pytest.approx(start, abs=1e-12)
+
+
+def behind_a_panel(measures=None, at=(0.6, -0.1, 1.25)) -> wb.Problem:
+    """Somebody who stands in front of a table and an upright panel, and reaches behind the panel."""
+    scene = wb.Scene(wb.load("human", stature=1.75)).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Box((0.5, 1.2, 0.04)), name="table", at=(0.55, 0.0, 0.78))
+    scene.add(wb.Box((0.04, 0.5, 0.5)), name="panel", at=(0.45, -0.1, 1.25))
+    feet, goals = [wb.Hold("left_foot"), wb.Hold("right_foot")], [wb.Point("right_index_tip", at)]
+    return wb.Problem(scene, goals=goals, constraints=feet, measures=measures, clearance=0.002)
+
+
+def test_what_is_reached_without_measures_does_not_depend_on_them():
+    """Not a posture of the search: measures neither shape its steps nor decide between its ends."""
+    method = wb.methods.QP(measures=False, restarts=4)
+    for at in ((0.6, -0.1, 1.25), (0.9, -0.1, 1.25)):  # behind the panel, and out of reach
+        usual = method.solve(behind_a_panel(at=at))
+        for measures in ([], [wb.tasks.Hang(weight=40.0), wb.tasks.Discomfort()]):
+            other = method.solve(behind_a_panel(measures, at))
+            assert other.status == usual.status
+            assert np.array_equal(other.q, usual.q)
+
+
+def test_a_preference_does_not_make_a_goal_unreachable():
+    """The left arm that is to hang by far more than anything else counts does not keep the right one from its goal."""
+    for weight in (0.1, 6.0, 1e4):
+        measures = [wb.Effort(), wb.tasks.Rhythm(), wb.tasks.Hang(["left_upper_arm"], weight=weight)]
+        assert wb.solve(behind_a_panel(measures)).status == "solved"

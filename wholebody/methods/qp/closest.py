@@ -12,7 +12,9 @@ Its positive part joins the program as soft rows. A dozen programs lead to a sta
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,7 +22,7 @@ from wholebody.base.arrays import Array, with_values
 from wholebody.figures.state import State, Wrench
 from wholebody.methods.qp.iterates import Iterate, LocalSolution, Stage
 from wholebody.methods.qp.rows import Rows, StepSize
-from wholebody.methods.qp.settings import NEAREST
+from wholebody.methods.qp.settings import NEAREST, SEARCH
 from wholebody.methods.qp.subproblem import compiled_kernel
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
@@ -132,6 +134,39 @@ class Closest(Stage):
         directions = np.zeros((int(kept.sum()), len(bending)))
         directions[:, bent] = vector[:, kept].T
         return directions, value[kept]
+
+
+class ReachTrials(NamedTuple):
+    """What descents through everything tell of how near goals can come."""
+
+    out_of_reach: bool  # whether enough of them rest at the same distance
+    ends: list[LocalSolution]  # where those rest that do not reach the goals
+    reached: Array | None  # (nq,) where one from another start than the first reaches them
+    spent: int  # programs
+
+
+def reach_trials(
+    reach: Closest, starts: Iterable[Array], nearest: float, agreeing: int, tolerance: float
+) -> ReachTrials:
+    """Descend from each start (nq,) until one reaches the goals, or `agreeing` ends are equally near.
+
+    This is then the least that limits and constraints allow, if nothing known came nearer than `nearest`: local minima
+    differ.
+    """
+    ends, spent = list[LocalSolution](), 0
+    for number, begin in enumerate(starts):
+        local = reach.run(begin)
+        spent += local.iterations
+        met = local.violation.worst <= reach.tolerance
+        if met or reach.shared.control.over:
+            return ReachTrials(False, [], local.q if met and number else None, spent)
+        if local.violation.hold > SEARCH.held * local.violation.left:
+            continue  # from there the constraints alone are too far
+        ends.append(local)
+        most = SEARCH.agree * min(nearest, *(end.violation.total for end in ends)) + tolerance
+        if sum(end.violation.total <= most for end in ends) == agreeing:
+            return ReachTrials(True, ends, None, spent)
+    return ReachTrials(False, ends, None, spent)
 
 
 def _add_kinematic_hessian(total: Array, state: State, part: Wrench, force: Array) -> None:

@@ -14,7 +14,7 @@ from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.control import Control
 from wholebody.methods.qp.rows import Multipliers, Rows, Violation
-from wholebody.methods.qp.settings import DESCENT
+from wholebody.methods.qp.settings import DESCENT, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.qp.tangential import Parts
@@ -124,6 +124,12 @@ class Stage:
         self.shared.control.tell(self.shared.trace[-1])
 
 
+def moving(shared: Run, q: Array) -> int:
+    """How many degrees of freedom move a goal at q (nq,)."""
+    rows = shared.subproblem.rows(shared.lineariser.at(q, 0.0))
+    return int(rows.soft[: rows.goals].any(axis=0).sum())
+
+
 def judge(
     before: tuple[float, float], after: tuple[float, float], predicted: PredictedReduction, width: float | None
 ) -> StepAcceptance:
@@ -145,8 +151,9 @@ def held(local: LocalSolution, tolerance: float) -> bool:
     return broken(local) <= tolerance
 
 
-def better(one: LocalSolution, other: LocalSolution, tolerance: float) -> bool:
-    """Whether one descent ended better: where all is met, then in the constraints, the goals, the measures."""
+def better(one: LocalSolution, other: LocalSolution, settings: Settings) -> bool:
+    """Whether one descent ended better: where all is met, then in constraints, goals and, if these count, measures."""
+    tolerance = settings.tolerance
     met = one.violation.worst <= tolerance
     if met != (other.violation.worst <= tolerance):
         return met
@@ -157,7 +164,7 @@ def better(one: LocalSolution, other: LocalSolution, tolerance: float) -> bool:
         left, right = max(left, tolerance), max(right, tolerance)
         if abs(left - right) > max(alike, 1e-5 * min(left, right)):
             return left < right
-    return one.measure < other.measure
+    return settings.measures and one.measure < other.measure
 
 
 def broken(local: LocalSolution) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from itertools import chain, takewhile
 from typing import NamedTuple
 
@@ -15,9 +16,9 @@ from wholebody.methods.contradictions import NEAREST, Contradiction, contradicti
 from wholebody.methods.control import Control
 from wholebody.methods.qp.before_contact import at_its_place, before_contact
 from wholebody.methods.qp.cancelling import posture_apart
-from wholebody.methods.qp.closest import ENDLESS, Closest
+from wholebody.methods.qp.closest import ENDLESS, Closest, reach_trials
 from wholebody.methods.qp.feasibility import Feasibility
-from wholebody.methods.qp.iterates import LocalSolution, Run, better, held
+from wholebody.methods.qp.iterates import LocalSolution, Run, better, held, moving
 from wholebody.methods.qp.settings import SEARCH, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP
@@ -55,6 +56,7 @@ class Multistart:
         self._start = problem.scene.figure.clamp(problem.start)
         self._first: int | None = None  # programs of the first attempt, once it is made
         self._without_gain = 0  # probes in a row that came no nearer, without contacts or relaxed
+        self._least_probed = np.inf  # least residual of the goals of these
         self._least = 0.0  # lower bound of the goals' residual, metres
         self._minima = Minima()  # where relaxed probes ended after the true clearances were required
         self._relaxed_minima = Minima()  # where the others ended
@@ -80,7 +82,7 @@ class Multistart:
         """The best of attempts from `begin` (nq,) and a descent from `other`; out of reach, the closest to `near`."""
         self._out_of_reach = bool(near)
         if not near:
-            self._search(self._start if begin is None else begin)
+            self._search(self._attempts(self._start if begin is None else begin))
         for q in near:
             self._accept(self._ran(self._closest(), q), self.how)
         if other is not None:
@@ -93,35 +95,43 @@ class Multistart:
             self._best = with_values(self.best, converged=True)
         return with_values(self.best, converged=False) if self.control.reason else self.best
 
-    def _search(self, begin: Array) -> None:
-        for attempt in self._attempts(begin):
+    def _search(self, attempts: Iterable[Attempt]) -> None:
+        for attempt in attempts:
             for q in attempt.starts:
                 local = attempt.stage(q)
-                if local is not None and self._accept(local, attempt.how):
+                if local is not None and self._accept(local, attempt.how or self.how):
                     return
                 if self.control.over or self._left < 0 or self._proven():
                     return
 
     def _attempts(self, begin: Array) -> Iterator[Attempt]:
         """The attempts in their order; each is decided on when those before it failed."""
-        start, state = self._start, self.lineariser.state
+        start = self._start
         yield Attempt([begin], self.directly, "directly")
         rests = (term.distance.reference for term in self.problem.measures if type(term) is Effort)
         yield Attempt((q for q in rests if (q != start).any()), self.directly, "from the posture of least effort")
-        self._first = len(self.trace)
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
-        least = least_left(self.contradictions)
-        if least is None:
-            return
-        yield Attempt(self._before_contact(), lambda q: self._descend(q, full_step=True), "from before contact")
-        yield Attempt(self._before_contact(grips=True), self._closing, "from before a grip")
-        yield Attempt([start], self._closing, "by feasibility first")
-        self._minima, self._relaxed_minima, self._without_gain = Minima(), Minima(), 0  # hands are no random starts
-        self._out_of_reach = self._known_out_of_reach(self.best.q)
-        if self._out_of_reach:
+        if (least := least_left(self.contradictions)) is None:
             return
         self._least = least
         if self._proven():
+            return
+        if self.settings.measures:
+            yield Attempt([start], self._without_measures, "")
+        else:
+            yield from self._attempts_for_feasibility()
+
+    def _attempts_for_feasibility(self) -> Iterator[Attempt]:
+        """Those in which measures do not count."""
+        start, state, least = self._start, self.lineariser.state, self._least
+        self._first = len(self.trace)
+        yield Attempt(self._before_contact(), lambda q: self._descend(q, full_step=True), "from before contact")
+        yield Attempt(self._before_contact(grips=True), self._closing, "from before a grip")
+        yield Attempt([start], self._closing, "by feasibility first")
+        # hands are no random starts
+        self._minima, self._relaxed_minima, self._without_gain, self._least_probed = Minima(), Minima(), 0, np.inf
+        self._out_of_reach = self._known_out_of_reach(self.best.q)
+        if self._out_of_reach or self._proven():
             return
         if not held(self.best, self.settings.tolerance):
             apart = posture_apart(self.problem, self.lineariser.workspace, self.best.q)
@@ -129,11 +139,23 @@ class Multistart:
             yield Attempt(starts, lambda q: self._probe(q, 0.0), "from where contacts that cancel are left")
         rng = np.random.default_rng(self.settings.seed)
         count = min(self.settings.restarts, SEARCH.inside_probes) if least else self.settings.restarts
-        if few := self._moving() < SEARCH.few:
+        if few := moving(self._shared, self.best.q) < SEARCH.few:
             self._minima, self._relaxed_minima = Minima(SEARCH.fewest_descents), Minima(SEARCH.fewest_descents)
         others = (throughout if few else restarts)(self.problem, state, start, rng, count)
         starts = self.lineariser.defined(chain(self._through, others))
         yield Attempt(self._while_open(starts), self._relaxed, "from another start")
+
+    def _without_measures(self, start: Array) -> LocalSolution:
+        """The search for a feasible posture, and a descent from there: no measure changes what counts as reached."""
+        settings = replace(self.settings, measures=False)
+        found = Multistart(self.problem, self.lineariser.workspace, self.solver, settings, self.control)
+        found.contradictions, found._least = self.contradictions, self._least
+        found._accept(found._ran(found._feasibility(found.lineariser, 0, ""), start), self.how)
+        found._search(found._attempts_for_feasibility())
+        self.spent += found.spent
+        self.trace += found.trace
+        self._out_of_reach = found._out_of_reach
+        return self._descend(found.best.q) if self._accept(found.best, found.how) else found.best
 
     def _while_open(self, starts: Iterable[Array]) -> Iterator[Array]:
         """Starts of relaxed probes, until enough say that the goals are out of reach, or the budget is spent."""
@@ -185,8 +207,9 @@ class Multistart:
         tolerance = self.settings.tolerance
         relaxed = self._probe(start, SEARCH.relaxation_depth)
         self._nearest_through = min(self._nearest_through, relaxed.violation.total)
-        nearer = relaxed.violation.left < (1.0 - SEARCH.nearer) * self.best.violation.left
+        nearer = relaxed.violation.left < (1.0 - SEARCH.nearer) * self._least_probed
         self._without_gain = 0 if nearer else self._without_gain + 1
+        self._least_probed = min(self._least_probed, relaxed.violation.left)
         if relaxed.violation.worst > SEARCH.reached * tolerance:
             self._relaxed_minima.add(relaxed.violation.total, relaxed.converged)
             return None
@@ -283,7 +306,10 @@ class Multistart:
         if self.control.over:
             return
         if self._out_of_reach:
-            self._approach(self.best.q)
+            local = self._ran(self._closest(), self.best.q)
+            if not held(local, tolerance) and local.violation.total < self.best.violation.total:
+                local = self._descend(local.q, note="nearest", measures=False, most=SEARCH.coming_near)
+            self._accept(local, self.how)
         if not held(self.best, tolerance):
             self._accept(self._stay(self.best), self.how)
         if not self._out_of_reach and self.best.violation.worst > tolerance:
@@ -302,38 +328,21 @@ class Multistart:
 
     def _known_out_of_reach(self, q: Array) -> bool:
         """Whether the goals are out of reach of q (nq,): descents through everything all rest at the same distance."""
-        # It is then the least that limits and constraints allow, if no relaxed probe came nearer. Local minima differ.
         if not (self.problem.goals and self.problem.scene.model.nv):
             return False
-        tolerance, ends = self.settings.tolerance, list[LocalSolution]()
         given = (self.problem, self.lineariser.state, self._start, np.random.default_rng(self.settings.seed))
-        agreeing = SEARCH.agreeing_few if (few := self._moving() < SEARCH.few) else SEARCH.agreeing
+        agreeing = SEARCH.agreeing_few if (few := moving(self._shared, self.best.q) < SEARCH.few) else SEARCH.agreeing
         starts = throughout(*given, SEARCH.reach_trials_few - 1) if few else None
-        others = starts or restarts(*given, SEARCH.reach_trials - 1, SEARCH.far)
-        enough, programs = SEARCH.reached * tolerance, self._at_most(SEARCH.reach_trial_programs)
+        starts = chain([q], self.lineariser.defined(starts or restarts(*given, SEARCH.reach_trials - 1, SEARCH.far)))
+        enough, programs = SEARCH.reached * self.settings.tolerance, self._at_most(SEARCH.reach_trial_programs)
         alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
         reach = Closest(alone, enough, programs, problem=self.problem, contacts=False)
-        for begin in chain([q], self.lineariser.defined(others)):
-            local = self._ran(reach, begin)
-            if local.violation.worst <= enough or self.control.over:
-                if local.violation.worst <= enough and begin is not q:
-                    self._through = [local.q]
-                return False
-            if local.violation.hold > SEARCH.held * local.violation.left:
-                continue  # from there the constraints alone are too far
-            ends.append(local)
-            least = min(self._nearest_through, *(end.violation.total for end in ends))
-            most = SEARCH.agree * least + tolerance
-            if sum(end.violation.total <= most for end in ends) == agreeing:
-                return True
-        near = (1.0 - SEARCH.nearer) * self.best.violation.left
-        self._without_gain = sum(end.violation.left >= near for end in ends)  # as relaxed probes count
-        return False
-
-    def _moving(self) -> int:
-        """How many degrees of freedom move a goal at the best posture."""
-        rows = self.subproblem.rows(self.lineariser.at(self.best.q, 0.0))
-        return int(rows.soft[: rows.goals].any(axis=0).sum())
+        found = reach_trials(reach, starts, self._nearest_through, agreeing, self.settings.tolerance)
+        self.spent += found.spent
+        self._through = [] if found.reached is None else [found.reached]
+        self._least_probed = min((end.violation.left for end in found.ends), default=np.inf)
+        self._without_gain = len(found.ends)  # as relaxed probes count
+        return found.out_of_reach
 
     def _closest_from_best(self) -> None:
         """Find the closest posture from the best one."""
@@ -343,14 +352,6 @@ class Multistart:
             nearest = self._descend(self.best.q, note="nearest", measures=False)
         self._accept(nearest, self.how)
         self._best = with_values(self.best, converged=self.best.converged or nearest.converged)
-
-    def _approach(self, begin: Array) -> None:
-        """Find the closest posture from one (nq,); where constraints do not hold then, restore them."""
-        tolerance = self.settings.tolerance
-        local = self._ran(self._closest(), begin)
-        if not held(local, tolerance) and local.violation.total < self.best.violation.total:
-            local = self._descend(local.q, note="nearest", measures=False, most=SEARCH.coming_near)
-        self._accept(local, self.how)
 
     def _at_most(self, programs: int) -> int:
         """The smaller of this number of programs and that of one descent."""
@@ -381,7 +382,7 @@ class Multistart:
         local = self._ran(self._descent(iterations, None, note, measures=measures, full_step=full_step), start)
         if (most is None or local.iterations < most) and not held(local, self.settings.tolerance):
             stayed = self._stay(local)
-            local = stayed if better(stayed, local, self.settings.tolerance) else local
+            local = stayed if better(stayed, local, self.settings) else local
         return local
 
     def _descent(
@@ -393,6 +394,6 @@ class Multistart:
 
     def _accept(self, local: LocalSolution, how: str) -> bool:
         """Keep the better one; whether the problem is solved now."""
-        if self._best is None or better(local, self._best, self.settings.tolerance):
+        if self._best is None or better(local, self._best, self.settings):
             self._best, self.how = local, how
         return self.best.violation.worst <= self.settings.tolerance

@@ -69,6 +69,8 @@ class Subproblem:
         heaviest = sum((m.weight * m.curvature(state) for m in problem.measures), np.zeros(state.model.nv))
         if heaviest.max(initial=0.0) > PROGRAM.heaviest_curvature:
             self.scale = PROGRAM.heaviest_curvature / float(heaviest.max())
+        # what stands for the measures where they do not count, so that what is reached does not depend on them
+        self._effort = 2.0 * problem.scene.figure.effort_weights
         self._equal = np.flatnonzero(self._lower == self._upper)
         self.equalities = [int((low == high).sum()) for low, high in zip(lower, upper, strict=True)]
         """How many rows of each constraint are equalities."""
@@ -134,10 +136,12 @@ class Subproblem:
         """The program of one step; `shift` (soft rows,) is added to the errors (method of multipliers)."""
         squares = at.squares if step.measures else at.squares[:0]
         curvature = at.curvature - at.squared if len(squares) else at.curvature
-        columns = np.array([curvature, at.gradient, at.lower, at.upper])
+        columns = np.array([curvature if step.measures else self._effort, at.gradient, at.lower, at.upper])
         least = np.empty(len(rows.elastic_violation))
         target = np.zeros(len(rows.soft_error)) if shift is None else shift.copy()
-        self._kernel.fill_program(columns, rows, target, least, step, self._numbers, self.scale)
+        self._kernel.fill_program(
+            columns, rows, target, least, step, self._numbers, self.scale if step.measures else 1.0
+        )
         program = QuadraticProgram(
             columns[0], columns[1], rows.soft, target, rows.soft_weight, rows.elastic, least, rows.elastic_weight,
             columns[2], columns[3],
