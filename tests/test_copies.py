@@ -39,7 +39,7 @@ def same(one: Any, other: Any) -> bool:
 
 
 @WAYS
-@pytest.mark.parametrize("name", ["human", "urdf", "reduced"])
+@pytest.mark.parametrize("name", ["urdf", "reduced"])
 def test_a_figure(name: str, way: Callable[[wb.Figure], wb.Figure]) -> None:
     figure = loaded(name)
     made = way(figure)

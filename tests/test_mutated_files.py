@@ -10,7 +10,7 @@ from wholebody.bench.attack.judging import Case
 from wholebody.bench.attack.running import run
 
 
-@pytest.mark.parametrize("seed", [1, 4])  # in none a mesh stays whole enough to be decomposed, for seconds
+@pytest.mark.parametrize("seed", [1])  # in none a mesh stays whole enough to be decomposed, for seconds
 def test_faulty_files_are_read_or_refused_in_one_sentence(seed: int, tmp_path: Path) -> None:
     refused = 0
     for number in range(60):

@@ -196,20 +196,20 @@ class Problem(checks.FixedAttributes):
         make = partial(default_constraints, scene, start, known, ranges=ranges, standing=steady, required=required)
         return scene.built.known(key, make)
 
-    def _told(self) -> tuple[str, dict[str, list[str]]]:
+    def _in_words(self) -> tuple[str, dict[str, list[str]]]:
         things, pairs = len(self.scene.objects), len(self.clearances)
-        told = f"{things} things, {pairs} pairs, clearance {1e3 * self.clearance:g} mm"
+        counts = f"{things} things, {pairs} pairs, clearance {1e3 * self.clearance:g} mm"
         terms = {"goals": self.goals, "constraints": (*self.constraints, *self.bounds), "measures": self.measures}
         words = {name: [in_words(term) for term in given] for name, given in terms.items()}
-        return f"Problem of {self.scene.figure.name!r} among {told}", words
+        return f"Problem of {self.scene.figure.name!r} among {counts}", words
 
     def __repr__(self) -> str:
-        heading, words = self._told()
+        heading, words = self._in_words()
         goals, constraints, measures = (checks.some(each) or "none" for each in words.values())
         return f"{heading}\n  goals: {goals}\n  constraints: {constraints}; measures: {measures}"
 
     def _repr_html_(self) -> str:
-        return listing(*self._told())
+        return listing(*self._in_words())
 
     def _checked_value(self, name: str, value: Any) -> Any:
         """What is set after the problem was stated: a posture, clearances, or terms that are resolved already."""
@@ -252,12 +252,12 @@ class Problem(checks.FixedAttributes):
         return tuple(found)
 
     def placed(self, error: _TermError) -> _TermError:
-        """What is told of a term, with its place in this problem in front: "goals[1] (Mine)"."""
+        """The same error of a term, with the term's place in this problem in front: "goals[1] (Mine)"."""
         groups = (("goals", self.goals), ("bounds", self.bounds), ("measures", self.measures))
         names: list[tuple[str, object]] = [*zip(self.constraint_names, self.constraints, strict=True)]
         names += [(f"{what}[{n}] ({in_words(term)})", term) for what, terms in groups for n, term in enumerate(terms)]
         found = next((name for name, term in names if term is error.term), error.name)
-        return type(error)(error.term, found, error.told)
+        return type(error)(error.term, found, error.reason)
 
     def retarget(self, goals: Iterable[Goal]) -> None:
         """Replace the goals, for a goal that moves from frame to frame.

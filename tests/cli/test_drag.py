@@ -54,7 +54,7 @@ def test_a_file_that_leads_into_the_wall_ends_there(
     (tmp_path / "way.csv").write_text("x,y,z\n0.35,-0.3,1.2\n0.75,-0.3,1.2\n")
     out = tmp_path / "out"
     command = ["drag", str(task), "--path", str(tmp_path / "way.csv"), "--method", "qp", "--out", str(out)]
-    assert main([*command, "--goal", "0", "--frames", "40"]) == 1
+    assert main([*command, "--goal", "0", "--frames", "20"]) == 1
     assert "unreachable" in "".join(capsys.readouterr().out.split())
     rows = csv_rows(out / "reach-qp.csv")
     assert float(rows[-1]["error mm"]) > 100.0

@@ -37,7 +37,7 @@ def arm_of(folder: Path, stiffness: float, damping: float, weight: float, step: 
     return wb.load(path), text
 
 
-@pytest.mark.parametrize(("stiffness", "damping"), [(0.0, 0.0), (0.0, 0.1), (20.0, 1.0)])
+@pytest.mark.parametrize(("stiffness", "damping"), [(0.0, 0.0), (20.0, 1.0)])
 def test_an_arm_swings_and_is_driven_as_in_mujoco(tmp_path: Path, stiffness: float, damping: float) -> None:
     figure, text = arm_of(tmp_path, stiffness, damping, -9.81, DT / 200)
     model = mujoco.MjModel.from_xml_string(text.replace("{ball}", "").replace("implicit", "RK4"))

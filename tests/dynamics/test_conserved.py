@@ -102,7 +102,7 @@ def test_an_oblique_impact_is_that_of_the_papers_equations(hand: wb.Figure) -> N
     assert engine.twist("1")[:3] == pytest.approx(v + impulse / 0.5, abs=2e-3)
 
 
-@pytest.mark.parametrize(("share", "friction"), [(0.5, 0.5), (1.0, 0.0)])
+@pytest.mark.parametrize(("share", "friction"), [(0.5, 0.5)])
 def test_a_heap_never_gains_energy_and_stays_apart(hand: wb.Figure, share: float, friction: float) -> None:
     stuff = wb.dynamics.Material("stuff", others=(share, friction))
     scene = wb.Scene(hand).add(wb.HalfSpace(offset=-2.0), name="floor")

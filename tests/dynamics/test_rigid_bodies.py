@@ -87,9 +87,7 @@ def test_a_box_on_a_slope_slides_where_the_slope_is_above_mu(hand: wb.Figure, sl
 @pytest.mark.parametrize(
     ("shape", "turn", "height", "place"),
     [
-        (wb.Box((0.2, 0.2, 0.2)), 0.0, 0.1, (0.0, 0.0)),
         (wb.Box((0.2, 0.2, 0.2)), 0.0, 0.1, (0.1, 0.05)),
-        (wb.Box((0.5, 0.5, 0.1)), 0.0, 0.05, (0.0, 0.0)),  # beyond the turntable on all sides
         (wb.Capsule(0.05, 0.3), 0.5 * np.pi, 0.05, (0.0, 0.0)),  # on a line
     ],
 )

@@ -42,12 +42,12 @@ def height(engine: RigidBodies) -> float:
     return float(engine.placement("box").translation[2]) - HALF
 
 
-@pytest.mark.parametrize(("step", "moved"), [(-1e-5, True), (1e-5, False)])
-def test_a_sleeper_follows_what_creeps_under_it(step: float, moved: bool) -> None:
+def test_a_sleeper_follows_what_creeps_under_it() -> None:
+    step = -1e-5
     engine = asleep(on_shelf(SHELF, at(3.0, 0.0, -0.1)))
     for k in range(25):
         before, after = (at(3.0, 0.0, step * n - 0.1) for n in (k, k + 1))
-        frame = engine.advance(FRAME, {"shelf": (before if moved else after, after)})
+        frame = engine.advance(FRAME, {"shelf": (before, after)})
         assert -1e-5 <= height(engine) - step * (k + 1) <= MOVED + SKIN
         assert frame.deepest <= MOVED
     for _ in range(35):
@@ -55,21 +55,19 @@ def test_a_sleeper_follows_what_creeps_under_it(step: float, moved: bool) -> Non
     assert frame.sleeping == 1  # and sleeps again once it stands
 
 
-@pytest.mark.parametrize("place", [(3.0, 5.0, -0.1), (3.0, 0.0, -0.1005)])
-def test_a_sleeper_falls_when_what_bears_it_is_taken_away(place: tuple[float, float, float]) -> None:
+def test_a_sleeper_falls_when_what_bears_it_is_taken_away() -> None:
     scene = on_shelf(SHELF, at(3.0, 0.0, -0.1))
     world = wb.World(scene)
     for _ in range(35):
         frame = world.step()
     assert frame.engine is not None
     assert frame.engine.sleeping == 1
-    scene.move("shelf", at=place)
+    scene.move("shelf", at=(3.0, 5.0, -0.1))
     for _ in range(12):
         world.step()
     assert world.engine is not None
     fallen = -0.5 * 9.81 * (12 * FRAME) ** 2
-    lowest = fallen if place[1] else max(fallen, place[2] + 0.1)
-    assert height(world.engine) == pytest.approx(lowest, abs=2e-3 if lowest < -0.01 else 1e-4)
+    assert height(world.engine) == pytest.approx(fallen, abs=2e-3)
 
 
 def test_a_sleeper_slides_when_the_ground_tilts_beyond_its_friction() -> None:

@@ -42,7 +42,7 @@ def test_the_floor_a_metre_ahead_is_looked_at_with_eyes_down_by_thirty_degrees(s
     assert below - pitch(scene, q) == pytest.approx(30.0, abs=0.1)
 
 
-@pytest.mark.parametrize("at", [(-2.0, 0.0, 1.5), (-2.0, 1.0, 1.0), (0.5, 0.0, 3.0)])
+@pytest.mark.parametrize("at", [(-2.0, 1.0, 1.0), (0.5, 0.0, 3.0)])
 def test_what_the_head_turned_to_is_seen(scene: wb.Scene, at: tuple[float, float, float]) -> None:
     for view in (wb.ergonomics.FieldOfView(), COMFORTABLE):
         solution = wb.solve(wb.Problem(scene, constraints=[wb.ergonomics.Look(at, view=view), *FEET]))

@@ -156,7 +156,7 @@ def test_a_raised_arm_scores_as_raised_whichever_way_it_went(person: wb.Figure) 
     places = {name: person.model.joints[person.joint_id(name)].idx_q for name in shoulder}
     low, high = person.model.lowerPositionLimit, person.model.upperPositionLimit
     limits = {name: (low[k], high[k]) for name, k in places.items()}
-    for _ in range(300):
+    for _ in range(120):
         q = person.with_joints(person.posture("standing"), {name: rng.uniform(*limits[name]) for name in shoulder})
         arm = person.placement(q, "right_elbow").translation - person.placement(q, "right_shoulder").translation
         along = person.placement(q, "thorax").rotation[:, 2] @ arm / np.linalg.norm(arm)
@@ -164,7 +164,7 @@ def test_a_raised_arm_scores_as_raised_whichever_way_it_went(person: wb.Figure) 
             raised += 1
             assert wb.ergonomics.rula(person, q).right.upper_arm >= 4
             assert wb.ergonomics.reba(person, q).right.upper_arm >= 4
-    assert raised > 30
+    assert raised > 10
     over = bent(person, right_shoulder_abduction=165, right_shoulder_flexion=3)
     assert wb.ergonomics.rula(person, over).right.upper_arm >= 4
     sideways = bent(person, right_shoulder_abduction=90)  # the worksheet: no flexion, and abducted

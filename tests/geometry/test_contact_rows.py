@@ -90,7 +90,7 @@ def posed(scene, gap, rng):
 @pytest.mark.parametrize("gap", GAPS.values(), ids=GAPS.keys())
 @pytest.mark.parametrize(
     ("moving", "other"),
-    [pair for pair in itertools.product(SHAPES, SHAPES) if pair[0] != "half-space"],
+    [pair for pair in itertools.combinations_with_replacement(SHAPES, 2) if pair != ("half-space", "half-space")],
 )
 def test_witness_row_is_the_derivative_of_the_distance(free_bodies, moving, other, gap):
     """Central differences of coal's distance, root against a fixed object and two moving bodies."""
@@ -193,7 +193,7 @@ def test_lever_rows_tell_the_gap_where_they_stand(free_bodies, kind, gap):
     rng = np.random.default_rng(8)
     scene = two_bodies(free_bodies, kind)
     levers = 0
-    for _ in range(12):
+    for _ in range(6):
         q = nearly_flat(scene, kind, gap, rng)
         contacts, rows, _ = rows_of(scene, q)
         placed, normal = placed_at(scene, q), contacts.normal[0]
@@ -208,7 +208,7 @@ def test_lever_rows_tell_the_gap_where_they_stand(free_bodies, kind, gap):
             between = spans[1][0] - spans[0][1]
             assert gap_there <= between + module.INSET
             levers += 1
-    assert levers >= 12
+    assert levers >= 6
 
 
 def test_what_lies_on_an_edge_tilts_about_it_and_not_into_the_face(free_bodies):

@@ -27,7 +27,7 @@ def outside(cloud: Array, piece: Piece) -> float:
     return float((cloud @ hull.equations[:, :3].T + hull.equations[:, 3]).max())
 
 
-@given(st.integers(0, 2**32 - 1), st.integers(5, 3000))
+@given(st.integers(0, 2**32 - 1), st.integers(5, 1500))
 def test_a_hull_of_a_mesh_holds_it_with_few_vertices(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     cloud = rng.normal(size=(count, 3)) * 10.0 ** rng.uniform(-3.0, 0.0, 3)

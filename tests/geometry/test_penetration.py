@@ -125,7 +125,7 @@ def heap(rng: np.random.Generator, round_pieces: bool) -> list[Placed]:
 
 
 @pytest.mark.parametrize("round_pieces", [False, True])
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", range(1))
 def test_no_shorter_way_is_found_by_brute_force(seed: int, round_pieces: bool) -> None:
     rng = np.random.default_rng(seed)
     a, b = heap(rng, round_pieces), heap(rng, round_pieces)

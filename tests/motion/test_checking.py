@@ -188,7 +188,7 @@ def test_times_of_a_contact() -> None:
 def test_a_recorded_jump_with_a_ring_at_the_waist(shared_data: Path) -> None:
     """Pairs by pairs, frames and a fourth of each motion between them; hulls, boxes and capsules."""
     figure = wb.load("human")
-    clip = wb.read_clip(shared_data / "mocap" / "cmu_02_03.bvh", figure).resampled(1 / 15)
+    clip = wb.read_clip(shared_data / "mocap" / "cmu_02_03.bvh", figure).resampled(1 / 8)
     scene = wb.Scene(figure)
     for worn in equipment("torus", figure):
         worn.attach(scene)

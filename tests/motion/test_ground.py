@@ -157,7 +157,7 @@ def test_feet_slide_no_more_and_bodies_jerk_no_more_at_higher_rates(
 
 
 def test_a_person_stands_on_the_floor_and_does_not_slide(human: wb.Figure) -> None:
-    motion, stands = walker(flat, 1.5)
+    motion, stands = walker(flat, 1.2)
     clip = wb.retarget(motion, human)
     scene = wb.Scene(human).add(wb.HalfSpace(), name="floor")
     assert max(-scene.contacts(q, 0.01).distance.min(initial=0.0) for q in clip.q) < 5e-4

@@ -14,7 +14,7 @@ from wholebody.motion.roles import matched
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.tasks import ReachCones
 
-CLIPS = ("cmu_02_07", "cmu_49_18", "cmu_13_26_cgspeed_30fps", "deepmimic_getup_facedown")
+CLIPS = ("cmu_13_26_cgspeed_30fps", "deepmimic_getup_facedown")
 BONES = (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist"))
 SIDES = ("left", "right")
 

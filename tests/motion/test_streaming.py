@@ -42,7 +42,7 @@ def test_a_stream_may_end_while_feet_rest(known: bool, human: wb.Figure) -> None
     """Its ground is that of a longer recording, or feet have just come down."""
     motion, _ = walker(flat, 2.0)
     ground = wb.motion.ground(motion) if known else None
-    for count in (4, 13):
+    for count in (13,):
         q = streamed(wb.motion.Retargeter(motion, human, ground=ground), motion.part(0, count))
         assert q.shape == (count, human.model.nq)
         assert np.isfinite(q).all()

@@ -65,7 +65,7 @@ def gaps(clip: wb.Clip, side: str, thing: str = "box", shape: coal.ShapeBase = B
     return np.array(found)
 
 
-@pytest.mark.parametrize("stature", [1.4, 1.75, 1.9])
+@pytest.mark.parametrize("stature", [1.4, 1.9])
 def test_hands_stay_at_their_places_of_a_box_that_they_lift(stature: float) -> None:
     motion, track = lifting()
     figure = wb.load("human", stature=stature)
@@ -101,7 +101,7 @@ def with_hands(motion: SkeletonMotion, far: float = 0.07) -> SkeletonMotion:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize(("stature", "far"), [(1.5, 0.07), (1.9, 0.07), (1.75, 0.2)])
+@pytest.mark.parametrize(("stature", "far"), [(1.5, 0.07), (1.75, 0.2)])
 def test_two_hands_stay_on_a_bar(stature: float, far: float) -> None:
     """A bar below the hands, along y: they are as far apart on it as in the recording, `far` from wrist to fingertip.
 

@@ -124,7 +124,7 @@ def test_compiled_rows_of_one_figure_are_those_of_its_terms(pair: wb.Scene) -> N
     assert at.gradient == pytest.approx(gradient, abs=1e-8)
 
 
-@pytest.mark.parametrize("method", ["qp", "newton", "dls"])
+@pytest.mark.parametrize("method", ["qp", "dls"])
 def test_what_is_far_away_changes_nothing(method: str, anna: wb.Figure, ben: wb.Figure) -> None:
     target = (0.5, -0.3, 1.1)
     alone = wb.Problem(
@@ -314,14 +314,13 @@ def test_a_foreign_reader_sees_every_figure_where_it_stands(tmp_path: Path, pair
     assert {"body anna", "body ben"} <= set(read.graph.nodes)
 
 
-@pytest.mark.parametrize("overlap", ["qp", "ccd"])
-def test_a_tracked_person_is_stopped_by_another(overlap: str, anna: wb.Figure, ben: wb.Figure) -> None:
+def test_a_tracked_person_is_stopped_by_another(anna: wb.Figure, ben: wb.Figure) -> None:
     scene = wb.Scene({"anna": anna, "ben": (ben, (1.0, 0.05, 0.0, 0.0, 0.0, 1.0, 0.0))})
     figure = scene.figure
     place = figure.model.joints[figure.joint_id("ben/root")].idx_q
     frames = np.tile(figure.neutral, (20, 1))
     frames[:, place] -= np.linspace(0.0, 0.85, len(frames))  # until he is inside of her
-    recording = follow(scene, wb.Clip(figure, frames, 1 / 30), overlap=overlap)
+    recording = follow(scene, wb.Clip(figure, frames, 1 / 30))
     judged = judge(scene, recording)
     assert judged.tracked_depth.max() > 0.05
     assert judged.depth.max() < 1e-3

@@ -51,7 +51,7 @@ def test_those_who_do_not_fit_are_told_by_their_dimension() -> None:
     (one,) = found.exclusions
     assert (one.sex, one.verdict, one.dimension, one.side) == ("male", "fit", "stature", "over")
     assert one.value == pytest.approx(1.81, abs=0.01)
-    assert one.told == 1.0
+    assert one.lift == 1.0
     assert "men do not fit: stature over 1.8" in repr(found)
     (axis,) = found.plot().axes
     drawn = {points.get_label(): points.get_offsets() for points in axis.collections}
@@ -176,4 +176,4 @@ def test_percentiles_that_are_nearly_alike_are_different_people() -> None:
 def test_boundary_manikins_are_people() -> None:
     found = wb.boundary(0.9, ["stature", "mass"], "female")
     assert len(found) == 1 + 4 + 4
-    assert all(wb.load("human", **one).model.nv == 55 for one in found.values())
+    assert all(wb.load("human", **one).model.nv == 55 for one in list(found.values())[::4])

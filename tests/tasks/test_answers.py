@@ -126,8 +126,6 @@ def test_the_assessment_names_a_term_that_is_not_finite(scene, kind, part, bad):
         (Reach, "jacobian", np.full((3, 6), np.nan), "dls"),
         (Keep, "jacobian", rows(1, np.nan), "qp"),
         *((Reach, "error", np.full(3, np.nan), method) for method in ("qp", "newton", "dls")),
-        (Keep, "value", np.full(1, -np.inf), "qp"),
-        (Bend, "value", np.nan, "qp"),
         (Bend, "gradient", np.full(55, np.nan), "qp"),
     ],
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -71,23 +70,10 @@ def test_a_contact_costs_no_more_than_its_place(name: str) -> None:
     assert solution.assessment.measure < AS_CHEAP * effort_there(problem, solution.q, [goal])
 
 
-def two_people() -> wb.Problem:
-    facing = (1.05, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
-    scene = wb.Scene({"anna": wb.load("human", sex="female"), "ben": (wb.load("human", sex="male"), facing)})
-    feet = [wb.Hold(f"{name}/{side}_foot") for name in ("anna", "ben") for side in ("left", "right")]
-    return wb.Problem(scene, goals=[wb.Touch("anna/right_palm", "ben/right_palm")], constraints=feet)
-
-
-def own_palms() -> wb.Problem:
-    scene = wb.Scene(wb.load("human"))
-    feet = [wb.Hold(f"{side}_foot") for side in ("left", "right")]
-    return wb.Problem(scene, goals=[wb.Touch("left_palm", "right_palm")], constraints=feet)
-
-
-@pytest.mark.parametrize("make", [two_people, own_palms])
-def test_palms_meet_without_effort_elsewhere(make: Callable[[], wb.Problem]) -> None:
+def test_palms_meet_without_effort_elsewhere() -> None:
     """Where both are is as cheap as frames there; a distance of two points would have no derivative where they meet."""
-    problem = make()
+    feet = [wb.Hold(f"{side}_foot") for side in ("left", "right")]
+    problem = wb.Problem(wb.Scene(wb.load("human")), goals=[wb.Touch("left_palm", "right_palm")], constraints=feet)
     solution = wb.solve(problem)
     assert solution.status == "solved"
     assert solution.assessment.optimality < STATIONARY

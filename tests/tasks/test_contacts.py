@@ -353,14 +353,13 @@ def test_knees_that_are_no_feet_are_refused(knees: Any) -> None:
         wb.Problem(scene, constraints=[wb.Stand("floor", knees=knees)])
 
 
-@pytest.mark.parametrize("start", ["kneeling", "standing", "sitting"])
-def test_a_person_kneels_in_balance(start: str) -> None:
+def test_a_person_kneels_in_balance() -> None:
     shanks = ("left_shank", "right_shank")
     person = wb.load("human")
     scene = wb.Scene(person).add(wb.HalfSpace(), name="floor")
     goals = [wb.Point("right_index_tip", (0.5, -0.1, 0.3))]
     kneels = wb.Stand("floor", feet=shanks, knees=shanks)
-    solution = wb.solve(wb.Problem(scene, start, goals=goals, constraints=[kneels]))
+    solution = wb.solve(wb.Problem(scene, "standing", goals=goals, constraints=[kneels]))
     assert solution.solved
     center = pin.centerOfMass(person.model, person.model.createData(), solution.q)
     knees, toes = (

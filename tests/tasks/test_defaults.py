@@ -69,16 +69,6 @@ def test_methods_that_cannot_take_one_leave_it_to_the_judge(scene: wb.Scene, met
     assert "Balance" in method.accepts(wb.Problem(scene, constraints=[wb.Balance()]))
 
 
-def test_a_reach_that_would_fall_over_is_unreachable(scene: wb.Scene) -> None:
-    goal = wb.Point("right_index_tip", (1.45, -0.2, 0.9))
-    kept, fallen = (
-        wb.solve(wb.Problem(scene, goals=[goal], constraints=[LEFT, RIGHT], balance=balance))
-        for balance in (None, False)
-    )
-    assert (kept.status, fallen.status) == ("unreachable", "solved")
-    assert kept.assessment.constraint_violation < 1e-5
-
-
 def test_who_leans_keeps_the_centre_of_mass_away_from_the_edge_of_the_feet(scene: wb.Scene) -> None:
     """Between a tenth of the base and the fifth that people can use at most on each side (King et al. 1994)."""
     goal = wb.Point("right_index_tip", (0.45, -0.20, 0.30))

@@ -95,7 +95,7 @@ def scene(humanoid: Any) -> Any:
 @pytest.mark.parametrize("name", TERMS)
 def test_derivative_equals_central_differences(name: str, scene: Any, random_posture: Any) -> None:
     state = State(scene.model)
-    for seed in range(6):
+    for seed in range(3):
         rng = np.random.default_rng(seed)
         start, q = random_posture(scene.model, rng, 0.3), random_posture(scene.model, rng)
         # Feet that are turned about stand on a corner each, which is no polygon.
@@ -136,7 +136,7 @@ def test_derivative_equals_central_differences_on_the_human(name: str, human: An
     state = State(human.model)
     start = human.figure.posture("standing")
     low, high = human.figure.tangent_bounds(start)
-    for seed in range(3):
+    for seed in range(2):
         rng = np.random.default_rng(seed)
         reach = rng.uniform(np.maximum(low, -1.5), np.minimum(high, 1.5))
         q = pin.integrate(human.model, start, reach)

@@ -48,7 +48,7 @@ def both(term: object, state: State) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("name", ["RangeOfMotion", "ReachCones", "Rhythm", "Effort", "RotationEffort", "Discomfort"])
-@pytest.mark.parametrize("flexion", [-20.0, 0.0, 30.0])
+@pytest.mark.parametrize("flexion", [0.0, 30.0])
 def test_values_and_gradients_are_finite_and_continuous_there(scene: wb.Scene, name: str, flexion: float) -> None:
     term, state = terms(scene)[name], State(scene.figure.model)
     value, slope = both(term, state.update(arms(scene, flexion, 90.0, 0.0)))

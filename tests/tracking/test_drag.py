@@ -43,7 +43,7 @@ def test_a_drag_follows_and_ends_exactly(scene: wb.Scene, method: str) -> None:
     assert np.array_equal(drag.q, last.q)
 
 
-@pytest.mark.parametrize("method", ["newton", "qp", "ccd"])
+@pytest.mark.parametrize("method", ["newton", "qp"])
 def test_a_hand_is_not_dragged_through_a_plate(method: str, before_plate: Callable[..., wb.Problem]) -> None:
     """The goal goes through a plate of 6 mm in steps of 40 mm, and the hand stays on its side."""
     problem = before_plate((0.8, 0.8), 0.55, 1.2)
@@ -62,13 +62,13 @@ def test_a_hand_is_not_dragged_through_a_plate(method: str, before_plate: Callab
     assert tip.oMi[frame.parentJoint].act(frame.placement.translation)[1] < 0.0
 
 
-@pytest.mark.parametrize("method", each(["qp", "newton", "ccd", "placo", "dls"]))
+@pytest.mark.parametrize("method", each(["qp", "newton", "ccd"]))
 def test_frames_whose_time_is_spent_are_free_and_arrive(
     scene: wb.Scene, method: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The goal goes into a block, then before it.
 
-    Clocks are read ten times a frame; of placo, whose motions are swept, twenty times; by ccd a hundred times.
+    Clocks are read ten times a frame, by ccd a hundred times.
     """
     problem = _problem(wb.Scene(scene.figure).add(wb.Box((0.3, 0.4, 0.2)), name="block", at=(0.5, -0.25, 0.9)))
     arms = {f"{side}_shoulder_abduction": 0.6 for side in ("left", "right")}  # dls sees no trunk, and stops at it
@@ -77,17 +77,15 @@ def test_frames_whose_time_is_spent_are_free_and_arrive(
     drag = wb.tracking.Drag(problem, method, budget=0.01)
     wb.tracking.Drag(problem, method).to((0.3, -0.25, 1.0))  # compiles, which reads clocks too
     ticks = itertools.count()
-    monkeypatch.setattr(
-        control.time, "thread_time", lambda: {"ccd": 0.0001, "placo": 0.0005}.get(method, 0.001) * next(ticks)
-    )
+    monkeypatch.setattr(control.time, "thread_time", lambda: {"ccd": 0.0001}.get(method, 0.001) * next(ticks))
     inside = [drag.to((0.5, -0.25, 0.9)) for _ in range(25)]
     assert min(frame.error for frame in inside) > 0.05
     for frame in inside:
         judged = wb.assess(problem, frame.q)
         assert judged.penetration < 1e-3
         assert judged.constraint_violation < 1e-3
-    # to the end, a search of the goal inside takes 7 Newton steps, 60 programs of placo, or 143 sweeps
-    assert max(frame.iterations for frame in inside) <= {"ccd": 110, "newton": 4, "placo": 25}.get(method, 11)
+    # to the end, a search of the goal inside takes 7 Newton steps or 143 sweeps
+    assert max(frame.iterations for frame in inside) <= {"ccd": 110, "newton": 4}.get(method, 11)
     assert any(drag.to((0.3, -0.25, 1.0)).error < 2e-3 for _ in range(60))
 
 
@@ -145,7 +143,7 @@ def test_a_frame_by_quadratic_programs_is_as_near_as_it_is_asked_for(scene: wb.S
     assert max(measures) < 1.06 * min(measures)  # they settle over a second, in which the goal moves on
 
 
-@pytest.mark.parametrize(("method", "speed"), [("ccd", 1.5), ("newton", 1.5), ("qp", 1.5), ("qp", 0.6)])
+@pytest.mark.parametrize(("method", "speed"), [("ccd", 1.5), ("newton", 1.5), ("qp", 0.6)])
 def test_an_arm_gives_way_to_what_comes_into_it_and_comes_back(planar_arm, method: str, speed: float) -> None:
     """A ball is pushed 25 cm into where the forearm is, and taken away again; the goal stays where the tip was."""
     scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.08), name="ball", at=(0.7, 0.6, 0.0))

@@ -73,7 +73,7 @@ def test_a_viewer_plays_the_way_round_a_thing() -> None:
     """The arm gives way to a ball within frames; the page has more keyframes than the motion has postures."""
     from wholebody.view import commands
 
-    figure = wb.load("avatar")
+    figure = wb.load("hand")  # an avatar's surface takes a second to make
     q = figure.clamp(figure.neutral)
     palm = wb.Scene(figure).state(q).frame(figure.frame_id(figure.frames[-1])).translation
     scene = wb.Scene(figure).add(wb.Sphere(0.05), name="ball", at=palm + (0.6, 0.0, 0.0))

@@ -76,7 +76,7 @@ def test_a_thing_pushes_the_hand_away_and_undo_brings_both_back(drag: LiveDrag) 
     assert not drag.undo()
 
 
-@pytest.mark.parametrize("method", ["qp", "newton", "assembly"])
+@pytest.mark.parametrize("method", ["qp", "assembly"])
 def test_a_thing_that_is_thrown_at_what_is_held_stays_before_it(drag: LiveDrag, method: str) -> None:
     if method == "assembly":
         drag, thing, aim = LiveDrag(jointed()), "block", np.array((-0.4, 0.0, 0.5))
@@ -257,7 +257,7 @@ def test_an_assembly_without_bodies_is_refused_and_one_without_shapes_is_dragged
         drag.choose("ccd")
 
 
-@pytest.mark.parametrize("method", ["qp", "ccd", "dls", "assembly"])
+@pytest.mark.parametrize("method", ["qp", "ccd", "assembly"])
 def test_what_frames_need_is_made_before_them(drag: LiveDrag, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Sweeps, chains and the scene of what moves take as long as ten frames; of two people, twenty."""
 
@@ -275,6 +275,6 @@ def test_what_frames_need_is_made_before_them(drag: LiveDrag, method: str, monke
             for kind in (Sweep, MovingScene, ChainResolver):
                 patched.setattr(kind, "__init__", made)
             start = drag.place(name)
-            for share in np.linspace(0.0, 1.0, 20):
+            for share in np.linspace(0.0, 1.0, 12):
                 drag.move(start + share * np.array(way))
         drag.let_go()

@@ -54,7 +54,7 @@ def problem_of(scene: wb.Scene, **more: object) -> wb.Problem:
 
 @pytest.mark.parametrize(
     ("kind", "speed", "turn"),
-    [("plate", 2.5, 3.0), ("ball", 2.5, 3.0), ("rod", 1.0, 0.0)],
+    [("plate", 2.5, 3.0), ("ball", 2.5, 3.0)],
 )
 def test_whoever_is_fast_enough_gets_out_of_the_way(kind: str, speed: float, turn: float) -> None:
     """The body may move by 4 m/s along any axis, so a free posture exists in every frame: it may go with the thing."""
@@ -108,7 +108,7 @@ def hash_of(kind: str, speed: float) -> int:
     return 10 * list(KINDS).index(kind) + int(speed)
 
 
-@pytest.mark.parametrize(("method", "kind"), [("qp", "plate"), ("qp", "rod"), ("ccd", "plate")])
+@pytest.mark.parametrize(("method", "kind"), [("qp", "plate"), ("ccd", "plate")])
 def test_what_passes_through_a_dragged_person_is_named(method: str, kind: str) -> None:
     named = free = through = 0
     for seed, speed in enumerate((4.0, 45.0)):
@@ -158,8 +158,7 @@ def test_the_frame_loop_names_what_it_cannot_avoid(overlap: str) -> None:
             assert frame.path[-1][1] == pytest.approx(frame.q)
             parts = max(parts, len(frame.path) - 1)
             if not frame.collisions and began < 1e-5:  # what was in before was named then
-                straight = throw.deepest(((0.0, before), (1.0, frame.q)), way, 60)
-                assert straight < 4e-4 or throw.deepest(frame.path, way) < 4e-4
+                assert throw.deepest(frame.path, way, 30 if len(frame.path) < 4 else 0) < 4e-4
             for one in frame.collisions:
                 assert str(one) in frame.note
             named += bool(frame.collisions)

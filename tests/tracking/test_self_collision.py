@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import coal
@@ -64,25 +63,16 @@ def through_the_torso(avatar: wb.Figure) -> list[Any]:
     return [standing, avatar.with_joints(standing, inside), standing]
 
 
-def through_each_other(avatar: wb.Figure) -> list[Any]:
-    front = avatar.posture("arms_forward")
-    crossed = {"right_shoulder_abduction": -0.5, "left_shoulder_abduction": -0.5}
-    return [front, avatar.with_joints(front, crossed), front]
-
-
-@pytest.mark.parametrize(
-    ("limbs", "overlap", "allowed"), [(through_the_torso, "ccd", 1e-3), (through_each_other, "qp", 1e-4)]
-)
-def test_no_limb_enters_the_body(avatar: wb.Figure, limbs: Callable[..., Any], overlap: str, allowed: float) -> None:
+def test_no_limb_enters_the_body(avatar: wb.Figure) -> None:
     scene = wb.Scene(avatar)
-    there, inside, back = limbs(avatar)
+    there, inside, back = through_the_torso(avatar)
     shares = np.sin(np.linspace(0.0, 0.5 * np.pi, 15)) ** 2
     tracked = [np.asarray(pin.interpolate(avatar.model, there, inside, share)) for share in shares]
     tracked = [*tracked, *[inside] * 3, *tracked[::-1], *[back] * 20]
-    recording = follow(scene, wb.Clip(avatar, tracked, 1 / 60), overlap=overlap)
+    recording = follow(scene, wb.Clip(avatar, tracked, 1 / 60), overlap="ccd")
     assert sampled_depth(scene, inside) > 0.02
     assert sampled_depth(scene, inside) == pytest.approx(
         assess_motion(scene, np.array([inside]), 1.0).depth[0], rel=0.25
     )
-    assert max(sampled_depth(scene, q) for q in recording.q[::3]) < allowed
+    assert max(sampled_depth(scene, q) for q in recording.q[::3]) < 1e-3
     assert np.abs(pin.difference(avatar.model, recording.q[-1], back)).max() < 1e-3

@@ -63,7 +63,7 @@ def test_a_click_brings_the_film_there(browser: Any, page: str, tmp_path: Path) 
     file = tmp_path / "page.html"
     file.write_text(page, encoding="utf-8")
     browser.open(file.as_uri())
-    assert browser.evaluate("document.querySelectorAll('canvas').length") == 7
+    assert browser.evaluate("document.querySelectorAll('canvas').length") == 8
     browser.evaluate(
         "(() => { const chart = document.querySelector('canvas'), box = chart.getBoundingClientRect();"
         "chart.setPointerCapture = () => {};"

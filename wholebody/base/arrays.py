@@ -43,8 +43,8 @@ def brief(self: Any) -> str:
     named = fields(self) if is_dataclass(self) else ()
     names = {one.name: one.default for one in named if one.repr} or dict.fromkeys(getattr(self, "_fields", ()), self)
     values = {name: getattr(self, name) for name in names}
-    told = [f"{name}={_word(value)}" for name, value in values.items() if not _is(value, names[name])]
-    text = f"{type(self).__name__}({', '.join(told)})"
+    shown = [f"{name}={_word(value)}" for name, value in values.items() if not _is(value, names[name])]
+    text = f"{type(self).__name__}({', '.join(shown)})"
     return text if len(text) <= LINE else f"{text[: LINE - 4]}...)"
 
 

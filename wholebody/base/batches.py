@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import multiprocessing
 import os
+import shutil
 import sys
 import threading
 import time
@@ -222,7 +223,7 @@ class JobOptions(TypedDict, total=False):
 
 
 class Jobs(NamedTuple):
-    """How many jobs at a time, on which cluster, and who is told how many are done."""
+    """How many jobs at a time, on which cluster, and what is called with how many are done."""
 
     jobs: int
     cluster: str | None
@@ -240,23 +241,29 @@ class Jobs(NamedTuple):
 
 def reporter(value: Callable[..., Any] | bool | None, what: str) -> Callable[..., Any] | None:
     """The function to call with the numbers of finished and of all jobs: a given one, a line on stderr, or None."""
-    return checks.function({True: _Line(), False: None}[value] if isinstance(value, bool) else value, what)
+    return checks.function({True: Line(), False: None}[value] if isinstance(value, bool) else value, what)
 
 
-class _Line:
-    """A line that is rewritten at most ten times a second."""
+class Line:
+    """A line on the error output that says how many of how many are done; rewritten at most ten times a second."""
 
     def __init__(self) -> None:
-        self._began, self._told = time.perf_counter(), 0.0
+        self._began, self._written = time.perf_counter(), 0.0
 
     def __call__(self, *given: Any) -> None:
+        """Take the numbers of finished and of all jobs, or a record that begins with them."""
         done, total = (given[0] if isinstance(given[0], tuple) else given)[:2]
+        self.write(done, total)
+
+    def write(self, done: float, total: float, note: str = "") -> None:
+        """Write it, in per cent where the total is no whole number, with what is being done."""
         now = time.perf_counter()
-        if done < total and now - self._told < 0.1:
+        if sys.stderr is None or (done < total and now - self._written < 0.1):
             return
-        self._told, spent = now, now - self._began
+        self._written, spent = now, now - self._began
         rest = f", {spent / done * (total - done):.0f} s to go" if 0 < done < total else ""
-        bar, end = "#" * int(20 * done / max(total, 1)), "\n" if done >= total else ""
-        if sys.stderr is not None:
-            sys.stderr.write(f"\r{bar:.<20} {done} of {total}, {spent:.0f} s{rest}   {end}")
-            sys.stderr.flush()
+        count = f"{done} of {total}" if isinstance(total, int) else f"{done / total:.0%}"
+        bar, end = "#" * int(20 * done / max(total, 1)), "\n" if done >= total and not note else ""
+        line, wide = f"{bar:.<20} {count}, {spent:.0f} s{rest}   {note}", shutil.get_terminal_size().columns - 1
+        sys.stderr.write(f"\r{f'{line:<{wide}.{wide}}' if note else line}{end}")
+        sys.stderr.flush()

@@ -109,12 +109,12 @@ def plain(bound: float) -> str:
     return re.sub(r"e([+-])0*", lambda sign: f"e{sign[1]}".replace("+", ""), short)
 
 
-def warn(told: str) -> None:
+def warn(message: str) -> None:
     """Warn, at the place that called the package."""
     frame, level = inspect.currentframe(), 1
     while frame is not None and frame.f_code.co_filename.startswith(_INSIDE):
         frame, level = frame.f_back, level + 1
-    warnings.warn(told, stacklevel=level)
+    warnings.warn(message, stacklevel=level)
 
 
 def warn_of_degrees(value: float, what: str, likely: float = MOST_TURNED, unit: str = "rad") -> None:
@@ -138,8 +138,8 @@ def time_step(value: object, what: str) -> float:
     """Seconds of a step or a frame, within `TIME_STEP`."""
     found = number(value, what, *TIME_STEP, "s, such as 0.02")
     if found > 10.0:  # Seconds of a step beyond which a number of frames a second was probably meant.
-        told = f"{what} is {found:g} s; for {found:g} frames a second give 1 / {found:g}"
-        warn(told)
+        message = f"{what} is {found:g} s; for {found:g} frames a second give 1 / {found:g}"
+        warn(message)
     return found
 
 

@@ -97,6 +97,24 @@ def compiled(*, inner: bool = False, **options: Any) -> Callable[[F], F]:
     return decorate
 
 
+def with_loops(name: str) -> Callable[[Callable[[Any], None]], Callable[[], Any]]:
+    """Make of what calls the loops of a module with small arguments a function that returns the module.
+
+    Its first call compiles the loops or reads them back, so that this does not happen in the middle of a solve.
+    """
+
+    def decorate(call: Callable[[Any], None]) -> Callable[[], Any]:
+        @lru_cache(maxsize=1)
+        def module() -> Any:
+            found = import_module(name)
+            call(found)
+            return found
+
+        return module
+
+    return decorate
+
+
 def compile_all(names: Sequence[str] = LOOPS) -> None:
     """Compile all loops of these modules, or load them from the cache."""
     for name in names:
@@ -169,21 +187,10 @@ def compile_seconds(clock: str = "thread_time") -> float:
 
 
 @lru_cache(maxsize=1)
-def _loop_type() -> Any:
-    """A compiled function of numba, read back from what is kept without all that compiling needs.
-
-    numba loads its tables of types and functions first, which takes 0.4 of 0.5 s. What compiles loads them by itself.
-
-    numba would compile a function anew for every constant that a caller gives, 22 times one that finds a table by its
-    number. Here a constant is a value as any: where that is faster, LLVM puts the function into its caller anyway.
-    """
-    from numba.core import event
+def _cache_type() -> Any:
+    """What is kept of a compiled function, beside its module or in a wheel; what cannot be read counts as nothing."""
     from numba.core.caching import FunctionCache, IndexDataCacheFile
-    from numba.core.codegen import JITCodeLibrary
-    from numba.core.compiler_lock import global_compiler_lock
-    from numba.core.registry import CPUDispatcher
     from numba.core.runtime import rtsys
-    from numba.core.types.misc import unliteral
 
     class Kept(FunctionCache):  # type: ignore[misc]
         def load_overload(self, sig: Any, target_context: Any) -> Any:
@@ -222,6 +229,24 @@ def _loop_type() -> Any:
             key = self._index_key(sig, codegen)
             self._precompiled().save(key, self._cache_file.load(key))
 
+    return Kept
+
+
+@lru_cache(maxsize=1)
+def _loop_type() -> Any:
+    """A compiled function of numba, read back from what is kept without all that compiling needs.
+
+    numba loads its tables of types and functions first, which takes 0.4 of 0.5 s. What compiles loads them by itself.
+
+    numba would compile a function anew for every constant that a caller gives, 22 times one that finds a table by its
+    number. Here a constant is a value as any: where that is faster, LLVM puts the function into its caller anyway.
+    """
+    from numba.core import event
+    from numba.core.codegen import JITCodeLibrary
+    from numba.core.compiler_lock import global_compiler_lock
+    from numba.core.registry import CPUDispatcher
+    from numba.core.types.misc import unliteral
+
     class Library(JITCodeLibrary):  # type: ignore[misc]
         @classmethod
         def read(cls, codegen: Any, kept: Any) -> Any:
@@ -231,14 +256,14 @@ def _loop_type() -> Any:
         code_type = Library
 
         def enable_caching(self) -> None:
-            self._cache = Kept(self.py_func)
+            self._cache = _cache_type()(self.py_func)
 
         def copy_kept(self) -> None:
             for sig in self.overloads:
                 self._cache.copy(sig, self.targetctx.codegen())
 
         def compile(self, sig: Any) -> Any:
-            if _beside and self.__module__ in BESIDE.values() and isinstance(self._cache, Kept):
+            if _beside and self.__module__ in BESIDE.values() and isinstance(self._cache, _cache_type()):
                 # another process compiles it; reading its cache is faster than compiling it here too
                 with event.trigger_event("numba:compile", data={"dispatcher": self}):
                     while _beside[0].poll() is None and self._cache.load_overload(sig, self.targetctx) is None:
@@ -306,7 +331,7 @@ def _watch() -> None:
     from numba.core import event
 
     class Listener(event.Listener):  # type: ignore[misc]
-        told = False
+        reported = False
 
         def on_start(self, event: Any) -> None:
             if _compiling["depth"] == 0:
@@ -314,8 +339,8 @@ def _watch() -> None:
                 _compiling["collects"] = gc.isenabled()
                 gc.disable()  # numba makes millions of objects that stay: to look through them is an eighth of the time
             _compiling["depth"] += 1
-            if not self.told and event.data["dispatcher"].__module__.startswith("wholebody."):
-                self.told = True
+            if not self.reported and event.data["dispatcher"].__module__.startswith("wholebody."):
+                self.reported = True
                 logging.getLogger(__name__).info("compiling the inner loops: up to a minute, once on a machine")
                 compile_beside()
 

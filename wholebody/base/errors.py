@@ -92,15 +92,15 @@ class TermError(InputError):
     Attributes:
         term: the term; None in another process.
         name: of the term, in words.
-        told: what is wrong with its answer, and how to correct it.
+        reason: what is wrong with its answer, and how to correct it.
     """
 
-    def __init__(self, term: object, name: str, told: str) -> None:
-        self.term, self.name, self.told = term, name, told
-        super().__init__(f"{name}: {told}")
+    def __init__(self, term: object, name: str, reason: str) -> None:
+        self.term, self.name, self.reason = term, name, reason
+        super().__init__(f"{name}: {reason}")
 
     def __reduce__(self) -> tuple[Any, ...]:  # a term need not go into another process
-        return type(self), (None, self.name, self.told)
+        return type(self), (None, self.name, self.reason)
 
 
 class UndefinedTermError(TermError):
@@ -113,7 +113,7 @@ class UndefinedTermError(TermError):
     WHERE = "at a posture"
     q: Any = None
 
-    def told_of(self, which: str) -> str:
+    def at_posture(self, which: str) -> str:
         """The sentence, with which posture it is, such as "of iteration 3"."""
         return str(self).replace(self.WHERE, f"{self.WHERE} {which}", 1)
 

@@ -127,8 +127,8 @@ def called(record: object) -> str:
     """A record in messages: its class, and the names that it must be given."""
     kind: Any = type(record)
     names = _names(kind)
-    told = ", ".join([checks.shown(getattr(record, name)) for name in names])
-    return f"{kind.__name__}({told})" if names else str(kind.__name__)
+    values = ", ".join([checks.shown(getattr(record, name)) for name in names])
+    return f"{kind.__name__}({values})" if names else str(kind.__name__)
 
 
 def check_of(kind: Any, name: str) -> Check:

@@ -18,8 +18,8 @@ def exported(package: str, file: str) -> tuple[Callable[[str], object], Callable
 
     def load(name: str) -> object:
         if name not in home:
-            told = f"module {package!r} has no attribute {name!r}"
-            raise AttributeError(told, name=name, obj=sys.modules[package])  # Python names the nearest
+            message = f"module {package!r} has no attribute {name!r}"
+            raise AttributeError(message, name=name, obj=sys.modules[package])  # Python names the nearest
         room = home[name] == package
         value = import_module(f"{package}.{name}") if room else getattr(import_module(home[name]), name)
         setattr(sys.modules[package], name, value)

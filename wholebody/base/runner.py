@@ -95,7 +95,6 @@ class Child:
     """A child process that does one job at a time; a new one replaces it when it has ended."""
 
     def __init__(self, environment: Mapping[str, str] | None = None) -> None:
-        """Prepare, with variables of `environment` in place of this process's."""
         self._environment = dict(environment or {})
         self._process: subprocess.Popen[bytes] | BaseProcess | None = None
         self._output: IO[bytes] | None = None

@@ -8,6 +8,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from wholebody.base.charts import new_chart
 from wholebody.base.files import packaged_toml
 from wholebody.bench.statistics import Interval
 
@@ -35,27 +36,23 @@ def method_style(name: str) -> Style:
 
 def figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, Any]:
     """Return an empty figure, inches, and its axes (rows, columns)."""
-    import matplotlib
+    from matplotlib import rc_context
 
-    matplotlib.use("agg")
-    from matplotlib import pyplot
-
-    matplotlib.rcParams.update(STYLE["settings"])
-    chart, axes = pyplot.subplots(rows, columns, figsize=size, squeeze=False, layout="constrained")
-    return chart, axes
+    with rc_context(STYLE["settings"]):
+        return new_chart(rows, columns, size)
 
 
 def save(chart: Any, path: Path) -> tuple[Path, Path]:
     """Write a chart as SVG and PNG beside each other; return both paths. It is laid out once for both."""
-    from matplotlib import pyplot
+    from matplotlib import rc_context
 
-    chart.get_layout_engine().execute(chart)
-    chart.set_layout_engine("none")
     path.parent.mkdir(parents=True, exist_ok=True)
     svg, png = path.with_suffix(".svg"), path.with_suffix(".png")
-    chart.savefig(svg, metadata={"Date": None})
-    chart.savefig(png, metadata={"Software": None})
-    pyplot.close(chart)
+    with rc_context(STYLE["settings"]):
+        chart.get_layout_engine().execute(chart)
+        chart.set_layout_engine("none")
+        chart.savefig(svg, metadata={"Date": None})
+        chart.savefig(png, metadata={"Software": None})
     return svg, png
 
 

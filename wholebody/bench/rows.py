@@ -80,7 +80,7 @@ def table(rows: Sequence[Row]) -> str:
     return "\n".join(lines)
 
 
-def told(row: Row) -> str:
+def in_words(row: Row) -> str:
     """A row in one line."""
     return f"{row.case}, {row.tool}: {', '.join(f'{name} {value}' for name, value in row.figures.items())}"
 

@@ -48,8 +48,8 @@ def machine() -> dict[str, str]:
 def sentence(facts: Mapping[str, str]) -> str:
     """The facts in one sentence of Markdown, without the system and the versions of packages: CSV files have these."""
     kept = "wholebody", "date", "processor", "cores", "load", "OMP_NUM_THREADS"
-    told = [f"{name} {value}" for name, value in facts.items() if name in kept]
-    return f"Measured with {'; '.join(told)}."
+    kept_facts = [f"{name} {value}" for name, value in facts.items() if name in kept]
+    return f"Measured with {'; '.join(kept_facts)}."
 
 
 def formatted(value: float, spec: str, unit: str = "", none: str = "") -> str:

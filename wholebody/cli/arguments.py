@@ -26,7 +26,7 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: Any = None
     ) -> tuple[argparse.Namespace, list[str]]:
-        """As `argparse` does; what a command does not know is told with the options of that command."""
+        """As `argparse` does; what a command does not know is named with the options of that command."""
         found, rest = super().parse_known_args(args, namespace)
         for word in rest[:1]:
             if is_number(word) and any(option.metavar == JOINED for option in self._actions):

@@ -185,6 +185,6 @@ def moments(frames: Sequence[WorldFrame]) -> list[int]:
     names = frames[0].placements
     places = np.array([[frame.placements[name].translation for name in names] for frame in frames])
     steps = np.linalg.norm(np.diff(places, axis=0), axis=2).sum(axis=1) if len(names) else np.zeros(len(frames) - 1)
-    ways = np.concatenate([[0.0], np.cumsum(steps)])
-    chosen = np.searchsorted(ways, ways[-1] * np.array([0.02, 0.25, 0.5, 0.75, 1.0]))
+    travelled = np.concatenate([[0.0], np.cumsum(steps)])
+    chosen = np.searchsorted(travelled, travelled[-1] * np.array([0.02, 0.25, 0.5, 0.75, 1.0]))
     return [min(int(number), len(frames) - 1) for number in chosen]

@@ -62,7 +62,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         try:
             return _run(sys.argv[1:] if argv is None else list(argv))
         finally:
-            sys.stdout.flush()  # what cannot be written is told, and not at the end of the process
+            sys.stdout.flush()  # what cannot be written is reported here, and not at the end of the process
     except WholebodyError as error:
         _say(str(error))
         return 2
@@ -83,11 +83,11 @@ def _run(given: list[str]) -> int:
     raise_again()
     _tell_progress()
     with warnings.catch_warnings():
-        warnings.showwarning = _told
+        warnings.showwarning = _show_warning
         return int(arguments.run(arguments))
 
 
-def _told(
+def _show_warning(
     message: Warning | str, category: type[Warning], filename: str, lineno: int, file: Any = None, line: Any = None
 ) -> None:
     """Say a warning of the library as a sentence, without its place in Python; others as Python does."""
@@ -99,7 +99,7 @@ def _ready() -> bool:
     if sys.stderr is None:
         sys.stderr = open(os.devnull, "w")  # noqa: SIM115 (for the rest of the process)
     if sys.stdout is None:
-        _say("stdout is closed, so nothing can be told; send it to a file or to /dev/null")
+        _say("stdout is closed, so nothing can be printed; send it to a file or to /dev/null")
         return False
     with suppress(UnsupportedOperation):  # a stdout of somebody else has no file
         os.write(sys.stdout.fileno(), b"")  # tells whether it can be written, before anything is computed
@@ -109,9 +109,9 @@ def _ready() -> bool:
     return True
 
 
-def _say(told: str) -> None:
+def _say(message: str) -> None:
     with suppress(OSError):
-        print(f"wholebody: {told}", file=sys.stderr, flush=True)
+        print(f"wholebody: {message}", file=sys.stderr, flush=True)
 
 
 def _discard_output() -> None:
@@ -122,7 +122,7 @@ def _discard_output() -> None:
 
 def _tell_progress() -> None:
     """Report long steps, such as the decomposition of a mesh, to stderr; the library itself only logs them."""
-    told = logging.getLogger("wholebody")
-    if not any(isinstance(handler, logging.StreamHandler) for handler in told.handlers):
-        told.addHandler(logging.StreamHandler())
-    told.setLevel(logging.INFO)
+    logger = logging.getLogger("wholebody")
+    if not any(isinstance(handler, logging.StreamHandler) for handler in logger.handlers):
+        logger.addHandler(logging.StreamHandler())
+    logger.setLevel(logging.INFO)

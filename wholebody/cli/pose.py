@@ -77,6 +77,6 @@ def _pose(path: Path, method: str | None, out: Path, as_json: bool, screenshots:
         tables.show_solution(task, solution)
     with Console(stderr=as_json).status("drawing"):
         written, note = draw_scene(task.problem, solution.q, task.view, out, task.title, screenshots)
-    told = [f"wrote {file}" for file in (out / "result.json", *written)]
-    print(*told, *filter(None, [note]), sep="\n", file=sys.stderr if as_json else sys.stdout)
+    lines = [f"wrote {file}" for file in (out / "result.json", *written)]
+    print(*lines, *filter(None, [note]), sep="\n", file=sys.stderr if as_json else sys.stdout)
     return 0 if solution.solved else 1

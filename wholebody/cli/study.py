@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
         records = study(
             asked.task, people=asked.people, targets=asked.targets, layouts=asked.layouts, method=asked.method,
             warm_start=asked.warm_start, jobs=arguments.at_once, cluster=arguments.cluster, folder=out,
-            progress=lambda told: status.update(f"{told.done} of {told.total}"),
+            progress=lambda state: status.update(f"{state.done} of {state.total}"),
         )  # fmt: skip
     made = table("case", "outcome", "goal error", "overlap", "time")
     for one in records:

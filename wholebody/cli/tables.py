@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from wholebody.assessment.posture import distance_and_angle
+from wholebody.base.batches import Line
 from wholebody.figures.state import State
 
 if TYPE_CHECKING:
@@ -44,26 +46,19 @@ def console(least: int = 0) -> Console:
 
 
 @contextmanager
-def bar(what: str, count: float = 1.0, *, thread: bool = True) -> Iterator[Callable[[float, str], Any]]:
-    """Show on the error output how far something is: the function takes how much of `count` is done, and what it is.
+def bar(what: str, count: float = 1.0) -> Iterator[Callable[[float, str], Any]]:
+    """Show on a terminal how far something is: the function takes how much of `count` is done, and what it is.
 
-    The bar goes when it is done. A thread redraws it, which a fork must not have.
+    The line goes when it is done.
     """
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TaskProgressColumn,
-        TextColumn,
-        TimeRemainingColumn,
-    )
-
-    numbers = TaskProgressColumn() if count == 1.0 else MofNCompleteColumn()
-    columns = TextColumn("{task.description}"), BarColumn(), numbers, TimeRemainingColumn()
-    settings: dict[str, Any] = {"transient": True, "auto_refresh": thread, "refresh_per_second": 4}
-    with Progress(*columns, console=Console(stderr=True), **settings) as shown:
-        task = shown.add_task(escape(what), total=count)
-        yield lambda done, said: shown.update(task, completed=done, description=escape(said), refresh=not thread)
+    line, shown = Line(), sys.stderr is not None and sys.stderr.isatty()
+    if shown:
+        line.write(0, count, what)
+    try:
+        yield lambda done, said: line.write(done, count, said) if shown else None
+    finally:
+        if shown:
+            sys.stderr.write("\r\x1b[K")
 
 
 def table(*columns: str, title: str = "") -> Table:

@@ -92,13 +92,13 @@ def _live(scene: InteractionScene, arguments: argparse.Namespace) -> int:
 
     live = LiveWorld(scene.scene, scene.track.q[0], give_way=arguments.give_way)
     receiver = None if arguments.udp is None else Receiver(arguments.udp, live.handles)
-    told = {""}
+    seen = {""}
 
     def places() -> Mapping[str, Array]:
         assert receiver is not None
         found = receiver.latest()
-        if receiver.note not in told and len(told) < 20:
-            told.add(receiver.note)
+        if receiver.note not in seen and len(seen) < 20:
+            seen.add(receiver.note)
             print(f"refused: {receiver.note}", flush=True)
         return found
 

@@ -15,7 +15,6 @@ class BodiesState:
     """Positions and velocities of all bodies; `velocity` [m/s] and `spin` [rad/s] (n, 3) are views of the twists."""
 
     def __init__(self, scene: Scene, pieces: Pieces) -> None:
-        """Put all bodies where the scene has them, with the velocities of their `wb.Body`."""
         count = len(pieces.names)
         self.pieces = pieces
         self.bodies = Bodies(

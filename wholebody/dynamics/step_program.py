@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask, with_values
+from wholebody.base.compiled import with_loops
 from wholebody.dynamics import (
     energy_kernel,
     impact_kernel,
@@ -246,8 +246,8 @@ def impact_times(gap: Array, speed: Array, pull: Array) -> Array:
     return found
 
 
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
+@with_loops("wholebody.dynamics.motion_kernel")
+def compiled_kernel(_: Any) -> None:
     """The loops of motion; those of all other modules named above are compiled or read back with them."""
     one, unit, mask, twist = np.zeros((1, 3)), np.eye(3)[None].copy(), np.ones(1, dtype=bool), np.zeros((1, 6))
     none, pairs, some, no_mask = _integers(0), _integers(0, 2), np.zeros(0), np.zeros(0, dtype=bool)
@@ -274,7 +274,6 @@ def compiled_kernel() -> Any:
     swept = SweptPoints(vectors, none, none, some, vectors, np.zeros((0, 4)))
     way = passing.Way(pairs, none, np.zeros((2, 0)), np.zeros((2, 0, 3)), np.zeros((2, 0, 4, 3)), one, some, some, 0.0)
     passing.doubtful(way, swept, no_mask)
-    return motion_kernel
 
 
 def _integers(*shape: int) -> Indices:

@@ -41,7 +41,7 @@ class Ergonomics:
         angles: of the body.
         rula, reba, owas: the scores.
         torques: static torques against strength.
-        seat: whether the person was taken to sit, and what told it.
+        seat: whether the person was taken to sit, and why.
 
     Examples:
         >>> wb.ergonomics.ergonomics_of(human, standing).rula.left.score
@@ -126,13 +126,13 @@ def ergonomics_of(
         >>> rows = scores.rows()
     """
     person = seen(figure, q, work, "ergonomics_of")
-    angles, told = person.angles, person.work
+    angles, work = person.angles, person.work
     return Ergonomics(
         angles,
-        Rula(*(rula_parts(angles, side, told) for side in SIDES)),
-        Reba(*(reba_parts(angles, side, told) for side in SIDES)),
-        owas_code(angles, told),
-        static_torques(person.figure, q, load=told.load, seated=told.sits(angles), strength=strength),
+        Rula(*(rula_parts(angles, side, work) for side in SIDES)),
+        Reba(*(reba_parts(angles, side, work) for side in SIDES)),
+        owas_code(angles, work),
+        static_torques(person.figure, q, load=work.load, seated=work.sits(angles), strength=strength),
         person.seat,
     )
 

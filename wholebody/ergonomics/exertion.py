@@ -19,7 +19,7 @@ from wholebody.figures.state import State
 from wholebody.motion.strength import Strength
 from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Constraint, Surroundings, filled
+from wholebody.tasks.base import ComputedTogether, Surroundings, filled
 from wholebody.tasks.distance import SumOfSquares
 from wholebody.tasks.forces import GRAVITY, Force, Forces, Loads, point_rows, pressure, resolved
 
@@ -216,7 +216,7 @@ class Exertion(SumOfSquares):
 
 
 @dataclass(frozen=True, eq=False)
-class StrengthLimit(Constraint):
+class StrengthLimit(ComputedTogether):
     """Keep joint torques within strength, and the compression of the disc L5/S1 within a bound.
 
     Rows are what is left: of the strength of each joint with published strength in either direction [share], and of the
@@ -250,16 +250,8 @@ class StrengthLimit(Constraint):
         """Look up the joints and their strength."""
         return filled(self, statics=statics_of(scene, self))
 
-    def value(self, state: State) -> Array:
-        """(m,) what is left."""
-        return self.value_and_jacobian(state, self.value)[0]
-
-    def jacobian(self, state: State) -> Array:
-        """(m, nv)."""
-        return self.value_and_jacobian(state, self.value)[1]
-
     def value_and_jacobian(self, state: State, value: Callable[[State], Array]) -> tuple[Array, Array]:
-        """Both from one look at the forces."""
+        """(m,) what is left, and its derivative (m, nv)."""
         share, moves = self.statics.efforts(state)
         values, rows = [self.share - share, self.share + share], [-moves, moves]
         if self.compression is not None:

@@ -63,8 +63,8 @@ class Lift(Checked):
         """The limit, what makes it zero, and the lifting index of a load."""
         none = [name for name, value in self.multipliers.items() if value == 0.0]
         why = f" ({' and '.join(none)} = 0)" if none else ""
-        told = "" if self.index is None else f", lifting index {self.index:.2f} with {self.load:g} kg"
-        return f"at most {self.limit:.1f} kg by the NIOSH equation{why}{told}"
+        index = "" if self.index is None else f", lifting index {self.index:.2f} with {self.load:g} kg"
+        return f"at most {self.limit:.1f} kg by the NIOSH equation{why}{index}"
 
     @property
     def multipliers(self) -> dict[str, float]:

@@ -93,8 +93,8 @@ class Seen(NamedTuple):
 
     figure: Figure  # the person
     angles: BodyAngles  # of the body
-    work: Work  # with `seated` and `back_supported` told
-    seat: str  # words for how they were told
+    work: Work  # with `seated` and `back_supported` decided
+    seat: str  # words for how they were decided
 
 
 def seen(body: Figure | Scene, q: Array, work: Work | None, what: str) -> Seen:
@@ -106,12 +106,12 @@ def seen(body: Figure | Scene, q: Array, work: Work | None, what: str) -> Seen:
     angles = body_angles(figure, q)
     seat, rest = _bearers(body, q, angles) if isinstance(body, Scene) and not asked.walking else (None, None)
     if asked.seated is not None:
-        told, sits = "as Work says", asked.seated
+        reason, sits = "as Work says", asked.seated
     elif seat is not None:
-        told, sits = f"as {seat} is below pelvis or thighs", True
+        reason, sits = f"as {seat} is below pelvis or thighs", True
     else:
-        told, sits = "by the posture", asked.sits(angles) and not asked.walking
-    words = f"{'sits' if sits else 'does not sit'}, {told}"
+        reason, sits = "by the posture", asked.sits(angles) and not asked.walking
+    words = f"{'sits' if sits else 'does not sit'}, {reason}"
     if sits and asked.back_supported is None and rest is not None:
         words += f"; the back is at {rest}"
     back = rest is not None if asked.back_supported is None else asked.back_supported

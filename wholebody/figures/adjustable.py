@@ -57,8 +57,8 @@ def adjustable(
         >>> seat.joints
         ('slide',)
     """
-    told = "adjustable: parts"
-    checks.instance(parts, Mapping, told, "give {'cushion': (wb.Box((0.45, 0.5, 0.05)), (0.2, 0, 0.4))}")
+    what = "adjustable: parts"
+    checks.instance(parts, Mapping, what, "give {'cushion': (wb.Box((0.45, 0.5, 0.05)), (0.2, 0, 0.4))}")
     model, last, joints = pin.Model(), 0, []
     model.name = ADJUSTABLE
     for name, span in (("slide", slide), ("height", height), ("tilt", tilt)):
@@ -78,11 +78,11 @@ def adjustable(
     pieces = []
     for name, given in parts.items():
         shape, at = given if isinstance(given, tuple) and len(given) == 2 else (given, (0.0, 0.0, 0.0))
-        told = f"adjustable: {checks.text(name, told)!r}"
-        checks.instance(shape, Shape, told, "give wb.Box, wb.Mesh or another")
+        what = f"adjustable: {checks.text(name, what)!r}"
+        checks.instance(shape, Shape, what, "give wb.Box, wb.Mesh or another")
         if "/" in name or model.existFrame(name) or isinstance(shape, HalfSpace):
-            raise InputError(f"{told}: take a name without a slash that no setting has, and a shape with an end")
-        place = placement(at, told)
+            raise InputError(f"{what}: take a name without a slash that no setting has, and a shape with an end")
+        place = placement(at, what)
         frame = model.addFrame(pin.Frame(name, last, 0, place, pin.FrameType.BODY))
         for number, part in enumerate(shape.pieces()):
             piece = pin.GeometryObject(f"{name}:{number}", last, frame, place * part.placement, part.geometry)

@@ -234,7 +234,7 @@ def _made(sex: str, stature: float, mass: float, age: float | None, stated: tupl
     all_of = population(sex).likely({**size, **known_years, **values})
     person = Person(sex, stature, mass, tuple((name, all_of[name]) for name in dimension_names()), tuple(values), age)
     for name, value in person.built[1].items():
-        # metres within which a stated dimension must be met; an overhead reach is told by `notes`
+        # metres within which a stated dimension must be met; `notes` says an overhead reach
         if name in values and name != OVERHEAD and abs(value - values[name]) > 0.001:
             raise InputError(
                 f"proportions: {name} {values[name]:g} m is out of the model's reach with the other dimensions and "
@@ -291,7 +291,6 @@ class Dimensions:
     """Sizes of one `Person`."""
 
     def __init__(self, person: Person) -> None:
-        """Compute the sizes of a person."""
         self.body = person
         self.stature = height = person.stature
         toe = self.joint("left_toe_extension")

@@ -175,9 +175,9 @@ def chosen_pairs(
     solids: Sequence[Named], reason: Callable[[Named, Named], str | None]
 ) -> tuple[tuple[tuple[str, str], ...], tuple[ExcludedPair, ...]]:
     """The pairs of pieces that are tested, by name, and those that are not, for which there is a reason."""
-    told = [(a.name, b.name, reason(a, b)) for a, b in combinations(solids, 2)]
-    tested = tuple((a, b) for a, b, why in told if not why)
-    return tested, tuple(ExcludedPair(a, b, why) for a, b, why in told if why)
+    judged = [(a.name, b.name, reason(a, b)) for a, b in combinations(solids, 2)]
+    tested = tuple((a, b) for a, b, why in judged if not why)
+    return tested, tuple(ExcludedPair(a, b, why) for a, b, why in judged if why)
 
 
 def is_root(joint: str) -> bool:

@@ -78,7 +78,9 @@ def hand_figure_of(person: Person, side: str) -> Figure:
     """Return the hand of a person; the side as for `hand_spec`."""
     spec = hand_spec(side, person)
     model = model_of(spec)
-    tested, excluded = chosen_pairs(spec.solids, _reason)
+    tested, excluded = chosen_pairs(
+        spec.solids, lambda a, b: finger_pair(a.segment.partition("_")[2], b.segment.partition("_")[2])
+    )
     names = tuple(joint.name for joint in spec.joints)
     groups = {finger: tuple(name for name in names if name.startswith(f"{side}_{finger}_")) for finger in FINGERS}
     description = Description(
@@ -177,10 +179,6 @@ def massive_links(size: Dimensions, radii: Mapping[str, tuple[float, float, floa
         mass = total * volumes[segment] / sum(volumes.values())
         inertia = (mass * (b * b + c * c) / 5.0, mass * (a * a + c * c) / 5.0, mass * (a * a + b * b) / 5.0)
         yield Link(segment, mass, (0.0, 0.0, -c), inertia)
-
-
-def _reason(a: Solid, b: Solid) -> str | None:
-    return finger_pair(a.segment.partition("_")[2], b.segment.partition("_")[2])
 
 
 def is_finger(segment: str) -> bool:

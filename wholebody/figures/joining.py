@@ -159,12 +159,12 @@ def _pairs_of_mount(
         neighbours = above[joint[a]] == joint[b] or above[joint[b]] == joint[a]
         why.append("neighbours" if neighbours else "touch where it is mounted" if (a, b) in touching else "")
     kept = np.array([not reason for reason in why], dtype=bool)
-    told = [
+    excluded = [
         ExcludedPair(pieces[a].name, pieces[b].name, reason)
         for (a, b), reason in zip(pairs.tolist(), why, strict=True)
         if reason
     ]
-    return pairs[kept], tuple(told)
+    return pairs[kept], tuple(excluded)
 
 
 def _merged(parts: Sequence[_Part]) -> Description:

@@ -152,8 +152,8 @@ def _pieces(vertices: Array, faces: NDArray[np.int64], share: float | None, what
     split = convex_pieces(vertices, faces, threshold=share, what=what)
     if split.added_volume <= 0.01:
         return split
-    told = f"{what}: its convex pieces ({len(split.pieces)}) have {split.added_volume:.0%} more volume"
-    return with_values(split, notes=(*split.notes, told))
+    note = f"{what}: its convex pieces ({len(split.pieces)}) have {split.added_volume:.0%} more volume"
+    return with_values(split, notes=(*split.notes, note))
 
 
 def _prism(radius: float, length: float) -> Array:

@@ -1,4 +1,4 @@
-"""Numbers of a model that lead to NaN are refused; angles that were probably meant in degrees are told."""
+"""Numbers of a model that lead to NaN are refused; of angles that were probably meant in degrees a warning says so."""
 
 from __future__ import annotations
 
@@ -88,17 +88,17 @@ class Turning:
         values = rows[:, self._places[column]]
         frame = int(np.argmax(np.maximum(self._low[column] - values, values - self._high[column])))
         where = f"{what}: joint {self._names[column]!r}" + (f" of frame {frame}" if q.ndim > 1 else "")
-        warn(self._told(where, float(values[frame]), column))
+        warn(self._sentence(where, float(values[frame]), column))
         return True
 
     def warn_of(self, name: str, value: float, place: int, q: Array) -> None:
         """Warn where a value of a joint, which is at a place of the posture q (nq,), is far out."""
         for column in np.flatnonzero(self._places == place).tolist():
             if not self._low[column] - FAR_OUT <= q[place] <= self._high[column] + FAR_OUT:
-                warn(self._told(f"joint {name!r}", value, column))
+                warn(self._sentence(f"joint {name!r}", value, column))
 
-    def _told(self, what: str, value: float, column: int) -> str:
-        """What is told of an angle [rad] that is far out of its limits."""
+    def _sentence(self, what: str, value: float, column: int) -> str:
+        """The warning of an angle [rad] that is far out of its limits."""
         low, high = (float(limits[column]) for limits in self._limits)
         if low <= np.radians(value) <= high:
             out = "far out of its limits" if np.isfinite(low) or np.isfinite(high) else "more than two turns"

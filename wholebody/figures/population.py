@@ -46,7 +46,6 @@ class Population:
     """
 
     def __init__(self, sex: str) -> None:
-        """Read the table of a sex."""
         rows = packaged_table(Path(__file__).parent / "data" / f"population_{sex}.csv")
         self.sex = sex
         self.names = tuple(row["name"] for row in rows)

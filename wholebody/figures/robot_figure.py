@@ -50,9 +50,9 @@ def robot_figure(robot: Robot, samples: int) -> Figure:
     model, geometry, links = robot.model, robot.geometry, robot.links
     excluded = choose_pairs(model, geometry, samples)
     if robot.untested is not None:
-        told = [robot.untested(pair.first, pair.second) for pair in geometry.collisionPairs]
-        gone = drop_pairs(geometry, [k for k, why in enumerate(told) if why], "")
-        named = [with_values(pair, reason=why) for pair, why in zip(gone, filter(None, told), strict=True)]
+        reasons = [robot.untested(pair.first, pair.second) for pair in geometry.collisionPairs]
+        gone = drop_pairs(geometry, [k for k, why in enumerate(reasons) if why], "")
+        named = [with_values(pair, reason=why) for pair, why in zip(gone, filter(None, reasons), strict=True)]
         excluded += tuple(sorted(named, key=lambda pair: pair.reason))
     rest = rest_posture(model, geometry)
     if robot.place is not None:
@@ -72,12 +72,12 @@ def robot_figure(robot: Robot, samples: int) -> Figure:
         postures=postures,
         cones=robot.cones,
         excluded=(*excluded, *rest.excluded),
-        notes=(*robot.notes, *renamed, *_told(rest)),
+        notes=(*robot.notes, *renamed, *_notes_on(rest)),
     )
     return Figure(robot.name, model, geometry, "own", description, robot.visual)
 
 
-def _told(rest: RestPosture) -> list[str]:
+def _notes_on(rest: RestPosture) -> list[str]:
     """Sentences on overlaps at zero."""
     notes = []
     if rest.parted:

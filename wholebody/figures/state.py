@@ -40,7 +40,6 @@ class Posed:
     """Pinocchio's data of a model with its joints at a posture, computed once while the same one is asked for."""
 
     def __init__(self, model: pin.Model) -> None:
-        """Allocate the data."""
         self._model, self._data, self._q = model, model.createData(), b""
 
     def at(self, q: Array) -> pin.Data:
@@ -71,7 +70,6 @@ class State:
     """
 
     def __init__(self, model: pin.Model) -> None:
-        """Allocate Pinocchio's data for `model`."""
         instance(model, pin.Model, "model", "give figure.model")
         self.model = model
         self.data = pin.Data(model)

@@ -14,12 +14,12 @@ would forbid turning about that edge.
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices
+from wholebody.base.compiled import with_loops
 from wholebody.base.errors import InputError
 from wholebody.geometry.pieces import COAL_ACCURACY
 from wholebody.geometry.proximity import Contacts, PairTable
@@ -82,15 +82,12 @@ class ContactRowBuilder:
         )  # fmt: skip
 
 
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
+@with_loops("wholebody.geometry.patch_kernel")
+def compiled_kernel(patch_kernel: Any) -> None:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
-    from wholebody.geometry import patch_kernel
-
     none, points, lengths, yes = np.zeros(0, dtype=np.intp), np.zeros((0, 3)), np.zeros(0), np.zeros(0, dtype=bool)
     pair, faces, placement = np.zeros((0, 2), dtype=np.intp), np.zeros((0, 4)), np.zeros((0, 4, 3))
     contacts = pair, lengths, points, points, points, none, placement
     table = yes, none, LENGTHS, points, none, faces, none, lengths, points
     room = np.zeros((0, 6)), lengths, none, pair
     patch_kernel.contact_rows(contacts, lengths, table, room)
-    return patch_kernel

@@ -116,7 +116,6 @@ class SinglePairs:
     """Asks coal for one pair after the other, without data for each; used by one run at a time."""
 
     def __init__(self, geometry: pin.GeometryModel) -> None:
-        """Take the pieces from a geometry model."""
         self._geometry = geometry
         self._vector = coal.StdVec_DistanceResult()
         self._results: list[Any] = []

@@ -71,15 +71,10 @@ def global_depth(depths: Array, normals: Array) -> Array:
 
 
 def object_penetration(
-    a: str,
-    b: str,
-    pieces_a: Sequence[Placed],
-    pieces_b: Sequence[Placed],
-    allowed: NDArray[np.bool_] | None = None,
-    tolerance: float = 1e-6,
+    a: str, b: str, pieces_a: Sequence[Placed], pieces_b: Sequence[Placed], allowed: NDArray[np.bool_] | None = None
 ) -> ObjectPenetration | None:
-    """Both measures of the overlap of two objects; None if no allowed pair (n, m) is deeper than the tolerance [m]."""
-    overlap, depths, normals = ObjectPair(pieces_a, pieces_b, allowed).overlapping(np.zeros(3), tolerance)
+    """Both measures of the overlap of two objects; None if no allowed pair (n, m) is deeper than a micrometre."""
+    overlap, depths, normals = ObjectPair(pieces_a, pieces_b, allowed).overlapping(np.zeros(3), 1e-6)
     if not overlap:
         return None
     way = least_separation(pieces_a, pieces_b, allowed)
@@ -162,8 +157,8 @@ def least_separation(
     # Zero where nothing overlaps, and with ``separated=False`` where nothing separates (between two half-spaces).
     pairs = ObjectPair(pieces_a, pieces_b, allowed)
     escapes = pairs.escapes()
-    ways = [*escapes, *([] if (found := _depth_first(pairs, _ROOT)) is None else [found])]
-    best = min(ways, key=lambda way: float(way @ way), default=None)
+    translations = [*escapes, *([] if (found := _depth_first(pairs, _ROOT)) is None else [found])]
+    best = min(translations, key=lambda way: float(way @ way), default=None)
     least = False
     if not pairs.sampled:
         best, least = _search(pairs, best)

@@ -46,8 +46,8 @@ def placement(at: PlacementLike, what: str = "placement") -> pin.SE3:
         if math.isfinite(norm) and abs(norm - 1.0) > ROUNDING:
             raise InputError(f"{what}: the quaternion has length {norm:.6g}, not 1; give qx, qy, qz, qw of a rotation")
         if values[3] == 1.0:
-            told = "is half a turn about x; quaternions are x, y, z, w, and (0, 0, 0, 1) is no turn"
-            warnings.warn(f"{what}: the quaternion (1, 0, 0, 0) {told}", stacklevel=3)
+            meaning = "is half a turn about x; quaternions are x, y, z, w, and (0, 0, 0, 1) is no turn"
+            warnings.warn(f"{what}: the quaternion (1, 0, 0, 0) {meaning}", stacklevel=3)
         x, y, z, w = (turn / norm if math.isfinite(norm) else turn).tolist()
         rotation = np.array(
             [

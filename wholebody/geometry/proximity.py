@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices, brief
 from wholebody.base.checks import number
+from wholebody.base.compiled import with_loops
 from wholebody.geometry.large_models import pairs_of
 from wholebody.geometry.memory_views import RESULT_DOUBLES, fields
 from wholebody.geometry.pair_distances import PairDistances
@@ -210,13 +210,13 @@ class Proximity:
         index, placed = self.ask(data, within, most)
         return self._gathered(ContactBuffer(len(index)), np.array(placed), index, within, most)
 
-    def query_views(self, data: Any, within: float, most: Array | None = None) -> Contacts:
+    def query_views(self, data: Any, within: float) -> Contacts:
         """What `query` returns, in arrays that the next call of this overwrites."""
-        index, placed = self.ask(data, within, most)
+        index, placed = self.ask(data, within)
         self._placed[:] = placed
         if len(index) > self._buffer.size:
             self._buffer = ContactBuffer(2 * len(index))
-        return self._gathered(self._buffer, self._placed, index, within, most)
+        return self._gathered(self._buffer, self._placed, index, within, None)
 
     def least(self, data: Any, within: float) -> Array:
         """Distances (pairs,) of pairs that may be nearer than `within` metres, and bounds from below of all others."""
@@ -291,11 +291,9 @@ class Proximity:
             contacts.normal[row], contacts.point_a[row], contacts.point_b[row] = normal, center + depth, center - depth
 
 
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
+@with_loops("wholebody.geometry.proximity_kernel")
+def compiled_kernel(proximity_kernel: Any) -> None:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
-    from wholebody.geometry import proximity_kernel
-
     placement, one, none = np.zeros((1, 4, 3)), np.zeros(1), np.zeros(0)
     index, pairs = np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp)
     lines, bound, marks = np.zeros((1, 3)), np.zeros((2, 0)), np.zeros((3, 0), dtype=np.intp)
@@ -305,4 +303,3 @@ def compiled_kernel() -> Any:
     results = np.zeros((0, RESULT_DOUBLES))
     proximity_kernel.gather(results, index, (pairs, one, bound), 0.0, none, room)
     proximity_kernel.bound_from_below(results, index, (pairs, one, bound), none)
-    return proximity_kernel

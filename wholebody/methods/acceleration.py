@@ -23,7 +23,6 @@ class Anderson:
     """Remembers plain steps and the displacements actually made."""
 
     def __init__(self) -> None:
-        """Begin with nothing remembered."""
         self.reset()
 
     def reset(self) -> None:

@@ -145,7 +145,6 @@ class UnsupportedTermError(InputError):
     """
 
     def __init__(self, method: str, terms: Sequence[str]) -> None:
-        """Build the sentence."""
         self.terms = tuple(terms)
         super().__init__(f"method {method!r} cannot take {'; '.join(terms)}; leave them out or use method='qp'")
 

@@ -112,7 +112,7 @@ def _undefined(status: Status, control: Control) -> str:
     """Which term of one's own had no finite number where a step led, if the problem is not solved."""
     if status == "solved" or control.undefined is None:
         return ""
-    return f"; a step was taken back: {control.undefined.told_of(f'of iteration {control.undefined_at}')}"
+    return f"; a step was taken back: {control.undefined.at_posture(f'of iteration {control.undefined_at}')}"
 
 
 def _way_out(problem: Problem, judgement: Assessment) -> str:

@@ -12,7 +12,6 @@ the point stays outside by the clearance, and the error is at least the clearanc
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any, Literal, NamedTuple
 
 import coal
@@ -101,9 +100,9 @@ class _Finder:
         """Find pieces that cannot move and are nearer than their clearance."""
         table, geometry = self._workspace.table, self._workspace.geometry
         group = np.array([self._group[joint] for joint in table.joint.tolist()], dtype=np.intp)
-        told = np.isin(group, list(self._fixed))
+        known = np.isin(group, list(self._fixed))
         pairs = table.pairs
-        fixed = np.flatnonzero((told[pairs].all(axis=1)) | (group[pairs[:, 0]] == group[pairs[:, 1]]))
+        fixed = np.flatnonzero((known[pairs].all(axis=1)) | (group[pairs[:, 0]] == group[pairs[:, 1]]))
         if not len(fixed):
             return
         center = self._centers(group)
@@ -138,7 +137,10 @@ class _Finder:
             elif isinstance(term, ReachCones):
                 cones = self._problem.scene.figure.cones if term.names is None else term.names
                 for place, (limb, cone_name) in enumerate(zip(term.limbs, cones, strict=True)):
-                    value = partial(_entry, term.value, place)
+
+                    def value(state: State, ask: Callable[[State], Array] = term.value, row: int = place) -> float:
+                        return float(ask(state)[row])
+
                     self._turned(f"{name}, {cone_name!r}", limb.limb, limb.reference, value)
 
     def _reachable(self) -> tuple[Array, Array]:
@@ -233,9 +235,9 @@ class _Finder:
     def _centers(self, group: NDArray[np.intp]) -> Array:
         """Origins (n, 3) of the pieces; those of fixed groups at their fixed placements."""
         center: Array = self._workspace.near(self._problem.start, 0.0).placements[:, 3].copy()
-        for told, (at, _) in self._fixed.items():
-            moved = at * self._start.oMi[told].inverse()
-            members = group == told
+        for joint, (at, _) in self._fixed.items():
+            moved = at * self._start.oMi[joint].inverse()
+            members = group == joint
             center[members] = center[members] @ moved.rotation.T + moved.translation
         return center
 
@@ -273,10 +275,6 @@ class _Finder:
                 else f"{owners[k]} (frozen)" for k in (a, b)]  # fmt: skip
         what = f"{-1e3 * distance:.3g} mm inside" if distance < 0.0 else f"{1e3 * distance:.3g} mm from"
         return f"{said[0]} is {what} {said[1]}" + (f", where {1e3 * asked:.3g} mm are required" if asked else "")
-
-
-def _entry(value: Callable[[State], Array], row: int, state: State) -> float:
-    return float(value(state)[row])
 
 
 def in_words(found: tuple[Contradiction, ...]) -> str:

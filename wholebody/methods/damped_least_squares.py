@@ -15,7 +15,6 @@ it, and the step is computed again without that joint.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -43,6 +42,7 @@ from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
 from wholebody.tasks.answers import values
+from wholebody.tasks.bounds import allowed
 from wholebody.tasks.checks import undefined, values_and_rows
 
 RANK = 1e-8  # squared singular values below this share of the largest count as zero
@@ -125,7 +125,7 @@ class _Descent:
             self._state.update(q)
             held = [term.lower - values(term, "value", term.value(self._state)) for term in problem.stated]
             distance, angle, _ = goal_errors(problem, self._state)
-            violation, error = float(np.abs(_joined(held)).max(initial=0.0)), max(distance, angle)
+            violation, error = float(np.abs(np.hstack([np.zeros(1), *held])).max()), max(distance, angle)
             self.trace.append(TraceEntry(error, violation, 0.0, step))
             self._control.tell(self.trace[-1])
             if (max(violation, enough), error) < best:
@@ -163,13 +163,12 @@ class _Descent:
         problem, state = self._problem, self._state
         equal = [(term, *values_and_rows(term, term.value, state)) for term in problem.stated]
         asked = [(goal.weight**0.5, *values_and_rows(goal, goal.error, state)) for goal in problem.goals]
-        held, of_held = _joined([term.lower - value for term, value, _ in equal]), _rows([e[2] for e in equal], state)
-        wanted = _joined([-root * error for root, error, _ in asked])
-        of_wanted = _rows([root * rows for root, _, rows in asked], state)
-        lower, upper = problem.scene.figure.tangent_bounds(state.q)
-        for bound in problem.bounds:
-            low, high = bound.bounds(state, None)
-            lower, upper = np.maximum(lower, low), np.minimum(upper, high)
+        none = np.zeros((0, state.model.nv))
+        held = np.hstack([none[:, 0], *(term.lower - value for term, value, _ in equal)])
+        of_held = np.vstack([none, *(rows for *_, rows in equal)])
+        wanted = np.hstack([none[:, 0], *(-root * error for root, error, _ in asked)])
+        of_wanted = np.vstack([none, *(root * rows for root, _, rows in asked)])
+        lower, upper = allowed(problem.bounds, problem.scene.figure.limits, state, None)
         dq, free = np.zeros(state.model.nv), upper > lower
         stopped = np.zeros(state.model.nv)
         while True:  # every round stops one more joint, so the loop ends
@@ -210,15 +209,6 @@ def _damped(jacobian: Array, error: Array, damping: float) -> Array:
     square = jacobian @ jacobian.T
     square[np.diag_indices_from(square)] += 0.5 * float(error @ error) + damping**2
     return np.asarray(jacobian.T @ np.linalg.solve(square, error))
-
-
-def _rows(rows: Sequence[Array], state: State) -> Array:
-    """Rows (m, nv) of all terms."""
-    return np.concatenate(rows) if rows else np.zeros((0, state.model.nv))
-
-
-def _joined(parts: list[Array]) -> Array:
-    return np.concatenate(parts) if parts else np.zeros(0)
 
 
 def _unsupported(problem: Problem) -> list[str]:

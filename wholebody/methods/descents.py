@@ -64,7 +64,6 @@ class DescentTracker(SolvingTracker, Generic[Kind]):
     """Follows by the searches of a method: a frame takes the end of a search, without an assessment or a message."""
 
     def __init__(self, method: Kind, problem: Problem, dt: float) -> None:
-        """Set up; arguments and errors as for `SolvingTracker`."""
         super().__init__(method, problem, dt)  # type: ignore[arg-type] # a method also says what it accepts
         rough: Any = method
         self._exact = method

@@ -37,7 +37,6 @@ class Stopwatch(threading.local):
     """Adds up the time that this thread spends within it: `seconds` so far, wall time."""
 
     def __init__(self) -> None:
-        """Begin at 0."""
         self.seconds = self._began = 0.0
 
     def __enter__(self) -> None:
@@ -104,7 +103,6 @@ class Iteration:
     def __init__(
         self, problem: Problem, workspace: Workspace, stepper: Stepper, settings: Settings, control: Control
     ) -> None:
-        """Begin at the start, within the limits."""
         self._problem, self._stepper, self._settings, self._control = problem, stepper, settings, control
         self._proximity, self._state = workspace.proximity, workspace.state
         self.q: Array = problem.scene.figure.clamp(problem.start)

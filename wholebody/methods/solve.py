@@ -48,8 +48,8 @@ def imported(name: str) -> Callable[..., Method]:
     try:
         found = getattr(import_module(module), kind)
     except Exception as error:  # whatever the module raises
-        told = one_line(f"{type(error).__name__}: {error}")
-        raise InputError(f"method {name!r} cannot be imported ({told}); give 'module:Class'") from None
+        reason = one_line(f"{type(error).__name__}: {error}")
+        raise InputError(f"method {name!r} cannot be imported ({reason}); give 'module:Class'") from None
     if not isinstance(found, type) or not all(callable(getattr(found, part, None)) for part in PROTOCOL):
         raise InputError(f"method {name!r} is no class with solve, tracker and accepts; derive it from wb.Method")
     return found

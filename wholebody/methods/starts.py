@@ -11,6 +11,7 @@ from wholebody.base.arrays import Array
 from wholebody.figures.human.fingers import opened_for_a_bar
 from wholebody.figures.state import State
 from wholebody.problem import Problem
+from wholebody.tasks.bounds import allowed
 from wholebody.tasks.grasp import Grasp
 
 SPREADS = (0.3, 0.6, 1.0)  # largest distance from the first start, as a share of each joint's range, in turn
@@ -117,10 +118,5 @@ def _ranges(problem: Problem, start: Array) -> tuple[Array, Array]:
 def _moved(problem: Problem, state: State, start: Array, move: Array) -> Array:
     """The start moved by (nv,) as far as limits and bounds allow."""
     figure = problem.scene.figure
-    lower, upper = figure.tangent_bounds(start)
-    state.update(start)
-    for bound in problem.bounds:
-        low, high = bound.bounds(state, None)
-        lower, upper = np.maximum(lower, low), np.minimum(upper, high)
-    q: Array = figure.clamp(pin.integrate(figure.model, start, np.clip(move, lower, np.maximum(lower, upper))))
-    return q
+    box = allowed(problem.bounds, figure.limits, state.update(start), None)
+    return figure.clamp(np.asarray(pin.integrate(figure.model, start, np.clip(move, *box))))

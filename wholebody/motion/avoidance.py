@@ -140,7 +140,7 @@ def avoid(
             why = str(error)
             if error.q is not None:
                 away = [np.linalg.norm(pin.difference(clip.figure.model, frame, error.q)) for frame in clip.q]
-                why = error.told_of(f"near frame {int(np.argmin(away))}")
+                why = error.at_posture(f"near frame {int(np.argmin(away))}")
             result = MethodResult(clip.q.copy(), message=f"the postures stay as they were: {why}")
             seconds, report = time.perf_counter() - began, replace(judge.report(result, run), solved=False)
         # what is not free, or held, is not worth the time; a new timing, or loads, would be others after it

@@ -21,11 +21,10 @@ from wholebody.motion.standing_ground import MOST_FRAMES, Foothold, Ground
 from wholebody.motion.thing_contacts import Placed, ThingContact, Things, least_distance, thickness
 from wholebody.motion.windows import long_runs, runs
 
-FIRM, STRONG = 24.0, 48.0  # s, weights of what rests, over the time step, in the first pass and later; 1 of a bone
+FIRM, STRONG = 24.0, 2.0  # s, s²: weights of what rests over the time step in the first pass, over its square later
 NEARING, SWING = 30.0, 0.3  # weights of what nearly rests, and of a sole between
 TOUCH = 200.0  # of what touches a thing
-LANDING = 3.0  # weight in the frame in which a point comes down, where contact decides
-BESIDE = np.array([0.1, 0.1, 1.0])  # shares of that weight: soles that meet come down beside each other
+BESIDE = np.array([0.1, 0.1, 1.0])  # shares of these weights: soles that meet come down beside each other
 STEP = 0.3  # m: a surface higher than this above the recording's ground is not what a sole comes down on
 FACING = 0.3  # least cosine of the angle from up to the normal of a sole that faces the ground
 FOLLOW = 0.8  # share of the body's shift that a new place keeps; the rest goes back with time
@@ -242,7 +241,7 @@ class Holds:
         Of every `span`-th frame the last one before a rest and the first one after it are at rest too, so that what
         lies between two of these frames is.
         """
-        down, strong = self._facing_down(paths[frame]), (STRONG if again else FIRM) / self._dt
+        down, strong = self._facing_down(paths[frame]), STRONG / self._dt**2 if again else FIRM / self._dt
         goals, weights = np.array(paths[frame]), np.zeros((len(self.points), 3))
         for number, stands in enumerate(self._stands):
             after = bisect_right([stand.first for stand in stands], frame)
@@ -259,7 +258,7 @@ class Holds:
                 if self.points[number].thing:
                     weights[number] = 0.0 if again and (number, frame) in self._gone else TOUCH
                 else:
-                    weights[number] = LANDING * BESIDE if frame == around[on[0]].first and not again else strong
+                    weights[number] = NEARING * BESIDE if frame == around[on[0]].first and not again else strong
             else:
                 goals[number], share = self._swing(number, frame, nearest, places, paths)
                 weights[number] = (

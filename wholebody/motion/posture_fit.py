@@ -29,6 +29,8 @@ DAMPING = 1e-4  # m²/rad² of every joint, so that the program has one answer
 WITHIN, CLEARANCE = 0.06, 5e-4  # m: nearer pairs have rows; distance that they keep
 PUSH = 0.03  # m: by which a step brings an overlap out at most
 SOFT = 8  # daqp's flag of a row that may be broken at a price
+LEAST_LEVER = 0.1  # m
+WHOLE = 4.0, 2.0  # weights of a root's places and turns: they move the whole mass, so that legs give way first
 RELAXED = 1e-10  # of the price: less holds contacts more exactly, and costs the program digits
 
 
@@ -211,3 +213,22 @@ class Fitter:
         """Angles (c,) of the limbs to the edges of their cones, positive inside; writes their wrenches."""
         cone_angles(*self._cones, self._state.joints, self._cone_rows, self._angles)
         return self._angles
+
+
+def levers(figure: Figure) -> Array:
+    """(nv,) by how many metres a degree of freedom moves what it moves farthest, a radian or metre; a root by more."""
+    model, data = figure.model, figure.model.createData()
+    pin.forwardKinematics(model, data, figure.neutral)
+    ends: list[list[Array]] = [[np.array(data.oMi[joint].translation)] for joint in range(model.njoints)]
+    for piece in figure.geometry.geometryObjects:
+        ends[piece.parentJoint].append(data.oMi[piece.parentJoint].act(piece.placement.translation))
+    found = np.full(model.nv, LEAST_LEVER)
+    for joint in range(model.njoints - 1, 0, -1):
+        ends[model.parents[joint]] += ends[joint]
+        reach = max(float(np.linalg.norm(end - data.oMi[joint].translation)) for end in ends[joint])
+        first = model.idx_vs[joint]
+        found[first : first + model.nvs[joint]] = max(reach, LEAST_LEVER)
+    if figure.root == "free":
+        found[:3] = 1.0
+        found[:6] *= np.repeat(WHOLE, 3)
+    return found

@@ -26,15 +26,15 @@ from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.figures.figure import Figure
 from wholebody.motion.held_points import HeldPoint
 from wholebody.motion.holds import Holds
-from wholebody.motion.posture_fit import Fitter, Goals, Layout
+from wholebody.motion.posture_fit import Fitter, Goals, Layout, levers
 from wholebody.motion.retarget_targets import LIMBS, Targets, Wanted, has_trunk, known_bones, parts_of
 from wholebody.motion.roles import Roles
 from wholebody.motion.structure import upright
 from wholebody.scene.workspace import Workspace
 
 FIRST, FREE, PASS, SWEEP = 60, 2, 3, 1  # most steps of a first frame, a free one, one of the first pass, one of a sweep
-EVERY, WORTH = 10, 0.8  # frames after which a free posture is sought anew, and the share of the cost that it is for
-SLOWING = 8  # frames before it would be too fast in which a joint begins to move
+EVERY, WORTH = 0.25, 0.8  # s after which a free posture is sought anew, and the share of the cost that it is for
+SLOWING = 0.2  # s before it would be too fast in which a joint begins to move
 JUMP = 0.5  # rad, m: postures of neighbouring frames that are farther apart were found otherwise
 FIRST_STEP = 0.1  # rad, m: largest change in a step of a first frame whose parts touch things; longer ones miss these
 STARTS = 4  # how often the first frame is solved, each time from where soles came down beside each other
@@ -43,12 +43,11 @@ SWEEPS: tuple[float, ...] = (1.8, 1.7, 1.6, 1.4, 1.2, 1.0)  # omega of each; mor
 FINER: tuple[float, ...] = (1.4, 1.2, 1.0)  # the same of sweeps over twice as many frames
 ANCHOR = 0.3  # weight of the place of the hips; 1 is that of a bone
 STAY = 0.03  # m/rad from the neutral posture, for what no goal determines
-CHANGE = 0.3  # weight of a change of the deviation in the first pass, in metres that limbs move
-BEND = 2.0  # s, weight of an acceleration of the deviation in sweeps, over the time step
-GOES_ON, RETURN = 0.9, 0.3  # share of the last change that goes on; s in which a deviation that nothing needs goes back
+CHANGE = 0.055  # s^0.5, weight of a change of the deviation in the first pass, over the root of the time step
+BEND = 0.067  # s², weight of an acceleration of the deviation in sweeps, in metres that limbs move
+GOES_ON, RETURN = 0.32, 0.3  # s in which a change of the deviation ends, and a deviation that nothing needs
+EVEN, KEEP = 0.06, 0.1  # s over which what bones do not determine is smoothed; weight of it, in metres that limbs move
 CALM, SPREAD = 0.025, 0.06  # s over which the free fit and the deviation of the first pass are smoothed
-LEAST_LEVER = 0.1  # m
-WHOLE = 4.0, 2.0  # weights of a root's places and turns: they move the whole mass, so that legs give way first
 KEPT = 30  # frames before the last one that stay known, for what looks back
 SPARE = 0.9  # share of the speed limits that the free fit takes, so that there is some for what deviates from it
 BONES = {"hand": 0.5, "toe": 0.7, "head": 0.7}  # weights of bones by their far ends, where it is not 1
@@ -80,19 +79,21 @@ class Run:
         self.slow_most = np.array([SPARE * self.most[one.idx_v] for one in joints])
         self.levers = levers(figure)
         self.none = (np.zeros((len(self.fitter.layout.held), 3)),) * 2
-        self.calm, self.spread = (normal(time, dt) for time in (CALM, SPREAD))
+        self.every, self.slowing = (max(1, round(time / dt)) for time in (EVERY, SLOWING))
+        self.even, self.calm, self.spread = (normal(time, dt) for time in (EVEN, CALM, SPREAD))
         # by frames: goals, free postures with their costs, those within speed limits, the free fit, where it has the
         # points that may be held, deviations of the first pass, what is held in sweeps, postures, deviations of the
         # sweeps
         self._wanted, self._chain = dict[int, Wanted](), dict[int, tuple[Array, float]]()
-        self._slow, self._free, self._paths = (dict[int, Array]() for _ in range(3))
+        self._slow, self._even, self._free, self._paths = (dict[int, Array]() for _ in range(4))
         self._first, self._found, self._deviation = (dict[int, Array]() for _ in range(3))
         self._held = dict[int, tuple[int, tuple[Array, Array]]]()
         self._backward = dict[int, tuple[Array, float]]()
         self._came, self.ended = 0, False
         self._front, self._latest = np.zeros(0), (np.zeros(self.model.nv), np.zeros(self.model.nv))
         self._stages: list[tuple[Callable[[int], None], int]] = [
-            (self._fit, 0), (self._slowed, EVERY + SLOWING), (self._calmed, len(self.calm) // 2)
+            (self._fit, 0), (self._slowed, self.every + self.slowing), (self._evened, len(self.even) // 2),
+            (self._calmed, len(self.calm) // 2),
         ]  # fmt: skip
         if holds is None:
             self._stages.append((self._alone, 0))
@@ -126,7 +127,7 @@ class Run:
         following: tuple[Array, float] | None = None
         for k in range(len(frames) - 1, -1, -1):
             self._wanted[k] = frames[k]
-            following = self._fitted(k, following and following[0], (len(frames) - 1 - k) % EVERY == 0)
+            following = self._fitted(k, following and following[0], (len(frames) - 1 - k) % self.every == 0)
             self._backward[k] = following
 
     def finish(self) -> list[Array]:
@@ -145,7 +146,7 @@ class Run:
                 self._done[number] = frame + 1
             come = self._done[number]
         found = [self._found[frame] for frame in range(given, come)]
-        for values in (self._slow, self._free, self._paths, self._first, self._found, self._deviation):
+        for values in (self._slow, self._even, self._free, self._paths, self._first, self._found, self._deviation):
             for frame in range(given - KEPT, come - KEPT):
                 values.pop(frame, None)
         for frame in range(given - KEPT, come - KEPT):
@@ -174,7 +175,7 @@ class Run:
     def _fit(self, k: int) -> None:
         """The free posture of a frame, from that before; the frames before follow one that was found otherwise."""
         near = self._chain[k - 1][0] if k else None
-        best = self._fitted(k, near, k % EVERY == 0)
+        best = self._fitted(k, near, k % self.every == 0)
         other = self._backward.pop(k, None)
         if other is not None and other[1] < WORTH * best[1]:
             best = other
@@ -184,7 +185,7 @@ class Run:
 
     def _led_back(self, k: int) -> None:
         """Follow a better posture of a frame backward; the frames before take it over where it costs least."""
-        first, back = max(0, k - EVERY), {k: self._chain[k]}
+        first, back = max(0, k - self.every), {k: self._chain[k]}
         for j in range(k - 1, first - 1, -1):
             back[j] = self.fitter.descend(back[j + 1][0], self._goals(j, self.upright, self.stay), FREE)
         least, start = (sum(each[1] for each in back.values()), 0) if first == 0 else (np.inf, k)
@@ -208,7 +209,7 @@ class Run:
             values, most = self.slow, self.slow_most
             here = q[values]
             self._front = np.clip(here, self._front - most, self._front + most) if k else here
-            last = min(k + SLOWING, self._came - 1)
+            last = min(k + self.slowing, self._came - 1)
             back = self._chain[last][0][values]
             for j in range(last - 1, k - 1, -1):
                 back = np.clip(self._chain[j][0][values], back - most, back + most)
@@ -217,9 +218,17 @@ class Run:
                 q[values] = np.clip(q[values], self._slow[k - 1][values] - most, self._slow[k - 1][values] + most)
         self._slow[k] = q
 
+    def _evened(self, k: int) -> None:
+        """The fit with what bones leave open at the mean of frames about it, so that limits begin to hold gently."""
+        q = self.figure.clamp(pin.normalize(self.model, self._mean(self._slow, k, self.even)))
+        before = self._even[k - 1] if k else None
+        self._even[k] = self.fitter.step(
+            q, self._goals(k, q, KEEP * np.minimum(self.levers, 1.0)), among=False, most=self._room(q, before)
+        )
+
     def _calmed(self, k: int) -> None:
-        """The free fit, without the noise of limits and of what no goal determines."""
-        q = self.figure.clamp(pin.normalize(self.model, self._mean(self._slow, k, self.calm)))
+        """The free fit, without the noise of the recording."""
+        q = self.figure.clamp(pin.normalize(self.model, self._mean(self._even, k, self.calm)))
         self._free[k], self._paths[k] = q, self.fitter.held(q)
 
     def _mean(self, values: dict[int, Array], k: int, weights: Array) -> Array:
@@ -250,7 +259,7 @@ class Run:
         assert self.holds is not None
         model, free, holds = self.model, self._free[k], self.holds
         deviation, change = self._latest
-        expected = (1.0 - min(self.dt / RETURN, 0.5)) * (deviation + GOES_ON * change)
+        expected = np.exp(-self.dt / RETURN) * (deviation + np.exp(-self.dt / GOES_ON) * change)
         reference = np.asarray(pin.integrate(model, free, expected))
         shift = deviation[:3] if self.figure.root == "free" else np.zeros(3)
         shift = pin.XYZQUATToSE3(free[:7]).rotation @ shift if self.figure.root == "free" else shift
@@ -259,7 +268,7 @@ class Run:
         q = self._reached(before, reference)
         for _ in range(1 if k else STARTS):
             held = holds.goals(k, self._paths, shift)
-            goals = self._goals(k, reference, CHANGE * self.levers, held)
+            goals = self._goals(k, reference, CHANGE / self.dt**0.5 * self.levers, held)
             q = self._settled(q, goals, before)
             if holds.lost(k, q, self.fitter.held(q), held):
                 q = self._settled(self._reached(before, reference), goals, before)
@@ -287,18 +296,27 @@ class Run:
     def _between(self, k: int, span: int) -> None:
         """The deviation of a frame `span` frames from two that were swept: the cubic through four of these."""
         if k % (2 * span) == span:
-            last = (self._came - 1) // (2 * span) * 2 * span
-            near = [self._deviation[min(max(k + j * span, 0), last)] for j in (-3, -1, 1, 3)]
+            near = [self._near(k + j * span, 2 * span) for j in (-3, -1, 1, 3)]
             self._deviation[k] = (9.0 * (near[1] + near[2]) - (near[0] + near[3])) / 16.0
             self._found[k] = self.figure.clamp(pin.integrate(self.model, self._free[k], self._deviation[k]))
+
+    def _near(self, k: int, span: int) -> Array:
+        """The deviation of every `span`-th frame; beyond the first and the last one it goes on half as fast."""
+        last = (self._came - 1) // span * span
+        inside = min(max(k, 0), last)
+        found = self._deviation[inside]
+        if inside == k or not last:
+            return found
+        return np.asarray(
+            found + 0.5 * abs(k - inside) / span * (found - self._deviation[inside + np.sign(inside - k) * span])
+        )
 
     def _swept(self, k: int, omega: float, span: int) -> None:
         """Solve a frame anew between those `span` and twice as many frames before and after it."""
         assert self.holds is not None
         if k % span:
             return
-        last = (self._came - 1) // span * span
-        near = [self._deviation[min(max(j, 0), last)] for j in range(k - 2 * span, k + 2 * span + 1, span)]
+        near = [self._near(k + j * span, span) for j in range(-2, 3)]
         smooth = (4.0 * (near[1] + near[3]) - (near[0] + near[4])) / 6.0
         wanted = near[2] + omega * (smooth - near[2])
         reference = np.asarray(pin.integrate(self.model, self._free[k], wanted))
@@ -306,7 +324,7 @@ class Run:
         if k not in self._held or self._held[k][0] != span:
             self._held[k] = span, self.holds.goals(k, self._paths, np.zeros(3), again=True, span=span)
         held = self._held[k][1]
-        goals = self._goals(k, reference, BEND / (span * self.dt) * self.levers, held)
+        goals = self._goals(k, reference, BEND / (span * self.dt) ** 2 * self.levers, held)
         before = self._found[k - span] if k else None
         q = self._reached(before, reference, span)
         for number in range(8 * SWEEP):  # more than the usual where cones, or contacts, are curved
@@ -368,22 +386,3 @@ def normal(time: float, dt: float) -> Array:
     half = max(1, int(np.ceil(3.0 * time / dt)))
     weights = np.exp(-0.5 * (np.arange(-half, half + 1) * dt / time) ** 2)
     return np.asarray(weights / weights.sum())
-
-
-def levers(figure: Figure) -> Array:
-    """(nv,) by how many metres a degree of freedom moves what it moves farthest, a radian or metre; a root by more."""
-    model, data = figure.model, figure.model.createData()
-    pin.forwardKinematics(model, data, figure.neutral)
-    ends: list[list[Array]] = [[np.array(data.oMi[joint].translation)] for joint in range(model.njoints)]
-    for piece in figure.geometry.geometryObjects:
-        ends[piece.parentJoint].append(data.oMi[piece.parentJoint].act(piece.placement.translation))
-    found = np.full(model.nv, LEAST_LEVER)
-    for joint in range(model.njoints - 1, 0, -1):
-        ends[model.parents[joint]] += ends[joint]
-        reach = max(float(np.linalg.norm(end - data.oMi[joint].translation)) for end in ends[joint])
-        first = model.idx_vs[joint]
-        found[first : first + model.nvs[joint]] = max(reach, LEAST_LEVER)
-    if figure.root == "free":
-        found[:3] = 1.0
-        found[:6] *= np.repeat(WHOLE, 3)
-    return found

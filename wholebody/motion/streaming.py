@@ -16,7 +16,7 @@ from wholebody.geometry.shapes import HalfSpace
 from wholebody.motion.footholds import LiveRests
 from wholebody.motion.held_points import held_points
 from wholebody.motion.holds import Holds
-from wholebody.motion.retarget_run import EVERY, SLOWING, Run
+from wholebody.motion.retarget_run import Run
 from wholebody.motion.retarget_targets import Proportions, wanted_of
 from wholebody.motion.retargeting import checked_ground, same_figure
 from wholebody.motion.roles import matched, skeleton_roles
@@ -89,11 +89,13 @@ class Retargeter:
             known = Ground(
                 (), {role: known.rests[role] for role in self._feet}, known.lowest, (0.0,), 0.0, False, motion.dt
             )
-            self._rests = LiveRests(np.array([known.lowest[role] for role in self._feet]), motion.dt, EVERY + SLOWING)
         surface = None if scene is None else surface_of(scene, ())
         points = held_points(figure, self._roles, known)
         self._holds = Holds(points, known, self._proportions.path, motion.dt, surface)
         self._run = Run(figure, like, self._roles, motion.dt, self._holds, world.workspace())
+        if ground is None:
+            lows = np.array([known.lowest[role] for role in self._feet])
+            self._rests = LiveRests(lows, motion.dt, self._run.every + self._run.slowing)
 
     def __repr__(self) -> str:
         return f"Retargeter({self._like.name!r}, frames of {self._like.dt:g} s, {self.ahead} ahead)"

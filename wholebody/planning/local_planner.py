@@ -40,6 +40,8 @@ class LocalPlanner(Protocol):
     """Makes the edges of trees."""
 
     searches: ClassVar[int]  # how many paths are looked for, of which the shortest counts; more = shorter, later
+    samples: ClassVar[int]  # of trees that look for a shorter path after the first; more = shorter paths, later
+    rounds: ClassVar[int]  # samples of trees until they get another end
     tries: ClassVar[int]  # shortcuts in a row that fail; more = shorter paths, later
     partial: bool  # whether one joint may move in another way than before, and all others as they did
 
@@ -66,10 +68,11 @@ class Geodesics:
     """Geodesics of Pinocchio, for figures that hold nothing."""
 
     searches: ClassVar[int] = 8
+    samples: ClassVar[int] = 600
+    rounds: ClassVar[int] = 50
     tries: ClassVar[int] = 30
 
     def __init__(self, problem: Problem, workspace: Workspace) -> None:
-        """Take a problem without constraints."""
         self._workspace, self._model = workspace, workspace.model
         self._clearance = problem.clearance
         self.partial = not problem.scene.figure.roots  # motions of free bodies became no shorter, but later
@@ -177,10 +180,11 @@ class TrackedMotions:
     """
 
     searches: ClassVar[int] = 2
+    samples: ClassVar[int] = 12
+    rounds: ClassVar[int] = 2  # a sample takes about as long as another end
     tries: ClassVar[int] = 12
 
     def __init__(self, problem: Problem, workspace: Workspace) -> None:
-        """Take a problem whose constraints and bounds hold on the way."""
         self.geodesics = Geodesics(problem, workspace)
         self._problem = problem.with_start(problem.start)
         self._model = problem.scene.model

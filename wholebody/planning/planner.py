@@ -37,10 +37,8 @@ KEPT = 1e-4  # m, rad: by which limits, constraints and clearances may be missed
 PASSED = 5e-4  # m: overlap between two frames that counts
 OVER = 1.001  # of the limits of velocity and acceleration: the last slowing may end a little above them
 ENDS = 8  # postures that meet goals; more = ends that are reached more easily, for a solve each
-ENOUGH = 600  # samples of trees that look for a shorter motion after the first; more = shorter motions, later
 NEARER = 0.95  # of the length of the best motion: what others are shorter than
 SEARCHED = 0.75  # of the time limit: for searches; the rest is for shortcuts, as long motions take longer to judge
-ROUNDS = 50  # of the trees, until they get another end
 
 
 @dataclass(frozen=True, repr=False)
@@ -227,8 +225,9 @@ class _Search:
     def shortest(self) -> tuple[list[Array] | None, str]:
         """The shortest of some paths, with shortcuts, and how it was found; or None and why there is none."""
         model, best, most, samples, runs = self._problem.scene.model, None, np.inf, 0, 0
-        while not runs or (runs < self._local.searches and samples < ENOUGH and BUDGET.spent < SEARCHED):
-            path, trees = self._path(NEARER * most, np.inf if not runs else ENOUGH - samples)
+        enough = self._local.samples
+        while not runs or (runs < self._local.searches and samples < enough and BUDGET.spent < SEARCHED):
+            path, trees = self._path(NEARER * most, np.inf if not runs else enough - samples)
             runs, samples = runs + 1, samples + trees.samples * (runs > 0)
             if path is None:
                 break
@@ -257,7 +256,7 @@ class _Search:
             trees.add_end(reached)
         while rounds < samples and (BUDGET.spent < SEARCHED or not self._begun):
             self._begun = True
-            if rounds % ROUNDS == 0 or not ends:
+            if rounds % self._local.rounds == 0 or not ends:
                 end = next(self._ends, None)
                 if end is None and not ends:
                     break

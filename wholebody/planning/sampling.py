@@ -24,7 +24,6 @@ class Turns:
     """Hinges whose limits are a whole turn apart or more: postures a turn apart there are the same but for limits."""
 
     def __init__(self, figure: Figure) -> None:
-        """Find them; where joints follow others, none."""
         hinges = (
             [] if figure.followers else [j for j in figure.model.joints[1:] if j.shortname().startswith("JointModelR")]
         )
@@ -46,7 +45,6 @@ class Sampler:
     """Draws postures of a problem; what is frozen stays."""
 
     def __init__(self, problem: Problem, rng: np.random.Generator) -> None:
-        """Take the problem, and what draws."""
         self._figure, self._rng, self._held = problem.scene.figure, rng, holds(problem)
         self._frozen = still_dofs(problem)
         self._roots = [self._figure.model.joints[root] for root in self._figure.roots.values()]

@@ -60,7 +60,6 @@ class Timing:
     """When the places of a path are passed: a cubic spline through postures (m, nq), from rest to rest."""
 
     def __init__(self, figure: Figure, path: Array, pace: Pace) -> None:
-        """Find the fastest timing."""
         self._figure, self._path, self._pace = figure, path, pace
         knots = np.arange(len(path))
         self._spline = make_interp_spline(knots, places(figure.model, path), k=min(3, len(path) - 1))

@@ -56,9 +56,10 @@ class SceneContents(checks.FixedAttributes):
         self._revision = 0
 
     @classmethod
-    def of_parts(cls, figure: Figure, objects: Iterable[SceneObject], built: SceneGeometry) -> Self:
+    def of_parts(cls, figure: Figure, objects: Iterable[SceneObject], built: SceneGeometry, revision: int = 0) -> Self:
         """A scene with a given geometry model and its own pairs; rebuilt after things were added or removed."""
         scene = cls(figure)
+        scene._revision = revision
         scene._objects = {thing.name: thing for thing in objects}
         scene._built = built
         return scene
@@ -325,8 +326,10 @@ def _warn_of_units(name: str, place: pin.SE3, shape: Shape | None = None) -> Non
     """Warn of a place and a size that are hardly metres."""
     # m: a thing farther than this from the origin is probably placed in millimetres
     if (far := max(map(abs, place.translation.tolist()))) > 100.0:
-        told = f"{name!r} is {far:.4g} m away; lengths are in metres, so divide millimetres by 1000, centimetres by 100"
-        checks.warn(told)
+        message = (
+            f"{name!r} is {far:.4g} m away; lengths are in metres, so divide millimetres by 1000, centimetres by 100"
+        )
+        checks.warn(message)
     extent = _extent(shape)
     if max(extent) > WIDEST_LIKELY and min(extent) > THICKEST_LIKELY:
         size = " x ".join(f"{length:.4g}" for length in extent)
@@ -335,8 +338,8 @@ def _warn_of_units(name: str, place: pin.SE3, shape: Shape | None = None) -> Non
             if isinstance(shape, Mesh)
             else "divide millimetres by 1000, centimetres by 100"
         )
-        told = f"{name!r} measures {size} m; lengths are in metres: {correction}"
-        checks.warn(told)
+        message = f"{name!r} measures {size} m; lengths are in metres: {correction}"
+        checks.warn(message)
 
 
 def _extent(shape: Shape | None) -> tuple[float, ...]:

@@ -62,8 +62,8 @@ def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Co
         robots = {names["body"][top]: top for top in compiled.robots}
         scene = Scene({_figure_name(name): mjcf_figure(compiled, name, concavity) for name in robots})
         mine = [body for top in robots.values() for body in compiled.tree(top)]
-        if told := _untested_between(compiled, list(robots.values())):
-            warn(f"{place}: pairs of two robots that the file does not test are tested: {some(told)}")
+        if untested := _untested_between(compiled, list(robots.values())):
+            warn(f"{place}: pairs of two robots that the file does not test are tested: {some(untested)}")
     else:
         scene = Scene(mjcf_figure(compiled, root, concavity))
         mine = list(compiled.tree(compiled.robot(None if root in (None, "fixed", "free") else root)))

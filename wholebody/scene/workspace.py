@@ -57,7 +57,6 @@ class Workspace(NotCopyable):
     """
 
     def __init__(self, built: SceneGeometry) -> None:
-        """Allocate, which takes some 3 ms for a person."""
         self._built = built
         self.model: pin.Model = built.model
         self.table: PairTable = built.table
@@ -156,9 +155,9 @@ class Workspace(NotCopyable):
         """Every pair nearer than `within` metres at the posture q, shape (nq,); see `Proximity.query`."""
         return self.proximity.query(self.state.update(q).data, within, most)
 
-    def near_views(self, q: Array, within: float, most: Array | None = None) -> Contacts:
+    def near_views(self, q: Array, within: float) -> Contacts:
         """What `near` returns, in arrays that the next call of this overwrites."""
-        return self.proximity.query_views(self.state.update(q).data, within, most)
+        return self.proximity.query_views(self.state.update(q).data, within)
 
     def largest_approach(self, most: Array) -> Array:
         """Most by which the distance of every pair (pairs,) can fall while no freedom moves more than `most` (nv,).

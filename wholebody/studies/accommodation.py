@@ -54,7 +54,7 @@ class Exclusion(NamedTuple):
     side: str  # "over" or "under"
     value: float  # metres (mass: kilograms) over or under which they are
     excluded: int  # how many are left out for it
-    told: float  # share of these that are on that side, less the share of those that are accommodated
+    lift: float  # share of these that are on that side, less the share of those that are accommodated
 
     def __str__(self) -> str:
         unit = "kg" if self.dimension == "mass" else "m"
@@ -130,7 +130,7 @@ class Accommodation(Shown):
                 out = [k for k in own if good and not good[k]]
                 rest = [k for k in own if self.accommodated[k]]
                 if out and rest:
-                    found.append(self._told(sex, verdict, out, rest))
+                    found.append(self._exclusion(sex, verdict, out, rest))
         return tuple(sorted(found, key=lambda one: -one.excluded))
 
     def plot(self) -> Any:
@@ -164,7 +164,7 @@ class Accommodation(Shown):
         held = [one for one, tried in zip(good, self.tried, strict=True) if tried]
         return sum(held) / len(held) if held else math.nan
 
-    def _told(self, sex: str, verdict: str, out: list[int], rest: list[int]) -> Exclusion:
+    def _exclusion(self, sex: str, verdict: str, out: list[int], rest: list[int]) -> Exclusion:
         """The dimension that orders them best (Mann and Whitney 1947), and the bound that parts them (Youden 1950).
 
         A bound alone is best by chance for a dimension that goes with the one that leaves people out.
@@ -188,9 +188,9 @@ class Accommodation(Shown):
         words = ", ".join(f"{self._of_tried(values):.0%} {name}" for name, values in parts)
         shares = ", ".join(f"{sex} {share}" for sex, share in self.by_sex.items() if sex)
         counts = self.records.counts()
-        told = "".join(f", {counts[one]} more {one}" for one in (REFUSED, ENDED, CANCELLED) if one in counts)
+        others = "".join(f", {counts[one]} more {one}" for one in (REFUSED, ENDED, CANCELLED) if one in counts)
         lines = [
-            f"Accommodation of {sum(self.tried)} people{told}: {self.share:.0%}" + (f"; {shares}" if shares else "")
+            f"Accommodation of {sum(self.tried)} people{others}: {self.share:.0%}" + (f"; {shares}" if shares else "")
         ]
         lines += [f"  {words}{self.records.remarks()}", *(f"  {one}" for one in self.exclusions)]
         for name, values in self.settings.items():

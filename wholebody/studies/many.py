@@ -28,7 +28,7 @@ RUN = 16  # problems that warm-start one from the other: longer = fewer cold sta
 
 
 class SolveProgress(NamedTuple):
-    """Told when a problem is done.
+    """How far a run is, after each problem.
 
     Attributes:
         done: problems, those of an earlier run included.

@@ -120,7 +120,7 @@ def name_changes(family: Family) -> bool:
     for (a, b), (joint, angle) in sorted(compute(most_turned, work).items()):
         if angle > max(JUMP, largest.get(b, (0.0, ""))[0]):
             largest[b] = angle, f"{joint} by {np.degrees(angle):.0f} degrees from {order[a].record.name}"
-    return any(keep(k, replace(done[k], change=told)) for k, (_, told) in largest.items())
+    return any(keep(k, replace(done[k], change=change)) for k, (_, change) in largest.items())
 
 
 def _neighbours(order: Sequence[Case]) -> list[Pair]:

@@ -70,10 +70,10 @@ def _solved(make: Make, method: Method, q: Array | None) -> dict[str, Any]:
                 return warm
         return answer_of(method.solve(problem))
     except WholebodyError as error:
-        told = str(error)
+        message = str(error)
     except Exception as error:  # of a term or a task of the user's own
-        told = one_line(f"{type(error).__name__}: {error}")
-    return {"outcome": REFUSED, "message": told, "q": None}
+        message = one_line(f"{type(error).__name__}: {error}")
+    return {"outcome": REFUSED, "message": message, "q": None}
 
 
 def _warm_answer(problem: Problem, method: Method, q: Array) -> dict[str, Any] | None:

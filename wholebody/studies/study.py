@@ -138,15 +138,15 @@ def planned(
 def _check_takes_three(task: Any, what: str) -> None:
     """Refuse a function that cannot be called with a figure, a target and a layout."""
     try:
-        told = inspect.signature(task)
+        signature = inspect.signature(task)
     except ValueError:  # a compiled function tells nothing
         return
     try:
-        told.bind(None, None, None)
+        signature.bind(None, None, None)
     except TypeError:
         raise InputError(
-            f"{what} takes {told}; give one that takes a figure, a target and a layout, also where these do not vary: "
-            "def task(figure, target, layout)"
+            f"{what} takes {signature}; give one that takes a figure, a target and a layout, also where these do "
+            "not vary: def task(figure, target, layout)"
         ) from None
 
 

@@ -28,7 +28,6 @@ class TaskFile:
     """A task file of which variants are made; it can be sent to another process."""
 
     def __init__(self, path: Path) -> None:
-        """Read the file and check it."""
         self.path = path
         self._place = path.absolute()  # a process that reads it again may work in another folder
         self.contents = read_contents(path)
@@ -151,8 +150,8 @@ def _by_name(contents: Contents, table: str) -> dict[str, Any] | None:
     for entry in contents.tables.get(table, ()):
         name = entry.values["name"]
         if name in found:
-            told = f"{shown(name)} is the name of another {table} too; give it another one"
-            raise entry.where.at("name").fault(told)
+            message = f"{shown(name)} is the name of another {table} too; give it another one"
+            raise entry.where.at("name").fault(message)
         rest = {key: value for key, value in entry.values.items() if key != "name"}
         found[name] = rest if table == "person" else next(iter(rest.values()))
     return found or None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -337,7 +337,7 @@ class Table:
     many: bool = False  # whether the file can have several, written in double brackets
     chooser: str = ""  # key that names the type; empty if there are no types
     implied: tuple[tuple[str, str], ...] = ()  # keys that only one type has and that imply it: (key, type)
-    forms: dict[str, Form] | None = None  # types by name
+    forms: Mapping[str, Form] | None = None  # types by name
     either: bool = False  # whether it may have one in single brackets, or several in double ones
 
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, fields, replace
-from typing import Any
 
 from wholebody import ergonomics, methods, tasks
 from wholebody.base.fields import Range, Vector
@@ -12,7 +11,6 @@ from wholebody.figures.anthropometry import AGE, MASS, PERCENTILE, STATURE
 from wholebody.figures.link_pieces import CONCAVITY
 from wholebody.geometry import shapes
 from wholebody.geometry.pieces import SMALLEST
-from wholebody.methods.base import BUDGET, CCD_TOLERANCE, DAMPING, ITERATIONS, RESTARTS, SEED, TIME_LIMIT, TOLERANCE
 from wholebody.motion.strength import Strength
 from wholebody.problem import CLEARANCE
 from wholebody.scene.matter.body import BallJoint, Body, Hinge
@@ -157,34 +155,18 @@ MEASURES = {
 }
 
 
-def _later(name: str) -> Callable[..., Any]:
-    """A method by its name in `wb.methods`, imported only when it is made."""
-    return lambda **settings: getattr(methods, name)(**settings)
+class _MethodForms(Mapping[str, Form]):
+    """Forms of the methods: every setting is a key; a class is imported where its form is asked for."""
 
+    def __getitem__(self, name: str) -> Form:
+        made = getattr(methods, methods.METHODS[name])
+        return _form(made, " ".join(field.name for field in fields(made)), solver=Text(), algebra=Text())
 
-_TOLERANCE, _ITERATIONS, _TIME_LIMIT = Number(TOLERANCE), Number(ITERATIONS), Number(TIME_LIMIT)
-_LIMITS = _keys(tolerance=_TOLERANCE, iterations=_ITERATIONS, time_limit=_TIME_LIMIT)
+    def __iter__(self) -> Iterator[str]:
+        return iter(methods.METHODS)
 
-METHODS = {
-    "qp": Form(
-        _keys(
-            solver=Text(), hot_start=Flag(), tolerance=_TOLERANCE, iterations=_ITERATIONS, budget=Number(BUDGET),
-            restarts=Number(RESTARTS), restarts_for_measure=Number(RESTARTS), seed=Number(SEED), measures=Flag(),
-            time_limit=_TIME_LIMIT,
-        ),
-        _later("QP"),
-    ),
-    "ccd": Form(
-        _keys(
-            tolerance=Number(CCD_TOLERANCE), iterations=_ITERATIONS, restarts=Number(RESTARTS), seed=Number(SEED),
-            time_limit=_TIME_LIMIT,
-        ),
-        _later("CCD"),
-    ),
-    "newton": Form((*_LIMITS, *_keys(algebra=Text(), inequalities=Choice(("slack", "barrier")))), _later("Newton")),
-    "placo": Form(_LIMITS, _later("Placo")),
-    "dls": Form((*_LIMITS, *_keys(damping=Number(DAMPING))), _later("DampedLeastSquares")),
-}  # fmt: skip
+    def __len__(self) -> int:
+        return len(methods.METHODS)
 
 
 _THING = _keys(at=PLACEMENT, color=kinds.Color())
@@ -232,5 +214,5 @@ TABLES = {
     "constraint": Table((), True, "type", forms=CONSTRAINTS),
     "measure": Table((), True, "type", forms=MEASURES),
     "view": Table(_keys(eye=POSITION, target=POSITION, see_through=Several(Text()))),
-    "method": Table((), chooser="name", forms=METHODS),
+    "method": Table((), chooser="name", forms=_MethodForms()),
 }

@@ -74,7 +74,6 @@ class Checked:
     """A method of a term whose answers are checked."""
 
     def __init__(self, term: object, what: str, found: Callable[..., Any], check: Check) -> None:
-        """Store the term, the method and its check."""
         self._term, self._what, self._found, self._check = term, what, found, check
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
@@ -205,8 +204,8 @@ def _numbers(term: object, what: str, given: Any, wanted: str) -> Array:
         raise _wrong(term, str(error)) from None
 
 
-def _wrong(term: object, told: str) -> TermError:
-    return TermError(term, in_words(term), told)
+def _wrong(term: object, message: str) -> TermError:
+    return TermError(term, in_words(term), message)
 
 
 def _finite(term: object, what: str, found: Array) -> Array:
@@ -223,5 +222,5 @@ def _known(term: object, what: str, found: Array) -> Array:
 
 
 def _undefined(term: object, what: str, found: float) -> UndefinedTermError:
-    told = f"its {what} has {found:g} {UndefinedTermError.WHERE}, which is not finite; its formula must give finite"
-    return UndefinedTermError(term, in_words(term), f"{told} numbers at every posture")
+    message = f"its {what} has {found:g} {UndefinedTermError.WHERE}, which is not finite; its formula must give finite"
+    return UndefinedTermError(term, in_words(term), f"{message} numbers at every posture")

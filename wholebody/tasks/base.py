@@ -199,6 +199,19 @@ class Constraint(Rows):
         """(m,) constrained values, in metres and radians."""
 
 
+class ComputedTogether(Constraint):
+    """Base of constraints whose values (m,) and rows (m, nv) come from one computation, `value_and_jacobian`."""
+
+    def value(self, state: State) -> Array:
+        """(m,) the values."""
+        return self.value_and_jacobian(state, self.value)[0]
+
+    def jacobian(self, state: State) -> Array:
+        """(m, nv) their derivative."""
+        rows: Any = self.value_and_jacobian(state, self.value)[1]
+        return np.asarray(rows)
+
+
 class Bound(Term, ABC):
     """Least and greatest displacement of every degree of freedom.
 

@@ -38,8 +38,8 @@ def owner_pair(scene: Any, pair: Any) -> tuple[str, str]:
     """Two names of segments or things that may touch; InputError for anything else."""
     known = {*scene.figure.segments, *scene.objects}
     if not isinstance(pair, (tuple, list)) or len(pair) != 2:
-        told = checks.shown(pair)
-        raise InputError(f"touching takes a list of pairs of names, such as [('right_hand', 'table')], not of {told}")
+        text = checks.shown(pair)
+        raise InputError(f"touching takes a list of pairs of names, such as [('right_hand', 'table')], not of {text}")
     for name in pair:
         checks.known(name, known, "segment or object", "touching")
     return str(pair[0]), str(pair[1])
@@ -51,7 +51,7 @@ def named(where: str, term: object) -> Iterator[None]:
     try:
         yield
     except TermError as error:
-        raise type(error)(term, f"{where} ({type(term).__name__})", error.told) from None
+        raise type(error)(term, f"{where} ({type(term).__name__})", error.reason) from None
 
 
 def check_rows(where: str, term: Any, evaluate: Callable[[State], Array], state: State) -> None:
@@ -64,13 +64,15 @@ def check_rows(where: str, term: Any, evaluate: Callable[[State], Array], state:
             low, high = (answers.limit(term, what, getattr(term, what)) for what in ("lower", "upper"))
             for what, bound in (("lower", low), ("upper", high)):
                 if bound.ndim and len(bound) not in (1, len(values)):
-                    told = f"it has {len(values)} values, and its {what} has shape {bound.shape}; give as many, or one"
-                    raise TermError(term, answers.in_words(term), told)
+                    message = (
+                        f"it has {len(values)} values, and its {what} has shape {bound.shape}; give as many, or one"
+                    )
+                    raise TermError(term, answers.in_words(term), message)
             if not (low <= high).all():
                 raise TermError(term, answers.in_words(term), "its lower is above its upper; give the lower one first")
         if answers.mask(term, "angular", term.angular).shape not in ((), (1,), values.shape):
-            told = f"it has {len(values)} values, and its angular has shape {np.shape(term.angular)}; give as many"
-            raise TermError(term, answers.in_words(term), told)
+            message = f"it has {len(values)} values, and its angular has shape {np.shape(term.angular)}; give as many"
+            raise TermError(term, answers.in_words(term), message)
 
 
 def values_and_rows(term: Any, evaluate: Callable[[State], Array], state: State) -> tuple[Array, Array]:
@@ -84,8 +86,8 @@ def check_row_count(term: Term, values: Array, jacobian: Wrench | Array, nv: int
     """A TermError where a term has not as many rows, of nv columns, as values (m,)."""
     count = len(jacobian.rows if isinstance(jacobian, Wrench) else jacobian)
     if count != len(values):
-        told = f"it has {len(values)} values and a jacobian of {count} rows at a posture; give shape "
-        raise TermError(term, answers.in_words(term), f"{told}{(len(values), nv)}")
+        message = f"it has {len(values)} values and a jacobian of {count} rows at a posture; give shape "
+        raise TermError(term, answers.in_words(term), f"{message}{(len(values), nv)}")
 
 
 def undefined(terms: Iterable[Term], state: State, dt: float | None = None) -> UndefinedTermError | None:
@@ -132,5 +134,5 @@ def check_frozen(bounds: Iterable[Bound], scene: Surroundings, state: State) -> 
         wrong = np.flatnonzero((high < least) | (low > most))
         if len(wrong):
             joint = next(j for j in scene.model.joints if j.idx_v <= wrong[0] < j.idx_v + j.nv)
-            told = f"{type(bound).__name__} keeps {scene.model.names[joint.id]} where it starts"
-            raise InputError(f"{told}, out of its limits; start it within them")
+            message = f"{type(bound).__name__} keeps {scene.model.names[joint.id]} where it starts"
+            raise InputError(f"{message}, out of its limits; start it within them")

@@ -128,8 +128,8 @@ class Gap(NamedTuple):
         if self.own is not None:
             upright, turns = self.own.rows(self.first, self.second, near, state)
             sides = 2.0 * np.pi * np.arange(8) / 8  # of the octagon within the circle of the room
-            ways, room = np.column_stack([np.cos(sides), np.sin(sides)]), self.own.room * np.cos(np.pi / 8)
-            value, rows = np.concatenate([value, ways @ upright - room]), np.vstack([rows, ways @ turns])
+            directions, room = np.column_stack([np.cos(sides), np.sin(sides)]), self.own.room * np.cos(np.pi / 8)
+            value, rows = np.concatenate([value, directions @ upright - room]), np.vstack([rows, directions @ turns])
             key = np.concatenate([key, 2 * MOST_FACES + np.arange(8)])
         return SupportingPlanes(value, rows, key, bend, np.zeros(len(bend), dtype=np.intp))
 

@@ -1,4 +1,4 @@
-"""What a problem of a person has without being told: ranges of motion, balance, and its measures."""
+"""What a problem of a person has by default: ranges of motion, balance, and its measures."""
 
 from __future__ import annotations
 
@@ -42,8 +42,10 @@ def usual_measures(
     feet, sits = stances(scene, start, terms), seated(scene, terms)
     arms: tuple[str, ...] = ()
     if ranges and scene.figure.ranges:
-        told = [inputs.body_of(scene, term.feet) for term in terms if isinstance(term, (Balance, LoadedBalance, Stand))]
-        arms = free_arms(scene, start, terms, bounds, {*told, *stands} - {None, *sits})
+        stated = [
+            inputs.body_of(scene, term.feet) for term in terms if isinstance(term, (Balance, LoadedBalance, Stand))
+        ]
+        arms = free_arms(scene, start, terms, bounds, {*stated, *stands} - {None, *sits})
     make = partial(default_measures, scene, start, feet, sits, arms, ranges=ranges)
     found: tuple[Measure, ...] = scene.built.known(("measures", ranges, feet, sits, arms, start.tobytes()), make)
     return found
@@ -201,11 +203,11 @@ def standing(
 def balancing(scene: Surroundings, terms: Sequence[Constraint | Goal]) -> tuple[str, ...]:
     """The figures with feet, by what their names begin with, of which no term says how they stand."""
     figure = scene.figure
-    told = [inputs.body_of(scene, term.feet) for term in terms if isinstance(term, (Balance, LoadedBalance, Stand))]
+    stated = [inputs.body_of(scene, term.feet) for term in terms if isinstance(term, (Balance, LoadedBalance, Stand))]
     return tuple(
         body
         for body in figure.bodies
-        if body not in told and (body == "" or {body + foot for foot in FEET} <= set(figure.segments))
+        if body not in stated and (body == "" or {body + foot for foot in FEET} <= set(figure.segments))
     )
 
 

@@ -16,7 +16,7 @@ from wholebody.base.fields import Checked
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.balance import Balance, Feet, Margin, SolePolygon, standing_corners
-from wholebody.tasks.base import Constraint, Surroundings, filled
+from wholebody.tasks.base import ComputedTogether, Surroundings, filled
 
 GRAVITY = 9.81
 """m/s^2, as in Pinocchio's models."""
@@ -113,7 +113,7 @@ def pressure(
 
 
 @dataclass(frozen=True, eq=False)
-class LoadedBalance(Constraint):
+class LoadedBalance(ComputedTogether):
     """Keep the balance under forces: the ground presses within the support polygon of the feet.
 
     As `Balance`, which it takes the place of, but of the point where the ground presses in place of the centre of mass:
@@ -157,15 +157,7 @@ class LoadedBalance(Constraint):
         """The margin."""
         return np.array(self.keeps)
 
-    def value(self, state: State) -> Array:
-        """(m,) distance inside each edge [m]."""
-        return self.value_and_jacobian(state, self.value)[0]
-
-    def jacobian(self, state: State) -> Array:
-        """(m, nv)."""
-        return self.value_and_jacobian(state, self.value)[1]
-
     def value_and_jacobian(self, state: State, value: Callable[[State], Array]) -> tuple[Array, Array]:
-        """Both from one look at the forces."""
+        """(m,) distance inside each edge [m], and its derivative (m, nv)."""
         point, rows = pressure(state, self.loads, self.soles.mass, *self.soles.height(state))
         return self.soles.inside(state, point, rows)

@@ -16,7 +16,6 @@ from wholebody.tasks import inputs
 from wholebody.tasks.axis import equidistant_error, equidistant_jacobian
 from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.distance import SumOfSquares
-from wholebody.tasks.sit import upright
 
 HANGS = 6.0
 """1/rad^2, beside an effort of 0.7 that counts from the trunk: ESTIMATE."""
@@ -53,9 +52,10 @@ class Hang(SumOfSquares):
 
     def resolve(self, scene: Surroundings, start: Array) -> Hang:
         """Find the upper arms, and how they hang in the first posture."""
-        rest = upright(scene)
-        places = tuple(inputs.find_place(scene, arm, "Hang") for arm in self.arms)
-        down = np.array([-rest.data.oMi[place.joint].rotation[2] for place in places])
+        places, figure = tuple(inputs.find_place(scene, arm, "Hang") for arm in self.arms), scene.figure
+        joints = [place.joint for place in places]
+        at = figure.joint_placements(figure.posture(figure.postures[0]), joints)  # a state takes a third of a problem
+        down = np.array([-at[joint].rotation[2] for joint in joints])
         return filled(self, places=places, down=down)
 
     def squares(self, state: State) -> tuple[Array, Array]:

@@ -123,12 +123,12 @@ class Lean(ContactTerm):
 
 def _meeting(scene: Surroundings, first: Surface, second: Surface, where: str) -> tuple[Part, ...]:
     """Two points that meet; where both are on the surfaces of their pieces, those look at each other."""
-    meeting, ways = Meeting(first, second), (_outwards(scene, first), _outwards(scene, second))
-    if ways[0] is None or ways[1] is None:
+    meeting, normals = Meeting(first, second), (_outwards(scene, first), _outwards(scene, second))
+    if normals[0] is None or normals[1] is None:
         return (meeting,)
-    face = Face(second, np.zeros(3), across(ways[1]), np.zeros(2))
+    face = Face(second, np.zeros(3), across(normals[1]), np.zeros(2))
     place = inputs.find_place(scene, first.name, where)
-    return meeting, Facing(place, across(ways[0]), face, np.array((0.0, 0.0, -1.0)))
+    return meeting, Facing(place, across(normals[0]), face, np.array((0.0, 0.0, -1.0)))
 
 
 def _outwards(scene: Surroundings, point: Surface) -> Array | None:

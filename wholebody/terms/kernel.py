@@ -90,8 +90,8 @@ def linearise(
     results, index, pairs, travelled, bound, within = asked
     distance, vectors, number, pair, least, gap_wrench, gap, gap_contact, gap_joints, gap_clearance = near
     if known < 0:
-        told = (pairs, travelled, bound)
-        known, broken = gather(results, index, told, within, clearances[1], (distance, vectors, number, pair))
+        given = (pairs, travelled, bound)
+        known, broken = gather(results, index, given, within, clearances[1], (distance, vectors, number, pair))
         if broken:
             return known, 0, True
     for c in range(known):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from copy import copy
-from functools import lru_cache
 from math import sqrt
 from typing import Any, NamedTuple
 
@@ -12,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
+from wholebody.base.compiled import with_loops
 from wholebody.base.errors import InputError, UndefinedTermError
 from wholebody.figures.description import Limits
 from wholebody.figures.state import State, Wrench
@@ -316,11 +316,9 @@ class Lineariser:
             np.clip(box, low, high, out=box)
 
 
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
+@with_loops("wholebody.terms.kernel")
+def compiled_kernel(term_kernel: Any) -> None:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
-    from wholebody.terms import kernel as term_kernel
-
     state = State(pin.buildSampleModelManipulator())
     plan = make_plan(NO_LIMITS, Terms(), None, state)
     nv = state.model.nv
@@ -330,7 +328,6 @@ def compiled_kernel() -> Any:
         (wrenches, _NONE, rows, box, measure, rows),
     )  # fmt: skip
     term_kernel.wrench_rows(wrenches, 0, 0, state.columns, plan[:4], rows)
-    return term_kernel
 
 
 class ConstraintValues:

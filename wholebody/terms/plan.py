@@ -289,5 +289,5 @@ def _distances(
 def checked_count(term: Goal | Constraint | Measure, rows: int, expected: int) -> None:
     """A TermError where a term of one's own has another number of rows than at the start."""
     if rows != expected:
-        told = f"it has {rows} rows here, and had {expected} at the start; give each term one number of rows"
-        raise TermError(term, type(term).__name__, f"{told} at all postures")
+        message = f"it has {rows} rows here, and had {expected} at the start; give each term one number of rows"
+        raise TermError(term, type(term).__name__, f"{message} at all postures")

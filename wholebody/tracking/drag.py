@@ -135,7 +135,10 @@ class ProblemDrag:
 
     def _followed(self) -> int:
         """Move by the longest free motion of `GoalMoves`, or out of a thing moved into the figure; the iterations."""
-        spent, tried, deep = 0, list[Array](), self._came_in()
+        spent, tried = 0, list[Array]()
+        # m: depth of an overlap that the tracker itself does not lead out of
+        deep = 0.0 if self.tracker.leaves_overlap else _depth(self.workspace, self.q)
+        deep = deep if deep > GRAZE else 0.0
         for step in self._frames():
             spent, q = spent + step.iterations, step.q
             if self._is_free(q, self.tracker.unswept) and (not deep or _depth(self.workspace, q) <= GRAZE):
@@ -167,11 +170,6 @@ class ProblemDrag:
         if self._motion is not None:
             return self._motion.first_contact(self.q, q, GRAZE) is None
         return is_free(self.workspace, self.q, q, unswept, budget_for_sweep())
-
-    def _came_in(self) -> float:
-        """Depth of overlap of the figure, metres; 0 if it is small, or if the tracker itself leads out."""
-        deep = 0.0 if self.tracker.leaves_overlap else _depth(self.workspace, self.q)
-        return deep if deep > GRAZE else 0.0
 
     def _leave(self, tried: list[Array], deep: float) -> None:
         """Move out of an overlap of `deep` metres: by a free motion, else to the shallower end."""

@@ -189,11 +189,11 @@ class FrameLoop(NotCopyable):
         """The first posture free of things that move, or the least deep, and what was not avoided."""
         began, start = time.perf_counter(), (0.0, self.shown)
         nearest = resolution.candidates[-1]
-        ways: list[tuple[tuple[float, Array], ...]] = [resolution.path] if resolution.path else []
+        paths: list[tuple[tuple[float, Array], ...]] = [resolution.path] if resolution.path else []
         ends = [*resolution.candidates, *(pin.interpolate(self.scene.model, self.shown, nearest, s) for s in SHARES)]
-        ways += [(start, (1.0, np.asarray(q))) for q in [*ends, self.shown]]
-        best, found, least = ways[0], tuple[Collision, ...](), np.inf
-        for way in ways:
+        paths += [(start, (1.0, np.asarray(q))) for q in [*ends, self.shown]]
+        best, found, least = paths[0], tuple[Collision, ...](), np.inf
+        for way in paths:
             collisions = motion.collisions(way)
             depth = sum(one.depth for one in collisions)
             if depth < least:
@@ -308,16 +308,16 @@ def follow(
     function(progress, "progress")
     same_joints(track, scene.figure, "follow")
     own = frame_placements(scene, track.things, len(track.q), "follow: things of the track")
-    ways = {**own, **frame_placements(scene, moves, len(track.q), "follow: moves")}
-    scene = copy.copy(scene) if ways else scene
+    tracks = {**own, **frame_placements(scene, moves, len(track.q), "follow: moves")}
+    scene = copy.copy(scene) if tracks else scene
     for name, places in own.items():
         scene.move(name, at=places[0])
     loop = FrameLoop(scene, track.q[0], overlap=overlap, dt=track.dt, seed=seed, rigid=rigid)
     frames = []
     for number, tracked in enumerate(track.q):
-        for name, places in ways.items():
+        for name, places in tracks.items():
             scene.move(name, at=places[number], over=track.dt)
         frames.append(loop.frame(tracked))
         if progress is not None:
             progress(number + 1)
-    return Recording.of(frames, track.q, track.dt, overlap, ways)
+    return Recording.of(frames, track.q, track.dt, overlap, tracks)

@@ -168,13 +168,13 @@ def read_rows(path: str | os.PathLike[str], sizes: Sequence[int], wanted: str) -
     path = checked_path(path, "path")
     text = read_text(path, "path")
     lines = {number: said.partition("#")[0].strip() for number, said in enumerate(text.splitlines(), start=1)}
-    told = [(f"{path}, line {number}", said) for number, said in lines.items() if said]
-    if told and not any(is_number(word) for word in _words(told[0][1])):
-        told = told[1:]
-    if not told:
+    entries = [(f"{path}, line {number}", said) for number, said in lines.items() if said]
+    if entries and not any(is_number(word) for word in _words(entries[0][1])):
+        entries = entries[1:]
+    if not entries:
         raise FileFormatError(f"{path}: it holds no places; give {wanted}, one place a line")
-    first = len(_words(told[0][1]))
-    return np.array([_place(*line, (first,) if first in sizes else sizes, wanted) for line in told])
+    first = len(_words(entries[0][1]))
+    return np.array([_place(*line, (first,) if first in sizes else sizes, wanted) for line in entries])
 
 
 def spread(corners: ArrayLike, frames: int | None = None, dt: float = FRAME) -> Array:

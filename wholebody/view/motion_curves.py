@@ -23,7 +23,7 @@ from wholebody.motion.load_change import load_curves, telling
 from wholebody.motion.retargeting import bone_errors
 from wholebody.motion.roles import skeleton_roles
 from wholebody.motion.skeleton import SkeletonMotion
-from wholebody.motion.stance import paths, standing_points
+from wholebody.motion.stance import has_feet, paths, standing
 from wholebody.motion.standing_ground import ground
 from wholebody.scene.scene import Scene
 from wholebody.view.side_by_side import beside
@@ -34,6 +34,7 @@ Names: TypeAlias = str | os.PathLike[str] | Mapping[str, Mapping[str, str]]
 
 JOINTS = 8  # that are drawn: those that move most, or that are changed most
 RECORDING = "recording"
+NEAR = 0.1  # m: distances that are drawn
 
 
 def motion_curves(
@@ -86,12 +87,33 @@ def _joints(clips: Mapping[str, Clip]) -> list[dict[str, Any]]:
 
 
 def _distances(clips: Mapping[str, Clip], scene: Scene) -> list[dict[str, Any]]:
-    lines = []
+    lines, least = [], []
     for name, clip in clips.items():
         found = check(clip, scene)
         between = np.append(found.between, 0.0)
         lines.append(("deepest overlap", name, 1e3 * np.maximum(found.depth, between)))
-    return [_chart("deepest overlap in each frame and until the next", "mm", lines)]
+        if not clip.things:
+            least += [(kind, name, 1e3 * values) for kind, values in _least(clip, scene).items()]
+    return [
+        _chart("deepest overlap in each frame and until the next", "mm", lines),
+        *([_chart(f"least distance of parts, below {1e3 * NEAR:g}", "mm", least)] if least else []),
+    ]
+
+
+def _least(clip: Clip, scene: Scene) -> dict[str, Array]:
+    """(n,) least signed distance in each frame, metres, of parts of the body, of what it wears, and of things."""
+    around = {name: each.segment is None for name, each in scene.objects.items()}
+    kinds = ["equipment" if name in around else "body" for name in scene.piece_owner]
+    kinds = ["things" if around.get(name) else kind for name, kind in zip(scene.piece_owner, kinds, strict=True)]
+    ranks = ("body", "equipment", "things")  # a pair is of the last one of its two
+    found = {kind: np.full(len(clip), np.nan) for kind in ranks}
+    with scene.borrow() as workspace:
+        for frame, q in enumerate(clip.q):
+            near = workspace.near(q, NEAR)
+            for (first, second), distance in zip(near.pair.tolist(), near.distance.tolist(), strict=True):
+                values = found[max(kinds[first], kinds[second], key=ranks.index)]
+                values[frame] = np.fmin(values[frame], distance)
+    return {kind: values for kind, values in found.items() if not np.isnan(values).all()}
 
 
 def _slides(motion: SkeletonMotion | None, clips: Mapping[str, Clip], names: Names | None) -> list[dict[str, Any]]:
@@ -104,10 +126,10 @@ def _slides(motion: SkeletonMotion | None, clips: Mapping[str, Clip], names: Nam
             np.array([rests[role] for role in feet]).reshape(len(feet), -1).T, motion.dt,
         )))  # fmt: skip
     for name, clip in clips.items():
-        standing = standing_points(clip.figure, clip.q, clip.dt)
-        if standing:
-            marks = np.array(list(standing.values())).T
-            lines.append(("feet", name, _fastest(paths(clip.figure, clip.q, tuple(standing)), marks, clip.dt)))
+        if has_feet(clip.figure):
+            found = standing(clip.figure, clip.q, clip.dt)
+            marks = np.array(list(found.values())).T
+            lines.append(("feet", name, _fastest(paths(clip.figure, clip.q, tuple(found)), marks, clip.dt)))
     return [_chart("fastest point of a foot that stands", "mm/s", lines)] if lines else []
 
 

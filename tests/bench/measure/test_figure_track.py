@@ -9,13 +9,10 @@ import numpy as np
 import pytest
 
 from tests.bench.following import followed
-from tests.csv_rows import csv_rows
 from wholebody.base.errors import InputError
-from wholebody.bench.measure import track as reaches
 from wholebody.bench.measure.step import taking
 from wholebody.bench.measure.track import SETTING, Track, figure_tracks, judge
 from wholebody.bench.suite.adapters.registry import chosen_tools, make_tool
-from wholebody.cli import main
 
 TOOLS = [name for name in ("wholebody", "placo", "placo/pruned", "pink", "mink") if name in chosen_tools()]
 LINK = '<link name="{}"><collision><geometry><sphere radius="0.02"/></geometry></collision></link>'
@@ -78,18 +75,3 @@ def test_a_figure_that_cannot_reach_is_refused(tmp_path: Path) -> None:
     path.write_text(f'<robot name="stone">{LINK.format("a")}</robot>')
     with pytest.raises(InputError, match="no chain"):
         figure_tracks(str(path))
-
-
-def test_the_command_writes_the_same_tables(
-    tmp_path: Path, root: Path, arm: list[Track], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(reaches, "figure_tracks", lambda *_: [replace(arm[1], targets=arm[1].targets[:8])])
-    out, file = str(tmp_path / "out"), str(root / "tests/data/arm/arm.urdf")
-    words = ("--figure", file, "--repeats", "1", "--steps", "8", "--tools", "wholebody", "--out", out)
-    assert main(["bench", "step", *words, "--update-docs", str(tmp_path)]) == 0
-    rows = csv_rows(tmp_path / "out" / "step-figures-time.csv")
-    assert {row["case"] for row in rows} == {"arm, contact"}
-    page = (tmp_path / "assets/bench/step-figures.txt").read_text()
-    assert "| arm, contact | wholebody |" in page
-    assert "standing human" not in page
-    assert "does not take" not in page

@@ -27,7 +27,7 @@ BUILDS = (*({"sex": who.sex, "stature": who.stature, "mass": who.mass} for who i
           *list(wb.people(6).values()))  # fmt: skip
 
 
-@pytest.mark.parametrize("build", BUILDS, ids=range(len(BUILDS)))
+@pytest.mark.parametrize("build", BUILDS[::2], ids=range(len(BUILDS[::2])))
 def test_the_body_has_every_dimension(build):
     figure = load("human", **build)
     found, wanted = measure(figure), dict(figure.describe().person.dimensions)
@@ -148,7 +148,7 @@ def _outside(geometry, rotation, translation, points):
     return np.linalg.norm(local, axis=1) - geometry.radius
 
 
-@pytest.mark.parametrize("case", ["F50", "M50"])
+@pytest.mark.parametrize("case", ["F50"])
 def test_spheres_cover_the_pieces_as_far_as_the_page_says(case):
     pieces, spheres = _placed(person(case)), _placed(person(case, "spheres"))
     rng = np.random.default_rng(0)

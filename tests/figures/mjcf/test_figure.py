@@ -87,7 +87,7 @@ def configuration(model: object, figure: wb.Figure, seed: int) -> tuple[np.ndarr
     return theirs.qpos.copy(), q
 
 
-@pytest.mark.parametrize("first", range(0, 40, 10))
+@pytest.mark.parametrize("first", range(0, 20, 10))
 def test_random_files_are_mujocos(first: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its log there
     for seed in range(first, first + 10):

@@ -61,7 +61,7 @@ def test_a_smooth_union_only_adds() -> None:
     assert (sharp - smooth).max() <= 0.01 + 1e-12
 
 
-@pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (0.42, 0.0, 1.0), (0.3, 0.2, 0.9)])
+@pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (0.3, 0.2, 0.9)])
 def test_the_edge_of_a_cut_is_sharp_on_a_coarse_grid(normal: tuple[float, float, float]) -> None:
     """A rod of radius 80 mm, cut off: its edge is an ellipse, and triangles of 20 mm keep to it."""
     radius, plane = 0.08, np.array(normal) / np.linalg.norm(normal)

@@ -62,7 +62,7 @@ def test_against_dense_sampling(flying: bool) -> None:
         found = sweep.first_contact(q0, q1)
         level = np.minimum(arena.distances(q0), 0.0) - 1e-4
         sampled = None
-        for t in np.linspace(0, 1, 301):
+        for t in np.linspace(0, 1, 151):
             if (arena.distances(pin.interpolate(arena.model, q0, q1, t)) < level).any():
                 sampled = t
                 break

@@ -53,7 +53,7 @@ def _corner(figure: wb.Figure) -> tuple[wb.Scene, list[Any]]:
 SCENES = {"wall": _wall, "table": _table, "torso": _torso, "arms": _arms, "corner": _corner}
 
 
-@pytest.mark.parametrize("name", list(SCENES)[:3])
+@pytest.mark.parametrize("name", ["table", "torso"])
 def test_no_frame_overlaps_and_the_last_is_what_is_tracked(
     name: str,
     avatar: wb.Figure,

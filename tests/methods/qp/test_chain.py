@@ -203,7 +203,7 @@ def test_the_effort_is_as_little_as_scipy_finds_from_many_starts(arm, turned):
     """The posture is stationary too; more starts for the measure find the best of all."""
     rng, state = np.random.default_rng(23), State(arm.model)
     lower, upper = arm.model.lowerPositionLimit, arm.model.upperPositionLimit
-    for _ in range(2):
+    for _ in range(1):
         problem = wb.Problem(wb.Scene(arm), START, goals=[random_goal(arm, "tip", rng, turned)])
         weights, errors = problem.measures[0].distance.weights, problem.goals[0].error
         least = np.inf

@@ -11,12 +11,9 @@ import wholebody as wb
 from wholebody.bench.attack.terms import at_the_place, contact
 
 CASES = {
-    "feet on a step": 787,
     "left tip on a rod": 1989,
-    "right tip on a rod": 2192,
     "thin rod": 2411,
     "hand along an edge": 104,
-    "thumb on a box": 2280,
 }
 
 

@@ -48,7 +48,7 @@ def furthest(clip: wb.Clip, other: wb.Clip) -> float:
 
 @pytest.mark.parametrize("ending", CLOSE)
 @given(seed=st.integers(0, 2**32 - 1), frames=st.integers(2, 5), dt=st.floats(1e-3, 1.0))
-@settings(max_examples=15)
+@settings(max_examples=6)
 def test_what_is_written_is_read_again(
     ending: str, seed: int, frames: int, dt: float, human: Figure, tmp_path_factory: pytest.TempPathFactory
 ) -> None:

@@ -226,3 +226,29 @@ def test_a_long_window_is_freed_in_parts_without_seams(
     assert max(longest) == 75
     np.testing.assert_allclose(parts.clip.q, whole.clip.q, atol=1e-3)
     assert parts.report.jerk < 1.05 * whole.report.jerk
+
+
+@pytest.mark.parametrize(("ways_on", "asked"), [
+    (lambda part: (part.first, part.end) != (22, 52), [(0, 30), (22, 52), (0, 52), (44, 100)]),
+    (lambda part: part.end < 52, [(0, 30), (22, 52), (0, 52), (0, 100)]),
+    (lambda part: part.first == 0, [(0, 30), (22, 52), (0, 52), (44, 100), (0, 100)]),
+])  # fmt: skip
+def test_a_part_that_cannot_go_on_is_freed_with_the_one_before(
+    planar_arm: Callable[..., Figure], ways_on: Callable[[Window], bool], asked: list[tuple[int, int]]
+) -> None:
+    """Parts of 30 frames: which are asked for where some have no answer, and the whole window where nothing is left."""
+    figure, seen = planar_arm((0.5, 0.5)), list[tuple[int, int]]()
+
+    class Windows:
+        def window(self, part: Window, *_: Any, patient: bool = True, **__: Any) -> window_run.WindowResult:
+            seen.append((part.first, part.end))
+            assert patient is (seen[-1] == (0, 100))
+            free = ways_on(part) or patient
+            return window_run.WindowResult(np.full((len(part), 2), float(part.end)), "" if free else "something", free)
+
+    with begun(wb.Clip(figure, np.zeros((100, 2)), 1 / 15), wb.Scene(figure)) as run:
+        given: Any = (Window(0, 100), np.zeros((100, 2)), None, lambda _: False)
+        found = trajectory._in_parts(run, Windows(), *given)  # type: ignore[arg-type]
+    assert seen == asked
+    assert not found.missed
+    assert (found.q[-1] == 100.0).all()

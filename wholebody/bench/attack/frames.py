@@ -81,7 +81,7 @@ def shown(scene: wb.Scene, loop: FrameLoop, places: Sequence[tuple[float, ...] |
     """Judge whether every frame is free of overlap or tells it, while the scene's only thing is put into places."""
     start: Array = loop.shown
     (name,) = scene.objects
-    told = 0
+    noted = 0
     for number, place in enumerate(places):
         if place is not None:
             scene.move(name, at=place)
@@ -89,8 +89,8 @@ def shown(scene: wb.Scene, loop: FrameLoop, places: Sequence[tuple[float, ...] |
         deepest = -float(Pairs(scene).distances(frame.q).min(initial=0.0))
         if deepest > 1.2e-4 and not frame.note:
             return Verdict("wrong", f"frame {number}: {1e3 * deepest:.2f} mm of overlap, and no note")
-        told += bool(frame.note)
-    return Verdict("right", f"{len(places)} frames, {told} with notes")
+        noted += bool(frame.note)
+    return Verdict("right", f"{len(places)} frames, {noted} with notes")
 
 
 def pairs(rng: np.random.Generator, folder: Path) -> Verdict:
@@ -120,12 +120,12 @@ def overlapping(scene: wb.Scene, q: Array) -> Verdict:
             continue
         least = _distance(scene, one, other)
         count += least < 0.0
-        told = frozenset((one, other)) in said
+        reported = frozenset((one, other)) in said
         # Pairs within this distance of contact may be told or not.
         slack = 2e-5 * max([1.0, *(extent(piece.geometry) for made in shapes for piece in made.pieces())])
-        if least < -slack and not told:
+        if least < -slack and not reported:
             return Verdict("wrong", f"{one} and {other} overlap by {-least:.3g} m, and nothing tells it")
-        if least > slack and told:
+        if least > slack and reported:
             return Verdict("wrong", f"{one} and {other} are {least:.3g} m apart, and are said to overlap")
     return Verdict("right", f"{count} pairs of {len(scene.objects)} things overlap")
 
@@ -243,8 +243,8 @@ def _deeper(pairs: Pairs, scene: Scene, start: Array, end: Array, shares: Array)
     began = np.minimum(pairs.distances(start), 0.0)
     if not len(began):
         return np.zeros(len(shares))
-    ways = (np.asarray(pin.interpolate(scene.model, start, end, float(share))) for share in shares)
-    return np.array([float((began - pairs.distances(q)).max()) for q in ways])
+    postures = (np.asarray(pin.interpolate(scene.model, start, end, float(share))) for share in shares)
+    return np.array([float((began - pairs.distances(q)).max()) for q in postures])
 
 
 class Watch:

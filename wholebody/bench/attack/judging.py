@@ -118,7 +118,6 @@ class Pairs:
     """Pairs of a figure and of things, with their distances at postures."""
 
     def __init__(self, scene: Scene) -> None:
-        """List the pieces and the pairs."""
         figure = scene.figure
         self._model, self._data = figure.model, figure.model.createData()
         self._request = coal.DistanceRequest()

@@ -63,13 +63,13 @@ def read(folder: Path, frames: int) -> Iterator[Row]:
         def work(path: Path = path, kind: tuple[str, ...] = kind) -> dict[str, Figure]:
             return _read(path, kind, human, frames)
 
-        with warnings.catch_warnings(record=True) as told:
+        with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             spent, _, found = measured_ms(lambda work=work: _answer(work))  # type: ignore[misc]
         said = (
             [str(found["said"])]
             if "said" in found
-            else list(dict.fromkeys(one_line(str(w.message), 300) for w in told))
+            else list(dict.fromkeys(one_line(str(w.message), 300) for w in caught))
         )
         figures = {name: value for name, value in found.items() if name != "said"}
         yield Row(str(path.relative_to(folder)), "", {**figures, "ms": spent, "said": "; ".join(said)})
@@ -222,7 +222,6 @@ class MinkRetargeting:
     """Postures of a figure that follow a skeleton."""
 
     def __init__(self, motion: SkeletonMotion, figure: wb.Figure, roles: Roles) -> None:
-        """Make the model, the tasks and the targets of all frames."""
         try:
             import mink
             import mujoco

@@ -36,7 +36,6 @@ class Run:
     """
 
     def __init__(self, track: Track, name: str) -> None:
-        """Set the tool up, make a first step and go back to the start."""
         self.track, steps = track, len(track.targets)
         self.wall, self.cpu = np.zeros(steps), np.zeros(steps)
         self.postures = np.empty((steps, track.scene.model.nq))
@@ -98,7 +97,7 @@ def least_times(track: Track, runs: Sequence[Run]) -> Array:
     """(runs, steps) microseconds of joint Jacobians, placements and distances of a step in Pinocchio and coal alone."""
     model, scene = track.scene.model, track.scene
     pairs = PairDistances(scene.geometry, scene.built.table.pairs)
-    data, geometry, told = model.createData(), pairs.geometry, pairs.data
+    data, geometry, results = model.createData(), pairs.geometry, pairs.data
     spent = np.empty((len(runs), len(track.targets)))
     for mine, run in zip(spent, runs, strict=True):
         near = [np.flatnonzero(every.distance < SETTING.within) for every in pairs_along(scene, run.postures)]
@@ -107,9 +106,9 @@ def least_times(track: Track, runs: Sequence[Run]) -> Array:
                 numbers = near[step].tolist()
                 clock = time.perf_counter_ns()
                 pin.computeJointJacobians(model, data, q)
-                pin.updateGeometryPlacements(model, data, geometry, told)
+                pin.updateGeometryPlacements(model, data, geometry, results)
                 for number in numbers:
-                    pin.computeDistance(geometry, told, number)
+                    pin.computeDistance(geometry, results, number)
                 mine[step] = 1e-3 * (time.perf_counter_ns() - clock)
     return spent
 
@@ -143,7 +142,7 @@ def result_rows(track: Track, runs: Runs) -> list[Row]:
     """What the first repeat of each tool came to, judged from its postures."""
     rows = []
     for name, (run, *_) in runs.items():
-        verdict, told = run.verdict, run.tool.remarks()
+        verdict, remarks = run.verdict, run.tool.remarks()
         figures: dict[str, Figure] = {
             "least distance mm": 1e3 * float(verdict.least_distance.min()),
             "steps inside": int((verdict.least_distance < 0.0).sum()),
@@ -153,11 +152,11 @@ def result_rows(track: Track, runs: Runs) -> list[Row]:
             "beyond limits rad": verdict.limit_violation,
             "root speed ÷ bound": verdict.fastest_root,
             "joint acceleration rad/s²": verdict.acceleration,
-            "pairs": int(told.get("pairs", track.pairs)),
+            "pairs": int(remarks.get("pairs", track.pairs)),
             "near": float(verdict.near.mean()),
             "touching": float(verdict.touching.mean()),
-            "rows": told.get("rows", float("nan")),
-            "solved exactly": told.get("exact", float("nan")),
+            "rows": remarks.get("rows", float("nan")),
+            "solved exactly": remarks.get("exact", float("nan")),
             "programs closed by": programs_text(run.tool.programs()),
             "no answer": run.tool.failures,
         }

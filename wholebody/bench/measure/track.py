@@ -79,7 +79,7 @@ def track(name: str, steps: int = 200) -> Track:
     chest = thorax + (0.16, 0.0, 0.0)  # m: before the origin of the thorax' frame, level with it
     inside = np.array(given.inside_m)
     first, second = round(given.into * steps), round((given.into + given.along) * steps)
-    ways = [
+    parts = [
         smooth_way(np.array([start_place, end_place]), count)
         for start_place, end_place, count in (
             (tip, inside[0], first),
@@ -87,7 +87,7 @@ def track(name: str, steps: int = 200) -> Track:
             (inside[1], chest, steps - second),
         )
     ]
-    return Track(name, scene, start, np.vstack(ways))
+    return Track(name, scene, start, np.vstack(parts))
 
 
 def smooth_way(places: Array, steps: int) -> Array:
@@ -194,16 +194,16 @@ def figure_tracks(spec: str, steps: int = 200) -> list[Track]:
         raise InputError(f"{spec}: it has no chain of joints with a tip that could reach; give a figure that moves")
     chain = max(chains, key=lambda chain: len(chain.joints))
     dofs = sorted({dof for name in chain.joints for dof in figure.dofs([name]).tolist()})
-    ways, distance = _ways(figure, spec, dofs, steps)
+    paths, distance = _ways(figure, spec, dofs, steps)
     clearance = min(SETTING.clearance, 0.5 * distance)
     held = (str(figure.segments[0]),) if figure.root == "free" else ()
-    places = tuple(np.array([figure.placement(q, chain.tip).translation for q in way]) for way in ways)
+    places = tuple(np.array([figure.placement(q, chain.tip).translation for q in way]) for way in paths)
     tracks = []
     for name in VARIANTS:
         scene = wb.Scene(figure)
         contact = name == "contact"
         if name != "alone":
-            _furnish(scene, ways, places, block=contact)
+            _furnish(scene, paths, places, block=contact)
         label = f"{Path(spec).stem}, {name}"
         tracks.append(Track(label, scene, figure.neutral, places[contact], chain.tip, held, clearance))
     return tracks
@@ -240,10 +240,10 @@ def _least(scene: wb.Scene, q: Array) -> float:
     return least
 
 
-def _furnish(scene: wb.Scene, ways: tuple[Array, Array], places: Sequence[Array], block: bool) -> None:
-    """Put the objects clear of both ways, and a block about where the second one takes the tip farthest."""
+def _furnish(scene: wb.Scene, paths: tuple[Array, Array], places: Sequence[Array], block: bool) -> None:
+    """Put the objects clear of both paths, and a block about where the second one takes the tip farthest."""
     # Objects are put clear of twelve postures along each way.
-    taken = Occupied(scene.figure, np.vstack([way[:: max(1, len(way) // 12)] for way in ways]))
+    taken = Occupied(scene.figure, np.vstack([way[:: max(1, len(way) // 12)] for way in paths]))
     tips = np.vstack(places)
     occupied = np.vstack([taken.centres, tips])
     low, high = occupied.min(axis=0), occupied.max(axis=0)

@@ -352,8 +352,8 @@ def _unnamed(throw: Throw, q: Array, step: Any, way: tuple[pin.SE3, pin.SE3], en
     if _deepest(throw, ((0.0, q), (0.0, q)), way, 1) >= 1.2e-4:  # what was in before was named then
         return False
     straight = ((0.0, q), (1.0, step.q))
-    ways = ((straight, 60), (step.path, 4))
-    return end > 1.2e-4 or all(_deepest(throw, path, way, parts) > 4e-4 for path, parts in ways)
+    paths = ((straight, 60), (step.path, 4))
+    return end > 1.2e-4 or all(_deepest(throw, path, way, parts) > 4e-4 for path, parts in paths)
 
 
 def all_throws(count: int, quick: bool = False) -> Iterator[Row]:

@@ -54,7 +54,7 @@ def _asked(pairs: Sequence[tuple[HardCase, Adapter]], jobs: int) -> list[Cell]:
     from wholebody.cli.tables import bar
 
     cells = []
-    with bar("asking", len(pairs), thread=False) as tell:
+    with bar("asking", len(pairs)) as tell:
         for cell in run(pairs, jobs):
             cells.append(cell)
             tell(len(cells), f"{cell.case.name}, {cell.method}")

@@ -11,7 +11,7 @@ from pathlib import Path
 from wholebody.base import checks
 from wholebody.base.errors import InputError
 from wholebody.base.files import make_folder
-from wholebody.bench.rows import Panel, Row, across, chart, only, report, texts, told
+from wholebody.bench.rows import Panel, Row, across, chart, in_words, only, report, texts
 from wholebody.bench.tables import machine, write_rows
 from wholebody.cli.bench.command import Chart, listed, measuring, publish
 from wholebody.cli.command import count, flag, option
@@ -172,7 +172,7 @@ def world(arguments: argparse.Namespace) -> int:
     for part, rows in found.items():
         for row in given[part]:
             rows.append(row)
-            print(told(row))
+            print(in_words(row))
             write_rows(arguments.out / f"world-{part}.csv", facts, rows)
     shown = dict(found)
     if "throws" in found:
@@ -240,7 +240,7 @@ def _compared(arguments: argparse.Namespace) -> int:
     rows = []
     for row in compare(arguments.folder, figures, 20 if arguments.quick else arguments.frames):
         rows.append(row)
-        print(told(row), flush=True)
+        print(in_words(row), flush=True)
     facts = machine() | {"frames": str(arguments.frames)}
     tables = {"All clips": totals(rows), "Each": rows}
     text = report(ABOUT, tables, facts)

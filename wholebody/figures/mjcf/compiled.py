@@ -99,16 +99,14 @@ class Compiled:
         """Bodies on the world with joints below them; otherwise bodies with a free joint; otherwise all."""
         # Bodies without a shape are left out if others have one: families of robots park unused joints there.
         tops = self.children[0]
-        inner = [top for top in tops if any(self._moves(body) for body in self.tree(top))]
+        kinds = {top: [self.model.jnt_type[k] for body in self.tree(top) for k in self.joints(body)] for top in tops}
+        inner = [top for top in tops if any(kind != FREE for kind in kinds[top])]
         inner = list(filter(self.has_shape, inner)) or inner
         return tuple(inner or [top for top in tops if self.is_free(top)] or tops)
 
     def has_shape(self, top: int) -> bool:
         """Whether a body or one that hangs on it has a geom."""
         return any(len(self.geoms(body)) for body in self.tree(top))
-
-    def _moves(self, body: int) -> bool:
-        return any(self.model.jnt_type[joint] != FREE for joint in self.joints(body))
 
     def robot(self, name: str | None) -> int:
         """The body of a robot on the world, by its name, or None where the file has one robot."""

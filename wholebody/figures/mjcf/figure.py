@@ -59,11 +59,11 @@ def mjcf_figure(
             kept.append(geom)
     if not shapes:
         notes.append("no geom of the robot can touch another one, so nothing of it collides")
-    geometry, told, numbers = geometry_of_links(
+    geometry, piece_notes, numbers = geometry_of_links(
         robot.model, shapes, check_concavity(concavity, links), compiled.path, colors=_colors(compiled, robot)
     )
     found = Robot(
-        compiled.name, robot.model, links, geometry, (*notes, *told),
+        compiled.name, robot.model, links, geometry, (*notes, *piece_notes),
         visual=visual_of(compiled, robot),
         frames=robot.sites,
         postures=_postures(compiled, robot),

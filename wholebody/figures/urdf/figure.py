@@ -83,8 +83,8 @@ def _within_followers(joints: tuple[UrdfJoint, ...]) -> tuple[tuple[UrdfJoint, .
         low, high = sorted((end - law.offset) / law.slope for end in (own.lower, own.upper))
         kept = max(low, ends[law.leader][0]), min(high, ends[law.leader][1])
         if kept[0] > kept[1]:
-            told = f"its limits exclude those of {shown(law.leader)}, so they are left out"
-            notes.append(f"joint {shown(name)}: {told}")
+            note = f"its limits exclude those of {shown(law.leader)}, so they are left out"
+            notes.append(f"joint {shown(name)}: {note}")
             continue
         ends[law.leader] = kept
     made = [with_values(joint, lower=ends[joint.name][0], upper=ends[joint.name][1]) for joint in joints]

@@ -65,8 +65,8 @@ def read_joints(
     names = {joint.name for joint in joints}
     for k, joint in enumerate(joints):
         if joint.mimic is not None and joint.mimic.joint not in names:
-            told = f"it mimics {shown(joint.mimic.joint)}, which is not in the file, so it is on its own"
-            notes.append(f"joint {shown(joint.name)}: {told}")
+            note = f"it mimics {shown(joint.mimic.joint)}, which is not in the file, so it is on its own"
+            notes.append(f"joint {shown(joint.name)}: {note}")
             joints[k] = with_values(joint, mimic=None)
     _check_followers({joint.name: joint for joint in joints}, path)
     return tuple(joints), _root(links, parent_of, path), tuple(notes)

@@ -69,6 +69,20 @@ def add_joint(
     return joint
 
 
+def add_model_joint(robot: Element, model: pin.Model, index: int, name: str, parent: str, child: str) -> None:
+    """Add a joint of a model that has a single axis, with its limits, between two links."""
+    known, joint = urdf_axis(model, index), model.joints[index]
+    assert known is not None
+    # rad/s, m/s: in place of a limit that is none
+    limit = {"effort": 1000.0, "velocity": min(float(model.velocityLimit[joint.idx_v]), 1e6)}
+    if joint.nq == 1:
+        limit["lower"], limit["upper"] = (
+            float(ends[joint.idx_q]) for ends in (model.lowerPositionLimit, model.upperPositionLimit)
+        )
+    place = model.jointPlacements[index]
+    add_joint(robot, name, known.kind, parent, child, origin=place, axis=known.axis, limit=limit)
+
+
 def exact(values: Iterable[float]) -> str:
     """Numbers with all their digits, parted by spaces, as URDF writes vectors."""
     return " ".join(repr(float(value)) for value in values)

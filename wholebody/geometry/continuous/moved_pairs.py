@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.compiled import with_loops
 from wholebody.base.errors import InputError
 from wholebody.geometry.proximity import Contacts, PairTable
 
@@ -49,11 +49,9 @@ def separated(table: PairTable, before: QueryResult, after: QueryResult, pairs: 
     return found
 
 
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
+@with_loops("wholebody.geometry.continuous.moved_pairs_kernel")
+def compiled_kernel(moved_pairs_kernel: Any) -> None:
     """The module of compiled loops, compiled or loaded from the cache, before a solve."""
-    from wholebody.geometry.continuous import moved_pairs_kernel
-
     none, places, pairs = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp)
     placements, lines, one = np.zeros((0, 4, 3)), np.zeros((0, 3)), np.zeros(1, dtype=np.intp)
     near = places, none, 0.0, places, none, 0.0
@@ -61,7 +59,6 @@ def compiled_kernel() -> Any:
     moved_pairs_kernel.separated(
         places, placements, placements, (places, pairs, lines, lines, lines), (lines, one, none, none), 0.0
     )
-    return moved_pairs_kernel
 
 
 def distances(placed: QueryResult, count: int) -> Array:

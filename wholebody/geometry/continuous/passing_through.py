@@ -79,8 +79,8 @@ def entered(
     at the beginning. The path has one configuration (nq,) or more.
     """
     last = _by_pair(depths.start(path[-1]), len(watched))
-    ways = ((path[0], path[-1]), path) if len(path) > 2 else (path,)
-    if not (last > INSIDE).any() and any(_is_clear(sweep, way) for way in ways):
+    paths = ((path[0], path[-1]), path) if len(path) > 2 else (path,)
+    if not (last > INSIDE).any() and any(_is_clear(sweep, way) for way in paths):
         return []
     first = _by_pair(depths.start(path[0]), len(watched))
     most = first.copy()

@@ -7,7 +7,6 @@ from the ends cannot tell how deep a pair gets in between, the motion is halved,
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import coal
@@ -15,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
+from wholebody.base.compiled import with_loops
 from wholebody.geometry.continuous.motion_bounds import MotionBounds
 from wholebody.geometry.pair_distances import PairDistances
 from wholebody.geometry.pieces import COAL_ACCURACY
@@ -230,11 +230,9 @@ def shapes_of(table: PairTable) -> Any:
     )  # fmt: skip
 
 
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
+@with_loops("wholebody.geometry.continuous.swept_depth_kernel")
+def compiled_kernel(swept_depth_kernel: Any) -> None:
     """The module of compiled loops, compiled or read back: not in the middle of a clip."""
-    from wholebody.geometry.continuous import swept_depth_kernel
-
     places, none, index = np.zeros((0, 4, 3)), np.zeros(0), np.zeros(0, dtype=np.intp)
     pairs, rows, one = np.zeros((0, 2), dtype=np.intp), np.zeros((0, 4)), np.zeros(1, dtype=np.intp)
     lines = np.zeros((0, 3))
@@ -245,4 +243,3 @@ def compiled_kernel() -> Any:
     swept_depth_kernel.lower_bounds(parts, np.zeros((0, 0, 4, 3)), shapes, speeds, 1.0, 0.0, none)
     sliding = swept_depth_kernel.Sliding(index, rows, none, places, np.zeros((0, 6)))
     swept_depth_kernel.keep_apart(sliding, shapes, speeds, none)
-    return swept_depth_kernel

@@ -68,7 +68,6 @@ class Attraction:
     """
 
     def __init__(self, scene: Scene, resolver: OverlapResolver) -> None:
-        """Find the degrees of freedom of each chain."""
         self._model, self._resolver, self._data = scene.model, resolver, scene.model.createData()
         self.step_length, self.limit, self.free = 0.0, 0, False
         self.parts: list[tuple[NDArray[np.intp], Array]] = []
@@ -165,7 +164,6 @@ class FrameResolver:
     """Overlap resolution from frame to frame in one scene."""
 
     def __init__(self, scene: Scene) -> None:
-        """Prepare the chains and their degrees of freedom."""
         self._model, self._figure, self._workspace = scene.model, scene.figure, scene.workspace()
         self._resolver = OverlapResolver(scene, self._workspace, exact=False)
         self._data = scene.model.createData(), scene.model.createData()  # at the tracked posture, and as shown before

@@ -34,7 +34,6 @@ class Polygon:
     """A reach cone: the test of a direction, on plain floats, and the nearest direction inside."""
 
     def __init__(self, cone: ReachCone) -> None:
-        """Copy the planes of the cone."""
         self._cone, slices = cone, np.cross(cone.visible, cone.vertices)
         self._wedges = [
             (three(slice_), three(after), three(edge))
@@ -66,7 +65,6 @@ class ConeGuard:
     """
 
     def __init__(self, figure: Figure, limbs: Limbs, name: str) -> None:
-        """Find the nodes between the cone's reference frame and the limb."""
         cone = figure.cones[name]
         self._polygon, self._axis, self._limbs = Polygon(cone.cone), np.asarray(cone.axis, dtype=float), limbs
         self._limb, self._base = (CarriedFrame(limbs, figure.frame_id(frame)) for frame in (cone.limb, cone.reference))
@@ -100,7 +98,6 @@ class Guard:
     """Keeps cones and ranges that share nodes."""
 
     def __init__(self, limbs: Limbs, parts: Sequence[Part]) -> None:
-        """Take the parts."""
         self.parts, self._limbs = tuple(parts), limbs
         self._rows = np.array(sorted({node for part in parts for node in part.nodes}), dtype=np.intp)
         self._last: Array | None = None

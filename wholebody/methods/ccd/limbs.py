@@ -7,9 +7,7 @@ nodes and does not move is a part of the later node's placement.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Hashable, Iterable
-from functools import lru_cache
 from math import atan2, cos, inf, sin
 from typing import Any
 
@@ -17,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.base.compiled import compiled
+from wholebody.base.compiled import compiled, with_loops
 
 Vector = tuple[float, float, float]
 Placement = tuple[float, ...]
@@ -128,7 +126,6 @@ class CarriedFrame:
     """
 
     def __init__(self, limbs: Limbs, frame: int) -> None:
-        """Find the node that carries the frame of this index."""
         described = limbs.model.frames[frame]
         self._limbs, self._joint, self._fixed = limbs, int(described.parentJoint), described.placement
         self.node = limbs.carrier(self._joint)
@@ -153,12 +150,11 @@ class CarriedFrame:
         return seen_from(self.placement, *seen_from(self._limbs.frame(self.node), x, y, z))
 
 
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
+@with_loops(__name__)
+def compiled_kernel(_: Any) -> None:
     """This module, after its loop is compiled or loaded from the cache; called before a solve, not during it."""
     none, slides, places = np.zeros(0), np.zeros(0, dtype=bool), np.zeros((0, 12))
     forward(np.zeros(0, dtype=np.intp), places, slides, np.zeros((0, 3)), none, places, np.zeros((0, 6)))
-    return sys.modules[__name__]
 
 
 def three(vector: Any) -> Vector:

@@ -57,13 +57,14 @@ class _Trial:
 class CCD(Checked, Descends):
     """Cyclic coordinate descent: one joint at a time, each to its best value, from the tip inwards.
 
-    Takes Point, Frame and Orientation goals. A goal on a chain of the figure moves the joints of that chain up to its
-    frame; any other goal moves all joints between its frame and the root; the root itself stays. Limits always hold,
+    Takes Point, Frame, Orientation and Relative goals. A goal on a chain of the figure moves the joints of that chain
+    up to its frame; any other goal moves all joints between its frame and the root; the root itself stays. A Relative
+    goal moves the joints of both frames by turns, but for those that move both and those of other goals. Limits hold,
     reach cones and ranges of motion if the problem has `ReachCones` and `RangeOfMotion`, clearances by the loop of
     Schmidl and Lin, which may turn other chains too. `Hold` is taken if no moving joint can move its frame; `Freeze`
     and `StepLimit` are taken. Balance, which a person keeps by default, is left to the assessment.
 
-    Other terms (Balance, Plane, Axis, CenterOfMass, Relative, measures) are refused by name. The method
+    Other terms (Balance, Plane, Axis, CenterOfMass, measures) are refused by name. The method
     has no objective beside the goals. A problem without measures is taken although its default is `Effort()`: the
     descent begins at the start and stops at the first posture that meets the goals, which is near the start and not the
     nearest; `assessment.measure` gives its effort.
@@ -134,7 +135,6 @@ class CCDTracker(DescentTracker[CCD]):
     """Follows by searches; its ways out resolve overlap with things that were moved into the figure."""
 
     def __init__(self, method: CCD, problem: Problem, dt: float) -> None:
-        """Set up; arguments and errors as for `DescentTracker`."""
         super().__init__(method, problem, dt)
         self._shared = _Shared(problem.scene, self.workspace)
         self.overlap_resolutions(problem.start)  # makes its chains, which would take as long as ten frames

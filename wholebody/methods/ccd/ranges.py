@@ -63,7 +63,6 @@ class CoupledGuard:
     """Keeps a weighted sum of joint values below its bound; see `CoupledRange`."""
 
     def __init__(self, figure: Figure, limbs: Limbs, part: CoupledRange) -> None:
-        """Find the nodes among the range's joints."""
         self._sum, self._bound, self._limbs = _Sum(figure, limbs, dict(part.joints)), part.bound, limbs
         self.nodes = self._sum.nodes
 
@@ -85,7 +84,6 @@ class EllipticGuard:
     """Keeps angles on or in an ellipse; see `EllipticRange`."""
 
     def __init__(self, figure: Figure, limbs: Limbs, part: EllipticRange) -> None:
-        """Find the nodes among the range's joints."""
         self._axes = [(_Sum(figure, limbs, dict.fromkeys(axis.joints, 1.0)), axis) for axis in part.axes]
         self._limbs = limbs
         self.nodes = tuple(node for angle, _ in self._axes for node in angle.nodes)
@@ -119,7 +117,6 @@ class TwistGuard:
     """Keeps the twist of a limb about its long axis within its bound; see `TwistRange`."""
 
     def __init__(self, figure: Figure, limbs: Limbs, part: TwistRange) -> None:
-        """Find the nodes between the reference and the limb."""
         self._part, self._limbs = part, limbs
         self._center = floats(pin.SE3(part.center, np.zeros(3)))
         self._slope: list[float] = (part.slope @ part.center).tolist()

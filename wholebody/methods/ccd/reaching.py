@@ -26,29 +26,45 @@ class Reached(NamedTuple):
     converged: bool
 
 
-def _aims(limbs: Limbs, data: Any, goals: Sequence[GoalPlace]) -> Aims:
-    """The points and axes of all goals with their targets, where `data` has the joints that these limbs do not move."""
-    # A place, then three axes of half the weight: their squared distances add up to twice that of a small angle.
-    lever = 0.3  # m per radian: weight of orientation against position; about the length of a forearm
-    rows: list[tuple[int, Any, Any, bool, float]] = []
-    for goal in goals:
-        carried = CarriedFrame(limbs, goal.frame)
-        carried.read(data)
-        if goal.place is not None:
-            rows.append((carried.node, moved(carried.placement, *goal.offset), goal.place, True, goal.weight))
-        if goal.rotation is not None:
-            for axis, wanted in zip(np.eye(3).tolist(), goal.rotation.T, strict=True):
-                weight = 0.5 * lever * lever * goal.weight
-                rows.append((carried.node, rotated(carried.placement, *axis), wanted, False, weight))
-    nodes, local, there, points, weights = zip(*rows, strict=True) if rows else ((), (), (), (), ())
-    return Aims(limbs, nodes, local, there, points, weights)
+class _Pursuit:
+    """What the limbs carry to its targets, which they may carry too, where `data` has the joints that they don't."""
+
+    def __init__(self, limbs: Limbs, data: Any, goals: Sequence[GoalPlace]) -> None:
+        # A place, then three axes of half the weight: their squared distances add up to twice that of a small angle.
+        lever = 0.3  # m per radian: weight of orientation against position; about the length of a forearm
+        rows: list[tuple[int, Any, int, Any, bool, float, int | None]] = []
+        for goal in goals:
+            carried, to = CarriedFrame(limbs, goal.frame), CarriedFrame(limbs, goal.to)
+            carried.read(data)
+            to.read(data)
+            if goal.place is not None:
+                point, there = moved(carried.placement, *goal.offset), moved(to.placement, *goal.place)
+                rows.append((carried.node, point, to.node, there, True, goal.weight, goal.half))
+            if goal.rotation is not None:
+                for axis, wanted in zip(np.eye(3).tolist(), goal.rotation.T.tolist(), strict=True):
+                    own, there = rotated(carried.placement, *axis), rotated(to.placement, *wanted)
+                    weight = 0.5 * lever * lever * goal.weight
+                    rows.append((carried.node, own, to.node, there, False, weight, goal.half))
+        nodes, local, bases, targets, points, weights, halves = zip(*rows, strict=True) if rows else ((),) * 7
+        self._targets = Aims(limbs, bases, targets, np.zeros((len(rows), 3)), points)
+        self.aims = Aims(limbs, nodes, local, self._targets.here, points, weights)
+        self._moving = any(half is not None for half in halves)
+        # factors of all aims in each half of a sweep: one of two frames moves while the other one is its target
+        still = [1 - half for half in (0, 1)] if {0, 1} <= set(halves) else [-1]
+        self.halves = [np.where([part == half for part in halves], 0.0, weights) for half in still]
+
+    def carry(self) -> None:
+        """Update where aims and targets are, after `limbs.forward`."""
+        if self._moving:
+            self._targets.carry()
+            self.aims.there[:] = self._targets.here
+        self.aims.carry()
 
 
 class Reach:
     """The joints of a request, and its goals."""
 
     def __init__(self, figure: Figure, request: Request, control: Control) -> None:
-        """Prepare the joints."""
         self._model = figure.model
         self.begin(request, control)
         self.limbs = Limbs(figure.model, request.joints)
@@ -69,7 +85,8 @@ class Reach:
         for guard in self._guards:
             guard.read(q, self._data)
             guard.keep()
-        aims = _aims(limbs, self._data, self._goals)
+        pursuit = _Pursuit(limbs, self._data, self._goals)
+        aims = pursuit.aims
         plan = aims.plan()
         error, last = aims.error, inf
         sweeps, converged = 0, not len(plan.turns)
@@ -79,11 +96,14 @@ class Reach:
                 last = error
                 if converged:
                     break
-            change = aims.sweep(plan)
-            limbs.forward()
-            for guard in self._guards:
-                guard.keep()
-            aims.carry()
+            change = 0.0
+            for weights in pursuit.halves:
+                aims.weights[:] = weights
+                change = max(change, aims.sweep(plan))
+                limbs.forward()
+                for guard in self._guards:
+                    guard.keep()
+                pursuit.carry()
             error = aims.error
             sweeps += 1
             converged = change < 1e-9

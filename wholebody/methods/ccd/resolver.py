@@ -183,5 +183,6 @@ def chains_of(figure: Figure) -> Mapping[str, tuple[Sequence[int], int]]:
         if leaf not in parents:
             path = [int(joint) for joint in model.supports[leaf] if joint > 0 and movable(model, int(joint))]
             tips = [k for k, frame in enumerate(model.frames) if frame.parentJoint == leaf]
+            tips.sort(key=lambda k: model.frames[k].type != pin.FrameType.JOINT)  # a joint's own frame is no tip
             found[str(model.names[leaf])] = path, tips[-1]
     return found

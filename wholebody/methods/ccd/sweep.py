@@ -14,9 +14,7 @@ Inverse Kinematics Problem of Mechanical Manipulators, IEEE Transactions on Robo
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterable, Sequence
-from functools import lru_cache
 from math import acos, atan2, ceil, cos, floor, inf, pi, sin
 from typing import Any, NamedTuple
 
@@ -24,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.base.compiled import compiled
+from wholebody.base.compiled import compiled, with_loops
 from wholebody.methods.ccd.limbs import Limbs, turned
 
 TURN = 2.0 * pi
@@ -110,15 +108,14 @@ def _plan(limbs: Limbs, carriers: tuple[int, ...], points: tuple[bool, ...], nod
     return Plan(np.array(turns, dtype=np.intp).reshape(-1, 4), np.array(moved, dtype=np.intp))
 
 
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
+@with_loops(__name__)
+def compiled_kernel(_: Any) -> None:
     """This module, after its loops are compiled or loaded from the cache; called before a solve, not during it."""
     places, six, rows = np.zeros(0, dtype=np.intp), np.zeros((0, 6)), np.zeros((0, 11))
     sweep(six, np.zeros(0, dtype=bool), np.zeros(0), np.zeros((2, 0)), rows, np.zeros((0, 4), dtype=np.intp), places)
     distance(rows)
     carry(np.zeros((0, 12)), places, rows)
     greatest_error(rows)
-    return sys.modules[__name__]
 
 
 @compiled()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,20 +16,23 @@ from wholebody.methods.ccd.guards import Kept
 from wholebody.methods.ccd.limbs import Vector, movable, three
 from wholebody.problem import Problem
 from wholebody.tasks.bounds import Freeze, StepLimit
-from wholebody.tasks.frame import Frame, Hold, Orientation
+from wholebody.tasks.frame import Frame, Hold, Orientation, Relative
 from wholebody.tasks.point import Point
 from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
 
 
 @dataclass(frozen=True)
 class GoalPlace:
-    """A frame, or a point of it, and its target."""
+    """A frame, or a point of it, and its target in the world or in another frame."""
 
     frame: int  # index in the model
     offset: Vector  # the point in the frame, metres
-    place: Vector | None  # target position in the world; None if only the orientation counts
-    rotation: Any  # (3, 3) target rotation in the world; None if only the position counts
+    place: Vector | None  # target position; None if only the orientation counts
+    rotation: Any  # (3, 3) target rotation; None if only the position counts
     weight: float  # factor on the squared error
+    to: int = 0  # index of the frame that has the target; 0 is the world
+    # of two frames that move towards each other, which half of a sweep moves this one
+    half: int | None = None
 
 
 @dataclass(frozen=True)
@@ -63,18 +67,36 @@ class _Reader:
 
     def goals(self) -> tuple[GoalPlace, ...]:
         """The goals; their joints are among `joints` then."""
-        found = []
+        found, relative = list[GoalPlace](), list[tuple[str, Relative]]()
         for number, goal in enumerate(self._problem.goals):
             where = f"goals[{number}], {type(goal).__name__}"
-            if not isinstance(goal, (Point, Frame, Orientation)):
+            if isinstance(goal, (Point, Frame, Orientation)):
+                self._move(where, goal.frame, reaching(self._figure, goal.frame))
+                found.append(_goal_place(goal))
+            elif isinstance(goal, Relative):
+                relative.append((where, goal))
+            else:
                 self.refused.append(where)
-                continue
-            path = [joint for joint in reaching(self._figure, goal.frame) if joint not in self.fixed]
-            if not path:
-                self.refused.append(f"{where}({goal.frame!r}), which no joint moves that may turn (the root stays)")
-            found.append(_goal_place(goal))
-            self.joints.update(path)
+        placed = frozenset(self.joints)
+        for where, goal in relative:
+            found += self._relative(where, goal, placed)
         return tuple(found)
+
+    def _move(self, where: str, frame: str, joints: Iterable[int]) -> None:
+        path = [joint for joint in joints if joint not in self.fixed]
+        if not path:
+            self.refused.append(f"{where}({frame!r}), which no joint moves that may turn (the root stays)")
+        self.joints.update(path)
+
+    def _relative(self, where: str, goal: Relative, placed: frozenset[int]) -> list[GoalPlace]:
+        """A goal between two frames: the joints of both move, but for those that move both or are placed already."""
+        place, base = goal.residual.place.joint, goal.residual.base.joint
+        apart = set.symmetric_difference(*(set(self._figure.model.supports[joint]) for joint in (place, base)))
+        ways = [apart.intersection(reaching(self._figure, name)) for name in (goal.frame, goal.to)]
+        kept = [way.isdisjoint(placed) and not way <= self.fixed for way in ways]
+        moving = [keeps or not any(kept) for keeps in kept]
+        self._move(where, goal.frame, set().union(*(way for way, moves in zip(ways, moving, strict=True) if moves)))
+        return [one for one, moves in zip(_ends(goal), moving, strict=True) if moves]
 
     def constraints(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Names of the reach cones and of the ranges of motion; call `goals` first."""
@@ -131,7 +153,21 @@ def reaching(figure: Figure, frame: str) -> tuple[int, ...]:
 def _goal_place(goal: Point | Frame | Orientation) -> GoalPlace:
     if isinstance(goal, Point):
         return GoalPlace(goal.place.frame, three(goal.resolved_offset), three(goal.resolved_target), None, goal.weight)
-    asked = goal.residual
-    there = three(asked.placement.translation) if asked.position else None
-    rotation = asked.placement.rotation if asked.orientation else None
-    return GoalPlace(asked.place.frame, (0.0, 0.0, 0.0), there, rotation, goal.weight)
+    return GoalPlace(goal.residual.place.frame, (0.0, 0.0, 0.0), *_target(goal.residual), goal.weight)
+
+
+def _target(asked: Any) -> tuple[Vector | None, Any]:
+    """Position and rotation that a residual of placements asks for."""
+    place = three(asked.placement.translation) if asked.position else None
+    return place, asked.placement.rotation if asked.orientation else None
+
+
+def _ends(goal: Relative) -> tuple[GoalPlace, GoalPlace]:
+    """The frame with its target in the other one, and the other one with its target in the frame."""
+    (place, rotation), origin = _target(goal.residual), (0.0, 0.0, 0.0)
+    frame, to = goal.residual.place.frame, goal.residual.base.frame
+    back = None if rotation is None else rotation.T
+    return (
+        GoalPlace(frame, origin, place, rotation, goal.weight, to, 0),
+        GoalPlace(to, place or origin, origin, back, goal.weight, frame, 1),
+    )

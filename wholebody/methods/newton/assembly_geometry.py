@@ -143,7 +143,6 @@ class LooseBodies:
         tested: Callable[[Owner, Owner], bool],
         pairs: Iterable[tuple[str, str]],
     ) -> None:
-        """Build the model."""
         self.model = pin.Model()
         for part in parts:
             if isinstance(part, str):

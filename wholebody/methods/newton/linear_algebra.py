@@ -9,8 +9,6 @@ with a positive diagonal D, the sparse Jacobian J and a diagonal M >= 0, which i
 
 from __future__ import annotations
 
-import sys
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +16,7 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.checks import known
-from wholebody.base.compiled import compiled
+from wholebody.base.compiled import compiled, with_loops
 from wholebody.base.errors import WholebodyError
 
 Places = NDArray[np.int32]
@@ -144,7 +142,6 @@ class Gram:
     """Lower triangle of J D^-1 J' + M as scipy's csc_matrix, whose data `refill` overwrites."""
 
     def __init__(self, pattern: Pattern) -> None:
-        """Pair the entries of J that share a column, and find the entries of their products."""
         from scipy.sparse import csc_matrix
 
         self.pattern = pattern
@@ -233,14 +230,13 @@ def _sum_products(scaled: Array, values: Array, products: Products, target: Plac
             pair += 1
 
 
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
+@with_loops(__name__)
+def compiled_kernel(_: Any) -> None:
     """This module, after its loops are compiled or loaded from the cache, before a solve."""
     none, places = np.zeros(0), np.zeros(0, dtype=np.int32)
     products = _paired(places, places, 0, 0)
     _laid_products(products, places)
     _sum_products(none, none, products, places, none)
-    return sys.modules[__name__]
 
 
 class QuasiDefinite:

@@ -103,7 +103,6 @@ class FigureObjective(Objective):
     """The rows of a problem: measures that are minimised, among them sums of squares; `reported` names the others."""
 
     def __init__(self, problem: Problem, bodies: FigureBodies, state: State) -> None:
-        """Prepare the rows for the figure's revolute joints."""
         counted = [root for root in bodies.roots if _counts_root(problem, state, root[2])]
         super().__init__(state, problem.start, [(bodies, 0, 0)], counted)
         self._curved, self.reported, self._follows = list[Measure](), list[str](), True

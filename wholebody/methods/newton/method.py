@@ -81,4 +81,4 @@ class Newton(Settings, Descends):
             InputError: the problem has a term that this method has no equations for, dt is not a positive finite
                 number, or the scene changed after the problem was made.
         """
-        return NewtonTracker(self, self, problem, dt)
+        return NewtonTracker(self, problem, dt)

@@ -65,7 +65,6 @@ class Search:
     """The search for one problem, which keeps the best result."""
 
     def __init__(self, active_system: FigureSystem, settings: Settings) -> None:
-        """Prepare for the problem of an active system."""
         self.active_system, self.settings = active_system, settings
         self.iterations = 0
         self.residuals: list[float] = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import posture
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT
-from wholebody.methods.base import TOLERANCE, Method, SolvingTracker
+from wholebody.methods.base import TOLERANCE, SolvingTracker
 from wholebody.methods.conclusion import concluded
 from wholebody.methods.control import BUDGET, Control
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
@@ -47,10 +47,11 @@ class NewtonTracker(SolvingTracker):
     unswept = SHORT
     leaves_overlap = True
 
-    def __init__(self, method: Method, settings: Settings, problem: Problem, dt: float | None) -> None:
-        """Build the equations; `settings` are those of the method. Where dt is None, speeds are not bounded."""
+    def __init__(self, method: Any, problem: Problem, dt: float | None) -> None:
+        """Build the equations for a method that is its `Settings`. Where dt is None, speeds are not bounded."""
         super().__init__(method, problem, 1.0 if dt is None else dt)
-        self._settings, self._bounded = settings, dt is not None
+        self._settings: Settings = method
+        self._bounded = dt is not None
         self._alone = OneAtATime("tracker")
         self._lay_out()
 

@@ -9,12 +9,12 @@ piecewise quadratic and smooth, and along a line its derivative is piecewise lin
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from wholebody.base.arrays import Array, with_values
+from wholebody.base.compiled import with_loops
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram, Room, work_size
 from wholebody.methods.qp.settings import CORRECTIONS
 
@@ -77,28 +77,22 @@ def room_for(program: QuadraticProgram, times: int = 1) -> Room:
     return Room(np.empty(times * work), np.empty(2 * times * k, dtype=np.intp), np.empty(times * k, dtype=bool))
 
 
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
+@with_loops("wholebody.methods.qp.active_set_kernel")
+def compiled_kernel(active_set_kernel: Any) -> None:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
-    from wholebody.methods.qp import active_set_kernel
-
     program, active = smallest()
     index, x = np.zeros(0, dtype=np.intp), np.zeros(1)
     room = Room(np.empty(work_size(1, 0, 0)), index, active.elastic)
     active_set_kernel.primal_dual_active_set(program, index, active, 1, CORRECTIONS, room, x)
     active_set_kernel.grow(program, index, index, active, CORRECTIONS, room, x)
     active_set_kernel.minimise_with(program, active, CORRECTIONS.tolerance, room.work, x)
-    return active_set_kernel
 
 
-@lru_cache(maxsize=1)
-def semismooth_kernel() -> Any:
+@with_loops("wholebody.methods.qp.semismooth_kernel")
+def semismooth_kernel(kernel: Any) -> None:
     """The module of semismooth Newton steps, compiled or read back: few solves need it, a tracker cannot wait."""
-    from wholebody.methods.qp import semismooth_kernel as kernel
-
     program, active = smallest()
     kernel.minimise(program, 1, CORRECTIONS.tolerance, active, np.empty(work_size(1, 0, 0)), np.zeros(1))
-    return kernel
 
 
 def smallest() -> tuple[QuadraticProgram, ActiveSet]:

@@ -18,6 +18,7 @@ from wholebody.geometry.penetration import global_depth, least_separation
 from wholebody.geometry.proximity import Contacts
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
+from wholebody.tasks.bounds import allowed
 
 CANCELLED = 0.1  # share of the deepest overlap below which what all normals together push with counts as none
 STEPS = 12  # most steps of least squares
@@ -90,10 +91,7 @@ def _moved(problem: Problem, workspace: Workspace, q: Array, joints: tuple[int, 
         step = rows.T @ np.linalg.solve(rows @ rows.T + 1e-3 * np.eye(6), error)
         # rad, m: of a degree of freedom in one of them
         step *= min(1.0, 0.2 / max(float(np.abs(step).max()), ROOM))
-        lower, upper = figure.tangent_bounds(q)
-        for bound in problem.bounds:
-            low, high = bound.bounds(state, None)
-            lower, upper = np.maximum(lower, low), np.minimum(upper, high)
+        lower, upper = allowed(problem.bounds, figure.limits, state, None)
         q = figure.clamp(pin.integrate(model, q, np.clip(step, np.minimum(lower, 0.0), np.maximum(upper, 0.0))))
         state.update(q)
     return q

@@ -119,7 +119,6 @@ class Descents:
     def __init__(
         self, asked: Asked, chain: PlainChain, rule: Rule, workspace: Workspace, settings: Settings, control: Control
     ) -> None:  # fmt: skip
-        """Set up; `run` does it all."""
         self.asked, self.chain, self.workspace, self.settings, self.control = asked, chain, workspace, settings, control
         self.start, self.rule, self.measured = chain.angles(asked.at), rule, rule.measured
         self.trace: list[TraceEntry] = []

@@ -119,7 +119,7 @@ def _descend(
     Robotics 27(5): the damping is half of the squared error. `near`: norms at which goals are met, and steps end.
     """
     size, rows = len(q), len(room.value)
-    right, system, dq = np.empty(rows), np.empty((rows, rows)), np.empty(size)
+    right, system, dq, ones = np.empty(rows), np.empty((rows, rows)), np.empty(size), np.ones(size)
     before, marked, (tolerance, done) = np.inf, np.inf, near
     for count in range(most + 1):
         evaluate(chain, goals, room, q)
@@ -144,17 +144,9 @@ def _descend(
                     if not room.free[i]:
                         right[r] -= room.jacobian[r, i] * dq[i]
                 damped += 0.5 * right[r] * right[r]
-            for r in range(rows):
-                for s in range(r + 1):
-                    total = 0.0
-                    for i in range(size):
-                        if room.free[i]:
-                            total += room.jacobian[r, i] * room.jacobian[s, i]
-                    system[r, s] = total
-                system[r, r] += damped
+            _fill_normal(room, ones, damped, system)
             if not solve(system, right):
                 return count
-            held = False
             for i in range(size):
                 if room.free[i]:
                     dq[i] = 0.0
@@ -197,13 +189,7 @@ def _least_effort(
                 right[r] = room.value[r]
                 for i in range(size):
                     right[r] += room.jacobian[r, i] * (shift[i] if room.free[i] else dq[i])
-                for s in range(r + 1):
-                    total = 0.0
-                    for i in range(size):
-                        if room.free[i]:
-                            total += room.jacobian[r, i] * room.jacobian[s, i] / nearest[1, i]
-                    system[r, s] = total
-                system[r, r] += 1e-12
+            _fill_normal(room, nearest[1], 1e-12, system)
             if not solve(system, right):
                 return count
             for i in range(size):
@@ -239,6 +225,19 @@ def _least_effort(
             moved[i], before[i] = share * dq[i], dq[i]
         _move(chain, q, dq, share)
     return 40
+
+
+@compiled(inner=True, error_model="numpy")
+def _fill_normal(room: Room, weights: Array, damping: float, system: Array) -> None:
+    """The lower triangle of ``J W^-1 J' + damping`` (m, m) over the free joints, for weights (n,)."""
+    for r in range(len(system)):
+        for s in range(r + 1):
+            total = 0.0
+            for i in range(len(weights)):
+                if room.free[i]:
+                    total += room.jacobian[r, i] * room.jacobian[s, i] / weights[i]
+            system[r, s] = total
+        system[r, r] += damping
 
 
 @compiled(inner=True)

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wholebody.base.arrays import Array, with_values
+from wholebody.base.compiled import with_loops
 from wholebody.methods.qp.chain_kernel import Chain
 from wholebody.methods.qp.closed_form_kernel import BRANCHES, CROSSING, PARALLEL, SLACK, THREE_PARALLEL, Arm
 
@@ -104,11 +105,9 @@ def _crossing(axes: Array, points: Array) -> Array:
     return found
 
 
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
+@with_loops("wholebody.methods.qp.closed_form_kernel")
+def compiled_kernel(closed_form_kernel: Any) -> None:
     """The module of compiled loops, compiled or read back."""
-    from wholebody.methods.qp import closed_form_kernel
-
     rows, one, near = np.zeros((1, 3)), np.zeros(1), np.zeros((2, 1))
     arm = Arm(rows, rows, np.zeros(1, dtype=np.intp), 0, CROSSING, 0, np.zeros((4, 3)), SLACK)
     found, goal, limits = np.zeros((0, BRANCHES, 1)), np.zeros(36), (one, one)
@@ -117,4 +116,3 @@ def compiled_kernel() -> Any:
     closed_form_kernel.sampled(arm, goal, limits, near, found, np.zeros((0, BRANCHES)), order)
     closed_form_kernel.along(arm, goal, limits, near, 0.0, one.copy())
     closed_form_kernel.beside(arm, goal, limits, near, 0.0, one, one.copy())
-    return closed_form_kernel

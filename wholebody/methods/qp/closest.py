@@ -131,9 +131,9 @@ class Closest(Stage):
         bent = np.flatnonzero(bending.any(axis=0))
         value, vector = np.linalg.eigh(bending[np.ix_(bent, bent)])
         kept = value > NEAREST.negligible * max(float(value.max(initial=0.0)), 1.0)
-        ways = np.zeros((int(kept.sum()), len(bending)))
-        ways[:, bent] = vector[:, kept].T
-        return ways, value[kept]
+        directions = np.zeros((int(kept.sum()), len(bending)))
+        directions[:, bent] = vector[:, kept].T
+        return directions, value[kept]
 
 
 class ReachTrials(NamedTuple):

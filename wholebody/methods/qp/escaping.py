@@ -9,13 +9,13 @@ A program would leave all of them violated where not all can be parted to first 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
+from wholebody.base.compiled import with_loops
 from wholebody.figures.state import free_roots, root_freedoms
 from wholebody.methods.control import BUDGET
 from wholebody.methods.qp.settings import ESCAPE
@@ -93,10 +93,7 @@ def _starts(model: pin.Model, box: Array) -> Iterator[Array]:
         yield begun
 
 
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
+@with_loops("wholebody.methods.qp.dense_kernel")
+def compiled_kernel(dense_kernel: Any) -> None:
     """The projection, compiled or read back."""
-    from wholebody.methods.qp import dense_kernel
-
     dense_kernel.project(np.zeros((0, 1)), np.zeros(0), np.zeros(1), np.zeros(1), np.zeros(1))
-    return dense_kernel

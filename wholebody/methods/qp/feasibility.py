@@ -39,7 +39,8 @@ class Feasibility(Stage):
         while here.violation.worst > self.tolerance and count < self.iterations and not self.shared.control.over:
             history.append(here.violation.total)
             count += 1
-            program = self._program(here, box)
+            size = StepSize(box / PROGRAM.box, 0.0, FEASIBILITY.damping, False)
+            program = self.shared.subproblem.program(here.at, here.rows, size)
             step = working_set.solve(program, here.rows.key).x
             stuck = float(np.abs(step).max(initial=0.0)) <= self.tolerance**2 or stalls(history, self.tolerance)
             if stuck:
@@ -68,10 +69,6 @@ class Feasibility(Stage):
             here = there
             self.record(here, "goal")
         return self.ended(here, here.violation.worst <= self.tolerance, count)
-
-    def _program(self, here: Iterate, box: float) -> QuadraticProgram:
-        size = StepSize(box / PROGRAM.box, 0.0, FEASIBILITY.damping, False)
-        return self.shared.subproblem.program(here.at, here.rows, size)
 
     def _turned_on(self, here: Iterate, program: QuadraticProgram, step: Array, wrapped: set[int]) -> Array | None:
         """Displacement (nv,) to its other limit of the joint pressed hardest at a limit, once each; None if none."""

@@ -45,7 +45,6 @@ class Multistart:
     def __init__(
         self, problem: Problem, workspace: Workspace, solver: QPSolver, settings: Settings, control: Control
     ) -> None:
-        """Set up for a problem; `run` does it all."""
         self.problem, self.solver, self.settings, self.control = problem, solver, settings, control
         self.subproblem = Subproblem(problem, workspace.state)
         self.lineariser = problem.lineariser(workspace)
@@ -85,7 +84,7 @@ class Multistart:
         if not near:
             self._search(self._attempts(self._start if begin is None else begin))
         for q in near:
-            self._accept(self._ran(self._closest(self._at_most(SEARCH.coming_near)), q), self.how)
+            self._accept(self._ran(self._closest(), q), self.how)
         if other is not None:
             self._accept(self.directly(other), "directly")
         self._find_closest()
@@ -306,7 +305,7 @@ class Multistart:
         if self.control.over:
             return
         if self._out_of_reach:
-            local = self._ran(self._closest(self._at_most(SEARCH.coming_near)), self.best.q)
+            local = self._ran(self._closest(), self.best.q)
             if not held(local, tolerance) and local.violation.total < self.best.violation.total:
                 local = self._descend(local.q, note="nearest", measures=False, most=SEARCH.coming_near)
             self._accept(local, self.how)
@@ -346,7 +345,7 @@ class Multistart:
 
     def _closest_from_best(self) -> None:
         """Find the closest posture from the best one."""
-        nearest = self._ran(self._closest(self._at_most(SEARCH.coming_near)), self.best.q)
+        nearest = self._ran(self._closest(), self.best.q)
         if not nearest.converged:
             self._accept(nearest, self.how)
             nearest = self._descend(self.best.q, note="nearest", measures=False)
@@ -357,7 +356,8 @@ class Multistart:
         """The smaller of this number of programs and that of one descent."""
         return min(programs, self.settings.iterations)
 
-    def _closest(self, most: int) -> Closest:
+    def _closest(self) -> Closest:
+        most = self._at_most(SEARCH.coming_near)
         return Closest(self._shared, self.settings.tolerance, most, problem=self.problem)
 
     def _stay(self, local: LocalSolution) -> LocalSolution:

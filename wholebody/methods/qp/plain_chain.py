@@ -11,6 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices, with_values
+from wholebody.base.compiled import with_loops
 from wholebody.figures.description import Limits
 from wholebody.methods.qp import chain_kernel
 from wholebody.methods.qp.chain_kernel import Chain, Goals, Room
@@ -223,8 +224,8 @@ def _is_plain(joint: pin.JointModel) -> bool:
     return bool(joint.nv == 1) and str(joint.shortname()).startswith(("JointModelR", "JointModelP"))
 
 
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
+@with_loops("wholebody.methods.qp.chain_kernel")
+def compiled_kernel(_: Any) -> None:
     """The module of the compiled loop, compiled or read back: not in the middle of a solve."""
     closed_form_kernel()
     joint, one, axis = np.zeros(1, dtype=np.intp), np.zeros(1), np.zeros((1, 3))
@@ -236,4 +237,3 @@ def compiled_kernel() -> Any:
         (chain, _NO_ARM, room), np.zeros(5), (np.zeros((0, 0, 36)), np.zeros((0, 6), dtype=np.int64)),
         (1, 1), np.zeros((0, 2, 1)), np.zeros((0, 1, 1)), np.zeros((0, 1, 4)), np.zeros(0, dtype=np.intp),
     )  # fmt: skip
-    return chain_kernel

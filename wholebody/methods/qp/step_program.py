@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 from math import sqrt
 from typing import Any, NamedTuple
 
@@ -12,6 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, brief, with_values
+from wholebody.base.compiled import with_loops
 from wholebody.figures.state import State
 from wholebody.methods.qp.active_set import semismooth_kernel
 from wholebody.methods.qp.quadratic_program import QuadraticProgram, work_size
@@ -241,11 +241,9 @@ def numbers_of(scale: float) -> Array:
     ])  # fmt: skip
 
 
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
+@with_loops("wholebody.methods.qp.tracking_kernel")
+def compiled_kernel(tracking_kernel: Any) -> None:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
-    from wholebody.methods.qp import tracking_kernel
-
     compiled_turning()
     semismooth_kernel()
     none, index = np.zeros(0), np.zeros(0, dtype=np.intp)
@@ -255,7 +253,6 @@ def compiled_kernel() -> Any:
         np.zeros(4, dtype=np.intp), (np.zeros(5 + work_size(1, 0, 0)), index, np.zeros(2, dtype=bool)), False,
     )  # fmt: skip
     tracking_kernel.run_ahead(none, none, 0, none, STEP, np.zeros(2))
-    return tracking_kernel
 
 
 class QPStep(NamedTuple):

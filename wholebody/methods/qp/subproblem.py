@@ -6,13 +6,13 @@ Because the programs are solved exactly, the order is kept to rounding whatever 
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, with_values
+from wholebody.base.compiled import with_loops
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
@@ -176,11 +176,9 @@ def lagrangian(multipliers: Multipliers, measure: float, rows: Rows) -> float:
     return measure + work
 
 
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
+@with_loops("wholebody.methods.qp.subproblem_kernel")
+def compiled_kernel(subproblem_kernel: Any) -> None:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
-    from wholebody.methods.qp import subproblem_kernel
-
     none, matrix, index = np.zeros(0), np.zeros((0, 1)), np.zeros(0, dtype=np.intp)
     rows = Rows(matrix, none, none, 0, matrix, none, index, 0, index, none)
     there = LinearRows(none, matrix, none, matrix, none, matrix, index, none, index)
@@ -191,4 +189,3 @@ def compiled_kernel() -> Any:
     subproblem_kernel.work(none, none, index, none, index, none)
     three = np.zeros(3)
     subproblem_kernel.add_kinematic_hessian(matrix, np.zeros((0, 6)), none, three, three, three)
-    return subproblem_kernel

@@ -54,7 +54,6 @@ class Extrapolation:
     """Where the tangential parts of the last steps lead."""
 
     def __init__(self) -> None:
-        """Begin with nothing known."""
         self._memory = Anderson()
         self._longest = STRETCH  # plain tangential parts
         self._as_plain = False  # whether the last proposal would have been the program's own step

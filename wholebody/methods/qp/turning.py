@@ -6,12 +6,12 @@ joints between the root and its two pieces do; an arm that is far from everythin
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices
+from wholebody.base.compiled import with_loops
 from wholebody.geometry.contact_rows import BAND, LEVER_DISTANCE
 from wholebody.methods.qp.rows import Bodies, Rows, Seen
 from wholebody.methods.qp.settings import TRACKING
@@ -60,11 +60,9 @@ class Turning:
         return float(self._kernel.linearisation_error(displacement, bodies, self._single, self._lengths, near, rows[:]))
 
 
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
+@with_loops("wholebody.methods.qp.turning_kernel")
+def compiled_kernel(turning_kernel: Any) -> None:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
-    from wholebody.methods.qp import turning_kernel
-
     none, index, three = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros((0, 3))
     joint, matrix = np.zeros(1, dtype=np.intp), np.zeros((0, 1))
     bodies = Bodies(np.zeros((1, 6)), joint, joint, joint, index, np.zeros((0, 4, 3)), none, np.zeros((3, 1, 6)))
@@ -73,7 +71,6 @@ def compiled_kernel() -> Any:
     turning_kernel.linearisation_error(
         np.zeros(1), bodies[:], np.zeros(0, dtype=bool), np.ones(6), (index.reshape(0, 2), none, three, none), rows[:],
     )  # fmt: skip
-    return turning_kernel
 
 
 def least_unseen(asked: float) -> float:

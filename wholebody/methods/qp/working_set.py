@@ -23,7 +23,6 @@ class WorkingSet:
     """
 
     def __init__(self, solver: QPSolver) -> None:
-        """Begin without a guess."""
         self.solver = solver
         self._kernel = compiled_kernel()
         self._room: Room | None = None

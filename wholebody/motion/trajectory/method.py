@@ -158,22 +158,29 @@ class Trajectory(Checked):
 def _in_parts(
     run: Run, windows: ClipRun, window: Window, reference: Array, faults: Faults, told: Callable[[float], bool]
 ) -> WindowResult:
-    """A window freed part by part, each from where the one before it is; at once where a part is not freed."""
+    """A window freed part by part, each from where the one before it is; with that one where a part is not freed.
+
+    What is missed by little stays, for the repair; where nothing comes before, all is freed at once.
+    """
     length, shared = run.frames(LONG, 2), run.frames(LONG / 4.0, 1)
-    q, first = np.array(reference), window.first
+    q, firsts, end, missed = np.array(reference), [window.first], window.first, list[str]()
 
     def part_told(done: float) -> bool:
-        return told((first - window.first + done * (length - shared)) / len(window))
+        return told((firsts[-1] - window.first + done * (length - shared)) / len(window))
 
-    while window.end - first > 2 * length:
-        part = Window(first, first + length)
-        freed = windows.window(part, faults, part_told, around=q, whole=False)
-        if freed.missed or run.ended:
-            return windows.window(window, faults, told)
-        q[part.first : part.end] = freed.q
-        first = part.end - shared
-    freed = windows.window(Window(first, window.end), faults, part_told, around=q)
-    if freed.missed and first > window.first:
-        return windows.window(window, faults, told)
-    q[first : window.end] = freed.q
-    return WindowResult(q[window.first : window.end], freed.missed)
+    while firsts and not run.ended:
+        first = firsts[-1]
+        end = max(end, first + length if window.end - first > 2 * length else window.end)
+        part, last = Window(first, end), end == window.end
+        if part == window:
+            break
+        freed = windows.window(part, faults, part_told, around=q, whole=last, patient=False)
+        if freed.missed and not freed.little:  # from there it cannot go on
+            firsts.pop()
+            continue
+        missed += [freed.missed] if freed.missed else []
+        q[first:end] = freed.q
+        if last:
+            return WindowResult(q[window.first : window.end], "; ".join(missed))
+        firsts.append(end - shared)
+    return windows.window(window, faults, told)

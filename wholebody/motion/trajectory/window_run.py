@@ -26,7 +26,7 @@ from wholebody.motion.trajectory.deviations import Chart, Objective
 from wholebody.motion.trajectory.loads import ClipLoads, WindowLoads
 from wholebody.motion.trajectory.nodes import NEAREST, Node, NodeEvaluator
 from wholebody.motion.trajectory.program import ONE_STEP, Limits
-from wholebody.motion.trajectory.sqp import MET, End, WindowProgram
+from wholebody.motion.trajectory.sqp import FAR, MET, End, WindowProgram
 from wholebody.motion.windows import Window
 
 NEARLY = 0.03  # rad, m: first trust region of the rounds after the first; few rows are near enough to count then
@@ -51,10 +51,11 @@ SETTINGS = WindowSettings()
 
 
 class WindowResult(NamedTuple):
-    """Postures (n, nq) of a window, and what did not succeed; empty where all did."""
+    """Postures (n, nq) of a window; what did not succeed, empty where all did; whether rows are missed by little."""
 
     q: Array
     missed: str
+    little: bool = True
 
 
 class _Way(NamedTuple):
@@ -81,9 +82,9 @@ class _Attempt(NamedTuple):
         return self.worst <= MET and not self.dipping
 
     @property
-    def rank(self) -> tuple[bool, bool, float]:
+    def rank(self) -> tuple[float, bool, float]:
         """The best attempt has the least."""
-        return self.worst > MET, self.dipping > 0, self.objective if self.worst <= MET else self.worst
+        return max(self.worst, MET), self.dipping > 0, self.objective
 
 
 class _Window(NamedTuple):
@@ -125,12 +126,12 @@ class ClipRun:
 
     def window(
         self, window: Window, found: Faults, cancel: Callable[[float], bool], begun: Array | None = None,
-        around: Array | None = None, whole: bool = True,
+        around: Array | None = None, whole: bool = True, patient: bool = True,
     ) -> WindowResult:  # fmt: skip
         """Free one window; a `cancel` that says so leaves it as it was.
 
         `begun` (n, nq) has postures to begin with, `around` those that stay beyond the window, the originals if
-        None; with `whole` false the last frame of a part is free.
+        None; with `whole` false the last frame of a part is free. What ended early goes on only if `patient`.
         """
         around = begun if around is None else around
         own = self._of(window, found, cancel, around, (window.first > 0, whole and window.end < len(self._reference)))
@@ -148,7 +149,7 @@ class ClipRun:
             attempt = self._attempt(start, own, objective, way)
             if attempt is None:
                 return WindowResult(own.chart.original, "")
-            if attempt.early:
+            if attempt.early and patient:
                 ended_early.append(attempt)
                 continue
             best = attempt if best is None or attempt.rank < best.rank else best
@@ -164,7 +165,7 @@ class ClipRun:
         changed = np.abs(best.x).max(axis=1) > 1e-9  # rad, m
         q = own.chart.original.copy()
         q[changed] = own.chart.postures(best.x)[changed]
-        return WindowResult(q, missed)
+        return WindowResult(q, missed, best.worst <= FAR)
 
     def _of(
         self, window: Window, found: Faults, cancel: Callable[[float], bool], begun: Array | None,

@@ -95,7 +95,6 @@ class Outside(SolvesAnew, ABC, Generic[Built]):
     loose: ClassVar[tuple[Budget, ...]] = (*few(5, 10, 20), *LADDER)
 
     def __init__(self, tolerance: float, iterations: int | None = None) -> None:
-        """Take a budget."""
         if not 1e-10 <= tolerance <= 0.1:
             raise InputError(f"tolerance is {tolerance}; give metres from 1e-10 to 0.1")
         self.tolerance, self.iterations = tolerance, iterations

@@ -57,7 +57,6 @@ class Loop(Outside[Stepper], ABC):
     )  # fmt: skip
 
     def __init__(self, tolerance: float, iterations: int | None = None) -> None:
-        """Take a budget."""
         super().__init__(tolerance, iterations)
         self._places: Array | None = None
         self._kept = 0.0

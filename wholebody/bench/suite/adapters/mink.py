@@ -178,7 +178,6 @@ class MinkTool(TaskTool):
     _kind = ("site",)
 
     def __init__(self, track: Track) -> None:
-        """Set the model and the tasks up."""
         import mink
         import mujoco
 

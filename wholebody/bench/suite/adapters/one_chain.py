@@ -16,7 +16,8 @@ import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.files import Scratch
 from wholebody.bench.suite.adapters.base import OneCall
-from wholebody.bench.suite.adapters.urdf import add_model_joint
+from wholebody.bench.suite.adapters.urdf import axis_of
+from wholebody.figures.urdf.writing import add_model_joint
 from wholebody.methods.differential import TOOL
 from wholebody.problem import Problem
 
@@ -35,7 +36,6 @@ class Chain:
     solver: Any = None
 
     def __init__(self, model: pin.Model, frame: int) -> None:
-        """Look the joints up."""
         self.model = model
         self.joints = list(model.supports[model.frames[frame].parentJoint])[1:]
         self.places = np.array([model.joints[joint].idx_q for joint in self.joints])
@@ -48,7 +48,8 @@ class Chain:
         ElementTree.SubElement(root, "link", name="link 0")
         for number, joint in enumerate(self.joints, 1):
             ElementTree.SubElement(root, "link", name=f"link {number}")
-            add_model_joint(root, self.model, joint, f"link {number - 1}", f"link {number}")
+            axis_of(self.model, joint, "URDF is written for turning and sliding joints")
+            add_model_joint(root, self.model, joint, f"joint {joint}", f"link {number - 1}", f"link {number}")
         with Scratch() as folder:
             path = folder / "chain.urdf"
             path.write_bytes(ElementTree.tostring(root))

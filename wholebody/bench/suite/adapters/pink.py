@@ -147,7 +147,6 @@ class PinkTool(TaskTool):
     name = "pink"
 
     def __init__(self, track: Track) -> None:
-        """Set the tasks up."""
         import pink
         from pink.barriers import SelfCollisionBarrier
 

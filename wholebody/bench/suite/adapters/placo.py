@@ -35,7 +35,6 @@ class PlacoTool(Tool):
     name = "placo"
 
     def __init__(self, track: Track) -> None:
-        """Set the solver up."""
         import placo
 
         figure, scene = track.scene.figure, track.scene.geometry

@@ -1,4 +1,4 @@
-"""A scene as an MJCF text: the same joints, limits, pieces, objects and frames; joints of a model in a URDF."""
+"""A scene as an MJCF text: the same joints, limits, pieces, objects and frames."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.bench.suite.problem_sets.things import shape_of
 from wholebody.figures.figure import Figure
-from wholebody.figures.urdf.writing import FOLLOWS, UrdfAxis, add_joint, exact, urdf_axis
+from wholebody.figures.urdf.writing import FOLLOWS, UrdfAxis, exact, urdf_axis
 from wholebody.scene.scene import Scene
 from wholebody.tasks.inputs import Place
 
@@ -35,23 +35,6 @@ def own_frame(figure: Figure, name: str) -> tuple[int, pin.SE3]:
     """Joint of a frame of a figure, and its placement in it."""
     frame = figure.model.frames[figure.frame_id(name)]
     return int(frame.parentJoint), frame.placement
-
-
-def joint_name(index: int) -> str:
-    """Name of our joint in the file."""
-    return f"joint {index}"
-
-
-def add_model_joint(top: ElementTree.Element, model: Any, index: int, parent: str, child: str) -> None:
-    """Add a turning or sliding joint of a model between two links; InputError for a joint of another kind."""
-    joint, known = model.joints[index], axis_of(model, index, "URDF is written for turning and sliding joints")
-    speed, fast = float(model.velocityLimit[joint.idx_v]), 1e3  # rad/s, m/s: in place of a limit that is none
-    limit = {"effort": 1.0, "velocity": speed if 0.0 < speed < fast else fast}
-    if joint.nq == 1:
-        limit["lower"] = model.lowerPositionLimit[joint.idx_q]
-        limit["upper"] = model.upperPositionLimit[joint.idx_q]
-    place = model.jointPlacements[index]
-    add_joint(top, joint_name(index), known.kind, parent, child, origin=place, axis=known.axis, limit=limit)
 
 
 def axis_of(model: Any, index: int, written_for: str) -> UrdfAxis:

@@ -136,7 +136,6 @@ class Held(wb.Goal):
     """A constraint without slack as an equality."""
 
     def __init__(self, hold: wb.Hold) -> None:
-        """Keep a hold that is resolved."""
         self.hold = hold
 
     def error(self, state: State) -> Array:

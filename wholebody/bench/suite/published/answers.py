@@ -65,8 +65,8 @@ def read_answers(path: Path, folder: Path) -> Answers:
     for place, item in enumerate(listed):
         answer = _answer(item, where := f"{path}: answers[{place}]", folder, known)
         if (answer.problem, answer.seed) in read:
-            told = f"answers {answer.problem} from the {answer.seed} seed a second time"
-            raise FileFormatError(f"{where} {told}; keep one of them")
+            message = f"answers {answer.problem} from the {answer.seed} seed a second time"
+            raise FileFormatError(f"{where} {message}; keep one of them")
         read[answer.problem, answer.seed] = answer
     return Answers(
         **texts,

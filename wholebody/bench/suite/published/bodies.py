@@ -20,7 +20,7 @@ from wholebody.bench.suite.problem_sets.things import hull_obj, shape_of
 from wholebody.bench.suite.published.rebuilt import SHAPES, VERSION, model_of
 from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
-from wholebody.figures.urdf.writing import add_joint, exact, urdf_axis
+from wholebody.figures.urdf.writing import add_joint, add_model_joint, exact, urdf_axis
 
 Meshes = dict[str, str]
 """Text of OBJ files by their path below the folder of an export."""
@@ -149,15 +149,9 @@ def _add_joint(top: ElementTree.Element, model: pin.Model, joint: int, links: tu
             "are published"
         )
     low, high = float(model.lowerPositionLimit[at]), float(model.upperPositionLimit[at])
-    most = 1e6  # rad, m: beyond which a limit is none
-    if not max(abs(low), abs(high)) < most:
+    if not max(abs(low), abs(high)) < 1e6:  # rad, m: beyond which a limit is none
         raise InputError(f"joint {model.names[joint]!r} has no limits; give it limits to publish it")
-    speed = min(float(model.velocityLimit[model.joints[joint].idx_v]), most)
-    add_joint(
-        top, model.names[joint], known.kind, links[model.parents[joint]], links[joint],
-        origin=model.jointPlacements[joint], axis=known.axis,
-        limit={"lower": low, "upper": high, "effort": 1000.0, "velocity": speed},
-    )  # fmt: skip
+    add_model_joint(top, model, joint, model.names[joint], links[model.parents[joint]], links[joint])
 
 
 def _add_inertia(link: ElementTree.Element, inertia: pin.Inertia) -> None:

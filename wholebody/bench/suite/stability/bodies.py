@@ -18,7 +18,6 @@ class Builder:
     """Builds a figure joint by joint."""
 
     def __init__(self, name: str) -> None:
-        """Begin with the world."""
         self.name, self.model, self.geometry = name, pin.Model(), pin.GeometryModel()
         self._segments: list[str] = []
         self._frames: list[str] = []

@@ -141,11 +141,11 @@ def _data() -> dict[str, Any]:
 
 
 def _case(name: str, given: Mapping[str, Any]) -> HardCase:
-    told = {key: value for key, value in given.items() if key not in ("quick", "ask", "best", "also")}
+    others = {key: value for key, value in given.items() if key not in ("quick", "ask", "best", "also")}
     best = given.get("best", 0.0)
     question = partial(asked, given["ask"]) if "ask" in given else not_numbers
     best = None if best == "open" else best
-    return HardCase(name=name, question=question, best=best, also=tuple(given.get("also", ())), **told)
+    return HardCase(name=name, question=question, best=best, also=tuple(given.get("also", ())), **others)
 
 
 def asked(ask: Mapping[str, Any]) -> Question:

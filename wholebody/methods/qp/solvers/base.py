@@ -32,7 +32,6 @@ class QPSolver(ABC):
     uncorrected: Array | None = None
 
     def __init__(self, hot_start: bool = True) -> None:
-        """Begin with no program solved."""
         self.hot_start = hot_start
         self._programs: dict[str, int] = {}
 

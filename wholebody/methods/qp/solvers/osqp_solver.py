@@ -34,7 +34,6 @@ class OSQPSolver(QPSolver):
     name = "osqp"
 
     def __init__(self, hot_start: bool = True) -> None:
-        """Begin without a workspace."""
         super().__init__(hot_start)
         self._workspace: Workspace | None = None
 
