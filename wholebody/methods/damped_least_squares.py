@@ -164,9 +164,9 @@ class _Descent:
         equal = [(term, *values_and_rows(term, term.value, state)) for term in problem.stated]
         asked = [(goal.weight**0.5, *values_and_rows(goal, goal.error, state)) for goal in problem.goals]
         none = np.zeros((0, state.model.nv))
-        held = np.hstack([none[:, 0], *(term.lower - value for term, value, _ in equal)])
+        held = np.hstack([np.zeros(0), *(term.lower - value for term, value, _ in equal)])
         of_held = np.vstack([none, *(rows for *_, rows in equal)])
-        wanted = np.hstack([none[:, 0], *(-root * error for root, error, _ in asked)])
+        wanted = np.hstack([np.zeros(0), *(-root * error for root, error, _ in asked)])
         of_wanted = np.vstack([none, *(root * rows for root, _, rows in asked)])
         lower, upper = allowed(problem.bounds, problem.scene.figure.limits, state, None)
         dq, free = np.zeros(state.model.nv), upper > lower

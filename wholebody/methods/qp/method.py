@@ -17,6 +17,7 @@ from wholebody.methods.qp.chain import from_seeds
 from wholebody.methods.qp.chain_batch import Batch, batches
 from wholebody.methods.qp.multistart import Multistart
 from wholebody.methods.qp.settings import Settings
+from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.registry import make_solver
 from wholebody.methods.qp.tracking import QPTracker
 from wholebody.problem import Problem
@@ -97,7 +98,7 @@ class QP(Settings, Descends):
         judgement = assess(problem, met.q) if met is not None and met.complete else None
         if met is not None and judgement is not None and meets(judgement, self.tolerance):
             return Ending(met.q, True, len(met.trace), met.trace, "directly", judgement=judgement)
-        search = Multistart(problem, workspace, make_solver(self.solver, self.hot_start), self, control)
+        search = Multistart(problem, workspace, self._qp_solver(), self, control)
         begin, before = (None, ()) if met is None else (met.q if judgement is None else None, met.trace)
         best = search.run(begin, None if met is None else met.blocked, () if met is None else met.near)
         return Ending(
@@ -128,7 +129,7 @@ class QP(Settings, Descends):
         for given in begins:
             start = posture(given, problem.scene.model.nq, "QP.minima: a start")
             with Control(self.time_limit, None, self.longest) as control, problem.borrow() as workspace:
-                search = Multistart(problem, workspace, make_solver(self.solver, self.hot_start), alone, control)
+                search = Multistart(problem, workspace, self._qp_solver(), alone, control)
                 end = search.feasibility_first(start) or search.directly(start)
             ending = Ending(
                 end.q, end.converged, search.spent, tuple(search.trace), search.how,
@@ -136,12 +137,14 @@ class QP(Settings, Descends):
             )  # fmt: skip
             yield concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control)
 
+    def _qp_solver(self) -> QPSolver:
+        """A QP solver of the name in the settings, for one run."""
+        return make_solver(self.solver, self.hot_start)
+
     def tracker(self, problem: Problem, dt: float) -> QPTracker:
         """What follows the goals of a problem that move from call to call: one program a step of `dt` seconds.
 
         Raises:
             InputError: dt is not a positive finite number, or the scene changed after the problem was stated.
         """
-        return QPTracker(
-            problem, make_solver(self.solver, self.hot_start), dt, self, lambda: replace(self, measures=True)
-        )
+        return QPTracker(problem, self._qp_solver(), dt, self, lambda: replace(self, measures=True))
