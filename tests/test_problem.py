@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -161,12 +163,26 @@ def test_other_goals_leave_what_was_stated_or_set(scene):
         problem.retarget(goals)
         assert problem.measures is measures
         assert problem.constraints is constraints
+    usual.constraints = again = wb.Problem(scene, goals=[GOAL], constraints=feet).defaults
+    usual.retarget([GOAL, *goals])
+    assert usual.constraints == again
+
+
+def test_clearances_follow_goals_that_were_set(scene):
+    """Defaults are of the goals that the problem was stated or retargeted with, whatever was set between."""
+    scene.add(wb.Box((0.5, 1.0, 0.04)), name="table", at=(0.6, 0.0, 0.8))
+    touch = [wb.Touch("right_palm", "table")]
+    problem, stated = (wb.Problem(scene, goals=one, clearance=0.004) for one in ([GOAL], touch))
+    problem.goals = stated.goals
+    problem.retarget(touch)
+    assert problem.clearances.tolist() == stated.clearances.tolist()
 
 
 def test_a_problem_is_tied_to_the_things_it_was_stated_with(scene):
     problem = wb.Problem(scene, goals=[GOAL])
     scene.add(wb.Sphere(0.1), name="ball", at=(1.0, 0.0, 1.0))
-    for ask in (problem.check_fresh, problem.workspace, lambda: wb.assess(problem, problem.start)):
+    moved = partial(problem.retarget, [wb.Touch("right_palm", "floor")])
+    for ask in (problem.check_fresh, problem.workspace, lambda: wb.assess(problem, problem.start), moved):
         with pytest.raises(wb.InputError, match="state the problem anew"):
             ask()
     again = wb.Problem(scene, goals=[GOAL])

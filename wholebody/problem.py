@@ -87,6 +87,9 @@ class Problem(checks.FixedAttributes):
     clearances: Array
     _plan: tuple[_Planned, TermPlan] | None
     """The terms as arrays, and the terms that they were made of; every solve begins with it."""
+    _known: tuple[Goal, ...]
+    _joined: tuple[Constraint, ...]
+    """The goals that the defaults are of, and the constraints with these defaults."""
     _places: tuple[int, ...]
     _rest: Array
     """(nq,) the start that the problem was stated with, which the defaults are of."""
@@ -148,7 +151,7 @@ class Problem(checks.FixedAttributes):
             _places=tuple([place for place, term in enumerate(given) if isinstance(term, Constraint)]),
             _plan=None,
         )
-        vars(self).update(constraints=self._resolved([given[place] for place in self._places]))
+        vars(self).update(constraints=(own := self._resolved([given[place] for place in self._places])), _joined=own)
         vars(self).update(self._by_default(self.goals))
         if self.bounds or any(map(is_own, (*self.goals, *self.constraints, *self.measures))):
             check_frozen(self.bounds, scene, state := scene.state(q))
@@ -160,14 +163,14 @@ class Problem(checks.FixedAttributes):
         scene, at, stated = self.scene, self._rest, self.stated
         terms: list[Constraint | Goal] = [*stated, *goals]
         stands = standing(scene, at, terms, self.bounds)
-        found: dict[str, Any] = {"goals": goals}
+        found: dict[str, Any] = {"goals": goals, "_known": goals}
         if self.measures is self._usual:
             measures = usual_measures(scene, at, terms, self.bounds, stands, ranges=self.range_of_motion)
             found.update(measures=measures, _usual=measures)
-        if len(stated) + len(self.defaults) == len(self.constraints):  # or constraints were set
+        if self.constraints is self._joined:  # or constraints were set
             defaults, left_out = self._usual_constraints(stated, stands)
             constraints = self.constraints if defaults is self.defaults else (*stated, *defaults)
-            found.update(constraints=constraints, defaults=defaults, left_out=left_out)
+            found.update(constraints=constraints, _joined=constraints, defaults=defaults, left_out=left_out)
         return found
 
     def _resolved(self, terms: Sequence[Constraint]) -> tuple[Constraint, ...]:
@@ -239,8 +242,6 @@ class Problem(checks.FixedAttributes):
         A default of a person, which stood nowhere, is called by its class alone. Constraints that were set afterwards
         are counted as they were set.
         """
-        if not self.constraints:
-            return ()
         defaults = {id(term) for term in self.defaults}
         count = sum(id(term) not in defaults for term in self.constraints)
         places = iter(self._places if len(self._places) == count else range(count))
@@ -262,9 +263,8 @@ class Problem(checks.FixedAttributes):
     def retarget(self, goals: Iterable[Goal]) -> None:
         """Replace the goals, for a goal that moves from frame to frame.
 
-        Where the new goals are of other kinds or frames, the defaults are found anew: a free arm hangs, who sits keeps
-        no balance, and pairs that a goal brings together have no clearance. What was stated or set stays. The new goals
-        are checked like the first ones. If one is refused, the old goals stay.
+        Goals of other kinds or frames have other defaults: a free arm hangs, who sits keeps no balance, and pairs that
+        a goal brings together have no clearance. What was stated or set stays; all stays if a new goal is refused.
 
         Raises:
             InputError: not a list of goals, or a goal with a value of the wrong kind, shape or range.
@@ -276,10 +276,11 @@ class Problem(checks.FixedAttributes):
             with self.borrow() as workspace:
                 check_own(workspace.state.update(self.start), goals=resolved)
         found: dict[str, Any] = {"goals": resolved}
-        if not alike(resolved, self.goals):
+        if not alike(resolved, self._known):  # others may have been set since
+            self.check_fresh()
             found = self._by_default(resolved)
-            if any(goal.touching for goal in (*resolved, *self.goals)):
-                stays = self.clearances != self._clearances(self.goals)  # which were set
+            if any(goal.touching for goal in (*resolved, *self._known)):
+                stays = self.clearances != self._clearances(self._known)  # which were set
                 found["clearances"] = np.where(stays, self.clearances, self._clearances(resolved))
         vars(self).update(found)  # they need no other check
 

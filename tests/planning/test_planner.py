@@ -264,6 +264,10 @@ def test_what_is_frozen_stays_and_a_goal_that_moves_it_is_refused() -> None:
 def test_the_first_motion_is_tried_whatever_the_limit_of_time_and_goals_come_in_any_list() -> None:
     problem, end = shelf(8)
     assert wb.plan(problem.scene, problem.start, end, time_limit=0.0).message == "the straight motion"
+    person = wb.Scene(wb.load("human", detail="capsules"))
+    near, held = person.figure.posture("standing"), [wb.Hold("left_foot"), wb.Hold("right_foot")]
+    bent = person.figure.with_joints(near, {"right_elbow_flexion": 0.6})
+    assert wb.plan(person, near, bent, constraints=held, time_limit=0.0).message == "the straight motion"
     found = wb.plan(problem.scene, problem.start, (goal for goal in problem.goals))
     assert found.solved
     with pytest.raises(wb.InputError, match="goal is empty"):

@@ -73,6 +73,16 @@ def test_the_dimension_that_excludes_is_named_and_not_one_that_goes_with_it() ->
         assert (told.dimension, told.side) == (name, "over")
 
 
+def test_the_dimension_of_which_both_ends_are_left_out_is_named() -> None:
+    people = [{"stature": one["stature"], **one["proportions"]} for one in wb.people(100, "male", seed=3).values()]
+    tried = [SimpleNamespace(q=())] * len(people)
+    for name in people[0]:
+        low, high = np.quantile([one[name] for one in people], [0.15, 0.85])
+        fits = tuple(bool(low <= one[name] <= high) for one in people)
+        found = Accommodation(tried, ("male",) * len(people), people, fits, (True,) * len(people), None)  # type: ignore[arg-type]
+        assert [one.dimension for one in found.exclusions] == [name]
+
+
 def standing(figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:
     """Somebody who stands where they are, with a hand forward."""
     goals = [wb.Point("right_index_tip", (0.4, -0.2, 1.2))]

@@ -290,7 +290,8 @@ class _Search:
         Most narrow places are around ends, and steps towards the start lead out of them.
         """
         start = self._problem.start
-        way, self._straight = self._local.towards(start, end)
+        with within_budget(np.inf):  # it is tried whatever the limit
+            way, self._straight = self._local.towards(start, end)
         if self._straight:
             return [start, *way[:-1], end]
         way, met = self._slides.towards(end, start)

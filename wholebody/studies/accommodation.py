@@ -167,12 +167,15 @@ class Accommodation(Shown):
     def _exclusion(self, sex: str, verdict: str, out: list[int], rest: list[int]) -> Exclusion:
         """The dimension that orders them best (Mann and Whitney 1947), and the bound that parts them (Youden 1950).
 
-        A bound alone is best by chance for a dimension that goes with the one that leaves people out.
+        A bound alone is best by chance for a dimension that goes with the one that leaves people out. Where both ends
+        are left out, people are ordered by how far they are from the middle of those who are accommodated.
         """
 
         def apart(name: str) -> float:
-            left, kept = ([self.dimensions[k][name] for k in who] for who in (out, rest))
-            return abs(float(np.sign(np.subtract.outer(left, kept)).mean()))
+            left, kept = (np.array([self.dimensions[k][name] for k in who]) for who in (out, rest))
+            middle = np.median(kept)
+            far = np.subtract.outer(np.abs(left - middle), np.abs(kept - middle))
+            return max(abs(float(np.sign(np.subtract.outer(left, kept)).mean())), float(np.sign(far).mean()))
 
         name = max(self.dimensions[out[0]], key=apart)
         left, kept = (np.sort([self.dimensions[k][name] for k in who]) for who in (out, rest))

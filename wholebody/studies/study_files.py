@@ -78,6 +78,8 @@ class TaskFile:
                 f"study: {self.path.name} has several figures; say whose place a person takes: "
                 f"{{'called': {next(iter(known))!r}, 'stature': 1.6}}"
             )
+        if "called" in person and [*known] == [""]:
+            raise InputError(f"study: {self.path.name} has one figure, which has no name; leave 'called' out")
         place = known[checks.known(person.get("called", next(iter(known))), known, "figure", "study: a person")]
         entry = entries[place]
         for name in person:

@@ -163,7 +163,7 @@ def _in_parts(
     What is missed by little stays, for the repair; where nothing comes before, all is freed at once.
     """
     length, shared = run.frames(LONG, 2), run.frames(LONG / 4.0, 1)
-    q, firsts, end, missed = np.array(reference), [window.first], window.first, list[str]()
+    q, firsts, end, missed = np.array(reference), [window.first], window.first, list[str]()  # of each part
 
     def part_told(done: float) -> bool:
         return told((firsts[-1] - window.first + done * (length - shared)) / len(window))
@@ -177,10 +177,11 @@ def _in_parts(
         freed = windows.window(part, faults, part_told, around=q, whole=last, patient=False)
         if freed.missed and not freed.little:  # from there it cannot go on
             firsts.pop()
+            missed[len(firsts) - 1 :] = []
             continue
-        missed += [freed.missed] if freed.missed else []
+        missed.append(freed.missed)
         q[first:end] = freed.q
         if last:
-            return WindowResult(q[window.first : window.end], "; ".join(missed))
+            return WindowResult(q[window.first : window.end], "; ".join(filter(None, missed)))
         firsts.append(end - shared)
     return windows.window(window, faults, told)
