@@ -59,6 +59,21 @@ def viser_server(port: int, label: str) -> Any:
     return server
 
 
+def put(node: Any, position: Any, wxyz: Any = None) -> None:
+    """Put a node of viser's scene elsewhere: at a position (3,), turned by a quaternion (4,).
+
+    viser's own properties do so too, but half of a frame of a page went by in their comparisons with what was before.
+    """
+    from viser import _messages
+
+    known, queue = node._impl, node._impl.api._queue_scene_message
+    known.position[:] = position
+    queue(_messages.SetPositionMessage(known.name, tuple(position.tolist())))
+    if wxyz is not None:
+        known.wxyz[:] = wxyz
+        queue(_messages.SetOrientationMessage(known.name, tuple(wxyz.tolist())))
+
+
 def _checked(guard: Guard, answer: Any) -> Any:
     """The function that answers a request before it becomes a page or a socket, with the guard before it."""
 
