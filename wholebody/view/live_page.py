@@ -338,16 +338,17 @@ class LivePage:
         return frame
 
     def _show(self, frame: LiveFrame) -> None:
-        self._place(frame.q, {})
-        for name, ball in self._handles.items():
-            put(ball, self.drag.place(name))
-        self._show_rings()
-        self._status.content = f"**{frame.status}**"
         unit = "mm" if self._target is None or len(self._target) == 3 else "mrad"
-        self._numbers.content = (
-            f"{frame.contacts} contacts, deepest overlap {1e3 * frame.overlap:.2f} mm  \n"
-            f"handle off by {1e3 * frame.error:.1f} {unit}; frame {1e3 * frame.seconds:.1f} ms"
-        )
+        with self.server.atomic():  # one message for all: each wakes the thread that sends
+            self._place(frame.q, {})
+            for name, ball in self._handles.items():
+                put(ball, self.drag.place(name))
+            self._show_rings()
+            self._status.content = f"**{frame.status}**"
+            self._numbers.content = (
+                f"{frame.contacts} contacts, deepest overlap {1e3 * frame.overlap:.2f} mm  \n"
+                f"handle off by {1e3 * frame.error:.1f} {unit}; frame {1e3 * frame.seconds:.1f} ms"
+            )
 
     def _place(self, q: Array, at: Mapping[str, pin.SE3]) -> None:
         """Put the pieces where they are at a posture (nq,), and those of some things at other placements."""
