@@ -45,8 +45,8 @@ class _Pursuit:
                     own, there = rotated(carried.placement, *axis), rotated(to.placement, *wanted)
                     weight = 0.5 * lever * lever * goal.weight
                     rows.append((carried.node, own, to.node, there, False, weight, goal.half))
-        nodes, local, bases, there, points, weights, halves = zip(*rows, strict=True) if rows else ((),) * 7
-        self._targets = Aims(limbs, bases, there, np.zeros((len(rows), 3)), points)
+        nodes, local, bases, targets, points, weights, halves = zip(*rows, strict=True) if rows else ((),) * 7
+        self._targets = Aims(limbs, bases, targets, np.zeros((len(rows), 3)), points)
         self.aims = Aims(limbs, nodes, local, self._targets.here, points, weights)
         self._moving = any(half is not None for half in halves)
         # factors of all aims in each half of a sweep: one of two frames moves while the other one is its target
