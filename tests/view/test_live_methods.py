@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -9,13 +10,14 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.dynamics.live_world import LiveWorld
 from wholebody.tracking.live import LiveDrag
 from wholebody.view.live_page import LivePage
 
 pytest.importorskip("viser")
 
 
-def opened(drag: LiveDrag, folder: Path) -> LivePage:
+def opened(drag: LiveDrag | LiveWorld, folder: Path) -> LivePage:
     return LivePage(drag, folder / "posture.toml", 8393)
 
 
@@ -80,5 +82,39 @@ def test_the_way_within_a_frame_is_shown(tmp_path: Path, monkeypatch: pytest.Mon
         monkeypatch.setattr(drag, "move", lambda place: move(place)._replace(path=way))
         page.follow(np.array((1.6, 0.0, 1.0)))
         assert seen == [(aside[0], pytest.approx(1.9875)), (drag.q[0], pytest.approx(1.95))]
+    finally:
+        page.stop()
+
+
+def test_a_thing_is_taken_where_the_mouse_sees_it(tmp_path: Path) -> None:
+    """The handle of a ball is inside of it, so the ball itself is one: it is lifted, falls and lies on the floor."""
+    scene = wb.Scene(wb.load("avatar")).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Sphere(0.1), name="ball", at=(0.7, -0.6, 0.1001), body=wb.Body(mass=0.4))
+    live = LiveWorld(scene)
+    page = opened(live, tmp_path)
+    try:
+        page._stopped.set()  # frames are made here
+        page._loop.join()
+        ball = page._pieces[live.scene.piece_owner.index("ball")]
+        (entry,) = ball._impl.drag_cb
+
+        def drag(phase: str, z: float) -> None:
+            start, end = (0.7, -0.7, 0.1), (0.7, -0.7, z)  # on its side
+            asyncio.run(entry.callback(SimpleNamespace(phase=phase, start_position=start, end_position=end)))
+
+        drag("start", 0.1)
+        assert live.taken == "ball"
+        drag("update", 0.6)
+        for _ in range(90):
+            page.go_on(live)
+        assert live.place("ball") == pytest.approx((0.7, -0.6, 0.6), abs=0.02)
+        assert ball.position == pytest.approx(live.place("ball"), abs=1e-5)
+        drag("end", 0.6)
+        assert not live.taken
+        for _ in range(90):
+            page.go_on(live)
+        assert live.place("ball")[2] == pytest.approx(0.1, abs=1e-3)
+        foot = page._pieces[live.scene.piece_owner.index("left_foot")]
+        assert not foot._impl.drag_cb
     finally:
         page.stop()

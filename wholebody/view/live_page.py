@@ -59,7 +59,8 @@ class LivePage:
         self._target: Any = None
         self._reached: Any = None
         self._settling = 0  # frames that are left after the mouse let go
-        self._sent: dict[int, Any] = {}
+        self._sent = np.full((len(drag.scene.piece_owner), 7), np.nan)  # placements that were sent, x y z and x y z w
+        self._state = drag.scene.state(drag.q)
         self._constraints: dict[str, Any] = {}
         self._rings: Any = None
         self._stopped = threading.Event()
@@ -158,8 +159,11 @@ class LivePage:
             if name in self.drag.handles:
                 self.toggle(name)
 
-        ball.on_drag(dragged)
-        ball.on_click(clicked)
+        owners = self.drag.scene.piece_owner  # the ball of a thing is inside of it: the mouse takes the thing itself
+        of_thing = [piece for piece, owner in zip(self._pieces, owners, strict=True) if owner == name]
+        for taken in (ball, *(of_thing if name in self.drag.things else ())):
+            taken.on_drag(dragged)
+            taken.on_click(clicked)
         return ball
 
     def toggle(self, name: str) -> None:
@@ -334,31 +338,33 @@ class LivePage:
         return frame
 
     def _show(self, frame: LiveFrame) -> None:
-        self._place(frame.q, {})
-        for name, ball in self._handles.items():
-            ball.position = self.drag.place(name)
-        self._show_rings()
-        self._status.content = f"**{frame.status}**"
         unit = "mm" if self._target is None or len(self._target) == 3 else "mrad"
-        self._numbers.content = (
-            f"{frame.contacts} contacts, deepest overlap {1e3 * frame.overlap:.2f} mm  \n"
-            f"handle off by {1e3 * frame.error:.1f} {unit}; frame {1e3 * frame.seconds:.1f} ms"
-        )
+        with self.server.atomic():  # one message for all: each wakes the thread that sends
+            self._place(frame.q, {})
+            for name, ball in self._handles.items():
+                ball.position = self.drag.place(name)
+            self._show_rings()
+            self._status.content = f"**{frame.status}**"
+            self._numbers.content = (
+                f"{frame.contacts} contacts, deepest overlap {1e3 * frame.overlap:.2f} mm  \n"
+                f"handle off by {1e3 * frame.error:.1f} {unit}; frame {1e3 * frame.seconds:.1f} ms"
+            )
 
     def _place(self, q: Array, at: Mapping[str, pin.SE3]) -> None:
         """Put the pieces where they are at a posture (nq,), and those of some things at other placements."""
         scene = self.drag.scene
-        data = scene.state(q).data
+        owners, placed = scene.piece_owner, self._state.update(q).data.oMi
+        values = np.empty_like(self._sent)
+        for number, piece in enumerate(scene.geometry.geometryObjects):
+            place, owner = placed[piece.parentJoint] * piece.placement, owners[number]
+            if owner in at:
+                place = at[owner] * scene.objects[owner].placement.actInv(place)
+            values[number] = pin.SE3ToXYZQUAT(place)
         with self.server.atomic():
-            for number, piece in enumerate(scene.geometry.geometryObjects):
-                place, owner = data.oMi[piece.parentJoint] * piece.placement, scene.piece_owner[number]
-                if owner in at:
-                    place = at[owner] * scene.objects[owner].placement.actInv(place)
-                known = self._sent.get(number)
-                if known is None or not place.isApprox(known, STILL):
-                    handle, self._sent[number] = self._pieces[number], place
-                    handle.position = place.translation
-                    handle.wxyz = np.roll(pin.Quaternion(place.rotation).coeffs(), 1)
+            for number in np.flatnonzero(~(np.abs(values - self._sent) <= STILL).all(axis=1)).tolist():
+                piece = self._pieces[number]
+                piece.position, piece.wxyz = values[number, :3], values[number, [6, 3, 4, 5]]
+                self._sent[number] = values[number]
 
 
 def _handle_color(held: bool) -> tuple[int, int, int]:
