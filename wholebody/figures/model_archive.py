@@ -55,8 +55,8 @@ def _restored(archive: str, limits: dict[str, Array], followers: list[_Follower]
 
 def _along(axis: Array) -> Any:
     """A joint that slides along or turns about an axis (6,)."""
-    kind, way = ("P", axis[:3]) if axis[:3].any() else ("R", axis[3:])
+    kind, direction = ("P", axis[:3]) if axis[:3].any() else ("R", axis[3:])
     for k, letter in enumerate("XYZ"):
-        if way[k] == 1.0:
+        if direction[k] == 1.0:
             return getattr(pin, f"JointModel{kind}{letter}")()
-    return (pin.JointModelPrismaticUnaligned if kind == "P" else pin.JointModelRevoluteUnaligned)(way)
+    return (pin.JointModelPrismaticUnaligned if kind == "P" else pin.JointModelRevoluteUnaligned)(direction)

@@ -208,7 +208,7 @@ def torques(
             continue
         forces = loads.ground.forces
         missing[k] = loads.ground.missing
-        pressed = np.einsum("ij,ij->i", forces, stand.ways)
+        pressed = np.einsum("ij,ij->i", forces, stand.axes)
         for foot, total in enumerate(foot_wrenches(forces, stand, len(names))):
             mine = stand.owner == foot
             force[k, foot] = total[:3]

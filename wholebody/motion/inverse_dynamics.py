@@ -77,11 +77,11 @@ class GroundForces(NamedTuple):
 
 
 def ground_forces(
-    wrench: Array, about: Array, points: Array, friction: float, ways: Array | None = None
+    wrench: Array, about: Array, points: Array, friction: float, axes: Array | None = None
 ) -> GroundForces:
-    """Forces at points (p, 3), within cones of friction about ways (p, 3), that give a wrench (6,) as nearly.
+    """Forces at points (p, 3), within cones of friction about axes (p, 3), that give a wrench (6,) as nearly.
 
-    The wrench is about a point (3,); without ways the cones point up.
+    The wrench is about a point (3,); without axes the cones point up.
     """
     # Least |wrench's error|^2 + (e |forces|)^2 over edges of pyramids (Lawson and Hanson 1974, chapter 23).
     if len(points) == 0:
@@ -93,8 +93,8 @@ def ground_forces(
     around = 2.0 * np.pi * np.arange(count) / count
     rims = np.column_stack([friction * np.cos(around), friction * np.sin(around), np.ones(count)])
     directions = np.tile(rims, (len(points), 1))
-    for number, way in enumerate(() if ways is None else ways):
-        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), way).toRotationMatrix()
+    for number, axis in enumerate(() if axes is None else axes):
+        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), axis).toRotationMatrix()
         directions[number * count : (number + 1) * count] = rims @ turn.T
     arms = np.repeat(points - about, count, axis=0)
     columns = np.hstack([directions, cross(arms, directions)]).T
@@ -117,7 +117,7 @@ class Touches(NamedTuple):
 
     points: Array  # (t, 3) points, metres
     owner: Indices  # (t,) number of the part of each, after the feet
-    ways: Array  # (t, 3) normals of unit length, out of the things
+    axes: Array  # (t, 3) of their cones of friction: normals of unit length, out of the things
 
 
 class Stand(NamedTuple):
@@ -130,7 +130,7 @@ class Stand(NamedTuple):
     normals: Array  # (e, 2) inward normals of its edges; of a line of both sides and both ends
     offsets: Array  # (e,) inside, ``normals @ place >= offsets``, metres
     height: float  # of the ground, metres
-    ways: Array  # (p, 3) normals of unit length at the points, out of what bears
+    axes: Array  # (p, 3) of the cones of friction: normals of unit length at the points, out of what bears
 
     def shifted(self, shifts: Sequence[Array]) -> Stand:
         """The same with each foot (3,) farther, metres."""
@@ -186,8 +186,8 @@ class InverseDynamics:
         found = _standing(points, owner)
         if touches is None:
             return found
-        both = (np.concatenate(pair) for pair in zip((points, owner, found.ways), touches, strict=True))
-        return with_values(found, **dict(zip(("points", "owner", "ways"), both, strict=True)))
+        both = (np.concatenate(pair) for pair in zip((points, owner, found.axes), touches, strict=True))
+        return with_values(found, **dict(zip(("points", "owner", "axes"), both, strict=True)))
 
     def loads(self, q: Array, v: Array, a: Array, stand: Stand) -> Loads:
         """Loads of a posture (nq,) with its velocity and acceleration (nv,)."""
@@ -229,7 +229,7 @@ class InverseDynamics:
 
     def split(self, wrench: Array, center: Array, stand: Stand) -> GroundForces:
         """The ground's forces for a wrench (6,) about the world's origin."""
-        return ground_forces(moved(wrench, center), center, stand.points, self._friction, stand.ways)
+        return ground_forces(moved(wrench, center), center, stand.points, self._friction, stand.axes)
 
     def outside(self, loads: Loads, stand: Stand) -> float:
         """By how far the zero moment point is outside of where a frame stands, metres; 0 where that says little."""
@@ -289,10 +289,10 @@ class InverseDynamics:
 
 def _standing(points: Array, owner: Indices) -> Stand:
     """Where points (p, 3) of feet stand."""
-    ways = np.tile([0.0, 0.0, 1.0], (len(points), 1))
+    axes = np.tile([0.0, 0.0, 1.0], (len(points), 1))
     if not len(points):
-        return Stand(points, owner, np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), 0.0, ways)
-    return Stand(points, owner, *_support(points[:, :2]), float(points[:, 2].min()), ways)
+        return Stand(points, owner, np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), 0.0, axes)
+    return Stand(points, owner, *_support(points[:, :2]), float(points[:, 2].min()), axes)
 
 
 def _support(points: Array) -> tuple[Array, Array, Array]:

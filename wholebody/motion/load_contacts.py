@@ -26,7 +26,7 @@ def touching_parts(clip: Clip, scene: Scene, feet: Collection[str]) -> tuple[tup
 
     Things that move in the clip bear nothing: what they weigh is not known.
     """
-    figure, owners = clip.figure, scene.piece_owner
+    figure, owners, slow = clip.figure, scene.piece_owner, RestLimits().speed
     model, data = figure.model, figure.model.createData()
     carrier = {name: name for name in figure.segments}
     carrier |= {name: each.segment for name, each in scene.objects.items() if each.segment is not None}
@@ -38,26 +38,26 @@ def touching_parts(clip: Clip, scene: Scene, feet: Collection[str]) -> tuple[tup
         for q, v in zip(clip.q, clip.velocities(), strict=True):
             pin.forwardKinematics(model, data, q, v)
             here = list[tuple[str, Array, Array]]()
-            for first, second, way, point in _sides(workspace.near(q, TOUCHING)):
+            for first, second, normal, point in _sides(workspace.near(q, TOUCHING)):
                 mine, other = owners[first], owners[second]
                 if mine in bearing and other not in carrier and other not in clip.things:
                     twist = pin.getVelocity(model, data, joints[mine], pin.ReferenceFrame.WORLD)
-                    if np.linalg.norm(twist.linear + np.cross(twist.angular, point)) <= RestLimits().speed:
-                        here.append((carrier[mine], point, way))
+                    if np.linalg.norm(twist.linear + np.cross(twist.angular, point)) <= slow:
+                        here.append((carrier[mine], point, normal))
             found.append(here)
     names = tuple(dict.fromkeys(segment for here in found for segment, _, _ in here))
     return names, [
         Touches(
             np.array([point for _, point, _ in here]).reshape(-1, 3),
             np.array([len(feet) + names.index(segment) for segment, _, _ in here], dtype=np.intp),
-            np.array([way for _, _, way in here]).reshape(-1, 3),
+            np.array([normal for _, _, normal in here]).reshape(-1, 3),
         )
         for here in found
     ]
 
 
 def _sides(near: Contacts) -> Iterator[tuple[int, int, Array, Array]]:
-    """Of each pair both ways: a piece, the other one, the normal (3,) out of that, and the point (3,) of the first."""
+    """Of each pair in both orders: a piece, the other, the normal (3,) out of it, and the point (3,) of the first."""
     for number, (first, second) in enumerate(near.pair.tolist()):
         yield first, second, -near.normal[number], np.array(near.point_a[number])
         yield second, first, np.array(near.normal[number]), np.array(near.point_b[number])

@@ -92,10 +92,10 @@ class _Reader:
         """A goal between two frames: the joints of both move, but for those that move both or are placed already."""
         place, base = goal.residual.place.joint, goal.residual.base.joint
         apart = set.symmetric_difference(*(set(self._figure.model.supports[joint]) for joint in (place, base)))
-        ways = [apart.intersection(reaching(self._figure, name)) for name in (goal.frame, goal.to)]
-        kept = [way.isdisjoint(placed) and not way <= self.fixed for way in ways]
+        paths = [apart.intersection(reaching(self._figure, name)) for name in (goal.frame, goal.to)]
+        kept = [path.isdisjoint(placed) and not path <= self.fixed for path in paths]
         moving = [keeps or not any(kept) for keeps in kept]
-        self._move(where, goal.frame, set().union(*(way for way, moves in zip(ways, moving, strict=True) if moves)))
+        self._move(where, goal.frame, set().union(*(path for path, moves in zip(paths, moving, strict=True) if moves)))
         return [one for one, moves in zip(_ends(goal), moving, strict=True) if moves]
 
     def constraints(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
