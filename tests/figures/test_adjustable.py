@@ -46,6 +46,10 @@ def test_a_task_file_has_what_is_adjustable(tmp_path: Path) -> None:
     assert read.joints == figure.joints
     np.testing.assert_array_equal(read.limits.lower, figure.limits.lower)
     np.testing.assert_array_equal(read.limits.upper, figure.limits.upper)
+    records = wb.study(
+        file, people=[{"sex": "female", "percentile": 50}]
+    )  # a seat is nobody whose place she could take
+    assert [one.outcome for one in records] == ["solved"]
     file.write_text(file.read_text().replace('name = "back"', 'name = "cushion"'))
     with pytest.raises(wb.FileFormatError, match="key parts: two parts have one name"):
         wb.read_task(file)

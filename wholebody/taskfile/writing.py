@@ -103,7 +103,8 @@ def _figure(figure: Figure, target: Path) -> dict[str, Any]:
     spec, options = figure.loaded_as
     named = {"name": spec} if spec in FIGURES else {"path": _beside(spec, target)}
     if "parts" in options:
-        parts = [{"name": name, **_shape(*one, name, False)} for name, one in options["parts"].items()]
+        known_parts: dict[str, tuple[Shape, Any]] = options["parts"]
+        parts = [{"name": name, **_shape(shape, at, name, mesh=False)} for name, (shape, at) in known_parts.items()]
         options = {**options, "parts": parts}
     if options.get("package_dirs"):
         options = {**options, "package_dirs": [_beside(str(folder), target) for folder in options["package_dirs"]]}
@@ -154,7 +155,7 @@ def _thing(thing: SceneObject, target: Path, beside: dict[Path, str]) -> dict[st
     return found
 
 
-def _shape(shape: Shape, at: Any, name: str, mesh: bool = True) -> dict[str, Any]:
+def _shape(shape: Shape, at: Any, name: str, *, mesh: bool = True) -> dict[str, Any]:
     """Kind, place and sizes of a shape; a mesh without its path, where it may be one."""
     kind = type(shape).__name__.lower()
     if kind not in SHAPES or not (mesh or kind != "mesh"):
