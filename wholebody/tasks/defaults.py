@@ -139,8 +139,11 @@ def stances(scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal
     """The feet of each person that stands and balances, or kneels, but does not sit, lean or hold on."""
 
     def kneels(stand: Stand) -> bool:
-        at_start = stand.value(State(scene.model).update(start))
-        return float(np.maximum(np.maximum(stand.lower - at_start, at_start - stand.upper), 0.0).max()) <= KNEELS
+        at_start = stand.value(state := State(scene.model).update(start))
+        # The ankles of who stands are as near to the ground as knees.
+        upright = [abs(state.frame(inputs.find_place(scene, knee, "").frame).rotation[2, 2]) for knee in stand.knees]
+        missed = np.maximum(np.maximum(stand.lower - at_start, at_start - stand.upper), 0.0).max()
+        return bool(missed <= KNEELS) and max(upright) < 0.5
 
     stand = (one for one in terms if isinstance(one, Stand))
     return tuple(tuple(one.feet) for one in stand if (one.balance or one.knees) and not (one.knees and kneels(one)))
