@@ -54,7 +54,7 @@ class Statics(NamedTuple):
     feet: tuple[inputs.Place, ...]  # the soles that bear, one or two; none for who sits
     joints: Indices  # (k,) in the tangent, of the joints with published strength
     carriers: Indices  # (k,) their joints in the model
-    upper: Array  # (k,) greatest torque towards positive angles [N m]
+    upper: Array  # (k,) greatest torque towards positive angles [N m]; infinite where none is published
     lower: Array  # (k,) least, negative
     back: tuple[int, int]  # joints of L5/S1, and of the next disc that has one
 
@@ -160,7 +160,7 @@ def statics_of(scene: Surroundings, term: Exertion | StrengthLimit) -> Statics:
              for name in figure.joints if (k := figure.joint_id(name)) not in legs]  # fmt: skip
     own, there = np.array(pairs, dtype=np.intp).T
     lower, upper = (limit[own] for limit in term.strength.limits(figure))
-    known = np.isfinite(lower) & np.isfinite(upper)
+    known = np.isfinite(lower) | np.isfinite(upper)  # of ankles one direction is
     joints = there[known]
     if standing:
         pressure(state, loads, body, 0.0)  # forces that lift are refused here
@@ -181,7 +181,7 @@ class Exertion(SumOfSquares):
 
     Attributes:
         forces: on the person beside the weight.
-        strength: of the person.
+        strength: of the person; by default the median of its sex and age.
         standing: whether both feet carry the person; False for who sits, whose legs do not count.
         person: whose torques, such as "anna", where the scene has several figures.
         weight: factor on the measure; 10 of it beside `Effort` is as strong as a habit.
@@ -224,8 +224,7 @@ class StrengthLimit(ComputedTogether):
 
     Attributes:
         forces: on the person beside the weight.
-        strength: of the person.
-        standing, person: as for `Exertion`.
+        strength, standing, person: as for `Exertion`.
         share: of the strength that may be used.
         compression: greatest of the disc L5/S1 [N]; None for no bound.
 

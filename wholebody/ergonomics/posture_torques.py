@@ -18,7 +18,6 @@ from wholebody.motion.strength import Strength
 from wholebody.scene.scene import Scene
 from wholebody.tasks.forces import GRAVITY, Force
 
-LEGS = ("hip", "knee", "ankle", "toe")
 RAISED = 0.03  # m: a sole higher than this over the lower one bears nothing
 
 
@@ -30,6 +29,7 @@ class StaticTorques:
         torque: joint -> torque, N m; positive towards positive angles.
         share: joint -> share of the strength in its direction, of the joints with published strength; more than 1 is
             more than the person can.
+        compression: of the disc L5/S1, N, as `back_compression` has it.
 
     Examples:
         >>> held = wb.ergonomics.static_torques(human, standing, load=5.0)
@@ -39,6 +39,7 @@ class StaticTorques:
 
     torque: Mapping[str, float]
     share: Mapping[str, float]
+    compression: float
 
     __repr__ = brief
 
@@ -67,7 +68,7 @@ def static_torques(
         q: (nq,) posture.
         load: mass in both hands together, half in each palm, kg.
         seated: whether a seat bears the weight.
-        strength: of the person; a man of median strength if left out.
+        strength: of the person; the median of its sex and age if left out.
 
     Raises:
         InputError: no person, no posture, or a value out of range.
@@ -89,14 +90,15 @@ def static_torques(
     state = State(person.model).update(q)
     low = min((state.frame(one.frame).translation[2] for one in statics.feet), default=0.0)
     bearing = tuple(one for one in statics.feet if state.frame(one.frame).translation[2] <= low + RAISED)
-    names = [name for name in person.joints if not (seated and name.split("_")[1] in LEGS)]
-    joints = {name: joint for name in names if (joint := person.model.joints[person.joint_id(name)]).nv == 1}
-    columns = np.array([joint.idx_v for joint in joints.values()], dtype=np.intp)
-    torque, _ = with_values(statics, feet=bearing).torques(state, columns, state.column_joint[columns])
-    lower, upper = (limit[columns] for limit in strength.limits(person))
-    share = np.abs(torque) / np.where(torque >= 0.0, upper, -lower)
-    known = np.isfinite(lower) | np.isfinite(upper)
+    statics = with_values(statics, feet=bearing)
+    legs = person.groups["legs"] if seated else ()
+    joints = {name: person.model.joints[person.joint_id(name)] for name in person.joints if name not in legs}
+    names = {joint.idx_v: name for name, joint in joints.items() if joint.nv == 1}
+    columns = np.array(list(names), dtype=np.intp)
+    torque, _ = statics.torques(state, columns, state.column_joint[columns])
+    share, _ = statics.efforts(state)
     return StaticTorques(
-        dict(zip(joints, torque.tolist(), strict=True)),
-        {name: one for name, one, is_known in zip(joints, share.tolist(), known, strict=True) if is_known},
+        dict(zip(names.values(), torque.tolist(), strict=True)),
+        {names[column]: one for column, one in zip(statics.joints.tolist(), np.abs(share).tolist(), strict=True)},
+        statics.compression(state)[0],
     )
