@@ -8,8 +8,8 @@ from typing import Any
 
 from wholebody.base.arrays import Array, brief
 from wholebody.ergonomics.angles import SIDES, BodyAngles, check_person
+from wholebody.ergonomics.exertion import StaticTorques, static_torques
 from wholebody.ergonomics.owas_score import Owas, owas_code
-from wholebody.ergonomics.posture_torques import StaticTorques, static_torques
 from wholebody.ergonomics.reba_score import Reba, reba_parts
 from wholebody.ergonomics.rula_score import Rula, rula_parts
 from wholebody.ergonomics.work import Work, seen

@@ -147,14 +147,12 @@ def _neck(angles: BodyAngles) -> int:
 
 
 def _trunk(angles: BodyAngles, work: Work) -> int:
-    """A trunk that rests on a back scores 1 if it is at least at a right angle to the thighs, however it leans.
-
-    The worksheet of Cornell University of a seated trunk that is not well supported: 2, upright too.
-    """
+    """A trunk that rests on a back scores 1 if it is at least at a right angle to the thighs, however it leans."""
     bent = abs(angles.trunk_flexion)
     opened = pi - max(angles.left.thigh_slope, angles.right.thigh_slope) - angles.trunk_flexion
     # between trunk and thighs, from which a seated trunk with a back is well supported
     rests = bool(work.back_supported) and work.sits(angles) and opened >= radians(90.0)
+    # upright too scores 2 "if not" well supported while seated, on the worksheet of Cornell University
     free = work.sits(angles) and not work.back_supported
     score = 1 if bent <= NEUTRAL else 2 if bent <= radians(20.0) else 3 if bent <= radians(60.0) else 4
     return (1 if rests else max(score, 1 + int(free))) + turned(angles.trunk_twist, angles.trunk_lateral)

@@ -1,8 +1,7 @@
 """Joint strength of people: the largest torques that muscles exert (Stobbe 1982; `figures/data/strength.csv`).
 
-From 40 years on men lose 12 % of it in ten years (Hurley 1995, Journals of Gerontology 50A: 12 to 15 % from about the
-fifth decade on), women 7.6 % (Hunter, Thompson and Adams 2000, Journal of Gerontology 55A(6), ages 20 to 89: knee
-extensors 9.3 %, plantar flexors 7.4 %, grip 6.2 %).
+From 40 years on men lose 12 % of it in ten years (Hurley 1995, Journals of Gerontology 50A: 12 to 15 %), women 7.6 %
+(Hunter, Thompson, Adams 2000, Journal of Gerontology 55A(6): knee extensors 9.3, plantar flexors 7.4, grip 6.2 %).
 """
 
 from __future__ import annotations
