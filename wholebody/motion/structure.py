@@ -199,11 +199,10 @@ def built_figure(figure: Figure) -> dict[str, str]:
         first[joint] = own
     places, names = [at[group[-1]] for group in groups], list[dict[str, str]]()
     for group, place in zip(groups, places, strict=True):
-        meeting = min(
-            reversed(group), key=lambda joint, place=place: round(float(np.linalg.norm(real[joint] - place)), 3)
-        )
-        names.append({"wrist": model.names[group[0]], "ankle": model.names[group[-1]], "head": model.names[group[-1]]})
-        names[-1][""] = model.names[meeting]
+        away = np.round(np.linalg.norm(real[group] - place, axis=1), 3)
+        meeting = group[len(group) - 1 - int(np.argmin(away[::-1]))]  # of those at the place the last one
+        named = {"wrist": group[0], "ankle": group[-1], "head": group[-1], "": meeting}
+        names.append({part: model.names[joint] for part, joint in named.items()})
     for number, group in enumerate(groups):  # where links end
         if number not in parents and group[-1] not in model.parents:
             parents.append(number)
