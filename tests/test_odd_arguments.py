@@ -637,7 +637,8 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Clip.write", Call(clip.write, {"path": path / "clip.npz"})
     for method in ("mirrored", "velocities", "accelerations"):
         yield f"Clip.{method}", Call(getattr(wb.Clip(hand, [hand.neutral], 0.1), method), {})  # type: ignore[arg-type]
-    yield "Strength", Call(wb.motion.Strength, {"percentile": 50.0, "sex": "female"}, lambda made: made.limits(arm))
+    strong = {"percentile": 50.0, "sex": "female", "age": 50.0}
+    yield "Strength", Call(wb.motion.Strength, strong, lambda made: made.limits(arm))
     yield "Strength.limits", Call(wb.motion.Strength().limits, {"figure": arm})
     found = wb.motion.torques(clip)
     yield "Torques.joint_of", Call(found.joint_of, {"column": 0})

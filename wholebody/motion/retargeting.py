@@ -30,7 +30,7 @@ from wholebody.motion.retarget_targets import (
 )
 from wholebody.motion.roles import Roles, matched, skeleton_roles
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
-from wholebody.motion.stance import paths
+from wholebody.motion.stance import point_paths
 from wholebody.motion.standing_ground import NOTHING, Ground
 from wholebody.motion.standing_ground import ground as find_ground
 from wholebody.motion.thing_contacts import ThingContact, Things, meetings, still_things, surface_of
@@ -241,8 +241,8 @@ def bone_errors(
 
 def errors_of(motion: SkeletonMotion, clip: Clip, roles: Roles) -> dict[str, Array]:
     """`bone_errors` with known roles."""
-    tracks = paths(clip.figure, clip.q, tuple(roles.frames.values())).swapaxes(0, 1)
-    places = dict(zip(roles.frames, tracks, strict=True))
+    points = roles.places(clip.figure)
+    places = dict(zip(points, point_paths(clip.figure, clip.q, list(points.values())).swapaxes(0, 1), strict=True))
     centres = {role: motion.positions[:, motion.names.index(joint)] for role, joint in roles.joints.items()}
     if clip.figure.root == "free":
         named = {"skeleton": roles.joints}

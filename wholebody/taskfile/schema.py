@@ -142,8 +142,8 @@ SOFT = kind_of(tasks.Soft, "weight")
 _NEWTONS = Numbers(Vector(3, Range(-MOST_FORCE, MOST_FORCE, "N")), "[x, y, z]")
 _FORCE = _form(tasks.Force, "frame force", frame=FRAME, force=_NEWTONS)
 FORCES = Several(Part("force", 'frame = "right_palm", force = [0.0, 0.0, -98.0]', {"": _FORCE}), 0)
-_STRENGTH = _form(Strength, "percentile sex", sex=Choice(("male", "female")))
-STRENGTH = Part("strength", 'percentile = 50, sex = "male"', {"": _STRENGTH})
+_STRENGTH = _form(Strength, "percentile sex age", sex=Choice(("male", "female")))
+STRENGTH = Part("strength", 'percentile = 50, sex = "male", age = 40', {"": _STRENGTH})
 _STRENGTHS: dict[str, Kind] = {"forces": FORCES, "strength": STRENGTH, "person": kinds.MEMBER}
 _FIELD = _form(ergonomics.FieldOfView, "horizontal up down declination")
 VIEW = Part(
