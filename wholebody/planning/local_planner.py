@@ -28,7 +28,9 @@ from wholebody.tasks import Posture
 from wholebody.tasks.base import filled
 from wholebody.tracking.qp_strategy import Attraction
 
-WITHIN = 0.02  # m: distance within which pairs are looked at; larger = fewer and dearer queries
+import os
+HALVES = (0.5, 0.25) if os.environ.get('WB_HALF') else ()
+WITHIN = float(os.environ.get('WB_WITHIN', '0.02'))  # m: distance within which pairs are looked at; larger = fewer and dearer queries
 MARGIN = 2e-3  # m: distance that motions keep beyond the clearance, where their ends do; larger = fewer queries
 NOISE = 1e-5  # m: by which distances of one posture differ from query to query
 REACHED = 1e-3  # rad, m: difference from a posture that counts as reached by steps of the tracker
@@ -121,6 +123,11 @@ class Geodesics:
             ahead = self._seen(there)  # most motions end here, so q is looked at afterwards
             seen = self._seen(q) if ahead is not None and seen is None else seen
             if not self._joins(here, motion / parts, seen, ahead):
+                seen = self._seen(q) if seen is None else seen
+                for share in HALVES:
+                    there = np.asarray(pin.integrate(self._model, here, share / parts * motion))
+                    if self._joins(here, share / parts * motion, seen, self._seen(there)):
+                        return [*way, there], False
                 return way, False
             way.append(there)
             here, seen = there, ahead

@@ -39,6 +39,8 @@ PASSED = 5e-4  # m: overlap between two frames that counts
 OVER = 1.001  # of the limits of velocity and acceleration: the last slowing may end a little above them
 ENDS = 8  # postures that meet goals; more = ends that are reached more easily, for a solve each
 NEARER = 0.95  # of the length of the best motion: what others are shorter than
+import os
+BRIDGE = int(os.environ.get('WB_BRIDGE','0'))
 SEARCHED = 0.75  # of the time before judging: for searches; the rest is for shortcuts and smoothing
 LEAST = 0.1  # s: a time limit below it counts as it; the straight motion of an arm takes less
 
@@ -253,6 +255,8 @@ class _Search:
         start, model, rounds = self._problem.start, self._problem.scene.model, 0
         self._straight = False
         trees = RRTConnect(self._local, model, start)
+        if self._local is not self._slides:
+            trees.slides = self._slides
         ends = [q for q in self._reached if self._apart(start, q) < most]
         for reached in ends:
             trees.add_end(reached)
@@ -281,10 +285,20 @@ class _Search:
             sample = self._sampler.near(middle, self._spreads[self._rng.integers(len(self._spreads))])
             if most < np.inf and self._apart(start, sample) + min(self._apart(sample, q) for q in ends) > most:
                 continue
+            if BRIDGE and rounds % 2:
+                sample = self._narrow(middle, sample)
             path = trees.grow(sample)
             if path is not None:
                 return path, trees
         return None, trees
+
+    def _narrow(self, middle, sample):
+        for _ in range(BRIDGE):
+            one = self._sampler.near(middle, self._spreads[self._rng.integers(len(self._spreads))])
+            found = self._sampler.between_contacts(one, self._slides.geodesics.free)
+            if found is not None:
+                return found
+        return sample
 
     def _led(self, end: Array) -> list[Array]:
         """Postures from the start to an end (nq,) without trees, if any: straight, or along things from the end back.
@@ -324,11 +338,11 @@ class _Judge:
         self._frame = 2.0 * (processor_time() - began)  # s: each is also swept from the one before
 
     def in_time(self, path: list[Array]) -> AbstractContextManager[None]:
-        """Inside it the budget ends early enough to judge a motion along postures (nq,), of a second at least."""
+        """Inside it the budget ends early enough to judge a motion along postures (nq,), of half a second at least."""
         figure = self.problem.scene.figure
         ways = np.array([pin.difference(figure.model, *pair) for pair in pairwise(path)]).reshape(-1, figure.model.nv)
         fastest = float((np.abs(ways) / self._pace.fastest(figure)).max(axis=1).sum())
-        return within_budget(max(BUDGET.left - self._frame * (1.0 + 1.5 * fastest) / self._pace.dt, 1e-9))
+        return within_budget(max(BUDGET.left - self._frame * (0.5 + 1.2 * fastest) / self._pace.dt, 1e-9))
 
     def judged(self, path: Array) -> Plan:
         """The motion along a path (m, nq) as fast as it may be, and what it is worth."""

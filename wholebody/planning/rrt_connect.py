@@ -9,6 +9,10 @@ from wholebody.base.arrays import Array
 from wholebody.planning.local_planner import LocalPlanner
 
 
+import os
+SLIDE = int(os.environ.get("WB_SLIDE", "0"))
+
+
 class Tree:
     """Postures that free motions join to its roots."""
 
@@ -58,6 +62,7 @@ class RRTConnect:
         self._trees = [Tree(model, start), Tree(model, start)]
         self._trees[0].add(start)
         self.samples = 0
+        self.slides = None
 
     def add_end(self, end: Array) -> None:
         """Add a posture (nq,) at which the motion may end."""
@@ -86,6 +91,8 @@ class RRTConnect:
         """Add the motion from the nearest posture towards a target; the last of it, and whether it is there."""
         number = tree.nearest(target)
         way, met = self._local.towards(tree.postures[number], target)
+        if not way and not met and tree.grown < SLIDE and self.slides is not None:
+            way, met = self.slides.towards(tree.postures[number], target, 2.0)
         for q in way:
             number = tree.add(q, number)
         return (number if way or met else None), met
