@@ -105,10 +105,10 @@ def test_structure_tells_what_names_do_not(turn: float, human: wb.Figure) -> Non
     expected = {name.replace(*next(((a, b) for a, b in ends.items() if a in name), ("", ""))): numbers[k]
                 for k, name in enumerate(names) if name != "crown"}  # fmt: skip
     assert found.joints == expected
-    assert set(found.told) == set(expected)
+    assert set(found.by_structure) == set(expected)
     with pytest.warns(UserWarning, match="by the structure of the skeleton .*left_knee is 'joint "):
         wb.retarget(motion, human)
-    assert matched(motion, human, {"skeleton": {"left_elbow": "joint 3", "left_wrist": "joint 4"}}).told == ()
+    assert matched(motion, human, {"skeleton": {"left_elbow": "joint 3", "left_wrist": "joint 4"}}).by_structure == ()
 
 
 def _with_soles(motion: SkeletonMotion, ankles: list[str]) -> SkeletonMotion:

@@ -31,7 +31,7 @@ class Roles(NamedTuple):
     table: str  # name of the table that matched the skeleton
     # roles of the figure that no joint of the skeleton is known to have, if there are others to name
     missing: tuple[str, ...] = ()
-    told: tuple[str, ...] = ()  # roles whose joints are known by the skeleton's structure alone
+    by_structure: tuple[str, ...] = ()  # roles whose joints are known by the skeleton's structure alone
 
 
 def matched(

@@ -114,9 +114,9 @@ def _parts(motion: SkeletonMotion, limb: _Limb) -> list[int]:
     size, rest = SHORT * motion.length(), motion.rest()
     first, middle, last = limb.joints[limb.first : limb.first + 3]
     beyond = [k for k in limb.joints[limb.first + 3 :] if np.linalg.norm(rest[k] - rest[last]) > size]
-    ways = rest[beyond] - rest[last]
+    offsets = rest[beyond] - rest[last]
     down = (rest[last] - rest[middle]) / np.linalg.norm(rest[last] - rest[middle])
-    ahead = np.abs(ways @ down) < 0.9 * np.linalg.norm(ways, axis=1)  # a joint in the sole is no toe
+    ahead = np.abs(offsets @ down) < 0.9 * np.linalg.norm(offsets, axis=1)  # a joint in the sole is no toe
     straight = not ahead.any()  # an arm, or a foot that hangs
     return [first, middle, last, *[k for k, off in zip(beyond, ahead, strict=True) if off or straight][:1]]
 

@@ -275,8 +275,8 @@ class TrackedMotions:
             for _ in range(0 if late[k] else 2):  # what is held is missed by the square of a step
                 q = self._settling.step(q, measures=False).q
             found[k] = q
-        ways, usual = (np.array([self._apart(*pair) for pair in pairwise(each)]) for each in (found, path))
-        return found, (ways > JUMP * usual + REACHED) | late[1:]
+        steps, usual = (np.array([self._apart(*pair) for pair in pairwise(each)]) for each in (found, path))
+        return found, (steps > JUMP * usual + REACHED) | late[1:]
 
     def _apart(self, q: Array, target: Array) -> float:
         return float(np.linalg.norm(pin.difference(self._model, q, target)))

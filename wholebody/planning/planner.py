@@ -322,8 +322,8 @@ def _smoothed(judge: _Judge, local: LocalPlanner, path: list[Array]) -> Plan:
     count = int(np.clip(length(model, path) / local.spacing, 20, 1000))
     with judge.in_time(path):
         even, _ = local.settled(resampled(model, path, count))
-        ways = [smooth(model, even, local), even]
-    plans = (judge.judged(way) for way in ways)
+        paths = smooth(model, even, local), even
+    plans = map(judge.judged, paths)
     found = next(plans)
     return found if found.solved or BUDGET.over else next(plans)
 
@@ -340,8 +340,8 @@ class _Judge:
     def in_time(self, path: list[Array]) -> AbstractContextManager[None]:
         """Inside it the budget ends early enough to judge a motion along postures (nq,), of half a second at least."""
         figure = self.problem.scene.figure
-        ways = np.array([pin.difference(figure.model, *pair) for pair in pairwise(path)]).reshape(-1, figure.model.nv)
-        fastest = float((np.abs(ways) / self._pace.fastest(figure)).max(axis=1).sum())
+        steps = np.array([pin.difference(figure.model, *pair) for pair in pairwise(path)]).reshape(-1, figure.model.nv)
+        fastest = float((np.abs(steps) / self._pace.fastest(figure)).max(axis=1).sum())
         return within_budget(max(BUDGET.left - self._frame * (0.5 + 1.2 * fastest) / self._pace.dt, 1e-9))
 
     def judged(self, path: Array) -> Plan:
@@ -359,8 +359,9 @@ class _Judge:
             f"accelerations reach {use.acceleration:.3g} of their limit" if not use.acceleration <= OVER else "",
         ]
         if not any(faults):
-            ways, sweep = enumerate(pairwise(q), 1), Sweep(scene.model, scene.geometry)
-            passed = next((k for k, way in ways if BUDGET.over or sweep.first_contact(*way, tolerance=PASSED)), 0)
+            sweep = Sweep(scene.model, scene.geometry)
+            free = (not BUDGET.over and sweep.first_contact(*pair, tolerance=PASSED) is None for pair in pairwise(q))
+            passed = next((k for k, kept in enumerate(free, 1) if not kept), 0)
             faults.append(f"something is passed through before frame {passed}" if passed else "")
         if BUDGET.over:
             faults = ["the time limit ended the judgement of a motion"]

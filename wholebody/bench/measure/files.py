@@ -76,7 +76,7 @@ def read(folder: Path, frames: int) -> Iterator[Row]:
 
 
 def _answer(work: Callable[[], dict[str, Figure]]) -> dict[str, Figure]:
-    """Figures of a file, or the sentence by which it is refused; any other error is a fault, and told as one."""
+    """Figures of a file, or the sentence by which it is refused; any other error is a fault, and reported as one."""
     try:
         return {"read": "yes", **work()}
     except WholebodyError as error:
@@ -319,8 +319,8 @@ def _rest_turn(role: str, own: dict[str, Array], rest: Array, joints: dict[str, 
             first, last = f"{side}_{start}", f"{side}_{end}"
             mine = role == first or (role == last and end == limb[2] and limb[0] == "shoulder")
             if mine and {first, last} <= own.keys() & joints.keys():
-                ways = own[last] - own[first], rest[joints[last]] - rest[joints[first]]
-                found: Array = pin.Quaternion.FromTwoVectors(*ways).toRotationMatrix()
+                bones = own[last] - own[first], rest[joints[last]] - rest[joints[first]]
+                found: Array = pin.Quaternion.FromTwoVectors(*bones).toRotationMatrix()
                 return found
     return np.eye(3)
 
