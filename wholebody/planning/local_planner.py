@@ -14,7 +14,6 @@ from typing import ClassVar, NamedTuple, Protocol
 import numpy as np
 import pinocchio as pin
 
-from wholebody.assessment.posture import largest_violation
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.errors import InputError
 from wholebody.geometry.continuous.motion_bounds import largest_approach
@@ -26,16 +25,15 @@ from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks import Posture
 from wholebody.tasks.base import filled
+from wholebody.terms.linearisation import ConstraintValues
 from wholebody.tracking.qp_strategy import Attraction
 
-import os
-HALVES = (0.5, 0.25) if os.environ.get('WB_HALF') else ()
-WITHIN = float(os.environ.get('WB_WITHIN', '0.02'))  # m: distance within which pairs are looked at; larger = fewer and dearer queries
+WITHIN = 0.02  # m: distance within which pairs are looked at; larger = fewer and dearer queries
 MARGIN = 2e-3  # m: distance that motions keep beyond the clearance, where their ends do; larger = fewer queries
 NOISE = 1e-5  # m: by which distances of one posture differ from query to query
 REACHED = 1e-3  # rad, m: difference from a posture that counts as reached by steps of the tracker
 JUMP = 1.5  # of the distance of two postures: above it their projections are on two sides of something
-ALLOWED = 1e-5  # m, rad: by which postures of a geodesic may miss constraints
+INSIDE = 5e-3  # rad, m: by which postures are within the bounds of constraints, where ends are; motions are curved
 GAIN = 5e-3  # rad, m: by which a step comes nearer at least; smaller = longer motions along things
 
 
@@ -97,6 +95,10 @@ class Geodesics:
         # of every pair by every freedom
         self._approach = np.asarray(largest_approach(workspace.table, centres, np.eye(self._model.nv)))
         self._between = (self._approach > 0.0).astype(float)
+        state, terms = workspace.state.update(problem.start), problem.constraints
+        self._values = ConstraintValues(terms, state)
+        sides = [np.broadcast_arrays(term.lower, term.upper, term.value(state))[:2] for term in terms]
+        self._sides = np.hstack([np.zeros((2, 0)), *sides]) + INSIDE * np.array([[1.0], [-1.0]])
         unbounded = np.flatnonzero(~np.isfinite(self._approach).all(axis=1))
         if len(unbounded):
             names = [workspace.owners[piece] for piece in workspace.table.pairs[unbounded[0]]]
@@ -109,6 +111,9 @@ class Geodesics:
         """See `LocalPlanner`."""
         near = self._workspace.near(q, self._clearance + MARGIN + NOISE)
         self._required[near.number] = np.minimum(self._required[near.number], near.distance - NOISE)
+        values = self._values.at(self._workspace.state)
+        self._sides[0] = np.minimum(self._sides[0], values - NOISE)
+        self._sides[1] = np.maximum(self._sides[1], values + NOISE)
 
     def free(self, q: Array) -> bool:
         """Whether a posture (nq,) keeps the distances."""
@@ -123,11 +128,6 @@ class Geodesics:
             ahead = self._seen(there)  # most motions end here, so q is looked at afterwards
             seen = self._seen(q) if ahead is not None and seen is None else seen
             if not self._joins(here, motion / parts, seen, ahead):
-                seen = self._seen(q) if seen is None else seen
-                for share in HALVES:
-                    there = np.asarray(pin.integrate(self._model, here, share / parts * motion))
-                    if self._joins(here, share / parts * motion, seen, self._seen(there)):
-                        return [*way, there], False
                 return way, False
             way.append(there)
             here, seen = there, ahead
@@ -167,9 +167,12 @@ class Geodesics:
         return max(1, int(np.ceil(np.abs(motion).max(initial=0.0) / 0.2)))
 
     def _seen(self, q: Array) -> Seen | None:
-        """What is seen at a posture (nq,); None where a pair is nearer than is required."""
-        proximity = self._workspace.proximity
-        room = proximity.least(self._workspace.state.update(q).data, WITHIN) - self._required
+        """What is seen at a posture (nq,); None where a pair is nearer than is required, or a constraint is missed."""
+        proximity, state = self._workspace.proximity, self._workspace.state.update(q)
+        values = self._values.at(state)
+        if (values < self._sides[0]).any() or (values > self._sides[1]).any():
+            return None
+        room = proximity.least(state.data, WITHIN) - self._required
         return Seen(room, proximity.distances.placed.copy()) if room.min(initial=0.0) >= 0.0 else None
 
     def _joins(self, q: Array, motion: Array, seen: Seen | None, ahead: Seen | None) -> bool:
@@ -239,19 +242,14 @@ class TrackedMotions:
 
     def joined(self, q: Array, target: Array, most: float) -> list[Array]:
         """See `LocalPlanner`; a geodesic if it may be, as it costs a tenth of steps."""
-        if not self._held and (way := self._allowed(self.geodesics.joined(q, target, most))):
+        if not self._held and (way := self.geodesics.joined(q, target, most)):
             return way
         way, met = self.towards(q, target, most)
         return way if met else []
 
     def through(self, path: Array) -> list[Array]:
         """See `LocalPlanner`; by geodesics."""
-        return self._allowed(self.geodesics.through(path))
-
-    def _allowed(self, way: list[Array]) -> list[Array]:
-        """Postures (nq,) of a motion that keep the constraints; none where one does not."""
-        states = (self._problem.scene.state(at) for at in way)
-        return way if all(largest_violation(self._problem, at) <= ALLOWED for at in states) else []
+        return self.geodesics.through(path)
 
     def towards(self, q: Array, target: Array, most: float = np.inf) -> tuple[list[Array], bool]:
         """See `LocalPlanner`; ends where the motion is longer than `most`, radians and metres."""

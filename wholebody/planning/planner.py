@@ -39,9 +39,8 @@ PASSED = 5e-4  # m: overlap between two frames that counts
 OVER = 1.001  # of the limits of velocity and acceleration: the last slowing may end a little above them
 ENDS = 8  # postures that meet goals; more = ends that are reached more easily, for a solve each
 NEARER = 0.95  # of the length of the best motion: what others are shorter than
-import os
-BRIDGE = int(os.environ.get('WB_BRIDGE','0'))
-SEARCHED = 0.75  # of the time before judging: for searches; the rest is for shortcuts and smoothing
+SEARCHED = 0.75  # of the time limit: for the first path; the rest is for shortcuts, smoothing and the judgement
+AGAIN = 0.4  # of the time limit: for shorter paths; more = shorter, later
 LEAST = 0.1  # s: a time limit below it counts as it; the straight motion of an arm takes less
 
 
@@ -130,13 +129,12 @@ def plan(
         judge = _Judge(problem, pace)
         found = None
         with problem.borrow() as workspace:
-            tracked = bool(problem.constraints or problem.bounds or scene.figure.followers)
+            tracked = holds(problem) or bool(problem.bounds or scene.figure.followers)
             slides = TrackedMotions(problem, workspace)
             local: LocalPlanner = slides if tracked else slides.geodesics
-            search = _Search(problem, (local, slides), ends, (sampler, rng))
+            search = _Search(judge, (local, slides), ends, (sampler, rng))
             while found is None or not (found.solved or BUDGET.over):
-                with judge.in_time([problem.start]):
-                    path, message = search.shortest()
+                path, message = search.shortest()
                 if path is None:
                     break
                 found = _smoothed(judge, local, path)
@@ -211,12 +209,13 @@ class _Search:
 
     def __init__(
         self,
-        problem: Problem,
+        judge: _Judge,
         planners: tuple[LocalPlanner, TrackedMotions],
         ends: Iterator[_End],
         random: tuple[Sampler, np.random.Generator],
     ) -> None:
-        self._problem, self._ends, self._begun = problem, ends, False
+        self._judge, self._ends, self._begun = judge, ends, False
+        problem = self._problem = judge.problem
         self._local, self._slides = planners
         self._sampler, self._rng = random
         self._reached: list[Array] = []
@@ -230,14 +229,15 @@ class _Search:
         """The shortest of some paths, with shortcuts, and how it was found; or None and why there is none."""
         model, best, most, samples, runs = self._problem.scene.model, None, np.inf, 0, 0
         enough = self._local.samples
-        while not runs or (runs < self._local.searches and samples < enough and BUDGET.spent < SEARCHED):
+        while not runs or (runs < self._local.searches and samples < enough and BUDGET.spent < AGAIN):
             path, trees = self._path(NEARER * most, np.inf if not runs else enough - samples)
             runs, samples = runs + 1, samples + trees.samples * (runs > 0)
             if path is None:
                 break
             if self._straight:
                 return path, "the straight motion"
-            path = shortcut(model, path, self._local, self._rng)
+            with self._judge.in_time(path):
+                path = shortcut(model, path, self._local, self._rng)
             if (found := length(model, path)) < most:
                 best, most = path, found
         if best is not None:
@@ -254,13 +254,11 @@ class _Search:
         """
         start, model, rounds = self._problem.start, self._problem.scene.model, 0
         self._straight = False
-        trees = RRTConnect(self._local, model, start)
-        if self._local is not self._slides:
-            trees.slides = self._slides
+        trees = RRTConnect(self._local, None if self._local is self._slides else self._slides, model, start)
         ends = [q for q in self._reached if self._apart(start, q) < most]
         for reached in ends:
             trees.add_end(reached)
-        while rounds < samples and (BUDGET.spent < SEARCHED or not self._begun):
+        while rounds < samples and (BUDGET.spent < (SEARCHED if most == np.inf else AGAIN) or not self._begun):
             self._begun = True
             if rounds % self._local.rounds == 0 or not ends:
                 end = next(self._ends, None)
@@ -285,20 +283,10 @@ class _Search:
             sample = self._sampler.near(middle, self._spreads[self._rng.integers(len(self._spreads))])
             if most < np.inf and self._apart(start, sample) + min(self._apart(sample, q) for q in ends) > most:
                 continue
-            if BRIDGE and rounds % 2:
-                sample = self._narrow(middle, sample)
             path = trees.grow(sample)
             if path is not None:
                 return path, trees
         return None, trees
-
-    def _narrow(self, middle, sample):
-        for _ in range(BRIDGE):
-            one = self._sampler.near(middle, self._spreads[self._rng.integers(len(self._spreads))])
-            found = self._sampler.between_contacts(one, self._slides.geodesics.free)
-            if found is not None:
-                return found
-        return sample
 
     def _led(self, end: Array) -> list[Array]:
         """Postures from the start to an end (nq,) without trees, if any: straight, or along things from the end back.
@@ -321,8 +309,8 @@ def _smoothed(judge: _Judge, local: LocalPlanner, path: list[Array]) -> Plan:
     model = judge.problem.scene.model
     count = int(np.clip(length(model, path) / local.spacing, 20, 1000))
     with judge.in_time(path):
-        even, _ = local.settled(resampled(model, path, count))
-        paths = smooth(model, even, local), even
+        even, blocked = local.settled(resampled(model, path, count))
+        paths = smooth(model, even, blocked, local), even
     plans = map(judge.judged, paths)
     found = next(plans)
     return found if found.solved or BUDGET.over else next(plans)

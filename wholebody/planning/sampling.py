@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable
 import numpy as np
 import pinocchio as pin
 
@@ -13,7 +11,6 @@ from wholebody.figures.self_pairs import random_postures
 from wholebody.methods.simplification.reach import still_dofs
 from wholebody.problem import Problem
 
-TURN = os.environ.get('WB_TURN','0')=='1'
 ROOM = 1.0  # m: by which samples move a free root along each axis
 BATCH = 256  # postures that are drawn at once, which takes a hundredth of drawing each
 
@@ -60,33 +57,18 @@ class Sampler:
             self._drawn = list(random_postures(self._figure.model, BATCH, int(self._rng.integers(2**31))))
         return self._drawn.pop()
 
-    def between_contacts(self, q: Array, free: Callable[[Array], bool]) -> Array | None:
-        """A free posture (nq,) halfway between two that are not, of which the first is q; None where none was found.
-
-        The bridge test (Hsu and others 2003): such postures are in narrow places.
-        """
-        if free(q):
-            return None
-        model, rng = self._figure.model, self._rng
-        away = 0.1 * np.asarray(pin.difference(model, q, self.turns.nearest(self.anywhere(), q)))
-        for joint in self._roots:
-            away[joint.idx_v : joint.idx_v + 6] = [*rng.uniform(-0.5 * ROOM, 0.5 * ROOM, 3), 0.0, 0.0, 0.0]
-        away[self._frozen] = 0.0
-        other = np.asarray(pin.integrate(model, q, away))
-        between = np.asarray(pin.interpolate(self._figure.model, q, other, 0.5))
-        return None if free(other) or not free(between) else between
-
     def near(self, q: Array, spread: float) -> Array:
         """A posture (nq,) whose joints are a share of the way from q (nq,) to a random posture.
 
-        A free root is within `ROOM` of that of q; where nothing is held it turns about the vertical.
+        A free root is within `ROOM` of that of q; where nothing is held it turns about the vertical in
+        half of the postures.
         """
         model, rng = self._figure.model, self._rng
         away = spread * np.asarray(pin.difference(model, q, self.turns.nearest(self.anywhere(), q)))
         for joint in self._roots:
             here = pin.XYZQUATToSE3(q[joint.idx_q : joint.idx_q + 7])
-            still = self._held or (TURN and rng.uniform() < 0.5)
-            turn = np.eye(3) if still else pin.exp3(np.array((0.0, 0.0, rng.uniform(-np.pi, np.pi))))
+            turns = not self._held and rng.uniform() < 0.5
+            turn = pin.exp3(np.array((0.0, 0.0, rng.uniform(-np.pi, np.pi)))) if turns else np.eye(3)
             moved = (spread if self._held else 1.0) * rng.uniform(-ROOM, ROOM, 3)
             there = pin.SE3(turn @ here.rotation, here.translation + moved)
             away[joint.idx_v : joint.idx_v + 6] = pin.log6(here.actInv(there)).vector
