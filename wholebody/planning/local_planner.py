@@ -269,8 +269,10 @@ class TrackedMotions:
         """See `LocalPlanner`."""
         found, late = path.copy(), np.zeros(len(path), dtype=bool)
         for k, q in enumerate(path[1:-1], start=1):
-            late[k] = BUDGET.over
-            for _ in range(0 if late[k] else 2):  # what is held is missed by the square of a step
+            if BUDGET.over:
+                late[k:] = True
+                break
+            for _ in range(2):  # what is held is missed by the square of a step
                 q = self._settling.step(q, measures=False).q
             found[k] = q
         steps, usual = (np.array([self._apart(*pair) for pair in pairwise(each)]) for each in (found, path))

@@ -254,7 +254,8 @@ class _Search:
         """
         start, model, rounds = self._problem.start, self._problem.scene.model, 0
         self._straight = False
-        trees = RRTConnect(self._local, None if self._local is self._slides else self._slides, model, start)
+        sliding = self._problem.scene.figure.roots and self._local is not self._slides
+        trees = RRTConnect(self._local, self._slides if sliding else None, model, start)
         ends = [q for q in self._reached if self._apart(start, q) < most]
         for reached in ends:
             trees.add_end(reached)
@@ -309,8 +310,8 @@ def _smoothed(judge: _Judge, local: LocalPlanner, path: list[Array]) -> Plan:
     model = judge.problem.scene.model
     count = int(np.clip(length(model, path) / local.spacing, 20, 1000))
     with judge.in_time(path):
-        even, blocked = local.settled(resampled(model, path, count))
-        paths = smooth(model, even, blocked, local), even
+        even, _ = local.settled(resampled(model, path, count))
+        paths = smooth(model, even, local), even
     plans = map(judge.judged, paths)
     found = next(plans)
     return found if found.solved or BUDGET.over else next(plans)
@@ -338,9 +339,10 @@ class _Judge:
         q, use = Timing(scene.figure, path, pace).within()
         asked, worst = self._between(q[-1]), _moved(self.problem, q)
         for frame in q:  # as far as the first that misses something
-            if worst <= KEPT and not BUDGET.over:
-                one = assess(asked, frame)
-                worst = max(worst, one.limit_violation, one.constraint_violation, one.clearance_violation)
+            if not worst <= KEPT or BUDGET.over:
+                break
+            one = assess(asked, frame)
+            worst = max(worst, one.limit_violation, one.constraint_violation, one.clearance_violation)
         faults = [
             f"a frame misses what must hold by {worst:.3g} m or rad" if not worst <= KEPT else "",
             f"velocities reach {use.velocity:.3g} of their limits" if not use.velocity <= OVER else "",

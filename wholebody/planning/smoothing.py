@@ -76,11 +76,10 @@ def places(model: pin.Model, path: Sequence[Array] | Array) -> Array:
     return found
 
 
-def smooth(model: pin.Model, path: Array, narrow: Mask, local: LocalPlanner) -> Array:
+def smooth(model: pin.Model, path: Array, local: LocalPlanner) -> Array:
     """A smooth path (n, nq) beside a free one: a Gaussian filters it, less so where that would not be free.
 
-    Where the path is itself too near to things to be seen to be free, `narrow` (n - 1,), it is left almost as it is.
-    The answer is the path where the time ends before.
+    It is the free path where the time for it ends before.
     """
     free = places(model, path)
     wide, share, found = _filtered(free, SPREAD * len(path)), np.ones(len(path)), path.copy()
@@ -96,10 +95,10 @@ def smooth(model: pin.Model, path: Array, narrow: Mask, local: LocalPlanner) -> 
         near = gaussian_filter1d(np.convolve(blocked, [1.0, 1.0]), 0.5 * SPREAD * len(path), mode="nearest")
         anew = near > 0.01 * near.max()
         share -= 0.6 * share * np.where(anew, near / near.max(), 0.0)
-    if (blocked & ~narrow).any() or BUDGET.over:
+    rounded, cut = local.settled(_postures(model, path, _filtered(places(model, found), CORNER)))
+    if BUDGET.over:
         return path
-    rounded, blocked = local.settled(_postures(model, path, _filtered(places(model, found), CORNER)))
-    return found if (blocked & ~narrow).any() else rounded
+    return found if (cut & ~blocked).any() else rounded
 
 
 def _runs(marked: Mask) -> list[slice]:
