@@ -156,7 +156,7 @@ class Holds:
 
     def give_up(self) -> str:
         """Split the contacts with things where points were let go of; says which, or nothing."""
-        told, places = [], dict[tuple[int, int], Array]()
+        reports, places = [], dict[tuple[int, int], Array]()
         for number, stands in enumerate(self._stands):
             kept = list[Foothold | ThingContact]()
             for stand in stands:
@@ -165,7 +165,7 @@ class Holds:
                     kept.append(stand)
                     continue
                 lost = stand.first + np.flatnonzero(~reached)
-                told.append(
+                reports.append(
                     f"{self.points[number].role} does not reach {stand.thing} in frames {lost[0]} to {lost[-1]}"
                 )
                 own = self._places[number, stand.first]
@@ -175,8 +175,8 @@ class Holds:
                     places[number, first] = own.copy()  # each part lands by itself
             self._stands[number] = kept
         self._gone.clear()
-        self._places = places if told else self._places  # recompute where feet come down
-        return "; ".join(told)
+        self._places = places if reports else self._places  # recompute where feet come down
+        return "; ".join(reports)
 
     def rest(self, role: str, frame: int) -> None:
         """Points of a role rest on the lowest level from a frame on, of a stream."""
@@ -335,6 +335,6 @@ class Holds:
 
     def _height(self, place: Array, stand: Foothold) -> float:
         """Height at which a point of a sole comes down, metres."""
-        told = self._scale * stand.height
-        below = None if self._surface is None else self._surface(np.array([place[0], place[1], told + STEP]))
-        return CLEARANCE + (told if below is None else below)
+        level = self._scale * stand.height
+        below = None if self._surface is None else self._surface(np.array([place[0], place[1], level + STEP]))
+        return CLEARANCE + (level if below is None else below)

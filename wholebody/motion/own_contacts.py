@@ -103,8 +103,7 @@ def own_contacts(
     model, data, pieces = figure.model, figure.model.createData(), dict[int, list[Piece]]()
     for piece in figure.geometry.geometryObjects:
         pieces.setdefault(piece.parentJoint, []).append(Piece(piece.geometry, piece.placement, np.inf))
-    ends = [frame for role, frame in roles.frames.items() if role.split("_")[-1] in ARM]
-    arms = {int(model.frames[figure.frame_id(frame)].parentJoint) for frame in ends}
+    arms = {joint for role, (joint, _) in roles.places(figure).items() if role.split("_")[-1] in ARM}
     body, found = [joint for joint in pieces if not arms & set(model.supports[joint])], []
     for rest in rests:
         hand, other = hands[rest.role], hands.get(rest.thing)
