@@ -906,7 +906,7 @@ BY_OWNERS = ("Trajectory.avoid", "PerFrame.avoid", "Bisection.avoid", "QP.batche
 DERIVATIVES = (
     "of_arms",
     "on_points",
-    "joint_placements",
+    "posed",
     "place_of",
     "companion",
     "folded",

@@ -15,7 +15,7 @@ from wholebody.base.compiled import with_loops
 from wholebody.figures.description import Limits
 from wholebody.methods.qp import chain_kernel
 from wholebody.methods.qp.chain_kernel import Chain, Goals, Room
-from wholebody.methods.qp.closed_form import Branches, closed_form
+from wholebody.methods.qp.closed_form import NEARLY, Branches, closed_form
 from wholebody.methods.qp.closed_form import compiled_kernel as closed_form_kernel
 from wholebody.methods.qp.closed_form_kernel import BRANCHES, CROSSING, SLACK, Arm
 from wholebody.methods.qp.settings import SEEDS
@@ -35,7 +35,8 @@ class PlainChain:
         chain: the arrays.
         idx_v: (n,) place of each joint in the tangent.
         arm: the arm that they are, None where it has no closed form.
-        held: the joint that the closed form holds; -1 for none.
+        guide: the same, or an arm that they nearly are.
+        held: the joint that the closed form of the guide holds; -1 for none.
         samples: how many values of it are looked at, and how many where none of these is within limits.
     """
 
@@ -64,7 +65,8 @@ class PlainChain:
         self._far = np.where(self.chain.turns.any(axis=1), np.pi, np.where(limited, np.inf, 1.0))
         self._rooms: dict[int, Room] = {}
         self.arm = closed_form(self.chain)
-        self.held = -1 if self.arm is None or self.arm.held < 0 else int(self.arm.joints[self.arm.held])
+        self.guide = self.arm or closed_form(self.chain, NEARLY)
+        self.held = -1 if self.guide is None or self.guide.held < 0 else int(self.guide.joints[self.guide.held])
         self.samples = (1, 1) if self.held < 0 else (SEEDS.samples, SEEDS.finer)
 
     def angles(self, q: Array) -> Array:
@@ -100,7 +102,7 @@ class PlainChain:
             joints[0, :3] = np.eye(3)
             self._rooms[rows] = Room(
                 joints, np.empty((size, 6)), np.empty((rows, 6)), np.empty(rows), np.empty((rows, size)),
-                np.empty(size, dtype=np.bool_),
+                np.empty((rows, size)), np.empty(size, dtype=np.bool_),
             )  # fmt: skip
         return self._rooms[rows]
 
@@ -147,15 +149,15 @@ class PlainChain:
             table, angles = goals.tables[0].copy(), np.empty((1, BRANCHES, len(half)))
             table[24:27] += shift[:3]
             table[27:] = (pin.exp3(shift[3:]) @ table[27:].reshape(3, 3)).ravel()
-            closed_form_kernel().branches(arm, table, _ONE, angles)
+            closed_form_kernel().branches(arm, table, _ONE, (lower - 2.0 * LOOSE, upper + 2.0 * LOOSE), angles)
             away = np.remainder(angles[0] - middle + np.pi, 2.0 * np.pi) - np.pi
             within = (np.abs(away) <= half + LOOSE).all(axis=1)  # not for NaN
             found.append(middle + np.clip(away[within], -half, half))
         return np.concatenate(found)
 
-    def is_exact(self, goals: Goals) -> bool:
-        """Whether the goals are one placement of a frame that the closed form has the postures of."""
-        return self.arm is not None and goals.entries[:, 2:].tolist() == [[0, 1, 1, 0]]
+    def is_guided(self, goals: Goals) -> bool:
+        """Whether the goals are one placement of a frame that the guide has postures of."""
+        return self.guide is not None and goals.entries[:, 2:].tolist() == [[0, 1, 1, 0]]
 
     def descents(
         self, tables: Array, goals: Goals, nearest: Array, asked: Array, ends: Array, seeds: int = 0
@@ -164,7 +166,7 @@ class PlainChain:
         # `tables` (k, e, 36) of goals. What was found (k, m, 4), how many (k,); -1 for more than there is room for.
         room = self.room(sum(3 * int(each[3] + each[4]) for each in goals.entries))
         found, counts = np.empty((*ends.shape[:2], 4)), np.full(len(ends), seeds)
-        arm = _NO_ARM if seeds or self.arm is None else self.arm
+        arm = _NO_ARM if seeds or self.guide is None else self.guide
         compiled_kernel().reach_all(
             (self.chain, arm, room), asked, (tables, goals.entries), self.samples, nearest, ends, found, counts
         )
@@ -230,7 +232,13 @@ def compiled_kernel(_: Any) -> None:
     closed_form_kernel()
     joint, one, axis = np.zeros(1, dtype=np.intp), np.zeros(1), np.zeros((1, 3))
     room = Room(
-        np.zeros((2, 4, 3)), np.zeros((1, 6)), np.zeros((0, 6)), np.zeros(0), np.zeros((0, 1)), np.zeros(1, np.bool_)
+        np.zeros((2, 4, 3)),
+        np.zeros((1, 6)),
+        np.zeros((0, 6)),
+        np.zeros(0),
+        np.zeros((0, 1)),
+        np.zeros((0, 1)),
+        np.zeros(1, np.bool_),
     )
     chain = Chain(joint, np.zeros((1, 4, 3)), axis, axis, np.zeros((2, 1), dtype=np.int8), one, one)
     chain_kernel.reach_all(
