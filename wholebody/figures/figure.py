@@ -219,7 +219,6 @@ class Figure(checks.FixedAttributes):
 
         To make a state takes longer than to state the rest of a problem.
         """
-        q = self._checked(q)
         return self._states.borrow(lambda state: state.at(q))
 
     def joint_id(self, name: str) -> int:

@@ -102,6 +102,7 @@ class State:
 
     def at(self, q: Array) -> State:
         """Move to the posture q as `update` does, unless `at` was asked for the same one last."""
+        q = posture(q, self._nq)
         asked = q.tobytes()
         if asked != self._asked:
             self.update(q.copy())._asked = asked

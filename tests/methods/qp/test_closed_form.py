@@ -63,8 +63,7 @@ def angles_of(chain: PlainChain, goal: np.ndarray, held: np.ndarray | None = Non
     """Values (8 v, n) of all branches for a goal (36,), NaN for none, with (v,) values of a joint that is held."""
     values = np.ones(1) if held is None else held
     found = np.empty((len(values), BRANCHES, len(chain.idx_v)))
-    everywhere = np.full(len(chain.idx_v), -np.inf), np.full(len(chain.idx_v), np.inf)
-    compiled_kernel().branches(chain.arm, goal, values, everywhere, found)
+    compiled_kernel().branches(chain.arm, goal, values, found)
     return found.reshape(-1, len(chain.idx_v))
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
 from wholebody.methods.qp.closed_form_kernel import BRANCHES, FULL, Arm, foreseen, sampled
-from wholebody.methods.qp.dense_kernel import copy, gram, solve
+from wholebody.methods.qp.dense_kernel import copy, solve
 from wholebody.terms.entries import Integers
 from wholebody.terms.residual_kernel import residuals
 
@@ -47,7 +47,6 @@ class Room(NamedTuple):
     wrench: Array  # (m, 6) of the errors
     value: Array  # (m,) the errors
     jacobian: Array  # (m, n) their derivatives
-    scaled: Array  # (m, n) the same over the weights of the joints; zero for those that do not move
     free: Mask  # (n,) whether a joint moves in the present step
 
 
@@ -140,21 +139,19 @@ def _descend(
         while held:  # every round holds one more joint, so the loop ends
             damped = damping
             for r in range(rows):
-                total = -room.value[r]
+                right[r] = -room.value[r]
                 for i in range(size):
                     if not room.free[i]:
-                        total -= room.jacobian[r, i] * dq[i]
-                damped += 0.5 * total * total
-                right[r] = total
+                        right[r] -= room.jacobian[r, i] * dq[i]
+                damped += 0.5 * right[r] * right[r]
             _fill_normal(room, ones, damped, system)
             if not solve(system, right):
                 return count
             for i in range(size):
                 if room.free[i]:
-                    total = 0.0
+                    dq[i] = 0.0
                     for r in range(rows):
-                        total += room.jacobian[r, i] * right[r]
-                    dq[i] = total
+                        dq[i] += room.jacobian[r, i] * right[r]
             held = _hold(chain, room.free, q, dq)
         _move(chain, q, dq, 1.0)
     return most
@@ -178,7 +175,6 @@ def _least_effort(
     """
     size, rows = len(q), len(room.value)
     right, system, dq, shift = np.empty(rows), np.empty((rows, rows)), np.empty(size), np.empty(size)
-    inverse = 1.0 / nearest[1]
     moved, before, share, wrong = np.zeros(size), np.zeros(size), 1.0, -1
     released, (tolerance, most) = np.empty(size, dtype=np.bool_), asked
     found[2] = 0.0
@@ -190,19 +186,17 @@ def _least_effort(
         changed = True
         while changed:  # every round holds a joint or releases one for the first time
             for r in range(rows):
-                total = room.value[r]
+                right[r] = room.value[r]
                 for i in range(size):
-                    total += room.jacobian[r, i] * (shift[i] if room.free[i] else dq[i])
-                right[r] = total
-            _fill_normal(room, inverse, 1e-12, system)
+                    right[r] += room.jacobian[r, i] * (shift[i] if room.free[i] else dq[i])
+            _fill_normal(room, nearest[1], 1e-12, system)
             if not solve(system, right):
                 return count
             for i in range(size):
                 if room.free[i]:
-                    total = 0.0
+                    dq[i] = shift[i]
                     for r in range(rows):
-                        total += room.jacobian[r, i] * right[r]
-                    dq[i] = shift[i] - inverse[i] * total
+                        dq[i] -= room.jacobian[r, i] * right[r] / nearest[1, i]
             changed = _hold_first(chain, room.free, q, dq)
             if not changed:
                 wrong = _held_wrongly(chain, room, q, dq, nearest, right)
@@ -234,13 +228,15 @@ def _least_effort(
 
 
 @compiled(inner=True, error_model="numpy")
-def _fill_normal(room: Room, inverse: Array, damping: float, system: Array) -> None:
-    """The lower triangle of ``J W^-1 J' + damping`` (m, m) over the free joints, for inverses (n,) of weights."""
+def _fill_normal(room: Room, weights: Array, damping: float, system: Array) -> None:
+    """The lower triangle of ``J W^-1 J' + damping`` (m, m) over the free joints, for weights (n,)."""
     for r in range(len(system)):
-        for i in range(len(inverse)):
-            room.scaled[r, i] = room.jacobian[r, i] * inverse[i] if room.free[i] else 0.0
-    gram(room.scaled, room.jacobian, len(system), system)
-    for r in range(len(system)):
+        for s in range(r + 1):
+            total = 0.0
+            for i in range(len(weights)):
+                if room.free[i]:
+                    total += room.jacobian[r, i] * room.jacobian[s, i] / weights[i]
+            system[r, s] = total
         system[r, r] += damping
 
 
@@ -352,11 +348,11 @@ def rows_of(chain: Chain, goals: Goals, room: Room) -> None:
     for e in range(len(entries)):
         for r in range(entries[e, 0], entries[e, 0] + 3 * (entries[e, 3] + entries[e, 4])):
             for k in range(len(room.columns)):
-                moved, rate = support[entries[e, 1], k] - support[entries[e, 2], k], 0.0
+                moved = support[entries[e, 1], k] - support[entries[e, 2], k]
+                room.jacobian[r, k] = 0.0
                 if moved != 0:
                     for i in range(6):
-                        rate += room.wrench[r, i] * room.columns[k, i]
-                room.jacobian[r, k] = moved * rate
+                        room.jacobian[r, k] += moved * room.wrench[r, i] * room.columns[k, i]
 
 
 @compiled(error_model="numpy", nogil=True)

@@ -112,7 +112,7 @@ def compiled_kernel(closed_form_kernel: Any) -> None:
     rows, one, near = np.zeros((1, 3)), np.zeros(1), np.zeros((2, 1))
     arm = Arm(rows, rows, np.zeros(1, dtype=np.intp), 0, CROSSING, 0, np.zeros((4, 3)), SLACK)
     found, goal, limits = np.zeros((0, BRANCHES, 1)), np.zeros(36), (one, one)
-    closed_form_kernel.branches(arm, goal, np.zeros(0), limits, found)
+    closed_form_kernel.branches(arm, goal, np.zeros(0), found)
     order = np.zeros(0, dtype=np.intp)
     closed_form_kernel.sampled(arm, goal, limits, near, found, np.zeros((0, BRANCHES)), order)
     closed_form_kernel.along(arm, goal, limits, near, 0.0, one.copy())

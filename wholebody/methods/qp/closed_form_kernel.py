@@ -63,25 +63,14 @@ def _cross(a: Vector, b: Vector) -> Vector:
 
 @compiled(inner=True)
 def _turn(axis: Vector, angle: float, v: Vector) -> Vector:
-    """A vector, turned about an axis."""
-    return _turned(axis, np.cos(angle), np.sin(angle), v)
-
-
-@compiled(inner=True)
-def _turned(axis: Vector, c: float, s: float, v: Vector) -> Vector:
-    """The same by an angle with this cosine and sine (Rodrigues)."""
+    """A vector, turned about an axis (Rodrigues)."""
+    c, s = np.cos(angle), np.sin(angle)
     across, along = _cross(axis, v), (1.0 - c) * _dot(axis, v)
     return (
         c * v[0] + s * across[0] + along * axis[0],
         c * v[1] + s * across[1] + along * axis[1],
         c * v[2] + s * across[2] + along * axis[2],
     )
-
-
-@compiled(inner=True)
-def _may_be(angle: float, k: int, ends: Array) -> bool:
-    """Whether an angle is within the ends (n, 2) of joint k by whole turns."""
-    return bool(angle + FULL * np.ceil((ends[k, 0] - angle) / FULL) <= ends[k, 1])
 
 
 @compiled(inner=True)
@@ -138,8 +127,8 @@ def _across(h: Vector) -> Vector:
 
 
 @compiled(inner=True, error_model="numpy")
-def _with_wrist(kind: int, slack: float, h: Array, o: Array, place: Array, ends: Array, found: Array) -> None:
-    """The branches (8, 6) within ends (6, 2) of an arm whose last axes cross; where they cross comes first."""
+def _with_wrist(kind: int, slack: float, h: Array, o: Array, place: Array, found: Array) -> None:
+    """The branches (8, 6) of an arm whose last axes cross; the place of their crossing comes first."""
     h1, h2, h3, o1, o2, o3 = _vector(h, 0), _vector(h, 1), _vector(h, 2), _vector(o, 0), _vector(o, 1), _vector(o, 2)
     wrist, at = _vector(o, 5), _plus(_rotated(place, _vector(o, 5)), _vector(place, 3))
     away = _minus(at, o1)
@@ -149,8 +138,6 @@ def _with_wrist(kind: int, slack: float, h: Array, o: Array, place: Array, ends:
         number, one, other = _bent(o1, h3, o3, wrist, at, slack)
     for outer in range(number):
         first = one if outer == 0 else other
-        if not _may_be(first, 0 if kind == PARALLEL else 2, ends):
-            continue
         if kind == PARALLEL:
             back = _plus(o1, _turn(h1, -first, away))
             count, low, high = _bent(o2, h3, o3, wrist, back, slack)
@@ -159,44 +146,35 @@ def _with_wrist(kind: int, slack: float, h: Array, o: Array, place: Array, ends:
             count, low, high = _angles(h1, h2, arm, _dot(h1, away), slack)
         for inner in range(count):
             second = low if inner == 0 else high
-            if not _may_be(second, 2 if kind == PARALLEL else 1, ends):
-                continue
             if kind == PARALLEL:
                 arm = _minus(_plus(o3, _turn(h3, second, _minus(wrist, o3))), o2)
                 q1, q2, q3 = first, _between(h2, arm, _minus(back, o2)), second
             else:
                 q1, q2, q3 = _between(h1, _turn(h2, second, arm), away), second, first
-            if _may_be(q1, 0, ends) and _may_be(q2, 1, ends):
-                k = 4 * outer + 2 * inner
-                _turned_wrist(h, place, (q1, q2, q3), slack, ends, found[k : k + 2])
+            _turned_wrist(h, place, (q1, q2, q3), slack, found[4 * outer + 2 * inner : 4 * outer + 2 * inner + 2])
 
 
 @compiled(inner=True)
-def _turned_wrist(h: Array, place: Array, first: Vector, slack: float, ends: Array, found: Array) -> None:
+def _turned_wrist(h: Array, place: Array, first: Vector, slack: float, found: Array) -> None:
     """The two ways (2, 6) to turn a wrist where the first three angles are known."""
     h1, h2, h3, h4, h5, h6 = (
         _vector(h, 0), _vector(h, 1), _vector(h, 2), _vector(h, 3), _vector(h, 4), _vector(h, 5),
     )  # fmt: skip
     q1, q2, q3 = first
+    asked = _turn(h3, -q3, _turn(h2, -q2, _turn(h1, -q1, _rotated(place, h6))))
     side = _across(h6)
-    asked, turned = _rotated(place, h6), _rotated(place, side)
-    for axis, angle in ((h1, -q1), (h2, -q2), (h3, -q3)):
-        c, s = np.cos(angle), np.sin(angle)
-        asked, turned = _turned(axis, c, s, asked), _turned(axis, c, s, turned)
+    turned = _turn(h3, -q3, _turn(h2, -q2, _turn(h1, -q1, _rotated(place, side))))
     count, low, high = _angles(h4, h5, h6, _dot(h4, asked), slack)
     for k in range(count):
         q5 = low if k == 0 else high
-        if not _may_be(q5, 4, ends):
-            continue
-        c, s = np.cos(q5), np.sin(q5)
-        q4 = _between(h4, _turned(h5, c, s, h6), asked)
-        q6 = _between(h6, side, _turned(h5, c, -s, _turn(h4, -q4, turned)))
+        q4 = _between(h4, _turn(h5, q5, h6), asked)
+        q6 = _between(h6, side, _turn(h5, -q5, _turn(h4, -q4, turned)))
         found[k, 0], found[k, 1], found[k, 2], found[k, 3], found[k, 4], found[k, 5] = q1, q2, q3, q4, q5, q6
 
 
 @compiled(inner=True, error_model="numpy")
-def _with_parallels(slack: float, h: Array, o: Array, place: Array, ends: Array, found: Array) -> None:
-    """The branches (8, 6) within ends (6, 2) of an arm whose axes 2 to 4 are parallel."""
+def _with_parallels(slack: float, h: Array, o: Array, place: Array, found: Array) -> None:
+    """The branches (8, 6) of an arm whose axes 2 to 4 are parallel."""
     h1, h2, h3, h5, h6 = _vector(h, 0), _vector(h, 1), _vector(h, 2), _vector(h, 4), _vector(h, 5)
     o1, o2, o3, o4, end = _vector(o, 0), _vector(o, 1), _vector(o, 2), _vector(o, 3), _vector(o, 5)
     third, fourth = _dot(h2, h3), _dot(h2, _vector(h, 3))
@@ -208,8 +186,6 @@ def _with_parallels(slack: float, h: Array, o: Array, place: Array, ends: Array,
         count, low, high = _angles(h2, h5, h6, _dot(h2, _turn(h1, -q1, _rotated(place, h6))), slack)
         for inner in range(count):
             q5 = low if inner == 0 else high
-            if not (_may_be(q1, 0, ends) and _may_be(q5, 4, ends)):
-                continue
             q6 = _between(h6, _rotated_back(place, _turn(h1, q1, h2)), _turn(h5, -q5, h2))
             turned = _turn(h1, -q1, _rotated(place, _turn(h6, -q6, _turn(h5, -q5, side))))
             total = _between(h2, side, turned)
@@ -223,22 +199,20 @@ def _with_parallels(slack: float, h: Array, o: Array, place: Array, ends: Array,
 
 
 @compiled(error_model="numpy")
-def branches(arm: Arm, goal: Array, values: Array, limits: tuple[Array, Array], found: Array) -> None:
-    """All postures of an arm in which a frame of its last joint is at a placement, but for some beyond limits.
+def branches(arm: Arm, goal: Array, values: Array, found: Array) -> None:
+    """All postures of an arm in which a frame of its last joint is at a placement.
 
     Args:
         arm: the axes.
         goal: (36,) the placement, and that of the frame in the joint, as in `terms.entries.RESIDUAL`.
         values: (v,) of the joint that is held; their number alone counts where none is.
-        limits: (n,) least and greatest angles, up to whole turns.
-        found: (v, 8, n) written: angles in the order of the chain, NaN where a branch does not exist or is left out.
+        found: (v, 8, n) written: angles in the order of the chain, NaN where a branch does not exist.
     """
-    ends = np.empty((6, 2))
     place, asked, six = np.empty((4, 3)), np.empty((4, 3)), np.empty((BRANCHES, 6))
     h, o = np.empty((6, 3)), np.empty((6, 3))
     _target(arm, goal, place, asked)
     for number in range(len(values)):
-        k, c, s = 0, np.cos(values[number]), np.sin(values[number])
+        k = 0
         for i in range(4):
             copy(asked[i], place[i])
         for i in range(len(arm.joints)):
@@ -246,23 +220,22 @@ def branches(arm: Arm, goal: Array, values: Array, limits: tuple[Array, Array], 
             if i == arm.held:  # e_i e_j ... = (e_i e_j e_i^-1) ... e_i: those behind it are turned as it is
                 for j in range(3):
                     unit = 1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0
-                    place[j, 0], place[j, 1], place[j, 2] = _rotated(asked, _turned(axis, c, -s, unit))
+                    place[j, 0], place[j, 1], place[j, 2] = _rotated(asked, _turn(axis, -values[number], unit))
                 there = _minus(_plus(_rotated(asked, point), _vector(asked, 3)), _rotated(place, point))
                 place[3, 0], place[3, 1], place[3, 2] = there
                 continue
             if 0 <= arm.held < i:
                 by, centre = _vector(arm.axes, arm.held), _vector(arm.points, arm.held)
-                axis = _turned(by, c, s, axis)
-                point = _plus(centre, _turned(by, c, s, _minus(point, centre)))
+                axis = _turn(by, values[number], axis)
+                point = _plus(centre, _turn(by, values[number], _minus(point, centre)))
             h[k, 0], h[k, 1], h[k, 2] = axis
             o[k, 0], o[k, 1], o[k, 2] = point
-            ends[k, 0], ends[k, 1] = limits[0][arm.joints[i]], limits[1][arm.joints[i]]
             k += 1
         six[:] = np.nan
         if arm.kind == THREE_PARALLEL:
-            _with_parallels(arm.slack, h, o, place, ends, six)
+            _with_parallels(arm.slack, h, o, place, six)
         else:
-            _with_wrist(arm.kind, arm.slack, h, o, place, ends, six)
+            _with_wrist(arm.kind, arm.slack, h, o, place, six)
         for b in range(BRANCHES):
             k = 0
             for i in range(len(arm.joints)):
@@ -327,12 +300,11 @@ def sampled(
         high = min(low + FULL, upper[joint])
         for v in range(len(values)):
             values[v] = low + (high - low) * v / (len(values) - 1)
+    branches(arm, goal, values, found)
     count, number = 0, len(found)
-    slack = BETWEEN if number > 1 else SLACK
-    branches(arm, goal, values, (lower - 2.0 * slack, upper + 2.0 * slack), found)
     for b in range(BRANCHES):
         for v in range(number):
-            effort[v, b] = within(found[v, b], lower, upper, near, slack)
+            effort[v, b] = within(found[v, b], lower, upper, near, BETWEEN if number > 1 else SLACK)
         for v in range(number):
             own = effort[v, b]
             if own == np.inf or (v > 0 and effort[v - 1, b] <= own) or (v + 1 < number and effort[v + 1, b] < own):
@@ -415,7 +387,7 @@ def beside(
 ) -> float:  # fmt: skip
     """Effort of the branch nearest to q (n,), written, for a value of the held joint; inf if over 1 rad away."""
     found, best, chosen = np.empty((1, BRANCHES, len(q))), np.inf, -1
-    branches(arm, goal, np.array([value]), (limits[0] - 2.0 * SLACK, limits[1] + 2.0 * SLACK), found)
+    branches(arm, goal, np.array([value]), found)
     for b in range(BRANCHES):
         effort, away = within(found[0, b], limits[0], limits[1], nearest, SLACK), 0.0
         for i in range(len(q)):

@@ -135,7 +135,7 @@ class QP(Settings, Descends):
         for given in begins:
             start = posture(given, problem.scene.model.nq, "QP.minima: a start")
             with Control(self.time_limit, None, self.longest) as control, problem.borrow() as workspace:
-                met = from_seeds(problem.with_start(start), workspace, alone, control)
+                met = from_seeds(problem.with_start(problem.scene.figure.clamp(start)), workspace, alone, control)
                 ending = self._complete(problem, met)
                 if ending is None:
                     search = Multistart(problem, workspace, self._qp_solver(), alone, control)

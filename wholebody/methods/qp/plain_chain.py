@@ -102,7 +102,7 @@ class PlainChain:
             joints[0, :3] = np.eye(3)
             self._rooms[rows] = Room(
                 joints, np.empty((size, 6)), np.empty((rows, 6)), np.empty(rows), np.empty((rows, size)),
-                np.empty((rows, size)), np.empty(size, dtype=np.bool_),
+                np.empty(size, dtype=np.bool_),
             )  # fmt: skip
         return self._rooms[rows]
 
@@ -149,7 +149,7 @@ class PlainChain:
             table, angles = goals.tables[0].copy(), np.empty((1, BRANCHES, len(half)))
             table[24:27] += shift[:3]
             table[27:] = (pin.exp3(shift[3:]) @ table[27:].reshape(3, 3)).ravel()
-            closed_form_kernel().branches(arm, table, _ONE, (lower - 2.0 * LOOSE, upper + 2.0 * LOOSE), angles)
+            closed_form_kernel().branches(arm, table, _ONE, angles)
             away = np.remainder(angles[0] - middle + np.pi, 2.0 * np.pi) - np.pi
             within = (np.abs(away) <= half + LOOSE).all(axis=1)  # not for NaN
             found.append(middle + np.clip(away[within], -half, half))
@@ -232,13 +232,7 @@ def compiled_kernel(_: Any) -> None:
     closed_form_kernel()
     joint, one, axis = np.zeros(1, dtype=np.intp), np.zeros(1), np.zeros((1, 3))
     room = Room(
-        np.zeros((2, 4, 3)),
-        np.zeros((1, 6)),
-        np.zeros((0, 6)),
-        np.zeros(0),
-        np.zeros((0, 1)),
-        np.zeros((0, 1)),
-        np.zeros(1, np.bool_),
+        np.zeros((2, 4, 3)), np.zeros((1, 6)), np.zeros((0, 6)), np.zeros(0), np.zeros((0, 1)), np.zeros(1, np.bool_)
     )
     chain = Chain(joint, np.zeros((1, 4, 3)), axis, axis, np.zeros((2, 1), dtype=np.int8), one, one)
     chain_kernel.reach_all(
