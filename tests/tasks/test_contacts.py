@@ -380,6 +380,20 @@ def test_who_kneels_on_one_knee_has_the_thigh_level_and_the_trunk_upright_from_a
         assert woman.placement(solution.q, "thorax").rotation[2, 2] > np.cos(np.radians(15.0))
 
 
+@pytest.mark.parametrize("sex", ["female", "male"])
+def test_a_foot_stands_on_a_rung_with_the_middle_of_its_sole(sex: str) -> None:
+    person, level = wb.load("human", sex=sex), (0.5**0.5, 0.0, 0.0, 0.5**0.5)
+    scene = wb.Scene(person).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Cylinder(0.015, 0.5), name="rung", at=(0.3, -0.1, 0.3, *level))
+    stands = [wb.Stand("floor", feet=["left_foot"]), wb.Stand("rung", feet=["right_foot"], balance=False)]
+    solution = wb.solve(wb.Problem(scene, constraints=stands))
+    assert solution.solved
+    heel, ball = (person.placement(solution.q, f"right_{end}").translation for end in ("heel", "ball"))
+    # On the rung and not under it, within the 7 mm of its face in front of and behind its middle.
+    assert 0.5 * (heel + ball)[2] == pytest.approx(0.315, abs=1e-4)
+    assert abs(0.5 * (heel + ball)[0] - 0.3) < 0.0072
+
+
 def test_a_person_kneels_in_balance() -> None:
     shanks = ("left_shank", "right_shank")
     person = wb.load("human")
