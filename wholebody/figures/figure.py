@@ -5,7 +5,7 @@ from __future__ import annotations
 import copyreg
 from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -32,6 +32,16 @@ def _joints_of(names: Sequence[str], prefix: str) -> range:
 
 
 copyreg.pickle(pin.Model, reduced)
+
+
+class Mount(NamedTuple):
+    """What a figure was mounted from; see `Figure.mounted`."""
+
+    base: Figure
+    other: Figure
+    on: str
+    name: str
+    at: pin.SE3
 
 
 class Figure(checks.FixedAttributes):
@@ -67,6 +77,7 @@ class Figure(checks.FixedAttributes):
         notes: sentences on what had to be changed about the geometry of a file, or about stated dimensions.
         limits: joint limits as arrays.
         loaded_as: name or path and options by which `wb.load` made it; None for one made in another way.
+        mount: of a figure that `mounted` made: both figures, frame, name and placement; otherwise None.
         followers: joint to the law by which it follows another (mimic).
         effort_weights: (nv,) weight of each degree of freedom in the effort.
         neutral_weights: (nv,) weight of each degree of freedom in the displacement from neutral: 1, and 0 for the root.
@@ -76,7 +87,7 @@ class Figure(checks.FixedAttributes):
         True
     """
 
-    _settable = frozenset({"loaded_as"})
+    _settable = frozenset({"loaded_as", "mount"})
     _correction = "a figure never changes: load another one with wb.load(...)"
 
     def __init__(
@@ -105,6 +116,7 @@ class Figure(checks.FixedAttributes):
         self.collision_groups = MappingProxyType(dict(description.collision_groups))
         self.excluded_pairs, self.notes = description.excluded, description.notes
         self.loaded_as: tuple[str, dict[str, Any]] | None = None
+        self.mount: Mount | None = None
         self.members = MappingProxyType(dict(description.members))
         self._data = Pool(lambda: Posed(model), at_most=1)  # 6.5 MB for 55 freedoms, 27 MB for 95
         self._description = description
@@ -145,7 +157,7 @@ class Figure(checks.FixedAttributes):
         }
         visual = None if self.visual is self.geometry else self.visual
         made_from = (self.name, self.model, self.geometry, self.detail, Description(**known), visual)
-        return Figure, made_from, {"loaded_as": self.loaded_as}
+        return Figure, made_from, {"loaded_as": self.loaded_as, "mount": self.mount}
 
     @property
     def outer(self) -> tuple[pin.GeometryObject, ...]:
@@ -380,8 +392,11 @@ class Figure(checks.FixedAttributes):
         frame, prefix = self.frame_id(on), checks.text(other.name if name is None else name, "mounted: name")
         if "/" in prefix or prefix in {*self.groups, *self.joints}:
             raise InputError(f"mounted: {self.name} has a part {prefix!r}, or it has a slash; give it another name")
-        parts = mounted_parts(self, other, frame, f"{prefix}/", placement(at, "mounted: at"))
-        return Figure(f"{self.name} with {prefix}", *parts[:2], "own", *parts[2:])
+        place = placement(at, "mounted: at")
+        parts = mounted_parts(self, other, frame, f"{prefix}/", place)
+        made = Figure(f"{self.name} with {prefix}", *parts[:2], "own", *parts[2:])
+        made.mount = Mount(self, other, on, prefix, place)
+        return made
 
     def describe(self) -> Description:
         """Return the named parts of the figure, to build another one from them."""
