@@ -97,9 +97,9 @@ class Articulated:
         now, left, self.impulses, self.frames, self.ends = 0.0, dt, {}, [], []
         while left > 1e-9 * dt:
             shares = (now / dt, min(1.0, (now + min(left, STEP)) / dt))
-            ways = {name: tuple(pin.SE3.Interpolate(*way, s) for s in shares) for name, way in moved.items()}
+            motions = {name: tuple(pin.SE3.Interpolate(*way, s) for s in shares) for name, way in moved.items()}
             aim = np.asarray(pin.integrate(self._model, self._tracked, steady * now))
-            step = self._step(min(left, STEP), aim, steady, ways, segments)
+            step = self._step(min(left, STEP), aim, steady, motions, segments)
             now, left = now + step, left - step
             self.ends.append(now)
         self._tracked = np.array(tracked)
@@ -151,11 +151,11 @@ class Articulated:
         # springs and contacts are implicit; what is free of them moves by the mean of both velocities
         moves = time * np.where((self.stiffness > 0.0) | bearing.any(), after, mean)
         paid = float(motor @ moves) + float(work[points.driven].sum())
-        ways = self._move(moves, segments, () if bearing.any() else drifted)
-        ways |= {name: (way[0], pin.SE3.Interpolate(*way, time / planned)) for name, way in moved.items()}
+        motions = self._move(moves, segments, () if bearing.any() else drifted)
+        motions |= {name: (way[0], pin.SE3.Interpolate(*way, time / planned)) for name, way in moved.items()}
         self._settle(began + paid, 1.0 if impulse.any() or self.stiffness.any() else 1.05, drifted)
         if engine is not None:
-            frame = engine.advance(time, ways)
+            frame = engine.advance(time, motions)
             self.frames.append(frame)
             self._react(frame.wrenches, segments)
         return time
@@ -283,7 +283,7 @@ class Articulated:
     def _move(
         self, way: Array, segments: Mapping[str, int], drifted: Sequence[tuple[pin.Force, Array]]
     ) -> dict[str, tuple[pin.SE3, pin.SE3]]:
-        """Move the joints by a way (nv,), and centres of mass to their places; the ways of the segments."""
+        """Move the joints by a way (nv,), and centres of mass to their places; the motions of the segments."""
         model, data, before = self._model, self._data, self._placements(segments)
         self.q = np.array(pin.integrate(model, self.q, way))
         pin.centerOfMass(model, data, self.q)

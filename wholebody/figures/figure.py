@@ -5,7 +5,7 @@ from __future__ import annotations
 import copyreg
 from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -15,7 +15,7 @@ from wholebody.base.arrays import Array, Indices, as_dict
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.pool import Pool
 from wholebody.figures.body_spec import geometry_of
-from wholebody.figures.description import Description, Place, followers_of, is_root, limits_of
+from wholebody.figures.description import Description, Mount, Place, followers_of, is_root, limits_of
 from wholebody.figures.joining import mounted_parts, posture_of_all
 from wholebody.figures.model_archive import reduced
 from wholebody.figures.model_check import LARGEST, Turning, check_model, with_joint_frames
@@ -32,16 +32,6 @@ def _joints_of(names: Sequence[str], prefix: str) -> range:
 
 
 copyreg.pickle(pin.Model, reduced)
-
-
-class Mount(NamedTuple):
-    """What a figure was mounted from; see `Figure.mounted`."""
-
-    base: Figure
-    other: Figure
-    on: str
-    name: str
-    at: pin.SE3
 
 
 class Figure(checks.FixedAttributes):
@@ -76,7 +66,7 @@ class Figure(checks.FixedAttributes):
         excluded_pairs: pairs of pieces that are never tested, with the reason.
         notes: sentences on what had to be changed about the geometry of a file, or about stated dimensions.
         limits: joint limits as arrays.
-        loaded_as: name or path and options by which `wb.load` made it; None for one made in another way.
+        loaded_as: name or path and options by which `wb.load` or `adjustable` made it; None for others.
         mount: of a figure that `mounted` made: both figures, frame, name and placement; otherwise None.
         followers: joint to the law by which it follows another (mimic).
         effort_weights: (nv,) weight of each degree of freedom in the effort.

@@ -37,7 +37,7 @@ class HeldPoint:
 
 def held_points(figure: Figure, roles: Roles, ground: Ground) -> list[HeldPoint]:
     """The points of a figure that rest at some time."""
-    found, resting = [], {role for role, mask in ground.rests.items() if mask.any()}
+    found, resting, own = [], {role for role, mask in ground.rests.items() if mask.any()}, roles.places(figure)
     data = figure.model.createData()
     pin.framesForwardKinematics(figure.model, data, upright(figure))
     for side in ("left", "right"):
@@ -50,8 +50,7 @@ def held_points(figure: Figure, roles: Roles, ground: Ground) -> list[HeldPoint]
                     found += [HeldPoint(role, side, joint, place, edge=k > 0) for k, place in enumerate(places)]
         for role in (f"{side}_{part}" for part in ("hand", "wrist", "knee")):
             if role in resting and role in roles.frames:
-                frame = figure.model.frames[figure.frame_id(roles.frames[role])]
-                found.append(HeldPoint(role, "", int(frame.parentJoint), np.array(frame.placement.translation)))
+                found.append(HeldPoint(role, "", *own[role]))
     return found
 
 
@@ -64,12 +63,13 @@ def touching_points(
     """
     found, data, own = [], figure.model.createData(), figure_roles(figure)
     pin.framesForwardKinematics(figure.model, data, upright(figure))
-    places = {role: np.array(data.oMf[figure.frame_id(frame)].translation) for role, frame in roles.frames.items()}
+    placed = roles.places(figure)
+    places = {role: np.array(data.oMi[joint].act(at)) for role, (joint, at) in placed.items()}
     for role, share in dict.fromkeys((one.role, one.share) for one in contacts):
         elbow, wrist, hand = (f"{role.split('_')[0]}_{part}" for part in ("elbow", "wrist", "hand"))
         carrier = role if role in places else wrist
-        joint = int(figure.model.frames[figure.frame_id(roles.frames[carrier])].parentJoint)
-        if carrier == wrist and hand not in own:
+        joint = placed[carrier][0]
+        if carrier == wrist and hand not in own and wrist not in roles.ends:
             found.append(HeldPoint(role, "", *_end(figure, joint), thing=True, share=share))
             continue
         place = places[carrier]

@@ -49,9 +49,9 @@ class Touched:
 
     def at(self, contact: ThingContact, frame: int) -> pin.SE3:
         """Where a thing is in a frame; of two hands the middle between them in the free fit, z along the normal."""
-        if contact.ways is None:
+        if contact.normals is None:
             return self.things.at(contact.thing, frame)
-        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), contact.ways[frame]).matrix()
+        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), contact.normals[frame]).matrix()
         pair = [self._parts[role, contact.share] for role in (contact.role, contact.thing)]
         if frame not in self._middles:
             data = self._figure.model.createData()
@@ -76,7 +76,7 @@ class Touched:
         """Signed distance of a point's part, with what its joint carries, to a thing at a posture (nq,), metres."""
         pin.forwardKinematics(self._figure.model, self._data, q)
         own = self._carried(point.joint)
-        if contact.ways is None:
+        if contact.normals is None:
             return least_distance(own, self.things.pieces(contact.thing, frame))
         return least_distance(own, self._carried(self._parts[contact.thing, contact.share].joint, most=1))
 
@@ -138,7 +138,9 @@ class Holds:
         self._gone -= {each for each in self._gone if each[1] == frame}
         for number, stand in self._touches(frame, held[1]):
             normal, gap, off = self._met(number, stand, frame, q, places, held[0])
-            if np.hypot(np.linalg.norm(off - (off @ normal) * normal), gap) > (LOST if stand.ways is None else APART):
+            if np.hypot(np.linalg.norm(off - (off @ normal) * normal), gap) > (
+                LOST if stand.normals is None else APART
+            ):
                 held[1][number] = 0.0
                 self._gone.add((number, frame))
         return any(each[1] == frame for each in self._gone)
@@ -151,7 +153,7 @@ class Holds:
         for number, stand in self._touches(frame, held[1]):
             normal, gap, way = self._met(number, stand, frame, q, places, held[0])
             off, start = float(normal @ way) + CLEARANCE - gap, held[0][number]
-            if stand.ways is not None:
+            if stand.normals is not None:
                 assert self._touched is not None
                 start, off = self._touched.at(stand, frame).translation, 0.5 * off
             elif frame != stand.first:
@@ -177,12 +179,12 @@ class Holds:
         assert self._touched is not None
         gap = self._touched.gap(stand, self.points[number], frame, q)
         normal = self._touched.at(stand, frame).rotation @ stand.normal
-        start = goals[number] if stand.ways is None else self._touched.other(stand)
+        start = goals[number] if stand.normals is None else self._touched.other(stand)
         return normal, gap, places[number] - start
 
     def give_up(self) -> str:
         """Split the contacts with things where points were let go of; says which, or nothing."""
-        told, places = [], dict[tuple[int, int], Array]()
+        reports, places = [], dict[tuple[int, int], Array]()
         for number, stands in enumerate(self._stands):
             kept = list[Foothold | ThingContact]()
             for stand in stands:
@@ -191,7 +193,7 @@ class Holds:
                     kept.append(stand)
                     continue
                 lost = stand.first + np.flatnonzero(~reached)
-                told.append(
+                reports.append(
                     f"{self.points[number].role} does not reach {stand.thing} in frames {lost[0]} to {lost[-1]}"
                 )
                 own = self._places[number, stand.first]
@@ -201,8 +203,8 @@ class Holds:
                     places[number, first] = own.copy()  # each part lands by itself
             self._stands[number] = kept
         self._gone.clear()
-        self._places = places if told else self._places  # recompute where feet come down
-        return "; ".join(told)
+        self._places = places if reports else self._places  # recompute where feet come down
+        return "; ".join(reports)
 
     def rest(self, role: str, frame: int) -> None:
         """Points of a role rest on the lowest level from a frame on, of a stream."""
@@ -363,6 +365,6 @@ class Holds:
 
     def _height(self, place: Array, stand: Foothold) -> float:
         """Height at which a point of a sole comes down, metres."""
-        told = self._scale * stand.height
-        below = None if self._surface is None else self._surface(np.array([place[0], place[1], told + STEP]))
-        return CLEARANCE + (told if below is None else below)
+        level = self._scale * stand.height
+        below = None if self._surface is None else self._surface(np.array([place[0], place[1], level + STEP]))
+        return CLEARANCE + (level if below is None else below)

@@ -48,9 +48,8 @@ class Goals(NamedTuple):
 class Layout(NamedTuple):
     """What goals are of."""
 
-    # points and turns: frames of the figure
-    points: list[str]
-    turns: list[str]
+    points: list[tuple[int, Array]]  # joint and place (3,) in it of each
+    turns: list[str]  # frames of the figure
     bones: Array  # (b, p) combinations of points: a row has 1 and -1 for a bone, or positive shares for the anchor
     bone_weights: Array  # (b,) weight of each
     turn_weights: Array  # (t,) weight of each angle, metres per radian
@@ -63,10 +62,9 @@ class Fitter:
     def __init__(self, figure: Figure, layout: Layout, workspace: Workspace) -> None:
         self.figure, self.model, self.layout, self._workspace = figure, figure.model, layout, workspace
         self._state = workspace.state
-        point_joints, point_parts = self._carried(layout.points)
-        held = np.array([place for _, place in layout.held]).reshape(-1, 3)
-        self._place_joints = np.array([*point_joints, *(joint for joint, _ in layout.held)], dtype=np.intp)
-        self._local = np.concatenate([point_parts[:, 3], held])
+        points = [*layout.points, *layout.held]
+        self._place_joints = np.array([joint for joint, _ in points], dtype=np.intp)
+        self._local = np.array([place for _, place in points]).reshape(-1, 3)
         self._turn_joints, self._turn_parts = self._carried(layout.turns)
         self._moved = np.repeat(self._state.support[[*self._place_joints, *self._turn_joints]], 3, axis=0)
         places = 3 * len(self._local)

@@ -354,7 +354,7 @@ class Run:
 
 
 def _layout(points: list[str], turns: list[str], roles: Roles, figure: Figure, held: list[HeldPoint]) -> Layout:
-    place = {role: np.eye(len(points))[k] for k, role in enumerate(points)}
+    own, place = roles.places(figure), {role: np.eye(len(points))[k] for k, role in enumerate(points)}
     for part in ("hip", "shoulder"):
         if {f"left_{part}", f"right_{part}"} <= place.keys():
             place[f"{part}s"] = 0.5 * (place[f"left_{part}"] + place[f"right_{part}"])
@@ -375,7 +375,7 @@ def _layout(points: list[str], turns: list[str], roles: Roles, figure: Figure, h
         rows += [place[role] for role in points]
         weights += [1.0] * len(points)
     return Layout(
-        [roles.frames[role] for role in points], [roles.turns[role] for role in turns], np.array(rows),
+        [own[role] for role in points], [roles.turns[role] for role in turns], np.array(rows),
         np.array(weights), np.array([TURNS[role.split("_")[-1]] for role in turns]),
         [(point.joint, point.place) for point in held],
     )  # fmt: skip

@@ -30,7 +30,7 @@ from wholebody.motion.retarget_targets import (
 )
 from wholebody.motion.roles import Roles, matched, skeleton_roles
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
-from wholebody.motion.stance import paths
+from wholebody.motion.stance import point_paths
 from wholebody.motion.standing_ground import NOTHING, Ground
 from wholebody.motion.standing_ground import ground as find_ground
 from wholebody.motion.thing_contacts import ThingContact, Things, meetings, still_things, surface_of
@@ -90,10 +90,10 @@ def retarget(
     if scene is not None:
         same_figure(instance(scene, Scene, "retarget: scene", "make one with wb.Scene(figure)"), figure)
     roles = matched(motion, figure, names)
-    if roles.told:
-        told = ", ".join(f"{role} is {roles.joints[role]!r}" for role in roles.told)
+    if roles.by_structure:
+        known = ", ".join(f"{role} is {roles.joints[role]!r}" for role in roles.by_structure)
         mend = "name them by names= (or --names FILE.toml) if not"
-        warn(f"retarget: {motion.name}: by the structure of the skeleton {told}; {mend}")
+        warn(f"retarget: {motion.name}: by the structure of the skeleton {known}; {mend}")
     if roles.missing:
         warn(
             f"retarget: no joint of {motion.name} is known for {', '.join(roles.missing)}, so these follow nothing; "
@@ -136,8 +136,8 @@ def retarget(
     clip = Clip(figure, q, motion.dt, motion.name, tracks)
     if lost:
         warn(f"retarget: {motion.name}: {lost}, which it lets go of there; things keep their places and sizes")
-    if told := said_of(errors_of(motion, clip, roles)):
-        warn(f"retarget: {motion.name}: {told}; bone_errors has them frame by frame")
+    if said := said_of(errors_of(motion, clip, roles)):
+        warn(f"retarget: {motion.name}: {said}; bone_errors has them frame by frame")
     return clip
 
 
@@ -241,8 +241,8 @@ def bone_errors(
 
 def errors_of(motion: SkeletonMotion, clip: Clip, roles: Roles) -> dict[str, Array]:
     """`bone_errors` with known roles."""
-    ways = paths(clip.figure, clip.q, tuple(roles.frames.values())).swapaxes(0, 1)
-    places = dict(zip(roles.frames, ways, strict=True))
+    points = roles.places(clip.figure)
+    places = dict(zip(points, point_paths(clip.figure, clip.q, list(points.values())).swapaxes(0, 1), strict=True))
     centres = {role: motion.positions[:, motion.names.index(joint)] for role, joint in roles.joints.items()}
     if clip.figure.root == "free":
         named = {"skeleton": roles.joints}

@@ -45,7 +45,7 @@ class ThingContact(NamedTuple):
     place: Array  # (3,) on the thing's surface, in its axes, metres
     normal: Array  # (3,) of unit length, out of the thing, in its axes
     share: float = 1.0  # of a hand: where between its wrist and its joint it touches
-    ways: Array | None = None  # (n, 3) normals of unit length, in the world, where the thing is the other hand
+    normals: Array | None = None  # (n, 3) normals of unit length, in the world, where the thing is the other hand
 
 
 def still_things(scene: Scene) -> list[str]:
@@ -186,11 +186,11 @@ def meetings(motion: SkeletonMotion, joints: Mapping[str, str], others: Sequence
         if one.role.endswith(("hand", "wrist")):
             free[one.first : one.end] = False
     far = np.linalg.norm(left - right, axis=1)
-    ways, z = (left - right) / (far[:, None] + 1e-9), np.array([0.0, 0.0, 1.0])
+    directions, z = (left - right) / (far[:, None] + 1e-9), np.array([0.0, 0.0, 1.0])
     mask = slow(left - right, motion.dt, RestLimits()) & (far <= MEETING) & (far > 1e-3) & free
     for run in runs(long_runs(mask, max(1, round(RestLimits().least / motion.dt)))):
         for (hand, other), sign in ((hands, 1.0), (hands[::-1], -1.0)):
-            found.append(ThingContact(hand, *run, other, np.zeros(3), z, share, sign * ways))
+            found.append(ThingContact(hand, *run, other, np.zeros(3), z, share, sign * directions))
     return sorted(found, key=lambda one: one.first)
 
 

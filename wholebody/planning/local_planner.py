@@ -245,9 +245,9 @@ class TrackedMotions:
             for _ in range(2):  # what is held is missed by the square of a step
                 q = self._settling.step(q, measures=False).q
             found.append(q)
-        ways = [self._apart(*pair) for pair in pairwise([*found, path[-1]])]
+        steps = [self._apart(*pair) for pair in pairwise([*found, path[-1]])]
         usual = [self._apart(*pair) for pair in pairwise(path)]
-        return np.array([*found, path[-1]]), np.array(ways) > JUMP * np.array(usual) + REACHED
+        return np.array([*found, path[-1]]), np.array(steps) > JUMP * np.array(usual) + REACHED
 
     def _apart(self, q: Array, target: Array) -> float:
         return float(np.linalg.norm(pin.difference(self._model, q, target)))

@@ -334,8 +334,8 @@ def _judged(problem: Problem, path: Array, pace: Pace) -> Plan:
         f"accelerations reach {use.acceleration:.3g} of their limit" if not use.acceleration <= OVER else "",
     ]
     if not any(faults):
-        ways, sweep = enumerate(pairwise(q), 1), Sweep(scene.model, scene.geometry)
-        passed = next((k for k, way in ways if sweep.first_contact(*way, tolerance=PASSED) is not None), 0)
+        motions, sweep = enumerate(pairwise(q), 1), Sweep(scene.model, scene.geometry)
+        passed = next((k for k, motion in motions if sweep.first_contact(*motion, tolerance=PASSED) is not None), 0)
         faults.append(f"something is passed through before frame {passed}" if passed else "")
     said = "; ".join(fault for fault in faults if fault)
     return Plan(Clip(scene.figure, q, pace.dt, "plan"), not said, said, length(scene.model, list(q)), worst, *use)

@@ -79,8 +79,8 @@ class RRTConnect:
         other, met = self._extend(self._trees[there], self._trees[here].postures[number])
         if not met or other is None:
             return None
-        ways = {here: self._trees[here].path(number), there: self._trees[there].path(other)}
-        return [*ways[0], *ways[1][-2::-1]]
+        branches = {here: self._trees[here].path(number), there: self._trees[there].path(other)}
+        return [*branches[0], *branches[1][-2::-1]]
 
     def _extend(self, tree: Tree, target: Array) -> tuple[int | None, bool]:
         """Add the motion from the nearest posture towards a target; the last of it, and whether it is there."""

@@ -126,7 +126,7 @@ class Grasp(ContactTerm):
         if self.approach is not None:
             height = APPROACHES[self.approach]
             up = np.array((0.0, 0.0, height or 1.0))
-            # rad: of the palm from straight down, up or level, for the three ways of approach
+            # rad: of the palm from straight down, up or level, for the three directions of approach
             parts.append(Looking(place, up, pi / 4, level=not height))
         return filled(self, parts=tuple(parts), touches=owner_pairs(segments_beyond(scene, place.joint), thing.owners))
 

@@ -132,7 +132,7 @@ class CCD(Checked, Descends):
 
 
 class CCDTracker(DescentTracker[CCD]):
-    """Follows by searches; its ways out resolve overlap with things that were moved into the figure."""
+    """Follows by searches; it resolves overlap with things that were moved into the figure."""
 
     def __init__(self, method: CCD, problem: Problem, dt: float) -> None:
         super().__init__(method, problem, dt)

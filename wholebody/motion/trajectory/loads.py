@@ -157,15 +157,15 @@ class ClipLoads:
         pressed: Mask = np.zeros(len(q), dtype=bool)
         for frame in range(1, len(q) - 1):
             here = self.dynamics.stand(steady[frame], [bool(mark[frame]) for mark in marks.values()])
-            told, seen = (
+            recorded, seen = (
                 self.dynamics.loads(postures[frame], *self.motion(*postures[frame - 1 : frame + 2]), stand)
                 for postures, stand in ((own.base, self.stands[frame]), (steady, here))
             )
-            torque[frame] = seen.torque - told.torque
-            pressed[frame] = seen.wrench[2] >= LIGHT * self.dynamics.weight and told.wrench[2] > 0.0
+            torque[frame] = seen.torque - recorded.torque
+            pressed[frame] = seen.wrench[2] >= LIGHT * self.dynamics.weight and recorded.wrench[2] > 0.0
             if pressed[frame] and len(self.stands[frame].normals):
                 height = self.stands[frame].height
-                place[frame] = zero_moment_point(seen.wrench, height) - zero_moment_point(told.wrench, height)
+                place[frame] = zero_moment_point(seen.wrench, height) - zero_moment_point(recorded.wrench, height)
         return replace(self, defects=Defects(torque, place, pressed))
 
     def worst(self) -> Array:
