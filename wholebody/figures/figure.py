@@ -66,7 +66,7 @@ class Figure(checks.FixedAttributes):
         excluded_pairs: pairs of pieces that are never tested, with the reason.
         notes: sentences on what had to be changed about the geometry of a file, or about stated dimensions.
         limits: joint limits as arrays.
-        loaded_as: name or path and options by which `wb.load` made it; None for one made in another way.
+        loaded_as: name or path and options by which `wb.load` or `adjustable` made it; None for others.
         followers: joint to the law by which it follows another (mimic).
         effort_weights: (nv,) weight of each degree of freedom in the effort.
         neutral_weights: (nv,) weight of each degree of freedom in the displacement from neutral: 1, and 0 for the root.
