@@ -38,7 +38,6 @@ _ENDS = {
 }  # fmt: skip
 """Joints at the ends of segments whose length is a size."""
 
-
 MEDIAN = {"male": (1.755, 84.6), "female": (1.626, 66.8)}
 """Stature, metres, and mass, kilograms, of half of all 4,082 men and 1,986 women of ANSUR II."""
 
@@ -213,10 +212,8 @@ def make_person(
 def _made(
     sex: str, stature: float | None, mass: float | None, age: float | None, stated: tuple[tuple[str, float], ...]
 ) -> Person:
-    given = {"stature": stature, "mass": mass, "age": age}
-    known = {name: value for name, value in given.items() if value is not None}
-    size = {name: known[name] for name in ("stature", "mass") if name in known}
-    values = dict(stated)
+    size = {name: value for name, value in (("stature", stature), ("mass", mass)) if value is not None}
+    known, values = size | ({} if age is None else {"age": age}), dict(stated)
     if values and (odd := population(sex).unlikely(values, size)):
         name, deviation, low, high = odd
         sizes = " and ".join(f"{value:.4g} {UNITS.get(name, 'm')}" for name, value in size.items())
