@@ -16,11 +16,11 @@ from wholebody.base.arrays import Array
 from wholebody.methods.base import TIME_LIMIT, check_problem
 from wholebody.methods.qp.chain import closed_form_postures
 from wholebody.methods.qp.method import QP
-from wholebody.methods.starts import all_found, restarts, throughout
+from wholebody.methods.starts import all_found, throughout
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 
-FEW = 20  # degrees of freedom up to which starts are spread over the whole range of every joint at once
+FEW = 20  # degrees of freedom up to which starts are so many that the answers they lead to can count as all
 LEAST = 12  # descents before a search counts as complete
 SINGULAR = 1e-3  # m or rad per rad: least singular value of the goals at a branch of a closed form that stands alone
 
@@ -35,7 +35,8 @@ class Solutions(Sequence[Solution]):
         descents: how many descents ended in a posture that solves the problem.
         starts: how many were made.
         complete: whether all answers count as found, by the rule of `methods.starts.all_found`: an estimate, no proof;
-            of an arm of six joints with a closed form, whether all of its branches were descended from.
+            of an arm of six joints with a closed form, whether all of its branches were descended from; of figures
+            with more than 20 degrees of freedom never.
 
     Examples:
         >>> found = wb.solutions(problem, most=2, starts=4)
@@ -81,9 +82,9 @@ def solutions(
     """Return distinct answers of a problem: local minima of its measures that meet its goals and keep what must hold.
 
     Descents begin at the branches of the closed form of an arm of six joints that has one, if none is singular.
-    Otherwise they begin at the problem's start and at random postures, for up to 20 degrees of freedom all over the
-    limits (a Latin hypercube), else as far from the start as other starts of `QP`. Measures count from the problem's
-    start. The search ends where all answers count as found, or after as many starts or seconds.
+    Otherwise they begin at the problem's start and at random postures all over the limits (a Latin hypercube). Measures
+    count from the problem's start. The search ends where all answers count as found, or after as many starts or
+    seconds.
 
     Args:
         problem: as for `wb.solve`.
@@ -123,6 +124,7 @@ def solutions(
         complete = all_found(len(known), descents, LEAST) if branches is None else begun == len(branches)
         if complete:
             break
+    complete &= branches is not None or problem.scene.model.nv <= FEW
     ordered = sorted(known, key=lambda answer: answer.assessment.measure)
     return Solutions(tuple(ordered[:most]), len(known), descents, begun, complete)
 
@@ -141,8 +143,7 @@ def _branches(problem: Problem) -> Array | None:
 def _starts(problem: Problem, count: int, seed: int) -> Iterator[Array]:
     """The start, and random postures (nq,)."""
     state, rng = problem.scene.state(problem.start), np.random.default_rng(seed)
-    spread = throughout if problem.scene.model.nv <= FEW else restarts
-    others = spread(problem, state, problem.start, rng, count - 1) if count > 1 else iter(())
+    others = throughout(problem, state, problem.start, rng, count - 1) if count > 1 else iter(())
     return chain([problem.scene.figure.clamp(problem.start)], others)
 
 

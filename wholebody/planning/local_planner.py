@@ -33,6 +33,7 @@ MARGIN = 2e-3  # m: distance that motions keep beyond the clearance, where their
 NOISE = 1e-5  # m: by which distances of one posture differ from query to query
 REACHED = 1e-3  # rad, m: difference from a posture that counts as reached by steps of the tracker
 JUMP = 1.5  # of the distance of two postures: above it their projections are on two sides of something
+LEVER = 0.05  # m
 INSIDE = 5e-3  # rad, m: by which postures are within the bounds of constraints, where ends are; motions are curved
 GAIN = 5e-3  # rad, m: by which a step comes nearer at least; smaller = longer motions along things
 
@@ -95,6 +96,7 @@ class Geodesics:
         # of every pair by every freedom
         self._approach = np.asarray(largest_approach(workspace.table, centres, np.eye(self._model.nv)))
         self._between = (self._approach > 0.0).astype(float)
+        self.levers = np.maximum(self._approach.max(axis=0, initial=0.0), LEVER)
         state, terms = workspace.state.update(problem.start), problem.constraints
         self._values = ConstraintValues(terms, state)
         sides = [np.broadcast_arrays(term.lower, term.upper, term.value(state))[:2] for term in terms]
@@ -221,8 +223,10 @@ class TrackedMotions:
         self._problem = problem.with_start(problem.start)
         self._model = problem.scene.model
         self._goal = Posture(problem.start).resolve(problem.scene, problem.start)
-        self._attraction = Attraction(problem.start, np.ones(self._model.nv))
         self._held = holds(problem)
+        levers = self.geodesics.levers
+        self._shares = np.ones_like(levers) if self._held else levers / levers.max()
+        self._attraction = Attraction(problem.start, self._shares**2)
         self.partial = not self._held  # what is held takes all joints along
         self._problem.goals = (self._goal,) if self._held else ()
         self._problem.measures = () if self._held else (self._attraction,)
@@ -253,14 +257,14 @@ class TrackedMotions:
 
     def towards(self, q: Array, target: Array, most: float = np.inf) -> tuple[list[Array], bool]:
         """See `LocalPlanner`; ends where the motion is longer than `most`, radians and metres."""
-        way, left, gone = list[Array](), self._apart(q, target), 0.0
+        way, left, gone, rest = list[Array](), self._apart(q, target), 0.0, self._rest(q, target)
         self._attraction.toward(target)
         if self._held:
             self._problem.goals = (filled(self._goal, target=target, resolved_target=target),)
         while left > REACHED:
-            here, before, q = q, left, self._tracker.step(q).q
-            left, gone = self._apart(q, target), gone + self._apart(here, q)
-            if left > max(before - GAIN, REACHED) or gone + left > most or BUDGET.over:
+            here, before, q = q, rest, self._tracker.step(q).q
+            left, gone, rest = self._apart(q, target), gone + self._apart(here, q), self._rest(q, target)
+            if (rest > before - GAIN and left > REACHED) or gone + left > most or BUDGET.over:
                 return way, False
             way.append(q)
         return way, True
@@ -280,3 +284,6 @@ class TrackedMotions:
 
     def _apart(self, q: Array, target: Array) -> float:
         return float(np.linalg.norm(pin.difference(self._model, q, target)))
+
+    def _rest(self, q: Array, target: Array) -> float:
+        return float(np.linalg.norm(self._shares * pin.difference(self._model, q, target)))
