@@ -46,6 +46,7 @@ class LocalPlanner(Protocol):
     rounds: ClassVar[int]  # samples of trees until they get another end
     tries: ClassVar[int]  # shortcuts in a row that fail; more = shorter paths, later
     spacing: ClassVar[float]  # rad, m: between postures that are smoothed; smaller = nearer to the free path, dearer
+    shares: Array  # (nv,) by which freedoms count in the distance of two postures, as far as they move a point
     partial: bool  # whether one joint may move in another way than before, and all others as they did
 
     def admit(self, q: Array) -> None:
@@ -84,7 +85,7 @@ class Geodesics:
     samples: ClassVar[int] = 600
     rounds: ClassVar[int] = 50
     tries: ClassVar[int] = 30
-    spacing: ClassVar[float] = 0.015
+    spacing: ClassVar[float] = 0.03
 
     def __init__(self, problem: Problem, workspace: Workspace) -> None:
         self._workspace, self._model = workspace, workspace.model
@@ -96,7 +97,8 @@ class Geodesics:
         # of every pair by every freedom
         self._approach = np.asarray(largest_approach(workspace.table, centres, np.eye(self._model.nv)))
         self._between = (self._approach > 0.0).astype(float)
-        self.levers = np.maximum(self._approach.max(axis=0, initial=0.0), LEVER)
+        levers = np.maximum(self._approach.max(axis=0, initial=0.0), LEVER)
+        self.shares = levers / levers.max()
         state, terms = workspace.state.update(problem.start), problem.constraints
         self._values = ConstraintValues(terms, state)
         sides = [np.broadcast_arrays(term.lower, term.upper, term.value(state))[:2] for term in terms]
@@ -224,9 +226,8 @@ class TrackedMotions:
         self._model = problem.scene.model
         self._goal = Posture(problem.start).resolve(problem.scene, problem.start)
         self._held = holds(problem)
-        levers = self.geodesics.levers
-        self._shares = np.ones_like(levers) if self._held else levers / levers.max()
-        self._attraction = Attraction(problem.start, self._shares**2)
+        self.shares = np.ones(self._model.nv) if self._held else self.geodesics.shares
+        self._attraction = Attraction(problem.start, self.shares**2)
         self.partial = not self._held  # what is held takes all joints along
         self._problem.goals = (self._goal,) if self._held else ()
         self._problem.measures = () if self._held else (self._attraction,)
@@ -286,4 +287,4 @@ class TrackedMotions:
         return float(np.linalg.norm(pin.difference(self._model, q, target)))
 
     def _rest(self, q: Array, target: Array) -> float:
-        return float(np.linalg.norm(self._shares * pin.difference(self._model, q, target)))
+        return float(np.linalg.norm(self.shares * pin.difference(self._model, q, target)))

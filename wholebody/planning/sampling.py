@@ -69,7 +69,7 @@ class Sampler:
             here = pin.XYZQUATToSE3(q[joint.idx_q : joint.idx_q + 7])
             turns = not self._held and rng.uniform() < 0.5
             turn = pin.exp3(np.array((0.0, 0.0, rng.uniform(-np.pi, np.pi)))) if turns else np.eye(3)
-            moved = (spread if self._held else 1.0) * rng.uniform(-ROOM, ROOM, 3)
+            moved = (spread if self._held else 10.0 ** rng.uniform(-1.0, 0.0)) * rng.uniform(-ROOM, ROOM, 3)
             there = pin.SE3(turn @ here.rotation, here.translation + moved)
             away[joint.idx_v : joint.idx_v + 6] = pin.log6(here.actInv(there)).vector
         away[self._frozen] = 0.0
