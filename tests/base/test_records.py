@@ -123,7 +123,7 @@ def test_other_settings_are_one_clear_error(tmp_path: Path, change: dict[str, An
 def test_a_run_of_other_code_is_not_gone_on_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     opened(tmp_path).add("a", Solve("of a record"))
     monkeypatch.setattr("wholebody.base.records.source_digest", lambda: "another")
-    with pytest.raises(InputError, match="holds a run with code = .*, and another is asked for"):
+    with pytest.raises(InputError, match=r"holds a run with code = .*, and another is asked for"):
         opened(tmp_path)
 
 

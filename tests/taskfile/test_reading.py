@@ -106,7 +106,7 @@ def test_the_good_file_is_good(write: Callable[[str], Path]) -> None:
         # a wrong structure
         ("[[goal]]", "[goal]", ["goal", "write [[goal]]"]),
         ("[figure]", "[[figure]]", ["figure 1", 'write called = "anna"']),
-        ('name = "human"\n', "", ["figure", "key name is missing", "human, avatar, hand, urdf"]),
+        ('name = "human"\n', "", ["figure", "key name is missing", "human, avatar, hand, adjustable, urdf"]),
         ('frame = "right_index_tip"\n', "", ["goal 1", "key frame is missing"]),
         ('type = "point"\n', "", ["goal 1", "key type is missing", "point, frame"]),
         ("[figure]\n", "", ["task.toml"]),

@@ -130,8 +130,9 @@ def test_a_scene_alone_and_a_result(tmp_path: Path) -> None:
     assert (result.status, result.message, result.method) == (solution.status, solution.message, solution.method)
 
 
-def test_proportions_and_age_are_written(tmp_path: Path) -> None:
-    figure = wb.load("human", percentile=75, proportions={"sitting_height": 0.95, "hand_length": 0.2}, age=50)
+def test_proportions_age_shoes_and_clothing_are_written(tmp_path: Path) -> None:
+    own = {"sitting_height": 0.95, "hand_length": 0.2}
+    figure = wb.load("human", percentile=75, proportions=own, age=50, shoes=0.02, clothing=0.01)
     again = wb.read_task(wb.taskfile.write_task(wb.Scene(figure), tmp_path / "scene.toml")).problem.scene.figure
     assert again.describe().person == figure.describe().person
     assert again.describe().person.age == 50.0

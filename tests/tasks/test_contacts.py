@@ -65,6 +65,19 @@ def test_derivative_of_every_contact(scene: wb.Scene, name: str, shift: float) -
         assert kinks <= 1  # where another piece becomes the nearest one within the difference
 
 
+@pytest.mark.parametrize("name", TERMS)
+def test_a_term_keeps_what_it_was_resolved_with_whatever_is_resolved_later(scene: wb.Scene, name: str) -> None:
+    figure, state, values = scene.figure, State(scene.figure.model), []
+    start, other = figure.posture("standing"), figure.posture("sitting")
+    for first in (start, other):
+        TERMS[name].resolve(scene, first)
+        term = TERMS[name].resolve(scene, start)
+        values.append(term.value(state.update(start)))
+        TERMS[name].resolve(scene, other)
+        np.testing.assert_array_equal(term.value(state.update(start)), values[0])
+    np.testing.assert_array_equal(values[1], values[0])
+
+
 @pytest.mark.parametrize("depth", [0.3, 0.02, 1e-4, -1e-4, -0.02, -0.1])
 def test_touch_is_the_signed_distance(depth: float) -> None:
     """A point and a ball: the distance is a formula, and the derivative is the direction."""

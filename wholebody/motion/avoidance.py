@@ -81,7 +81,7 @@ def avoid(
             its own frame: `Hold("left_hand", relative_to="right_hand")` keeps the grip that each frame has.
         hold_feet: keep the feet of a figure that has some where they stand, as `wb.motion.StanceFeet()` does, unless
             `constraints` has a `wb.motion.StanceFeet` of its own; False lets them slide.
-        dynamics: keep the torques of joints within the strength of a person (a man of median strength if True; effort
+        dynamics: keep the torques of joints within strength (the median of the person's sex and age if True; effort
             limits of a robot), and the zero moment point within the support. What the clip exceeds already is exceeded
             by no more: no joint needs more than its strength or than its largest torque before, and in no frame is the
             zero moment point farther outside than it was. Contacts come first; the report says what is left. The method

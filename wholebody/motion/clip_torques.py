@@ -154,7 +154,7 @@ def torques(
             and slower there than 0.15 m/s.
         feet: segments that may stand; left and right foot, or the ankles of a robot. A foot stands while its heel,
             ball or tip of the toes is low and slow; without frames of such names, while its own frame is.
-        strength: of the person, for `lower`, `upper` and `share`; a man of median strength if left out. For figures
+        strength: of the person, for `lower`, `upper` and `share`; median of its sex and age if left out. For figures
             whose joints have no published strength, such as robots, the effort limits of their descriptions count.
         friction: coefficient of friction of the ground.
         cutoff: Hz of the low-pass filter (Butterworth, zero lag) that takes the noise of recordings out before

@@ -95,14 +95,14 @@ def standing_places(figure: Figure, roles: Roles) -> tuple[dict[str, Array], dic
     data, geometry = figure.model.createData(), figure.geometry.createData()
     q = upright(figure)
     pin.framesForwardKinematics(figure.model, data, q)
-    found = {role: data.oMf[figure.frame_id(frame)] for role, frame in roles.frames.items()}
+    places = {role: np.array(data.oMi[joint].act(at)) for role, (joint, at) in roles.places(figure).items()}
     pin.updateGeometryPlacements(figure.model, data, figure.geometry, geometry)
     low = np.inf
     for piece, at in zip(figure.geometry.geometryObjects, geometry.oMg, strict=True):
         corners = at.rotation @ box_corners(piece.geometry).T + at.translation[:, None]
         low = min(low, float(corners[2].min()))
     return (
-        {role: at.translation.copy() for role, at in found.items()},
+        places,
         {role: data.oMf[figure.frame_id(frame)].rotation.copy() for role, frame in roles.turns.items()},
         low if np.isfinite(low) else 0.0,
     )

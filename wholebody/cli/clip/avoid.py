@@ -118,7 +118,7 @@ def _method(name: str, arguments: argparse.Namespace) -> Avoider:
     if arguments.dynamics:
         if not has_setting(method, "dynamics"):
             raise InputError(f"--dynamics: the method {method.name} does not take dynamics; leave out --method")
-        settings["dynamics"] = Strength(sex=arguments.sex or "male")
+        settings["dynamics"] = Strength(sex=arguments.sex)
     return replace(method, **settings) if settings else method  # type: ignore[type-var]
 
 
