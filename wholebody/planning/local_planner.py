@@ -33,7 +33,7 @@ MARGIN = 2e-3  # m: distance that motions keep beyond the clearance, where their
 NOISE = 1e-5  # m: by which distances of one posture differ from query to query
 REACHED = 1e-3  # rad, m: difference from a posture that counts as reached by steps of the tracker
 JUMP = 1.5  # of the distance of two postures: above it their projections are on two sides of something
-LEVER = 0.05  # m
+LEVER = 0.05  # m: least that a freedom counts as moving a point by, a radian or metre
 INSIDE = 5e-3  # rad, m: by which postures are within the bounds of constraints, where ends are; motions are curved
 GAIN = 5e-3  # rad, m: by which a step comes nearer at least; smaller = longer motions along things
 
@@ -97,8 +97,6 @@ class Geodesics:
         # of every pair by every freedom
         self._approach = np.asarray(largest_approach(workspace.table, centres, np.eye(self._model.nv)))
         self._between = (self._approach > 0.0).astype(float)
-        levers = np.maximum(self._approach.max(axis=0, initial=0.0), LEVER)
-        self.shares = levers / levers.max()
         state, terms = workspace.state.update(problem.start), problem.constraints
         self._values = ConstraintValues(terms, state)
         sides = [np.broadcast_arrays(term.lower, term.upper, term.value(state))[:2] for term in terms]
@@ -110,6 +108,8 @@ class Geodesics:
                 f"plan: how much a motion brings {names[0]} and {names[1]} together has no bound; attach a box in "
                 "place of a half-space, and give limits to what slides"
             )
+        levers = np.maximum(self._approach.max(axis=0, initial=0.0), LEVER)
+        self.shares = levers / levers.max()
 
     def admit(self, q: Array) -> None:
         """See `LocalPlanner`."""

@@ -39,7 +39,7 @@ class Tree:
         return int(np.argmin(np.einsum("ij,ij->i", apart, apart)))
 
     def _place(self, q: Array) -> Array:
-        return self._shares * np.asarray(pin.difference(self._model, self._origin, q))
+        return np.asarray(self._shares * pin.difference(self._model, self._origin, q))
 
     def path(self, number: int) -> list[Array]:
         """Postures from a root to one of the tree."""
