@@ -211,7 +211,8 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "load", Call(lambda spec, **options: wb.load(spec, **options), {"spec": path / "arm.urdf"})
     for option, value in {"root": "fixed", "package_dirs": [path], "concavity": 0.5, "samples": 10}.items():
         yield f"load({option})", Call(wb.load, {"spec": path / "arm.urdf", option: value})
-    for option, value in {"sex": "male", "stature": 1.7, "mass": 70.0, "detail": "spheres", "age": 50.0}.items():
+    body = {"sex": "male", "stature": 1.7, "mass": 70.0, "detail": "spheres", "age": 50.0}
+    for option, value in (body | {"shoes": 0.03, "clothing": 0.01}).items():
         yield f"load({option})", Call(lambda _option=option, **given: wb.load("human", **given), {option: value})
     yield "load(proportions)", Call(lambda **given: wb.load("human", **given), {"proportions": {"span": 1.85}})
     yield "finger_angles", Call(wb.figures.finger_angles, {"shape": "fist", "side": "left"})
@@ -402,6 +403,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Soft", Call(wb.Soft, soft, solve_it)
     yield "State", Call(State, {"model": arm.model})
     yield "State.update", Call(state.update, {"q": q})
+    yield "State.at", Call(state.at, {"q": q})
     yield "State.frame", Call(state.frame, {"index": 1})
     for method in ("center_of_mass", "center_of_mass_jacobian"):
         yield f"State.{method}", Call(getattr(state, method), {})
@@ -636,7 +638,8 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Clip.write", Call(clip.write, {"path": path / "clip.npz"})
     for method in ("mirrored", "velocities", "accelerations"):
         yield f"Clip.{method}", Call(getattr(wb.Clip(hand, [hand.neutral], 0.1), method), {})  # type: ignore[arg-type]
-    yield "Strength", Call(wb.motion.Strength, {"percentile": 50.0, "sex": "female"}, lambda made: made.limits(arm))
+    strong = {"percentile": 50.0, "sex": "female", "age": 50.0}
+    yield "Strength", Call(wb.motion.Strength, strong, lambda made: made.limits(arm))
     yield "Strength.limits", Call(wb.motion.Strength().limits, {"figure": arm})
     found = wb.motion.torques(clip)
     yield "Torques.joint_of", Call(found.joint_of, {"column": 0})
@@ -906,7 +909,7 @@ BY_OWNERS = ("Trajectory.avoid", "PerFrame.avoid", "Bisection.avoid", "QP.batche
 DERIVATIVES = (
     "of_arms",
     "on_points",
-    "joint_placements",
+    "posed",
     "place_of",
     "companion",
     "folded",

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from wholebody.base.errors import FileFormatError, InputError
-from wholebody.base.records import RecordFile
+from wholebody.base.records import RecordFile, source_digest
 
 SETTINGS = {"seed": 0, "sets": ("a",), "levels": {"x": [[0.1, None], [0.01, 3]]}, "most": nan}
 
@@ -120,7 +120,14 @@ def test_other_settings_are_one_clear_error(tmp_path: Path, change: dict[str, An
     assert len(opened(tmp_path).kept) == 1
 
 
-HEAD = {"content": "solves of a test", "version": "1.0"}
+def test_a_run_of_other_code_is_not_gone_on_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened(tmp_path).add("a", Solve("of a record"))
+    monkeypatch.setattr("wholebody.base.records.source_digest", lambda: "another")
+    with pytest.raises(InputError, match=r"holds a run with code = .*, and another is asked for"):
+        opened(tmp_path)
+
+
+HEAD = {"content": "solves of a test", "version": "1.0", "code": source_digest()}
 
 
 @pytest.mark.parametrize(

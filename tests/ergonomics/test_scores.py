@@ -167,8 +167,12 @@ def test_a_raised_arm_scores_as_raised_whichever_way_it_went(person: wb.Figure) 
     assert raised > 10
     over = bent(person, right_shoulder_abduction=165, right_shoulder_flexion=3)
     assert wb.ergonomics.rula(person, over).right.upper_arm >= 4
-    sideways = bent(person, right_shoulder_abduction=90)  # the worksheet: no flexion, and abducted
-    assert wb.ergonomics.rula(person, sideways).right.upper_arm == 2
+    for degrees, upper_arm in ((90, 2), (97, 5)):  # the worksheet: no flexion, and abducted; above 90
+        sideways = bent(person, right_shoulder_abduction=degrees)
+        assert wb.ergonomics.rula(person, sideways).right.upper_arm == upper_arm
+    inward = bent(person, right_shoulder_flexion=60, right_shoulder_abduction=-30)  # not abducted
+    assert wb.ergonomics.body_angles(person, inward).right.shoulder_abduction < radians(-20.0)
+    assert wb.ergonomics.rula(person, inward).right.upper_arm == wb.ergonomics.reba(person, inward).right.upper_arm == 3
 
 
 def test_angles_do_not_depend_on_where_a_person_stands_and_looks(person: wb.Figure) -> None:
@@ -251,6 +255,9 @@ def test_a_seated_trunk_with_a_back_scores_one_in_rula(person: wb.Figure) -> Non
     assert wb.ergonomics.rula(person, q, wb.ergonomics.Work(seated=True)).left.trunk == 3
     assert wb.ergonomics.rula(person, q, wb.ergonomics.Work(seated=True, back_supported=True)).left.trunk == 1
     assert wb.ergonomics.rula(person, q, wb.ergonomics.Work(seated=False, back_supported=True)).left.trunk == 3
+    for back, trunk in ((True, 1), (False, 2)):  # "also if trunk is well supported while seated; 2 if not"
+        work = wb.ergonomics.Work(seated=True, back_supported=back)
+        assert wb.ergonomics.rula(person, person.posture("sitting"), work).left.trunk == trunk
     curled = person.with_joints(q, {"left_hip_flexion": radians(115), "right_hip_flexion": radians(115)})
     assert wb.ergonomics.rula(person, curled, wb.ergonomics.Work(seated=True, back_supported=True)).left.trunk == 3
     scene = wb.Scene(person).add(wb.Box((0.1, 1.0, 0.1)), name="backrest", at=(-2.0, 0.0, q[2] + 0.3))
@@ -288,7 +295,7 @@ def test_scores_print_as_a_table(person: wb.Figure) -> None:
     head, rula, *rest = str(found).splitlines()
     assert head.split() == ["score", "left", "right", "worse"]
     assert rula.split()[:3] == ["RULA", str(found.rula.left.score), str(found.rula.right.score)]
-    assert [line.split()[0] for line in rest] == ["REBA", "OWAS", "strength", "seat"]
+    assert [line.split()[0] for line in rest] == ["REBA", "OWAS", "strength", "back", "seat"]
 
 
 def test_colours_are_of_every_segment_and_red_where_it_is_worst(person: wb.Figure) -> None:

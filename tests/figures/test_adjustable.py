@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,24 @@ def test_a_seat_is_as_high_as_the_legs_are_long() -> None:
     assert chosen["seat/height"] == pytest.approx(measure(person)["popliteal_height"], abs=2e-4)
     ball = problem.scene.figure.placement(solution.q, "anna/right_ball").translation
     np.testing.assert_allclose(ball, (0.5, -0.12, 0.0), atol=1e-4)
+
+
+def test_a_task_file_has_what_is_adjustable(tmp_path: Path) -> None:
+    problem = cabin(wb.load("human"))
+    file = wb.taskfile.write_task(problem, tmp_path / "cabin.toml")
+    again = wb.read_task(file).problem
+    np.testing.assert_allclose(wb.solve(again).q, wb.solve(problem).q, atol=1e-6)
+    figure, read = problem.scene.figure, again.scene.figure
+    assert read.joints == figure.joints
+    np.testing.assert_array_equal(read.limits.lower, figure.limits.lower)
+    np.testing.assert_array_equal(read.limits.upper, figure.limits.upper)
+    records = wb.study(
+        file, people=[{"sex": "female", "percentile": 50}]
+    )  # a seat is nobody whose place she could take
+    assert [one.outcome for one in records] == ["solved"]
+    file.write_text(file.read_text().replace('name = "back"', 'name = "cushion"'))
+    with pytest.raises(wb.FileFormatError, match="key parts: two parts have one name"):
+        wb.read_task(file)
 
 
 def test_a_study_tells_the_settings_of_people() -> None:

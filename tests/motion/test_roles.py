@@ -12,6 +12,7 @@ import pytest
 import wholebody as wb
 from wholebody.motion.roles import matched
 from wholebody.motion.skeleton import SkeletonMotion
+from wholebody.motion.structure import upright
 
 LEGS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
 KNOWN = {
@@ -105,10 +106,10 @@ def test_structure_tells_what_names_do_not(turn: float, human: wb.Figure) -> Non
     expected = {name.replace(*next(((a, b) for a, b in ends.items() if a in name), ("", ""))): numbers[k]
                 for k, name in enumerate(names) if name != "crown"}  # fmt: skip
     assert found.joints == expected
-    assert set(found.told) == set(expected)
+    assert set(found.by_structure) == set(expected)
     with pytest.warns(UserWarning, match="by the structure of the skeleton .*left_knee is 'joint "):
         wb.retarget(motion, human)
-    assert matched(motion, human, {"skeleton": {"left_elbow": "joint 3", "left_wrist": "joint 4"}}).told == ()
+    assert matched(motion, human, {"skeleton": {"left_elbow": "joint 3", "left_wrist": "joint 4"}}).by_structure == ()
 
 
 def _with_soles(motion: SkeletonMotion, ankles: list[str]) -> SkeletonMotion:
@@ -127,9 +128,24 @@ def _with_soles(motion: SkeletonMotion, ankles: list[str]) -> SkeletonMotion:
     return SkeletonMotion.moved(tuple(names), np.array(parents), np.array(offsets), local, motion.positions[:, 0], 0.02)
 
 
+def robot(folder: Path, links: list[tuple[str, str, tuple[float, ...], float, str]]) -> wb.Figure:
+    """A robot of boxes: link before, name, place of its joint in that, size, axis of its joint."""
+    lines = ["<robot name='robot'><link name='base'/>"]
+    for parent, name, place, size, axis in links:
+        at, along = " ".join(map(str, place)), " ".join(str(int(axis == letter)) for letter in "xyz")
+        lines.append(
+            f"<link name='{name}'><collision><geometry><box size='{size} {size} {size}'/></geometry></collision></link>"
+            f"<joint name='{name}_j' type='revolute'><parent link='{parent}'/><child link='{name}'/>"
+            f"<origin xyz='{at}'/><axis xyz='{along}'/><limit lower='-2' upper='2' effort='9' velocity='9'/></joint>"
+        )
+    path = folder / "robot.urdf"
+    path.write_text("".join([*lines, "</robot>"]))
+    return wb.load(path, root="free")
+
+
 def test_a_robot_with_long_fingers_has_its_elbows_before_its_wrists(tmp_path: Path) -> None:
     """Fingers of 22 cm, as of the grippers of Talos, and a root link without a shape, as of Romeo."""
-    lines, sides = ["<robot name='robot'><link name='base'/>"], (("left", 1), ("right", -1))
+    sides = ("left", 1), ("right", -1)
     links = [("base", "torso", (0, 0, 0.4), 0.3), ("torso", "head", (0, 0, 0.3), 0.1)]
     for side, sign in sides:
         links += [("base", f"{side}_a", (0, 0.1 * sign, -0.1), 0.1), (f"{side}_a", f"{side}_b", (0, 0, -0.38), 0.1)]
@@ -137,16 +153,41 @@ def test_a_robot_with_long_fingers_has_its_elbows_before_its_wrists(tmp_path: Pa
         links += [(f"{side}_d", f"{side}_e", (0, 0, -0.27), 0.05), (f"{side}_e", f"{side}_f", (0, 0, -0.26), 0.05)]
         links += [(f"{side}_f", f"{side}_{end}", (x, 0, -0.22), 0.02) for end, x in (("g", -0.05), ("h", 0.05))]
         links += [(f"{side}_{end}", f"{side}_{end}2", (0, 0, -0.12), 0.02) for end in "gh"]
-    for parent, name, place, size in links:
-        at = " ".join(map(str, place))
-        lines.append(
-            f"<link name='{name}'><collision><geometry><box size='{size} {size} {size}'/></geometry></collision></link>"
-            f"<joint name='{name}_j' type='revolute'><parent link='{parent}'/><child link='{name}'/>"
-            f"<origin xyz='{at}'/><axis xyz='0 1 0'/><limit lower='-2' upper='2' effort='9' velocity='9'/></joint>"
-        )
-    path = tmp_path / "robot.urdf"
-    path.write_text("".join([*lines, "</robot>"]))
-    figure = wb.load(path, root="free")
+    figure = robot(tmp_path, [(*link, "y") for link in links])
     found = matched(still(tuple(KNOWN["SMPL-X"].split())), figure, None).frames
     parts = zip(LEGS, "abcdef", strict=True)
     assert found == {"pelvis": "base"} | {f"left_{part}": f"left_{joint}_j" for part, joint in parts}
+
+
+@pytest.mark.parametrize("ahead", [1, -1])
+def test_a_small_robot_with_a_stiff_trunk_is_known_by_its_axes(ahead: int, tmp_path: Path) -> None:
+    """Numbered joints, of which the third of a leg turns it far below the hip; no wrists; some look backward."""
+    links = []
+    for side, sign in (("LLEG", ahead), ("RLEG", -ahead)):
+        links += [
+            ("base", f"{side}_1_R", (0, 0.1 * sign, -0.1), 0.02, "x"),
+            (f"{side}_1_R", f"{side}_2", (0,) * 3, 0.02, "y"),
+        ]
+        links += [
+            (f"{side}_2", f"{side}_3_R", (0, 0, -0.15), 0.02, "z"),
+            (f"{side}_3_R", f"{side}_4", (0, 0, -0.1), 0.02, "y"),
+        ]
+        links += [
+            (f"{side}_4", f"{side}_5", (0, 0, -0.25), 0.02, "y"),
+            (f"{side}_5", f"{side}_6_R", (0,) * 3, 0.06, "x"),
+        ]
+    for side, sign in (("LARM", ahead), ("RARM", -ahead)):
+        links += [
+            ("base", f"{side}_1", (0, 0.2 * sign, 0.3), 0.02, "y"),
+            (f"{side}_1", f"{side}_2_R", (0,) * 3, 0.02, "x"),
+        ]
+        links += [(f"{side}_2_R", f"{side}_3", (0, 0, -0.15), 0.3, "y")]
+    figure = robot(tmp_path, links)
+    found = matched(still(tuple(KNOWN["SMPL-X"].split())), figure, None)
+    numbers = dict(zip(LEGS, ("LEG_2", "LEG_4", "LEG_6_R", "ARM_2_R", "ARM_3", "ARM_3"), strict=True))
+    assert found.frames == {"pelvis": "base"} | {f"left_{part}": f"L{joint}_j" for part, joint in numbers.items()}
+    joint, place = found.places(figure)["left_wrist"]
+    assert figure.model.names[joint] == "LARM_3_j"
+    assert np.abs(place).max() == pytest.approx(0.15)  # the face of its box, 0.3 m wide
+    left = figure.placement(upright(figure), "LARM_1").translation
+    assert left == pytest.approx([0.0, 0.2, 0.3])

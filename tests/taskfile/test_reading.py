@@ -106,7 +106,7 @@ def test_the_good_file_is_good(write: Callable[[str], Path]) -> None:
         # a wrong structure
         ("[[goal]]", "[goal]", ["goal", "write [[goal]]"]),
         ("[figure]", "[[figure]]", ["figure 1", 'write called = "anna"']),
-        ('name = "human"\n', "", ["figure", "key name is missing", "human, avatar, hand, urdf"]),
+        ('name = "human"\n', "", ["figure", "key name is missing", "human, avatar, hand, adjustable, urdf"]),
         ('frame = "right_index_tip"\n', "", ["goal 1", "key frame is missing"]),
         ('type = "point"\n', "", ["goal 1", "key type is missing", "point, frame"]),
         ("[figure]\n", "", ["task.toml"]),
@@ -212,7 +212,7 @@ def test_a_figure_is_mounted_on_another_one(write: Callable[[str], Path]) -> Non
     assert both.members.keys() == {"anna", "ben"}
     assert "ben/tool/right_index_tip" in both.frames
     for text, said in (
-        (anna + HAND + '"anna/right_pal"', "figure 2.*right_palm"),
+        (anna + HAND + '"anna/right_pal"', ":8, figure 2, key on.*right_palm"),
         (anna + HAND + '"right_palm"', "figure 2, key on: no figure is called 'right_palm'; known: anna"),
         (HAND + '"right_palm"', "figure 1, key on: no figure has the frame"),
     ):

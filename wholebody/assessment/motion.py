@@ -119,8 +119,8 @@ def frames_passed_through(
             )
             is not None
         )
-    sweep, ways = Sweep(scene.model, scene.geometry), enumerate(pairwise(q), start=1)
-    return tuple(frame for frame, way in ways if sweep.first_contact(*way, tolerance=depth) is not None)
+    sweep, motions = Sweep(scene.model, scene.geometry), enumerate(pairwise(q), start=1)
+    return tuple(frame for frame, motion in motions if sweep.first_contact(*motion, tolerance=depth) is not None)
 
 
 def deepened(scene: Scene, q: Array) -> Array:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import fcntl
+import functools
+import hashlib
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping
@@ -30,7 +32,8 @@ class RecordFile(Generic[T]):
         path: of the file; its folder is made if it does not exist.
         content: what the records are, in words.
         make: makes a record of the plain values that `dataclasses.asdict` gives; of a text it gets the text.
-        settings: of the run, as plain values; records of a run with other settings are refused.
+        settings: of the run, as plain values; records of a run with other settings, or by other code of this package,
+            are refused.
 
     Raises:
         InputError: the settings are others, or the file cannot be written.
@@ -45,7 +48,7 @@ class RecordFile(Generic[T]):
             raise InputError(f"{path} is no file; give another folder")
         self.path, self._make, self._read = path, make, 0
         self.kept: dict[str, T] = {}
-        self._head = {"content": content, "version": VERSION, **(settings or {})}
+        self._head = {"content": content, "version": VERSION, "code": source_digest(), **(settings or {})}
         with self._opened():
             pass
 
@@ -123,6 +126,16 @@ class RecordFile(Generic[T]):
     def _foreign(self, why: str) -> FileFormatError:
         content = self._head["content"]
         return FileFormatError(f"{self.path}: holds no {content} ({one_line(why)}); give another folder")
+
+
+@functools.cache
+def source_digest() -> str:
+    """Digest of the Python files of the package, by which a run knows whether the same code began it."""
+    package = Path(__file__).parents[1]
+    digest = hashlib.sha256()
+    for path in sorted(package.rglob("*.py")):
+        digest.update(path.relative_to(package).as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:12]
 
 
 def _line(value: Any) -> bytes:

@@ -123,7 +123,7 @@ def only(rows: Sequence[Row], *names: str) -> list[Row]:
 
 
 def across(rows: Sequence[Row], *names: str, columns: str = "case") -> list[Row]:
-    """Figures of rows as a table of two ways: a row a tool, a column a case and figure; or the other way round."""
+    """Figures of rows as a table with two headings: a row a tool, a column a case and figure, or the reverse."""
     found: dict[str, dict[str, Figure]] = {}
     for row in rows:
         down, column = (row.tool, row.case) if columns == "case" else (row.case, row.tool)

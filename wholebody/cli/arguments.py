@@ -43,7 +43,7 @@ class Parser(argparse.ArgumentParser):
         super().error(message)
 
 
-PERSON = ("sex", "stature", "mass", "percentile", "proportions", "age", "detail", "hands")
+PERSON = ("sex", "stature", "mass", "percentile", "proportions", "age", "shoes", "clothing", "detail", "hands")
 """Options of `wb.load` that `add_person` adds."""
 
 
@@ -58,6 +58,8 @@ def add_person(parser: Any) -> None:
         help="a dimension of a person, m, such as sitting_height=0.93; the others follow; repeated",
     )  # fmt: skip
     parser.add_argument("--age", type=float, metavar="YEARS", help="of a person, 17 to 69: ranges of motion, size")
+    parser.add_argument("--shoes", type=float, metavar="M", help="thickness of soles of a person, m (default: 0)")
+    parser.add_argument("--clothing", type=float, metavar="M", help="thickness of cloth on trunk and limbs, m")
     parser.add_argument(
         "--detail", choices=("spheres", "capsules", "hulls"), help="detail of the geometry (default: capsules)"
     )

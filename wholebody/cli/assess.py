@@ -40,7 +40,7 @@ print RULA, REBA, OWAS and the torques against published strength too; --json pr
         choices=("yes", "no"),
         help="whether the person sits (default: decided by what is below, or the posture)",
     ),
-    option("--sex", metavar="SEX", help="of the strength: male or female (default: male)"),
+    option("--sex", metavar="SEX", help="of the strength: male or female (default: the person's)"),
     option("--percentile", type=float, metavar="P", help="of the strength, 5 to 95 (default: 50)"),
     flag("--json", "print JSON instead of tables"),
     epilog="""\

@@ -38,7 +38,7 @@ def _jerk(values: Array) -> float:
 
 
 def drag_rows(task: str, drag: Dragged, judged: DragJudgement) -> tuple[Row, list[Row]]:
-    """A drag and its frames: "deepest" is of frames, start and end, "between" a bound on the ways between them."""
+    """A drag and its frames: "deepest" is of frames, start and end, "between" a bound on the motions between them."""
     columns = {
         "ms": 1e3 * drag.seconds,
         "CPU ms": 1e3 * drag.cpu_seconds,

@@ -128,17 +128,17 @@ def given_placements(kinematic: object) -> dict[str, tuple[pin.SE3, pin.SE3]]:
     if kinematic is None:
         return {}
     given = checks.instance(kinematic, Mapping, "kinematic", "give {name: (placement before, after)}")
-    return {name: _two_placements(ways, name) for name, ways in given.items()}
+    return {name: _two_placements(pair, name) for name, pair in given.items()}
 
 
-def _two_placements(ways: object, name: str) -> tuple[pin.SE3, pin.SE3]:
+def _two_placements(pair: object, name: str) -> tuple[pin.SE3, pin.SE3]:
     """Two placements; checking each of those that are pin.SE3 already would take a frame longer than its bodies."""
-    if not isinstance(ways, (tuple, list)) or len(ways) != 2:
+    if not isinstance(pair, (tuple, list)) or len(pair) != 2:
         raise InputError(
-            f"kinematic: {checks.shown(name)} has {checks.shown(ways)}; give its placements before and after"
+            f"kinematic: {checks.shown(name)} has {checks.shown(pair)}; give its placements before and after"
         )
     before, after = (
-        way if isinstance(way, pin.SE3) and np.isfinite(way.homogeneous).all() else placement(way, f"kinematic: {name}")
-        for way in ways
+        one if isinstance(one, pin.SE3) and np.isfinite(one.homogeneous).all() else placement(one, f"kinematic: {name}")
+        for one in pair
     )
     return before, after

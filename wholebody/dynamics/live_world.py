@@ -46,7 +46,7 @@ class LiveWorld:
         held: frames that the tracked posture keeps where they are.
         taken: the handle that the mouse holds; "" for none.
         give_way: who takes an overlap of the figure with a thing that moves by itself, see `World`.
-        ways: what `give_way` may be.
+        give_way_choices: what `give_way` may be.
         methods, chosen: of the tracker: "qp" alone.
 
     Examples:
@@ -75,7 +75,7 @@ class LiveWorld:
         self._subject = LiveProblem(stated)
         self.handles, self.held = tuple(self._subject.handles), set(self._subject.held)
         self.things = things_of(scene)
-        self.ways = GIVE_WAY
+        self.give_way_choices = GIVE_WAY
         self.methods, self.chosen = {"qp": "qp"}, "qp"
         self._begin()
         self.take(self.handles[0])

@@ -52,10 +52,10 @@ class Way(NamedTuple):
     gap: Array  # (2, k) their distances before the step, and at least those after it
     normal: Array  # (2, k, 3) from the first to the second; after it zero where none is known
     placement: Array  # (2, pieces, 4, 3) of all pieces
-    shift: Array  # (n, 3) ways of the centres of mass, metres
+    shift: Array  # (n, 3) displacements of the centres of mass, metres
     angle: Array  # (n,) by which each has turned, radians
     lever: Array  # (n,) greatest distance of a point from its centre of mass, metres
-    fall: float  # sag of the relative way because of gravity, metres
+    fall: float  # sag of the relative displacement because of gravity, metres
 
 
 def check_passing(

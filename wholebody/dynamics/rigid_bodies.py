@@ -190,7 +190,7 @@ class RigidBodies:
                 the frame, between which it moves with constant velocity and angular velocity. What is not named stands.
         """
         dt = checks.number(dt, "dt", TIME_STEP[0], 10.0, "s, such as 1/60")
-        state, given = self.state, {self._number(name): ways for name, ways in given_placements(kinematic).items()}
+        state, given = self.state, {self._number(name): pair for name, pair in given_placements(kinematic).items()}
         ended = state.copies()
         for number, (before, after) in given.items():
             if self._pieces.dynamic[number]:

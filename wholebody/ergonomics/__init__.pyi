@@ -2,13 +2,14 @@ from wholebody.ergonomics.angles import BodyAngles as BodyAngles, body_angles as
 from wholebody.ergonomics.assessment import Ergonomics as Ergonomics, ergonomics_of as ergonomics_of
 from wholebody.ergonomics.exertion import (
     Exertion as Exertion,
+    StaticTorques as StaticTorques,
     StrengthLimit as StrengthLimit,
     back_compression as back_compression,
+    static_torques as static_torques,
 )
 from wholebody.ergonomics.lifting import Lift as Lift, lift_between as lift_between
 from wholebody.ergonomics.vision import Look as Look
 from wholebody.ergonomics.owas_score import Owas as Owas, owas as owas
-from wholebody.ergonomics.posture_torques import StaticTorques as StaticTorques, static_torques as static_torques
 from wholebody.ergonomics.reba_score import Reba as Reba, RebaParts as RebaParts, reba as reba
 from wholebody.ergonomics.rula_score import Rula as Rula, RulaParts as RulaParts, rula as rula
 from wholebody.ergonomics.vision import FieldOfView as FieldOfView, Sight as Sight, sight as sight

@@ -178,7 +178,8 @@ def _side(now: _Body, upright: _Body, side: str, lowest: float) -> SideAngles:
     hand = -now.turn(f"{side}_forearm", f"{side}_hand")[:, 2]  # the long axis of a hanging hand points down
     thigh, shank = _unit(knee - hip), _unit(ankle - knee)
     flexion = float(np.arctan2(upper[0], -upper[2]))
-    sideways = np.hypot(upper[0], upper[2]) <= 0.2  # length in the sagittal plane below which an arm has no flexion
+    # length in the sagittal plane below which an arm has no flexion, unless it points up by more than 5 degrees
+    sideways = np.hypot(upper[0], upper[2]) <= 0.2 and upper[2] <= 0.087
     return SideAngles(
         shoulder_flexion=0.0 if sideways else flexion + (2.0 * np.pi if flexion < -0.5 * np.pi else 0.0),
         shoulder_abduction=float(np.arcsin(np.clip(out * upper[1], -1.0, 1.0))),

@@ -8,8 +8,8 @@ from typing import Any
 
 from wholebody.base.arrays import Array, brief
 from wholebody.ergonomics.angles import SIDES, BodyAngles, check_person
+from wholebody.ergonomics.exertion import StaticTorques, static_torques
 from wholebody.ergonomics.owas_score import Owas, owas_code
-from wholebody.ergonomics.posture_torques import StaticTorques, static_torques
 from wholebody.ergonomics.reba_score import Reba, reba_parts
 from wholebody.ergonomics.rula_score import Rula, rula_parts
 from wholebody.ergonomics.work import Work, seen
@@ -67,6 +67,7 @@ class Ergonomics:
         sides = [f"{share:.0%} {joint}" if joint else "" for joint, share in map(self.torques.of_side, SIDES)]
         joint, share = self.torques.worst
         made.append(("strength", *sides, f"{share:.0%} of the strength of {joint}" if joint else "not known"))  # type: ignore[arg-type]
+        made.append(("back", "", "", f"{self.torques.compression:.0f} N press the disc L5/S1"))
         made.append(("seat", "", "", self.seat))
         return made
 
@@ -88,6 +89,7 @@ class Ergonomics:
             **scores,
             "owas": {"code": self.owas.code, "category": self.owas.category, "action": self.owas.action},
             "strength": {"worst": joint, "share": share, "shares": dict(self.torques.share)},
+            "compression": self.torques.compression,
             "torques": dict(self.torques.torque),
             "seat": self.seat,
             "angles": _plain(asdict(self.angles)),
@@ -116,7 +118,7 @@ def ergonomics_of(
         figure: a person, see `body_angles`; or a scene with one: then whoever has a thing below pelvis or thighs sits.
         q: (nq,) posture.
         work: load, repetition, support; none if left out.
-        strength: of the person; a man of median strength if left out.
+        strength: of the person; the median of its sex and age if left out.
 
     Raises:
         InputError: no person, no posture, no work or no strength.

@@ -1,8 +1,8 @@
-"""Strength in the search for a posture: joint torques of weight and forces, and the compression of the low back."""
+"""Joint torques of weight and forces against strength, in the search and of a posture; compression of the low back."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Annotated, NamedTuple
 
@@ -10,10 +10,11 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array, Indices, cross
+from wholebody.base.arrays import Array, Indices, brief, cross, with_values
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Range
-from wholebody.ergonomics.angles import check_person
+from wholebody.ergonomics.angles import SIDES, check_person
+from wholebody.ergonomics.work import LOAD
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.motion.strength import Strength
@@ -30,6 +31,7 @@ LEVER = 0.06
 ROUND = 5.0  # N m: smaller moments than this of either side count as none, so that the derivative is continuous
 NARROW = 0.01  # m: of soles nearer than this, seen from above, as if they were so far apart
 FEET = ("left_sole", "right_sole")
+RAISED = 0.03  # m: a sole higher than this over the lower one bears nothing
 MOST = 3400.0
 """N: compression that NIOSH's action limit allows (1981)."""
 
@@ -54,7 +56,7 @@ class Statics(NamedTuple):
     feet: tuple[inputs.Place, ...]  # the soles that bear, one or two; none for who sits
     joints: Indices  # (k,) in the tangent, of the joints with published strength
     carriers: Indices  # (k,) their joints in the model
-    upper: Array  # (k,) greatest torque towards positive angles [N m]
+    upper: Array  # (k,) greatest torque towards positive angles [N m]; infinite where none is published
     lower: Array  # (k,) least, negative
     back: tuple[int, int]  # joints of L5/S1, and of the next disc that has one
 
@@ -160,7 +162,7 @@ def statics_of(scene: Surroundings, term: Exertion | StrengthLimit) -> Statics:
              for name in figure.joints if (k := figure.joint_id(name)) not in legs]  # fmt: skip
     own, there = np.array(pairs, dtype=np.intp).T
     lower, upper = (limit[own] for limit in term.strength.limits(figure))
-    known = np.isfinite(lower) & np.isfinite(upper)
+    known = np.isfinite(lower) | np.isfinite(upper)  # of ankles one direction is
     joints = there[known]
     if standing:
         pressure(state, loads, body, 0.0)  # forces that lift are refused here
@@ -181,7 +183,7 @@ class Exertion(SumOfSquares):
 
     Attributes:
         forces: on the person beside the weight.
-        strength: of the person.
+        strength: of the person; by default the median of its sex and age.
         standing: whether both feet carry the person; False for who sits, whose legs do not count.
         person: whose torques, such as "anna", where the scene has several figures.
         weight: factor on the measure; 10 of it beside `Effort` is as strong as a habit.
@@ -224,8 +226,7 @@ class StrengthLimit(ComputedTogether):
 
     Attributes:
         forces: on the person beside the weight.
-        strength: of the person.
-        standing, person: as for `Exertion`.
+        strength, standing, person: as for `Exertion`.
         share: of the strength that may be used.
         compression: greatest of the disc L5/S1 [N]; None for no bound.
 
@@ -279,3 +280,84 @@ def back_compression(figure: Figure, q: Array, forces: Sequence[Force] = ()) -> 
     q = checks.posture(q, person.model.nq, "back_compression: q")
     term = StrengthLimit(forces, standing=False).resolve(Scene(person), q)
     return term.statics.compression(State(person.model).update(q))[0]
+
+
+@dataclass(frozen=True)
+class StaticTorques:
+    """Torques that hold a posture.
+
+    Attributes:
+        torque: joint -> torque, N m; positive towards positive angles.
+        share: joint -> share of the strength in its direction, of the joints with published strength; more than 1 is
+            more than the person can.
+        compression: of the disc L5/S1, N, as `back_compression` has it.
+
+    Examples:
+        >>> held = wb.ergonomics.static_torques(human, standing, load=5.0)
+        >>> max(held.share.values()) < 1.0
+        True
+    """
+
+    torque: Mapping[str, float]
+    share: Mapping[str, float]
+    compression: float
+
+    __repr__ = brief
+
+    @property
+    def worst(self) -> tuple[str, float]:
+        """The joint nearest to its strength, and its share; ("", 0) without any."""
+        return max(self.share.items(), key=lambda item: item[1], default=("", 0.0))
+
+    def of_side(self, side: str) -> tuple[str, float]:
+        """The same of the arm and the leg of "left" or "right"."""
+        checks.choice(side, SIDES, "side")
+        mine = {name: share for name, share in self.share.items() if name.startswith(f"{side}_")}
+        return max(mine.items(), key=lambda item: item[1], default=("", 0.0))
+
+
+def static_torques(
+    figure: Figure, q: Array, *, load: float = 0.0, seated: bool = False, strength: Strength | None = None
+) -> StaticTorques:
+    """Torques that hold a posture and a load, as of `Exertion`.
+
+    The weight of the body and of the load rests on the soles of the feet that are lowest. Of somebody seated it rests
+    on the seat, so joints of the legs are left out.
+
+    Args:
+        figure: a person.
+        q: (nq,) posture.
+        load: mass in both hands together, half in each palm, kg.
+        seated: whether a seat bears the weight.
+        strength: of the person; the median of its sex and age if left out.
+
+    Raises:
+        InputError: no person, no posture, or a value out of range.
+
+    Examples:
+        >>> round(wb.ergonomics.static_torques(human, standing, load=10.0).torque["left_elbow_flexion"], 1)
+        4.9
+    """
+    person = check_person(figure, "static_torques: figure")
+    q = checks.posture(q, person.model.nq, "static_torques: q")
+    person.warn_of_angles(q, "static_torques: q")
+    load = LOAD(load, "static_torques: load")
+    seated = checks.flag(seated, "static_torques: seated")
+    strength = Strength() if strength is None else _strength(strength, "static_torques: strength")
+    held = [Force(f"{side}_palm", (0.0, 0.0, -0.5 * GRAVITY * load)) for side in SIDES if load]
+    statics = statics_of(Scene(person), Exertion(held, strength=strength, standing=not seated))
+    state = State(person.model).update(q)
+    low = min((state.frame(one.frame).translation[2] for one in statics.feet), default=0.0)
+    bearing = tuple(one for one in statics.feet if state.frame(one.frame).translation[2] <= low + RAISED)
+    statics = with_values(statics, feet=bearing)
+    legs = person.groups["legs"] if seated else ()
+    joints = {name: person.model.joints[person.joint_id(name)] for name in person.joints if name not in legs}
+    names = {joint.idx_v: name for name, joint in joints.items() if joint.nv == 1}
+    columns = np.array(list(names), dtype=np.intp)
+    torque, _ = statics.torques(state, columns, state.column_joint[columns])
+    share, _ = statics.efforts(state)
+    return StaticTorques(
+        dict(zip(names.values(), torque.tolist(), strict=True)),
+        {names[column]: one for column, one in zip(statics.joints.tolist(), np.abs(share).tolist(), strict=True)},
+        statics.compression(state)[0],
+    )

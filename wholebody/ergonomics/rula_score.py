@@ -2,7 +2,8 @@
 
 The tables are those of the paper as the worksheets of A. Hedge (Cornell University) and ErgonomicsPlus print them. Nine
 public implementations were compared with table C; eight agree in every cell. Where the paper has words instead of
-numbers ("twisted", "raised"), the constants say what is taken.
+numbers ("twisted", "raised"), the constants say what is taken. Loads are the paper's: of more than 10 kg now and then
+it scores 2, which the worksheets shorten to 3.
 """
 
 from __future__ import annotations
@@ -124,7 +125,7 @@ def raised(arm: SideAngles) -> int:
     """Score of an upper arm that nothing supports, 1 to 6: its flexion, a raised shoulder, abduction; also of REBA."""
     bent = arm.shoulder_flexion
     score = 4 if bent > radians(90.0) else 3 if bent > radians(45.0) else 2 if abs(bent) > radians(20.0) else 1
-    return score + int(arm.shoulder_rise > RAISED) + int(abs(arm.shoulder_abduction) > ABDUCTED)
+    return score + int(arm.shoulder_rise > RAISED) + int(arm.shoulder_abduction > ABDUCTED)
 
 
 def lower_arm(arm: SideAngles) -> int:
@@ -151,8 +152,10 @@ def _trunk(angles: BodyAngles, work: Work) -> int:
     opened = pi - max(angles.left.thigh_slope, angles.right.thigh_slope) - angles.trunk_flexion
     # between trunk and thighs, from which a seated trunk with a back is well supported
     rests = bool(work.back_supported) and work.sits(angles) and opened >= radians(90.0)
-    score = 1 if rests else 1 if bent <= NEUTRAL else 2 if bent <= radians(20.0) else 3 if bent <= radians(60.0) else 4
-    return score + turned(angles.trunk_twist, angles.trunk_lateral)
+    # upright too scores 2 "if not" well supported while seated, on the worksheet of Cornell University
+    free = work.sits(angles) and not work.back_supported
+    score = 1 if bent <= NEUTRAL else 2 if bent <= radians(20.0) else 3 if bent <= radians(60.0) else 4
+    return (1 if rests else max(score, 1 + int(free))) + turned(angles.trunk_twist, angles.trunk_lateral)
 
 
 def _force(work: Work) -> int:

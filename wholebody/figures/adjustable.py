@@ -75,7 +75,7 @@ def adjustable(
     if not parts or not joints:
         raise InputError("adjustable takes parts, and slide, height or tilt; add what does not move by scene.add")
     middle = 0.5 * (model.lowerPositionLimit + model.upperPositionLimit)
-    pieces = []
+    pieces, known = [], {}
     for name, given in parts.items():
         shape, at = given if isinstance(given, tuple) and len(given) == 2 else (given, (0.0, 0.0, 0.0))
         what = f"adjustable: {checks.text(name, what)!r}"
@@ -83,6 +83,7 @@ def adjustable(
         if "/" in name or model.existFrame(name) or isinstance(shape, HalfSpace):
             raise InputError(f"{what}: take a name without a slash that no setting has, and a shape with an end")
         place = placement(at, what)
+        known[name] = shape, place
         frame = model.addFrame(pin.Frame(name, last, 0, place, pin.FrameType.BODY))
         for number, part in enumerate(shape.pieces()):
             piece = pin.GeometryObject(f"{name}:{number}", last, frame, place * part.placement, part.geometry)
@@ -96,4 +97,7 @@ def adjustable(
         postures={"middle": partial(copied, q=middle)},
         effort=dict.fromkeys(joints, 0.0),
     )
-    return Figure(ADJUSTABLE, model, geometry_model(pieces), "own", description)
+    figure = Figure(ADJUSTABLE, model, geometry_model(pieces), "own", description)
+    ranges = {"slide": slide, "height": height, "tilt": tilt}
+    figure.loaded_as = ADJUSTABLE, {"parts": known, **{name: span for name, span in ranges.items() if span is not None}}
+    return figure

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, lru_cache
 from typing import NamedTuple
 
@@ -32,6 +32,9 @@ DIMENSION = Range(0.0, 3.0, "m")
 
 AGE = Range(17.0, 69.0, "years")
 """Of the adults that were measured: 17 to 58 years the dimensions, 20 to 69 the ranges of motion."""
+
+SHOES = Range(0.0, 0.15, "m")
+CLOTHING = Range(0.0, 0.1, "m")
 
 _ENDS = {
     "elbow_flexion": "upper_arm", "wrist_flexion": "forearm", "knee_flexion": "thigh", "ankle_dorsiflexion": "shank",
@@ -57,6 +60,8 @@ class Person:
     dimensions: tuple[tuple[str, float], ...] = field(repr=False)
     stated: tuple[str, ...] = ()  # names of those that were given; the others are likely for them
     age: float | None = field(default=None, repr=False)  # years, for the ranges of motion; None for those of all adults
+    shoes: float = field(default=0.0, repr=False)  # metres of sole below the foot
+    clothing: float = field(default=0.0, repr=False)  # metres of cloth on trunk and limbs
 
     @property
     def column(self) -> str:
@@ -175,6 +180,8 @@ def make_person(
     percentile: float | None = None,
     age: float | None = None,
     proportions: Mapping[str, float] | None = None,
+    shoes: float = 0.0,
+    clothing: float = 0.0,
 ) -> Person:
     """Return a checked `Person`.
 
@@ -188,6 +195,9 @@ def make_person(
         age: years, 17 to 69, for the ranges of motion, and for dimensions that change with it; those of all adults if
             left out.
         proportions: other dimensions, metres by the names of `dimension_names`; those left out are likely for them.
+        shoes: thickness of their level soles, metres; the bare foot stands that much higher.
+        clothing: thickness of cloth around trunk, arms and legs, metres: breadths and depths grow by twice that, girths
+            by 2 pi times that, and who sits is higher by it. Hands, head and feet are bare.
 
     Raises:
         InputError: an unknown sex, a number out of the range of people, a percentile of nothing, or dimensions that
@@ -216,7 +226,9 @@ def make_person(
         raise InputError(
             f"mass {weight:g} kg does not go with stature {height:g} m; give a mass between {low:.0f} and {high:.0f} kg"
         )
-    return _made(people.sex, height, weight, years.get("age"), tuple(sorted(stated.items())))
+    person = _made(people.sex, height, weight, years.get("age"), tuple(sorted(stated.items())))
+    sole, cloth = SHOES(shoes, "shoes"), CLOTHING(clothing, "clothing")
+    return replace(person, shoes=sole, clothing=cloth) if sole or cloth else person
 
 
 @lru_cache(maxsize=256)
@@ -260,6 +272,7 @@ def describe(person: Person) -> str:
     own = "" if person.age is None else f", {person.age:g} years"
     if person.stated:
         own += ", proportions of their own"
+    own += "".join(f", {name} of {mm:.3g} mm" for name in ("shoes", "clothing") if (mm := 1e3 * getattr(person, name)))
     size = f"stature {person.stature:.4g} m, mass {person.mass:.4g} kg"
     return f"{person.sex}, {size}{own}; written by wholebody from its tables"
 
@@ -297,10 +310,11 @@ class Dimensions:
         self.toe_joint_x = toe[0]
         self.toe_half_height = person.segment("left_toes", "radius_b") * height
         self.toe_length = person.segment("left_toes", "length") * height
-        self.sole = toe[2] - self.toe_half_height
+        bare = toe[2] - self.toe_half_height
+        self.sole = bare - person.shoes
         self.heel_x = toe[0] + self.toe_length - person.size("foot_length")
         self.foot_half_width = 0.5 * person.size("foot_breadth")
-        self.hip_height = -self.sole + person.length("left_thigh") + person.length("left_shank")
+        hip_height = person.length("left_thigh") + person.length("left_shank") - bare
 
         self.hand_length = person.length("left_hand")
         self.hand_breadth = person.size("hand_breadth")
@@ -326,7 +340,7 @@ class Dimensions:
 
         upward = ("spine1", "spine2", "spine3", "spine4", "neck1", "neck2")
         above = sum(self.joint(f"{name}_flexion")[2] for name in upward)
-        self.head_top = height - self.hip_height - above
+        self.head_top = height - hip_height - above
         self.head_half_breadth = 0.5 * person.size("head_breadth")
         self.head_half_length = 0.5 * person.size("head_length")
         # Fraction of stature (Drillis & Contini, in Winter 2009).

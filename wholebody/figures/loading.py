@@ -27,7 +27,8 @@ def load(spec: str | PathLike[str], **options: Any) -> Figure:
         **options: for "human" and "avatar": `sex` ("male", "female"), `stature` in metres, `mass` in kilograms,
             `percentile` (1 to 99) for those of the two that are left out, `proportions` such as ``{"sitting_height":
             0.93}`` in metres (dimensions of ANSUR II, by the names of `docs/human.md`; the others follow as they go
-            together in people), `age` in years (17 to 69; from 45 on some ranges of motion are smaller), and `detail`
+            together in people), `age` in years (17 to 69; from 45 on some ranges of motion are smaller), `shoes`, the
+            thickness of soles, `clothing`, that of cloth on trunk and limbs, both in metres, and `detail`
             ("spheres", "capsules", "hulls"): with "spheres" the body is tested against itself and what it carries
             by its 39 spheres, and against things by its hulls; for "human": `hands` ("rigid", "fingers");
             for "hand": `side` ("left", "right"), `sex`, `stature`, `mass`, `percentile`;
@@ -72,7 +73,11 @@ def load(spec: str | PathLike[str], **options: Any) -> Figure:
 
 
 def _check_options(builder: Callable[..., Figure], options: dict[str, Any], where: str) -> None:
-    known = [name for name in inspect.signature(builder).parameters if name != "path"]
+    from wholebody.figures.anthropometry import make_person
+
+    own = inspect.signature(builder).parameters
+    known = [name for name in own if name not in ("path", "who")]
+    known += inspect.signature(make_person).parameters if "who" in own else ()
     for option, value in options.items():
         if option not in known:
             raise UnknownNameError("option", option, known, where)

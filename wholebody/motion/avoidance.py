@@ -81,7 +81,7 @@ def avoid(
             its own frame: `Hold("left_hand", relative_to="right_hand")` keeps the grip that each frame has.
         hold_feet: keep the feet of a figure that has some where they stand, as `wb.motion.StanceFeet()` does, unless
             `constraints` has a `wb.motion.StanceFeet` of its own; False lets them slide.
-        dynamics: keep the torques of joints within the strength of a person (a man of median strength if True; effort
+        dynamics: keep the torques of joints within strength (the median of the person's sex and age if True; effort
             limits of a robot), and the zero moment point within the support. What the clip exceeds already is exceeded
             by no more: no joint needs more than its strength or than its largest torque before, and in no frame is the
             zero moment point farther outside than it was. Contacts come first; the report says what is left. The method
@@ -166,7 +166,7 @@ class _Judge:
         self._clip = Clip(scene.figure, clip.q, clip.dt, clip.name)  # with what the figure carries
         self._loads = None
         if self._strength is not None:
-            self._loads = torques(self._clip, feet=self.feet, strength=self._strength)
+            self._loads = torques(self._clip, scene, feet=self.feet, strength=self._strength)
         self._was = check(clip, scene, depth=COLLISION)
         terms = frame_terms(scene, clip.q, clip.dt, given, method.clearance)
         self.asked = _bounds(given, self._was, terms, keep_ends)
@@ -178,7 +178,8 @@ class _Judge:
         change = None
         if self._loads is not None and self._strength is not None:
             places = None if result.times is None else result.times / self._clip.dt
-            change = load_change(self._loads, self._clip.with_q(result.q), places, self._strength, self.feet)
+            after = self._clip.with_q(result.q)
+            change = load_change(self._loads, after, places, self._strength, self.feet, self.terms.scene)
         report = judged(self._was, self.terms, self.asked, result, run.work, self._name, change)
         more = ["the caller ended it" if run.ended else "", run.work.left_out, "" if report.solved else self.foreseen]
         return replace(report, message="; ".join(filter(None, [report.message, *more])))

@@ -32,7 +32,7 @@ CLEARANCE = Range(0.0, 0.5, "m")  # of a method that keeps one
 
 
 class AvoidProgress(NamedTuple):
-    """Told while a clip is freed: the share done so far, from 0 to 1, and what is being done."""
+    """Called while a clip is freed: the share done so far, from 0 to 1, and what is being done."""
 
     share: float
     note: str
@@ -140,7 +140,7 @@ class Run:
     terms: FrameTerms  # original postures, what holds in each of them, figure and things
     workspace: Workspace  # of this run alone
     clearance: float  # least distance of every pair, metres
-    watch: Watch  # is told how far it is
+    watch: Watch  # follows the progress
     feet: tuple[str, ...] = ()  # segments or frames on which the figure stands
     work: Work = field(default_factory=Work)  # counts programs and postures
 

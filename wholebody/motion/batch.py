@@ -34,7 +34,7 @@ Source = Clip | str | os.PathLike[str]
 
 
 class BatchProgress(NamedTuple):
-    """Told when a case is done: how many are, those of an earlier run included, of how many, and which was the last.
+    """Called when a case is done: how many are, those of an earlier run included, of how many, and which was the last.
 
     Examples:
         >>> done = wb.motion.BatchProgress(3, 12, None)
@@ -116,7 +116,7 @@ def avoid_many(
     if twice is not None:
         raise InputError(f"{what}: two pieces of equipment are named {checks.shown(twice)}; give each another name")
     worn: dict[str, Worn] = {label(one): one for one in pieces}
-    ways = _ways([as_avoider(one) for one in checks.listed(methods, f"{what}: methods", "['trajectory']")])
+    avoiders = _by_name([as_avoider(one) for one in checks.listed(methods, f"{what}: methods", "['trajectory']")])
     feet = checks.flag(options.get("hold_feet", True), f"{what}: hold_feet")
     held: AvoidOptions = {"constraints": given, "hold_feet": feet}
     if checks.flag(options.get("keep_ends", False), f"{what}: keep_ends"):
@@ -132,7 +132,7 @@ def avoid_many(
         _Asked(AvoidedCase(name, wears, way, asked=_fingerprint(marks[name], one, method, held)), one, method)
         for name in sources
         for wears, one in worn.items()
-        for way, method in ways.items()
+        for way, method in avoiders.items()
     ]
     return batch.freed(asked, faults, held)
 
@@ -300,7 +300,7 @@ def _sources(given: Sequence[Any], figure: Figure | None, what: str) -> dict[str
     return dict(found)
 
 
-def _ways(methods: Sequence[Avoider]) -> dict[str, Avoider]:
+def _by_name(methods: Sequence[Avoider]) -> dict[str, Avoider]:
     """The methods by name; further settings of one name have a number."""
     found: dict[str, Avoider] = {}
     for method in methods:

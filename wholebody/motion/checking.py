@@ -124,7 +124,7 @@ class ClipCheck(Shown):
 
     def __str__(self) -> str:
         """Three lines: whether it is free, the deepest overlap, and limits, speeds, feet and jerk."""
-        told = f"{self.clip.name}, {len(self.clip)} frames: "
+        heading = f"{self.clip.name}, {len(self.clip)} frames: "
         first = f"nothing overlaps by more than {1e3 * self.tolerance:g} mm"
         if not self.free:
             between = f"{self.dips} times between free frames"
@@ -134,7 +134,7 @@ class ClipCheck(Shown):
             worst = max(self.contacts, key=lambda contact: contact.deepest)
             deepest += f", {worst.first} and {worst.second} at {worst.deepest_frame * self.clip.dt:.2f} s"
         return (
-            f"{told}{first}\n{deepest}\n{len(self.limits)} joints beyond limits, {len(self.speeds)} too fast; feet "
+            f"{heading}{first}\n{deepest}\n{len(self.limits)} joints beyond limits, {len(self.speeds)} too fast; feet "
             f"slide {1e3 * self.slid:.1f} mm at most; jerk {self.mean_jerk:.0f} rad/s^3"
         )
 
@@ -294,6 +294,6 @@ def _worst_first(columns: Iterable[tuple[str, Array, float, float, float]]) -> t
         worst = int(np.argmax(excess))
         if excess[worst] > rounding:
             count, broken = int((excess > rounding).sum()), low if values[worst] < low else high
-            told = Beyond(name, count, worst, float(values[worst]), float(broken))
-            found.append((float(excess[worst]) - rounding, told))
+            worst_of = Beyond(name, count, worst, float(values[worst]), float(broken))
+            found.append((float(excess[worst]) - rounding, worst_of))
     return tuple(each for _, each in sorted(found, key=lambda item: -item[0]))

@@ -49,7 +49,7 @@ def dip_depth(workspace: Workspace, before: Array, after: Array) -> float:
 
 
 def dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, list[float]]:
-    """Gaps that dip, and the shares of each at which its pairs are deepest; nearly the same share is told once."""
+    """Gaps that dip, and the shares of each at which its pairs are deepest; nearly the same share is listed once."""
     found = dipping(workspace, q, gaps)
     return {gap: _deepest(workspace, q[gap], q[gap + 1], numbers[:6]) for gap, numbers in found.items()}
 
@@ -76,7 +76,7 @@ def _deepest(workspace: Workspace, before: Array, after: Array, numbers: Sequenc
     contact = workspace.sweep.first_contact(before, after, tolerance=DIP)
     begun: tuple[float, ...] = () if contact is None else (contact.fraction, contact.fraction + 2e-3)
     shares = sorted({*(k / 64.0 for k in range(65)), *begun})
-    told, golden = list[float](), 0.5 * (5.0**0.5 - 1.0)
+    kept, golden = list[float](), 0.5 * (5.0**0.5 - 1.0)
     for pieces in pairs:
         place = 1 + int(np.argmin([distance(pieces, share) for share in shares[1:-1]]))
         low, high = shares[place - 1], shares[place + 1]
@@ -84,9 +84,9 @@ def _deepest(workspace: Workspace, before: Array, after: Array, numbers: Sequenc
             first, second = high - golden * (high - low), low + golden * (high - low)
             low, high = (low, second) if distance(pieces, first) < distance(pieces, second) else (first, high)
         deepest = float(0.5 * (low + high))
-        if all(abs(deepest - other) > 0.01 for other in told):
-            told.append(deepest)
-    return told
+        if all(abs(deepest - other) > 0.01 for other in kept):
+            kept.append(deepest)
+    return kept
 
 
 def depth(workspace: Workspace, q: Array, clearance: float = 0.0) -> float:

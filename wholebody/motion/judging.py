@@ -231,7 +231,7 @@ def foreseen(terms: FrameTerms, was: ClipCheck, keep_ends: bool) -> str:
 
 def _held(terms: FrameTerms, was: ClipCheck) -> str:
     """What is held, with what it carries, where it is inside of a thing, so that no method can free it."""
-    figure, model, told, feet = terms.scene.figure, terms.scene.model, list[str](), False
+    figure, model, parts, feet = terms.scene.figure, terms.scene.model, list[str](), False
     carrier = {name: each.segment for name, each in terms.scene.objects.items() if each.segment is not None}
     carrier |= {name: name for name in figure.segments}
     stands = [{model.frames[figure.frame_id(name)].parentJoint for name in names} for names in terms.stands]
@@ -248,13 +248,13 @@ def _held(terms: FrameTerms, was: ClipCheck) -> str:
         if inside.any():
             feet = feet or bool((standing & inside).any())
             word = "stands" if standing.any() else "is held"
-            told.append(f"{part} {word} up to {1e3 * contact.depth[inside].max():.0f} mm inside {thing}")
-    if not told:
+            parts.append(f"{part} {word} up to {1e3 * contact.depth[inside].max():.0f} mm inside {thing}")
+    if not parts:
         return ""
     mend = (
         "let feet slide by hold_feet=False, or retarget the recording with this scene, which puts feet on what is below"
     )
-    return f"{', '.join(told)}, and is held there; {mend} them" if feet else f"{', '.join(told)}; leave that Hold out"
+    return f"{', '.join(parts)}, and is held there; {mend} them" if feet else f"{', '.join(parts)}; leave that Hold out"
 
 
 def _jumps(was: ClipCheck) -> str:
@@ -281,7 +281,7 @@ def _jumps(was: ClipCheck) -> str:
 def _ends(was: ClipCheck) -> str:
     """Which of the ends that are to be kept collide, and where the clip could begin or end."""
     free = np.flatnonzero(was.depth <= DEPTH)
-    told = []
+    parts = []
     for word, frame in (("first", 0), ("last", len(was.depth) - 1)):
         if was.depth[frame] > DEPTH:
             worst = max(was.contacts, key=lambda contact: contact.depth[frame], default=None)
@@ -289,7 +289,7 @@ def _ends(was: ClipCheck) -> str:
             mend = "leave keep_ends out"
             if len(free):
                 mend = f"give clip[{free[0]}:]" if word == "first" else f"give clip[:{free[-1] + 1}]"
-            told.append(
+            parts.append(
                 f"the {word} posture overlaps by {1e3 * was.depth[frame]:.1f} mm{pair} and cannot be kept; {mend}"
             )
-    return "; ".join(told)
+    return "; ".join(parts)

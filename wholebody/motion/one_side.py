@@ -53,15 +53,15 @@ def keep_back(
     run: Run, q: Array, gap: int, most: int, first: int = 0, *, cancelled: Callable[[], bool] | None = None
 ) -> bool:
     """Keep frames beside a gap on one side of what its motion passes, in place, `most` at most; whether done."""
-    ways = {side: _beside(run, q, gap, side, SHALLOW, first) for side in (1, -1)}
-    found = dict[int, list[Array]]((side, []) for side in ways)
+    sides = {side: _beside(run, q, gap, side, SHALLOW, first) for side in (1, -1)}
+    found = dict[int, list[Array]]((side, []) for side in sides)
     for _ in range(most):
-        for side, way in list(ways.items()):  # in turn, so that the shorter way ends both
+        for side, postures in list(sides.items()):  # in turn, so that the shorter motion ends both
             if cancelled is not None and cancelled():
                 return False
-            posture = next(way, None)
+            posture = next(postures, None)
             if posture is None:
-                del ways[side]
+                del sides[side]
                 continue
             found[side].append(posture.q)
             if posture.joined:

@@ -96,8 +96,8 @@ def smoothed(run: Run, q: Array, asked: MotionBounds) -> Smoothed:
         for window in run.windows(beyond, 0.5):
             frames = slice(window.first, window.end)
             if not run.ended:
-                told = run.watch.teller(1.0, 0.0, f"frames {window.first} to {window.end - 1} are made smooth")
-                smooth = windows.window(window, found, told, q)
+                report = run.watch.teller(1.0, 0.0, f"frames {window.first} to {window.end - 1} are made smooth")
+                smooth = windows.window(window, found, report, q)
                 if not smooth.missed and not run.ended:
                     q[frames], count = smooth.q, count + 1
         beyond = excess(clip, clip.with_q(q), asked).beyond

@@ -21,7 +21,7 @@ from wholebody.motion.standing_ground import Ground
 from wholebody.motion.structure import upright
 
 SMALL = 1e-9
-"""Metres: shorter ways have no direction."""
+"""Metres: shorter vectors have no direction."""
 
 
 UPRIGHT = 0.7
@@ -95,14 +95,14 @@ def standing_places(figure: Figure, roles: Roles) -> tuple[dict[str, Array], dic
     data, geometry = figure.model.createData(), figure.geometry.createData()
     q = upright(figure)
     pin.framesForwardKinematics(figure.model, data, q)
-    found = {role: data.oMf[figure.frame_id(frame)] for role, frame in roles.frames.items()}
+    places = {role: np.array(data.oMi[joint].act(at)) for role, (joint, at) in roles.places(figure).items()}
     pin.updateGeometryPlacements(figure.model, data, figure.geometry, geometry)
     low = np.inf
     for piece, at in zip(figure.geometry.geometryObjects, geometry.oMg, strict=True):
         corners = at.rotation @ box_corners(piece.geometry).T + at.translation[:, None]
         low = min(low, float(corners[2].min()))
     return (
-        {role: at.translation.copy() for role, at in found.items()},
+        places,
         {role: data.oMf[figure.frame_id(frame)].rotation.copy() for role, frame in roles.turns.items()},
         low if np.isfinite(low) else 0.0,
     )
@@ -114,13 +114,13 @@ def rest_axes(motion: SkeletonMotion, roles: Roles) -> Array | None:
     body = _Body({role: rest[motion.names.index(joint)] for role, joint in roles.joints.items()})
     top = next((role for role in ("shoulders", "neck", "head", "chest") if body.has("hips", role)), None)
     up = np.array([0.0, 0.0, 1.0])
-    ways = [] if top is None else [body.way("hips", top)]
+    vectors = [] if top is None else [body.way("hips", top)]
     for side in ("left", "right"):
         for first, second in (("hip", "knee"), ("knee", "ankle")):
             if body.has(f"{side}_{first}", f"{side}_{second}"):
-                ways.append(-body.way(f"{side}_{first}", f"{side}_{second}"))
+                vectors.append(-body.way(f"{side}_{first}", f"{side}_{second}"))
     pair = next((part for part in ("hip", "shoulder") if body.has(f"left_{part}", f"right_{part}")), None)
-    if pair is None or not ways or any(way @ up < UPRIGHT * np.linalg.norm(way) for way in ways):
+    if pair is None or not vectors or any(way @ up < UPRIGHT * np.linalg.norm(way) for way in vectors):
         return None
     left = body.way(f"right_{pair}", f"left_{pair}")
     left = left - (left @ up) * up
@@ -167,8 +167,8 @@ class Proportions:
         root = turns.get("pelvis", _pelvis(source, motion))
         if self._fixed:  # only what moves relative to the pelvis can be followed
             back = np.swapaxes(root, 1, 2)
-            ways = {role: at - source.places["hips"] for role, at in source.places.items()}
-            turned = {role: (back @ way[:, :, None])[:, :, 0] for role, way in ways.items()}
+            vectors = {role: at - source.places["hips"] for role, at in source.places.items()}
+            turned = {role: (back @ way[:, :, None])[:, :, 0] for role, way in vectors.items()}
             source = _Body(turned, self._source)
             turns = {role: back @ turn for role, turn in turns.items() if role != "pelvis"}
             hips = np.tile(own.places.get("hips", np.zeros(3)), (len(motion), 1))
@@ -323,10 +323,12 @@ def soles(
             continue
         flat = stands[ankle] & stands[toe]
         start, end = (motion.names.index(roles.joints[role]) for role in (ankle, toe))
-        ways = motion.positions[:, end] - motion.positions[:, start]
-        heading, own = ways[flat] * (1.0, 1.0, 0.0), places[toe] - places[ankle]
+        vectors = motion.positions[:, end] - motion.positions[:, start]
+        heading, own = vectors[flat] * (1.0, 1.0, 0.0), places[toe] - places[ankle]
         along = np.linalg.norm(heading, axis=1)
-        if not flat.any() or along.min() < 0.5 * np.median(np.linalg.norm(ways, axis=1)):  # a hanging foot says nothing
+        if not flat.any() or along.min() < 0.5 * np.median(
+            np.linalg.norm(vectors, axis=1)
+        ):  # a hanging foot says nothing
             continue
         rise = float(own[2] / np.linalg.norm(own))
         wanted = heading / along[:, None] * np.sqrt(1.0 - rise**2) + (0.0, 0.0, rise)

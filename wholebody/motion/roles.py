@@ -6,15 +6,19 @@ import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
+import numpy as np
+
+from wholebody.base.arrays import Array
 from wholebody.base.checks import path as checked_path
 from wholebody.base.checks import shown
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.files import packaged_table, parsed_toml, read_text
 from wholebody.figures.figure import Figure
 from wholebody.motion.skeleton import SkeletonMotion
-from wholebody.motion.structure import built, built_figure
+from wholebody.motion.structure import built, built_figure, link_end, side_of
 
 ROWS = packaged_table(Path(__file__).parent / "data" / "roles.csv")
 
@@ -31,7 +35,17 @@ class Roles(NamedTuple):
     table: str  # name of the table that matched the skeleton
     # roles of the figure that no joint of the skeleton is known to have, if there are others to name
     missing: tuple[str, ...] = ()
-    told: tuple[str, ...] = ()  # roles whose joints are known by the skeleton's structure alone
+    by_structure: tuple[str, ...] = ()  # roles whose joints are known by the skeleton's structure alone
+    # where in its frame (3,) a wrist is of which the forearm ends without a joint, metres; others are where frames are
+    ends: Mapping[str, Array] = MappingProxyType({})
+
+    def places(self, figure: Figure) -> dict[str, tuple[int, Array]]:
+        """Joint of the figure that carries each role, and where (3,) it is in it, metres."""
+        frames = {role: figure.model.frames[figure.frame_id(name)] for role, name in self.frames.items()}
+        return {
+            role: (int(frame.parentJoint), frame.placement.act(self.ends.get(role, np.zeros(3))))
+            for role, frame in frames.items()
+        }
 
 
 def matched(
@@ -66,7 +80,18 @@ def matched(
         table,
         tuple(role for role in asked if role in frames and role not in found),
         tuple(role for role in common if role in more),
+        _ends(figure, {role: frames[role] for role in common}),
     )
+
+
+def _ends(figure: Figure, frames: Mapping[str, str]) -> dict[str, Array]:
+    """Where wrists are that have the frames of their elbows."""
+    found = {}
+    for role, name in frames.items():
+        if role.endswith("wrist") and name == frames.get(role.replace("wrist", "elbow")):
+            frame = figure.model.frames[figure.frame_id(name)]
+            found[role] = frame.placement.actInv(link_end(figure, frame.parentJoint))
+    return found
 
 
 def skeleton_roles(
@@ -130,16 +155,12 @@ def figure_roles(figure: Figure) -> dict[str, str]:
     found: dict[str, str] = {}
     parts = [role.removeprefix("left_") for role in ROLES if role.startswith("left_")]
     for joint in figure.joints:
-        words = joint.lower()
-        side = next(
-            (side for side in ("left", "right") if re.search(rf"{side}|(?<![a-z]){side[0]}(?![a-z])", words)), ""
-        )
-        part = next((part for part in parts if part in words), "")
+        side = ("", "left", "right")[side_of(joint)]
+        part = next((part for part in parts if part in joint.lower()), "")
         # Of several joints at a hip, a shoulder or an ankle the last one is where they meet; of a wrist the first.
         if side and part and (part in ("hip", "shoulder", "ankle") or f"{side}_{part}" not in found):
             found[f"{side}_{part}"] = joint
-    if not {"left_knee", "left_elbow"} <= found.keys():  # a humanoid whose joints are numbered, such as Talos
-        found = built_figure(figure) | found
+    found = built_figure(figure) | found  # joints of some are numbered, such as those of Talos
     if figure.root == "free":
         links = (*figure.segments, *figure.frames)  # a root link without a shape is no segment
         found["pelvis"] = next(name for name in links if figure.model.frames[figure.frame_id(name)].parentJoint == 1)

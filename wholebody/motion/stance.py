@@ -280,12 +280,17 @@ class Sliding:
 
 def paths(figure: Figure, q: Array, frames: tuple[str, ...]) -> Array:
     """Positions (n, frames, 3) of frames in the world at postures (n, nq), metres."""
-    data, numbers = figure.model.createData(), [figure.frame_id(name) for name in frames]
-    found = np.zeros((len(q), len(frames), 3))
+    found = [figure.model.frames[figure.frame_id(name)] for name in frames]
+    return point_paths(figure, q, [(int(frame.parentJoint), frame.placement.translation) for frame in found])
+
+
+def point_paths(figure: Figure, q: Array, points: Sequence[tuple[int, Array]]) -> Array:
+    """The same (n, p, 3) of points, of each its joint and where (3,) it is in it."""
+    data, found = figure.model.createData(), np.zeros((len(q), len(points), 3))
     for k, posture in enumerate(q):
         pin.forwardKinematics(figure.model, data, posture)
-        for i, number in enumerate(numbers):
-            found[k, i] = pin.updateFramePlacement(figure.model, data, number).translation
+        for i, (joint, place) in enumerate(points):
+            found[k, i] = data.oMi[joint].act(place)
     return found
 
 

@@ -1,4 +1,8 @@
-"""Joint strength of people: the largest torques that muscles exert (Stobbe 1982; `figures/data/strength.csv`)."""
+"""Joint strength of people: the largest torques that muscles exert (Stobbe 1982; `figures/data/strength.csv`).
+
+From 40 years on men lose 12 % of it in ten years (Hurley 1995, Journals of Gerontology 50A: 12 to 15 %), women 7.6 %
+(Hunter, Thompson, Adams 2000, Journal of Gerontology 55A(6): knee extensors 9.3, plantar flexors 7.4, grip 6.2 %).
+"""
 
 from __future__ import annotations
 
@@ -10,10 +14,13 @@ import numpy as np
 from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.fields import Checked, Range
+from wholebody.figures.anthropometry import AGE
 from wholebody.figures.figure import Figure
 from wholebody.figures.tables import table
 
 PERCENTILES = (5.0, 50.0, 95.0)
+STRONGEST = 40.0  # years: until which strength is whole
+LOSS = {"male": 0.012, "female": 0.0076}  # a year, of the strength at that age
 
 
 def _sex(value: Any, _: str) -> str:
@@ -29,10 +36,11 @@ class Strength(Checked):
 
     Attributes:
         percentile: share of people of this sex who are weaker, 5 to 95.
-        sex: "male" or "female".
+        sex: "male" or "female"; None for that of the figure, and male for a figure without one.
+        age: years, 17 to 69; None for that of the figure, and under 40 for a figure without one.
 
     Raises:
-        InputError: a percentile beyond what was measured.
+        InputError: a percentile or an age beyond what was measured.
         UnknownNameError: another sex.
 
     Examples:
@@ -40,22 +48,27 @@ class Strength(Checked):
     """
 
     percentile: Annotated[float, Range(PERCENTILES[0], PERCENTILES[-1])] = 50.0
-    sex: Annotated[str, _sex] = "male"
+    sex: Annotated[str, _sex] | None = None
+    age: Annotated[float, AGE] | None = None
 
     def limits(self, figure: Figure) -> tuple[Array, Array]:
         """Least and largest torques (nv,) of a figure's joints, N m; infinite where none is published, as of a root."""
         from scipy.special import ndtri
 
         checks.instance(figure, Figure, "Strength.limits: figure", "load one with wb.load('human')")
+        person = figure.describe().person
+        sex = self.sex or ("male" if person is None else person.sex)
+        age = (None if person is None else person.age) if self.age is None else self.age
+        left = 1.0 - LOSS[sex] * max((age or STRONGEST) - STRONGEST, 0.0)
         lower, upper = np.full(figure.model.nv, -np.inf), np.full(figure.model.nv, np.inf)
         for name in figure.joints:
             joint = figure.model.joints[figure.joint_id(name)]
             for row in table("strength") if joint.nv == 1 else ():
                 if row["joint"] == _kind(name):
                     sign, bounds = (-1.0, lower) if row["sign"] == "-" else (1.0, upper)
-                    logs = np.log([float(row[f"{self.sex}_{percentile:g}"]) for percentile in PERCENTILES])
+                    logs = np.log([float(row[f"{sex}_{percentile:g}"]) for percentile in PERCENTILES])
                     place = np.interp(ndtri(self.percentile / 100.0), ndtri(np.array(PERCENTILES) / 100.0), logs)
-                    bounds[joint.idx_v] = sign * np.exp(place)
+                    bounds[joint.idx_v] = sign * left * np.exp(place)
         return lower, upper
 
 

@@ -16,6 +16,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.figures.figure import Figure
+from wholebody.geometry.pieces import box_corners
 from wholebody.motion.skeleton import UNITS, SkeletonMotion, longest_way
 
 PARTS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist", "head")
@@ -51,10 +52,11 @@ def limb_pairs(parents: Indices, offsets: Array) -> tuple[tuple[int, _Limb, _Lim
             for one, other in combinations(limbs, 2)
             if len(one.joints) == len(other.joints)
         ]
-        alike = [pair for pair in alike if pair[0] < 0.15]
-        if alike:
-            _, one, other = min(alike, key=lambda each: each[0])
-            found.append((joint, one, other))
+        taken = list[_Limb]()  # arms and legs of a stiff trunk begin at one joint
+        for _, one, other in sorted((pair for pair in alike if pair[0] < 0.15), key=lambda each: each[0]):
+            if one not in taken and other not in taken:
+                taken += one, other
+                found.append((joint, one, other))
     found = sorted(found, key=lambda pair: pair[1].length + pair[2].length, reverse=True)[:2]
     if len(found) < 2:
         return ()
@@ -83,11 +85,13 @@ def _limb(start: int, children: list[list[int]], lengths: Array, reach: Array) -
     return _Limb(joints, first, bones) if sum(bones) > 0.4 * reach[start] else None
 
 
-def built(motion: SkeletonMotion) -> dict[str, str]:
-    """Role to joint of a skeleton by its structure; empty where it is no person's."""
+def built(motion: SkeletonMotion, stands: bool = False) -> dict[str, str]:
+    """Role to joint of a skeleton by its structure; empty where it is no person's. What `stands` has its legs below."""
     pairs = limb_pairs(motion.parents, motion.offsets)
     if not pairs:
         return {}
+    if stands:
+        pairs = tuple(sorted(pairs, key=lambda pair: float(motion.positions[0, pair[1].joints[-1], 2])))
     places = motion.positions[:: max(1, len(motion) // 50)]
     (hips, *legs), (chest, *arms) = pairs
     found = {"pelvis": hips} if hips == chest else {"pelvis": hips, "chest": chest}
@@ -95,8 +99,11 @@ def built(motion: SkeletonMotion) -> dict[str, str]:
         for side, limb in zip(("left", "right"), _sided(motion, places, pair, legs), strict=True):
             found |= {f"{side}_{part}": joint for part, joint in zip(parts, _parts(motion, limb), strict=False)}
     taken = {joint for limb in (*legs, *arms) for joint in limb.joints}
+    while hips >= 0:  # from a chest that is the root a way leads down to the legs
+        taken.add(hips)
+        hips = int(motion.parents[hips])
     above = [k for k in range(len(motion.names)) if motion.parents[k] == chest and k not in taken]
-    if chest != hips and above:
+    if "chest" in found and above:
         neck = [max(above, key=lambda k: _reach(motion, k))]
         while below := [k for k in range(len(motion.names)) if motion.parents[k] == neck[-1]]:
             neck.append(max(below, key=lambda k: _reach(motion, k)))
@@ -114,15 +121,15 @@ def _parts(motion: SkeletonMotion, limb: _Limb) -> list[int]:
     size, rest = SHORT * motion.length(), motion.rest()
     first, middle, last = limb.joints[limb.first : limb.first + 3]
     beyond = [k for k in limb.joints[limb.first + 3 :] if np.linalg.norm(rest[k] - rest[last]) > size]
-    ways = rest[beyond] - rest[last]
+    offsets = rest[beyond] - rest[last]
     down = (rest[last] - rest[middle]) / np.linalg.norm(rest[last] - rest[middle])
-    ahead = np.abs(ways @ down) < 0.9 * np.linalg.norm(ways, axis=1)  # a joint in the sole is no toe
+    ahead = np.abs(offsets @ down) < 0.9 * np.linalg.norm(offsets, axis=1)  # a joint in the sole is no toe
     straight = not ahead.any()  # an arm, or a foot that hangs
     return [first, middle, last, *[k for k, off in zip(beyond, ahead, strict=True) if off or straight][:1]]
 
 
 def _sided(motion: SkeletonMotion, places: Array, pair: list[_Limb], legs: list[_Limb]) -> list[_Limb]:
-    signs = [sum(_letter(motion.names[joint]) for joint in limb.joints) for limb in pair]
+    signs = [sum(side_of(motion.names[joint]) for joint in limb.joints) for limb in pair]
     if signs[0] * signs[1] < 0:
         return pair if signs[0] > 0 else pair[::-1]
     left = np.zeros((len(places), 3))
@@ -133,7 +140,7 @@ def _sided(motion: SkeletonMotion, places: Array, pair: list[_Limb], legs: list[
     return pair if float((left * apart).sum()) >= 0.0 else pair[::-1]
 
 
-def _letter(name: str) -> int:
+def side_of(name: str) -> int:
     """1 for a name of the left side, -1 for one of the right, 0 for neither."""
     plain = re.sub(r"^.*[:|]", "", name)
     side = re.search(r"left|right", plain, re.IGNORECASE) or re.search(
@@ -143,40 +150,74 @@ def _letter(name: str) -> int:
 
 
 def upright(figure: Figure) -> Array:
-    """(nq,) the posture in which a figure stands with flat soles and straight limbs: a robot's zero, if it has one."""
-    return np.asarray(figure.posture("zero") if "zero" in figure.postures else figure.neutral)
+    """(nq,) a posture with flat soles and straight limbs, looking along x: a robot's zero, if it has one."""
+    q: Array = np.array(figure.posture("zero") if "zero" in figure.postures else figure.neutral)
+    if figure.root == "free":
+        data = figure.model.createData()
+        pin.forwardKinematics(figure.model, data, q)
+        left = sum(side_of(name) * at.translation for name, at in zip(figure.model.names, data.oMi, strict=True))
+        turns = round(float(np.arctan2(-left[0], left[1]) / (0.5 * np.pi)))  # quarters, of robots that look elsewhere
+        turn = pin.Quaternion(pin.AngleAxis(-0.5 * np.pi * turns, np.array([0.0, 0.0, 1.0])))
+        q[3:7] = (turn * pin.Quaternion(q[3:7])).coeffs() if turns else q[3:7]
+    return q
+
+
+def link_end(figure: Figure, joint: int) -> Array:
+    """(3,) the far end of what a joint carries, in its axes, metres; the joint itself where it carries nothing."""
+    pieces = [piece for piece in figure.geometry.geometryObjects if piece.parentJoint == joint]
+    corners = [[0.0, 0.0, 0.0], *(piece.placement.act(at) for piece in pieces for at in box_corners(piece.geometry))]
+    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+    end, axis = 0.5 * (low + high), int(np.argmax(np.maximum(high, -low)))
+    end[axis] = high[axis] if high[axis] > -low[axis] else low[axis]
+    return np.asarray(end)
 
 
 def built_figure(figure: Figure) -> dict[str, str]:
-    """Joint by role of a figure without names of parts, by its limbs at its zero; empty where it is no person's."""
-    # Near joints are one: a hip is where its last joint is, a wrist where its first one is.
+    """Joint by role of a figure, by its limbs at its zero; empty where it is no person's.
+
+    A wrist has the joint of the elbow where the forearm ends without one.
+    """
+    # Joints of one place are one, and a hinge is anywhere along its axis: that of a thigh's turn is at the hip.
     model, data = figure.model, figure.model.createData()
-    pin.forwardKinematics(model, data, upright(figure))
-    at = np.array([place.translation for place in data.oMi])
-    root = 1 if figure.root == "free" else 0
+    pin.computeJointJacobians(model, data, upright(figure))
+    real = np.array([place.translation for place in data.oMi])
+    at, root = real.copy(), 1 if figure.root == "free" else 0
     near = NEAR_JOINTS * float(np.ptp(at[root:], axis=0).max())
     first, groups, parents = {root: 0}, [[root]], [-1]  # joint to its group
     for joint in range(root + 1, model.njoints):
-        own = first[model.parents[joint]]
-        if own and np.linalg.norm(at[joint] - at[groups[own][-1]]) < near and model.parents[joint] == groups[own][-1]:
+        before, columns = model.parents[joint], model.joints[joint]
+        own, way = first[before], at[before] - at[joint]
+        axis = data.J[3:, columns.idx_v] if columns.nv == 1 else np.zeros(3)  # none of what slides
+        along = (axis @ way) * axis
+        if own and list(model.parents).count(before) == 1 and np.linalg.norm(way - along) < near:
             groups[own].append(joint)
+            at[joint] += along
         else:
             parents.append(own)
             groups.append([joint])
             own = len(groups) - 1
         first[joint] = own
-    places = np.array([at[group[-1]] for group in groups])
-    offsets = np.array([places[k] - places[max(parent, 0)] for k, parent in enumerate(parents)])
-    names = tuple(model.names[group[-1]] for group in groups)
-    still = SkeletonMotion(
-        names, np.array(parents), offsets, np.tile(np.eye(3), (1, len(names), 1, 1)), places[None], 1.0
-    )
-    wrists = {model.names[group[-1]]: model.names[group[0]] for group in groups}
-    return {
-        role: wrists[name] if role.endswith("wrist") else name
-        for role, name in built(still).items()
+    places, names = [at[group[-1]] for group in groups], list[dict[str, str]]()
+    for group, place in zip(groups, places, strict=True):
+        away = np.round(np.linalg.norm(real[group] - place, axis=1), 3)
+        meeting = group[len(group) - 1 - int(np.argmin(away[::-1]))]  # of those at the place the last one
+        named = {"wrist": group[0], "ankle": group[-1], "head": group[-1], "": meeting}
+        names.append({part: model.names[joint] for part, joint in named.items()})
+    for number, group in enumerate(groups):  # where links end
+        if number not in parents and group[-1] not in model.parents:
+            parents.append(number)
+            places.append(data.oMi[group[-1]].act(link_end(figure, group[-1])))
+            names.append({"": model.names[group[-1]]})
+    offsets = np.array([place - places[max(parent, 0)] for place, parent in zip(places, parents, strict=True)])
+    numbers = tuple(f"{names[k]['']} {k}" for k in range(len(names)))
+    turns = np.tile(np.eye(3), (1, len(names), 1, 1))
+    still = SkeletonMotion(numbers, np.array(parents), offsets, turns, np.array(places)[None], 1.0)
+    found = {
+        role: names[numbers.index(name)]
+        for role, name in built(still, stands=True).items()
         if role.split("_")[-1] in PARTS
     }
+    return {role: own.get(role.split("_")[-1], own[""]) for role, own in found.items()}
 
 
 def recognised_unit(parents: Indices, offsets: Array) -> str:

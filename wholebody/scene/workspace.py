@@ -96,8 +96,8 @@ class Workspace(NotCopyable):
     def next_frame(self, q: Array) -> FrameMotion | None:
         """The frame in which the things go that moved since the last one; None if none did, and none is in the figure.
 
-        Things are where it ends. Those that were put into the figure are among them: it leaves them, or is told. The
-        figure begins at the posture q (nq,).
+        Things are where it ends. Those that were put into the figure are among them: it leaves them, or reports them.
+        The figure begins at the posture q (nq,).
         """
         if not (self.moved or self._inside):
             return None

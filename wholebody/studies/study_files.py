@@ -12,6 +12,7 @@ from wholebody.base.arrays import with_values
 from wholebody.base.checks import shown
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.files import is_file
+from wholebody.figures.adjustable import ADJUSTABLE
 from wholebody.geometry.placement import placement
 from wholebody.methods import METHODS
 from wholebody.problem import Problem
@@ -72,7 +73,8 @@ class TaskFile:
     def _figures(self, person: Mapping[str, Any]) -> list[Entry]:
         """The figures of the file, with a person in place of the only one, or of the one called so."""
         entries = list(self.contents.tables["figure"])
-        known = {e.values.get("called", ""): place for place, e in enumerate(entries) if "on" not in e.values}
+        known = {e.values.get("called", ""): place for place, e in enumerate(entries)
+                 if "on" not in e.values and e.name != ADJUSTABLE}  # fmt: skip
         if len(known) > 1 and "called" not in person:
             raise InputError(
                 f"study: {self.path.name} has several figures; say whose place a person takes: "

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, fields, replace
+from typing import Any
 
 from wholebody import ergonomics, methods, tasks
 from wholebody.base.fields import Range, Vector
-from wholebody.figures.anthropometry import AGE, MASS, PERCENTILE, STATURE
+from wholebody.figures.adjustable import ADJUSTABLE
+from wholebody.figures.anthropometry import AGE, CLOTHING, MASS, PERCENTILE, SHOES, STATURE
 from wholebody.figures.link_pieces import CONCAVITY
 from wholebody.geometry import shapes
 from wholebody.geometry.pieces import SMALLEST
@@ -53,20 +56,8 @@ def _needed(**given: Kind) -> tuple[Key, ...]:
 _PERSON = _keys(
     sex=Choice(("male", "female")), stature=Number(STATURE), mass=Number(MASS), percentile=Number(PERCENTILE)
 )
-_OWN = _keys(proportions=kinds.PROPORTIONS, age=Number(AGE))
+_OWN = _keys(proportions=kinds.PROPORTIONS, age=Number(AGE), shoes=Number(SHOES), clothing=Number(CLOTHING))
 _DETAIL = _keys(detail=Choice(("spheres", "capsules", "hulls")))
-
-FIGURES = {
-    "human": Form((*_PERSON, *_OWN, *_DETAIL, *_keys(hands=Choice(("rigid", "fingers"))))),
-    "avatar": Form((*_PERSON, *_OWN, *_DETAIL)),
-    "hand": Form((*_keys(side=Choice(("left", "right"))), *_PERSON)),
-    "urdf": Form(
-        (
-            *_needed(path=Text()),
-            *_keys(root=Choice(("fixed", "free")), package_dirs=Several(Text()), concavity=Number(CONCAVITY)),
-        )
-    ),
-}
 
 SHAPES = {
     "box": Form(_needed(size=_LENGTHS), shapes.Box),
@@ -86,6 +77,39 @@ SHAPES = {
 }
 
 
+def _part_form(form: Form) -> Form:
+    """A shape as a part of what is adjustable: its name, the shape and where it is."""
+    make: Any = form.make
+    keys = (*_needed(name=Text()), *form.keys, *_keys(at=PLACEMENT))
+    return Form(keys, lambda name, at=(0.0, 0.0, 0.0), **size: (name, (make(**size), at)))
+
+
+PARTS = Several(
+    Part(
+        "part",
+        'name = "rim", shape = "torus", radius = 0.18, tube = 0.015',
+        {name: _part_form(form) for name, form in SHAPES.items() if name not in ("halfspace", "mesh")},
+        "shape",
+    )
+)
+_SPAN, _TURN = (
+    Numbers(Vector(2, each), "[least, greatest]") for each in (POSITION.vector.each, Range(-math.pi, math.pi, "rad"))
+)
+
+FIGURES = {
+    "human": Form((*_PERSON, *_OWN, *_DETAIL, *_keys(hands=Choice(("rigid", "fingers"))))),
+    "avatar": Form((*_PERSON, *_OWN, *_DETAIL)),
+    "hand": Form((*_keys(side=Choice(("left", "right"))), *_PERSON)),
+    ADJUSTABLE: Form((*_needed(parts=PARTS), *_keys(slide=_SPAN, height=_SPAN, tilt=_TURN))),
+    "urdf": Form(
+        (
+            *_needed(path=Text()),
+            *_keys(root=Choice(("fixed", "free")), package_dirs=Several(Text()), concavity=Number(CONCAVITY)),
+        )
+    ),
+}
+
+
 def _form(made: type, names: str, /, **given: Kind) -> Form:
     """A form whose keys are fields of the class that it makes; those without a default are required."""
     needed = {field.name for field in fields(made) if field.default is field.default_factory is MISSING}
@@ -97,7 +121,7 @@ CONTACTS = {
     "touch": _form(tasks.Touch, "part thing weight"),
     "lean": _form(tasks.Lean, "on part side weight", part=SEGMENT),
     "sit": _form(tasks.Sit, "on back pelvis trunk erect weight", pelvis=SEGMENT, trunk=SEGMENT),
-    "grasp": _form(tasks.Grasp, "hand thing kind side opposed along approach weight", hand=Choice(("left", "right"))),
+    "grasp": _form(tasks.Grasp, "hand thing kind side opposed along approach weight"),
 }
 """Contacts; each is a goal and a constraint, by the table in which it stands."""
 
@@ -118,8 +142,8 @@ SOFT = kind_of(tasks.Soft, "weight")
 _NEWTONS = Numbers(Vector(3, Range(-MOST_FORCE, MOST_FORCE, "N")), "[x, y, z]")
 _FORCE = _form(tasks.Force, "frame force", frame=FRAME, force=_NEWTONS)
 FORCES = Several(Part("force", 'frame = "right_palm", force = [0.0, 0.0, -98.0]', {"": _FORCE}), 0)
-_STRENGTH = _form(Strength, "percentile sex", sex=Choice(("male", "female")))
-STRENGTH = Part("strength", 'percentile = 50, sex = "male"', {"": _STRENGTH})
+_STRENGTH = _form(Strength, "percentile sex age", sex=Choice(("male", "female")))
+STRENGTH = Part("strength", 'percentile = 50, sex = "male", age = 40', {"": _STRENGTH})
 _STRENGTHS: dict[str, Kind] = {"forces": FORCES, "strength": STRENGTH, "person": kinds.MEMBER}
 _FIELD = _form(ergonomics.FieldOfView, "horizontal up down declination")
 VIEW = Part(

@@ -18,6 +18,7 @@ from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import UnknownNameError
 from wholebody.base.files import is_file, is_folder, title_of
 from wholebody.figures import Figure, join, load
+from wholebody.figures.adjustable import ADJUSTABLE, adjustable
 from wholebody.figures.loading import member
 from wholebody.geometry.placement import placement
 from wholebody.geometry.shapes import Mesh, Shape
@@ -155,6 +156,8 @@ def _figure(contents: Contents) -> Figure:
 def _mounted(figure: Figure, mount: Entry, on: str) -> Figure:
     """A figure with that of an entry on a frame of it."""
     other, at = _loaded(mount), mount.values.get("at", (0.0, 0.0, 0.0))
+    with mount.where.at("on").named():
+        figure.frame_id(on)
     with mount.where.named():
         return figure.mounted(other, on=on, name=mount.values.get("called"), at=at)
 
@@ -162,13 +165,18 @@ def _mounted(figure: Figure, mount: Entry, on: str) -> Figure:
 def _loaded(entry: Entry) -> Figure:
     options = {name: value for name, value in entry.values.items() if name not in ("called", "at", "on")}
     joints = options.pop("joints", None)
-    spec: str | Path = entry.name
+    spec: Any = entry.name
     if entry.name == "urdf":
         spec = _file(options.pop("path"), entry.where.at("path"))
         if "package_dirs" in options:
             options["package_dirs"] = [entry.where.file.parent / folder for folder in options["package_dirs"]]
+    make: Callable[..., Figure] = load
+    if entry.name == ADJUSTABLE:
+        make, spec = adjustable, dict(options["parts"])
+        if len(spec) < len(options.pop("parts")):
+            raise entry.where.at("parts").fault("two parts have one name; give each another")
     with entry.where.named():
-        figure: Figure = load(spec, **options)
+        figure: Figure = make(spec, **options)
     if joints is None:
         return figure
     entry.keys["joints"].kind.names(joints, figure, entry.where.at("joints"))

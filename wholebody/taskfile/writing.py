@@ -17,7 +17,7 @@ from wholebody.base.checks import instance, shown
 from wholebody.base.errors import InputError
 from wholebody.base.files import title_of
 from wholebody.figures.figure import Figure
-from wholebody.geometry.shapes import Mesh
+from wholebody.geometry.shapes import Mesh, Shape
 from wholebody.problem import Problem
 from wholebody.scene.geometry_model import SceneObject
 from wholebody.scene.scene import Scene
@@ -87,11 +87,24 @@ def _measure(term: Any, number: int) -> str:
 
 def _figures(figure: Figure, target: Path) -> list[str]:
     if not figure.members:
-        return [_table("[figure]", _figure(figure, target))]
-    return [
-        _table("[[figure]]", {"called": name, **_figure(one, target), "at": _seven(at)})
-        for name, (one, at) in figure.members.items()
-    ]
+        tables = _with_mounts(figure, target, "", {})
+    else:
+        named = figure.members.items()
+        tables = [
+            table
+            for name, (one, at) in named
+            for table in _with_mounts(one, target, f"{name}/", {"called": name, "at": _seven(at)})
+        ]
+    return [_table("[figure]" if len(tables) == 1 else "[[figure]]", table) for table in tables]
+
+
+def _with_mounts(figure: Figure, target: Path, prefix: str, named: dict[str, Any]) -> list[dict[str, Any]]:
+    """The tables of a figure, which is named so, and of what is mounted on it one after the other."""
+    if figure.mount is None:
+        return [{**named, **_figure(figure, target)}]
+    base, other, on, name, at = figure.mount
+    mounted = {"called": name, **_figure(other, target), "on": prefix + on, "at": _seven(at)}
+    return [*_with_mounts(base, target, prefix, named), mounted]
 
 
 def _figure(figure: Figure, target: Path) -> dict[str, Any]:
@@ -101,7 +114,11 @@ def _figure(figure: Figure, target: Path) -> dict[str, Any]:
             "load a figure by name or by path"
         )
     spec, options = figure.loaded_as
-    named = {"name": spec} if spec in ("human", "avatar", "hand") else {"path": _beside(spec, target)}
+    named = {"name": spec} if spec in FIGURES else {"path": _beside(spec, target)}
+    if "parts" in options:
+        known_parts: dict[str, tuple[Shape, Any]] = options["parts"]
+        parts = [{"name": name, **_shape(shape, at, name, mesh=False)} for name, (shape, at) in known_parts.items()]
+        options = {**options, "parts": parts}
     if options.get("package_dirs"):
         options = {**options, "package_dirs": [_beside(str(folder), target) for folder in options["package_dirs"]]}
     known = {key.name for form in FIGURES.values() for key in form.keys}
@@ -129,20 +146,13 @@ def _start(problem: Problem) -> dict[str, Any]:
 
 
 def _thing(thing: SceneObject, target: Path, beside: dict[Path, str]) -> dict[str, Any]:
-    kind = type(thing.shape).__name__.lower()
-    if kind not in SHAPES:
-        raise InputError(f"write_task: {thing.name!r} is a {type(thing.shape).__name__}, which task files do not have")
-    found: dict[str, Any] = {"name": thing.name, "shape": kind}
+    found: dict[str, Any] = {"name": thing.name, **_shape(thing.shape, thing.placement, thing.name)}
     if thing.segment is not None:
         found["to"] = thing.segment
         if thing.rests_on:
             found["rests_on"] = list(thing.rests_on)
-    found["at"] = _seven(thing.placement)
     if thing.color is not None:
         found["color"] = list(thing.color)
-    for key in SHAPES[kind].keys:
-        if key.name != "path":
-            found[key.name] = _plain(getattr(thing.shape, key.name))
     if isinstance(thing.shape, Mesh):
         found["path"] = _mesh(thing.shape, thing.name, target, beside, found)
     if thing.body is not None:
@@ -156,6 +166,15 @@ def _thing(thing: SceneObject, target: Path, beside: dict[Path, str]) -> dict[st
         if thing.body.joints:
             found["joints"] = [_part(joint, JOINT_OF_A_THING) for joint in thing.body.joints]
     return found
+
+
+def _shape(shape: Shape, at: Any, name: str, *, mesh: bool = True) -> dict[str, Any]:
+    """Kind, place and sizes of a shape; a mesh without its path, where it may be one."""
+    kind = type(shape).__name__.lower()
+    if kind not in SHAPES or not (mesh or kind != "mesh"):
+        raise InputError(f"write_task: {name!r} is a {type(shape).__name__}, which task files do not have")
+    sizes = {key.name: _plain(getattr(shape, key.name)) for key in SHAPES[kind].keys if key.name != "path"}
+    return {"shape": kind, "at": _seven(at), **sizes}
 
 
 def _mesh(shape: Mesh, name: str, target: Path, beside: dict[Path, str], found: dict[str, Any]) -> str:

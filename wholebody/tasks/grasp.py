@@ -116,17 +116,17 @@ class Grasp(ContactTerm):
         if not hand.pieces:
             raise InputError(f"{where}: the hand of {shown(self.frame)} has no pieces; name one with geometry")
         check_apart(hand, thing, where)
-        state = State(scene.model).update(start)
-        if self.kind == "palm":
-            parts = self._palm(scene, place, hand, thing, state, where)
-        elif self.kind == "power":
-            parts = self._power(scene, place, hand, thing, state, where)
-        else:
-            parts = self._fingers(scene, thing, state, where)
+        with scene.figure.posed(start) as state:
+            if self.kind == "palm":
+                parts = self._palm(scene, place, hand, thing, state, where)
+            elif self.kind == "power":
+                parts = self._power(scene, place, hand, thing, state, where)
+            else:
+                parts = self._fingers(scene, thing, state, where)
         if self.approach is not None:
             height = APPROACHES[self.approach]
             up = np.array((0.0, 0.0, height or 1.0))
-            # rad: of the palm from straight down, up or level, for the three ways of approach
+            # rad: of the palm from straight down, up or level, for the three directions of approach
             parts.append(Looking(place, up, pi / 4, level=not height))
         return filled(self, parts=tuple(parts), touches=owner_pairs(segments_beyond(scene, place.joint), thing.owners))
 

@@ -148,7 +148,7 @@ def opened(term: Any, distance: float) -> Any:
 
 
 def _beside(place: Place, bar: Face, axis: int, state: State) -> tuple[Array, Array]:
-    """Ways [m] from the palm to a bar's middle along a palm's axis, across and along the bar; derivatives (2, nv)."""
+    """From the palm to a bar's middle along a palm's axis, across and along the bar, metres; derivatives (2, nv)."""
     center, axes = bar.at(state)
     frame, along = state.frame(place.frame), axes[2]
     palm, across_palm = frame.translation, frame.rotation[:, axis]

@@ -35,7 +35,7 @@ class Timed(NamedTuple):
 
 
 def timed(postures: Sequence[Array], paths: Sequence[Sequence[tuple[float, Array]]], dt: float) -> Timed:
-    """The postures of a motion, and those on the ways between: `paths` has shares and postures a frame, or nothing."""
+    """The postures of a motion, and those on the paths between: `paths` has shares and postures a frame, or nothing."""
     if len(paths) not in (0, len(postures)):
         raise InputError(f"the motion has {len(paths)} paths and {len(postures)} postures; give as many")
     found = Timed([], np.zeros(0), [], [])

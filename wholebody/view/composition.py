@@ -163,10 +163,10 @@ def legend(keyframes: Sequence[Keyframe]) -> list[tuple[str, Any]]:
 
 
 def status(keyframes: Sequence[Keyframe], count: int, dt: float, found: Assessment | None) -> str:
-    """One line about what is shown: postures `dt` s apart, their ways as keyframes, or the only one's fit."""
+    """One line about what is shown: postures `dt` s apart, their paths as keyframes, or the only one's fit."""
     said = [f"{count} postures, {(count - 1) * dt:.2f} s"] if count > 1 else []
     if found is not None and found.goal_errors:
-        # radians: smaller angles are not told
+        # radians: smaller angles are not shown
         angle = f", {degrees(found.goal_angle):.1f}°" if found.goal_angle > 1e-3 else ""
         said.append(f"goals missed by at most {1e3 * found.goal_error:.1f} mm{angle}")
     if not all(keyframe.contacts_shown for keyframe in keyframes):

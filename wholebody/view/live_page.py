@@ -187,7 +187,7 @@ class LivePage:
             self._boxes[name].on_update(partial(self._ticked, name))
         again = "start again"
         if isinstance(self.drag, LiveWorld):
-            self._give_way = gui.add_dropdown("gives way", self.drag.ways, initial_value=self.drag.give_way)
+            self._give_way = gui.add_dropdown("gives way", self.drag.give_way_choices, initial_value=self.drag.give_way)
             self._give_way.on_update(self._locked(partial(self._share, self.drag)))
         if isinstance(self.drag, LiveDrag):
             again = "undo"

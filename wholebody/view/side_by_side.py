@@ -77,8 +77,8 @@ def _check(motion: SkeletonMotion | None, clips: Mapping[str, Clip], scene: Scen
         {} if motion is None else {"the recording": len(motion)}
     )
     if len(set(counts.values())) > 1:
-        told = ", ".join(f"{name} {count}" for name, count in counts.items())
-        raise InputError(f"side by side: motions have different numbers of frames ({told}); give the same ones")
+        listed = ", ".join(f"{name} {count}" for name, count in counts.items())
+        raise InputError(f"side by side: motions have different numbers of frames ({listed}); give the same ones")
     around = [name for name, each in scene.objects.items() if each.segment is None]
     for clip in clips.values():
         for thing in clip.things:
@@ -140,10 +140,10 @@ def _bones(world: Scene, motion: SkeletonMotion, aside: float) -> dict[str, list
     for joint, parent in enumerate(motion.parents):
         if parent < 0 or np.linalg.norm(motion.offsets[joint]) < SHORT:
             continue
-        ways = places[:, joint] - places[:, parent]
-        length = float(np.median(np.linalg.norm(ways, axis=1)))
+        bones = places[:, joint] - places[:, parent]
+        length = float(np.median(np.linalg.norm(bones, axis=1)))
         middles = 0.5 * (places[:, joint] + places[:, parent])
-        track = [pin.SE3(_along(way), middle) for way, middle in zip(ways, middles, strict=True)]
+        track = [pin.SE3(_along(way), middle) for way, middle in zip(bones, middles, strict=True)]
         name = f"bone {motion.names[joint]}"
         world.add(Capsule(RADIUS, max(length, SHORT)), name=name, at=track[0], color=(0.25, 0.28, 0.33, 1.0))
         tracks[name] = track

@@ -353,12 +353,12 @@ class Viewer:
             InputError: no motion is shown, the ending is another, or a number is out of range.
             MissingPackageError: there is no Chromium, or no ffmpeg for an MP4.
         """
-        wanted, told = self._commands(), checks.function(progress, "movie: progress")
+        wanted, report = self._commands(), checks.function(progress, "movie: progress")
         if self._motion is None:
             raise InputError("a movie needs a motion; call play() before movie()")
         (postures, dt), place = self._motion, check_movie(path)
         times, fps = frame_times(place, len(postures), dt, fps)
-        drawn = counted(self._screenshots.pictures(wanted, size, times), len(times), told)
+        drawn = counted(self._screenshots.pictures(wanted, size, times), len(times), report)
         return write(place, movie(place.suffix, drawn, fps))
 
     def close(self) -> None:

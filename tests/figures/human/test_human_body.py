@@ -90,6 +90,32 @@ def test_calf_and_thigh_give_way_by_what_flesh_does():
         assert 0.0 < depth < 0.040, case
 
 
+@pytest.mark.parametrize("detail", ["capsules", "hulls"])
+def test_shoes_lift_and_clothing_surrounds(detail):
+    # 30 mm of sole, 10 mm of cloth: all around for a girth, on both sides for a breadth, once under who sits.
+    bare, dressed = (measure(load("human", sex="female", detail=detail, **worn))
+                     for worn in ({}, {"shoes": 0.03, "clothing": 0.01}))  # fmt: skip
+    more = {name: round(1e3 * (dressed[name] - bare[name]), 6) for name in bare}
+    wanted = {
+        "hip_breadth": 20.0, "hip_breadth_sitting": 20.0, "waist_depth": 20.0, "chest_breadth": 20.0,
+        "bideltoid_breadth": 20.0, "thigh_clearance": 20.0, "buttock_knee_length": 20.0,
+        "sitting_height": 10.0, "popliteal_height": 30.0 - 10.0, "acromial_height": 30.0 + 10.0, "wrist_height": 30.0,
+        "span": 0.0, "hand_breadth": 0.0, "head_length": 0.0, "foot_length": 0.0,
+    } | ({"calf_circumference": 20.0 * math.pi} if detail == "capsules" else {})  # fmt: skip
+    assert {name: more[name] for name in wanted} == pytest.approx(wanted, abs=1.0 if detail == "hulls" else 1e-6)
+
+
+def test_who_wears_shoes_stands_and_sees_higher_by_their_soles():
+    for detail in ("capsules", "hulls", "spheres"):
+        bare, shod = (load("human", percentile=5, detail=detail, shoes=sole) for sole in (0.0, 0.04))
+        eyes = [figure.placement(figure.posture("standing"), "gaze").translation[2] for figure in (bare, shod)]
+        assert eyes[1] - eyes[0] == pytest.approx(0.04, abs=1e-6)
+        tips = [shod.placement(shod.posture("standing"), f"left_{name}").translation[2] for name in ("heel", "toe_tip")]
+        assert tips == pytest.approx([0.0, 0.0], abs=1e-6)
+    with pytest.raises(wb.InputError, match=r"shoes is 30; .*0.03"):
+        load("human", shoes=30)
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_a_percentile_is_a_design_case(case):
     who = design_cases()[case]

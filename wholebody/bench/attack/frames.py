@@ -121,7 +121,7 @@ def overlapping(scene: wb.Scene, q: Array) -> Verdict:
         least = _distance(scene, one, other)
         count += least < 0.0
         reported = frozenset((one, other)) in said
-        # Pairs within this distance of contact may be told or not.
+        # Pairs within this distance of contact may be reported or not.
         slack = 2e-5 * max([1.0, *(extent(piece.geometry) for made in shapes for piece in made.pieces())])
         if least < -slack and not reported:
             return Verdict("wrong", f"{one} and {other} overlap by {-least:.3g} m, and nothing tells it")
@@ -169,7 +169,9 @@ def slept(scene: wb.Scene, places: Sequence[tuple[float, ...]], *, over: bool) -
         if apart < -2e-4 and number >= len(places) + gets_out - 1:
             return Verdict("wrong", f"frame {number}: the body is {-apart:.3g} m inside of what bears it")
         if apart < -1e-4 and abs(frame.deepest + apart) > 1e-5:
-            return Verdict("wrong", f"frame {number}: the body is {-apart:.3g} m deep, {frame.deepest:.3g} m are told")
+            return Verdict(
+                "wrong", f"frame {number}: the body is {-apart:.3g} m deep, reported as {frame.deepest:.3g} m"
+            )
     return Verdict("right", f"{len(places)} places of the support")
 
 

@@ -30,13 +30,13 @@ def _given(kind: str) -> list[Any]:
 def mutated(text: bytes, rng: np.random.Generator) -> bytes:
     """Return a text with one to three mutations, seldom more."""
     spliced = [partial(_spliced, how) for how in ("flip", "delete", "delete", "repeat", "cut", "insert", "insert")]
-    ways: tuple[Callable[[bytes, np.random.Generator], bytes], ...] = (
+    changes: tuple[Callable[[bytes, np.random.Generator], bytes], ...] = (
         *(_number,) * 6, *(_value,) * 4, *(_word,) * 3, _misspelt, _misspelt, *spliced, _lines, _lines, _encoded,
         _nested, _bomb, partial(_spliced, "empty"),
     )  # fmt: skip
     count = int(rng.choice([1, 1, 1, 2, 3, 10]))
     for _ in range(count):
-        text = ways[int(rng.integers(len(ways)))](text, rng)
+        text = changes[int(rng.integers(len(changes)))](text, rng)
     return text
 
 

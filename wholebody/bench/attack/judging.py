@@ -46,7 +46,7 @@ KINDS = {
     "pairs": "things in each other, against every two pieces",
     "sleeper": "sleeping bodies whose support slides, turns, jumps or leaves",
     "weights": "goals of one frame with weights from 1 to 1e6, met in at most thrice the frames of equal ones",
-    "put": "things that are put into a figure that is shown, every frame free or told",
+    "put": "things that are put into a figure that is shown, every frame free or reported",
 }
 
 

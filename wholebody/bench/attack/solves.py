@@ -201,7 +201,7 @@ def _wrongs(problem: Problem, solution: Solution, found: Judged, tolerance: floa
         return ["the posture or a distance at it is not made of numbers"]
     if solution.status not in get_args(Status):
         return [f"{solution.status!r} is no status"]
-    # Two ways of measuring may differ by this; coal's distances of ellipsoids are relative to their size.
+    # Two measurements may differ by this; coal's distances of ellipsoids are relative to their size.
     rounding = 2e-6 + 1e-5 * Pairs(problem.scene).size
     allowed = 1.1 * tolerance + rounding
     wrongs = []

@@ -32,7 +32,7 @@ from wholebody.motion.retarget_targets import LIMBS, rest_axes, standing_places
 from wholebody.motion.retargeting import errors_of
 from wholebody.motion.roles import ROWS, Roles, matched
 from wholebody.motion.skeleton import SkeletonMotion
-from wholebody.motion.stance import paths
+from wholebody.motion.stance import point_paths
 from wholebody.motion.standing_ground import ground
 from wholebody.motion.structure import upright
 
@@ -76,7 +76,7 @@ def read(folder: Path, frames: int) -> Iterator[Row]:
 
 
 def _answer(work: Callable[[], dict[str, Figure]]) -> dict[str, Figure]:
-    """Figures of a file, or the sentence by which it is refused; any other error is a fault, and told as one."""
+    """Figures of a file, or the sentence by which it is refused; any other error is a fault, and reported as one."""
     try:
         return {"read": "yes", **work()}
     except WholebodyError as error:
@@ -158,8 +158,8 @@ def judged(motion: SkeletonMotion, clip: Clip, roles: Roles) -> dict[str, Figure
     """Figures of a clip that follows a recording: findings of `wb.check` on a floor, bones, slides, jerk."""
     found = check(clip, wb.Scene(clip.figure).add(wb.HalfSpace(), name="floor"))
     errors = np.degrees(np.concatenate(list(errors_of(motion, clip, roles).values())))
-    shared = [role for role in roles.frames if role in roles.joints]
-    ours = paths(clip.figure, clip.q, tuple(roles.frames[role] for role in shared))
+    shared, points = list(roles.frames), roles.places(clip.figure)
+    ours = point_paths(clip.figure, clip.q, list(points.values()))
     theirs = motion.positions[:, [motion.names.index(roles.joints[role]) for role in shared]]
     rests = ground(motion, {"skeleton": roles.joints}).rests
     slides = [
@@ -233,7 +233,7 @@ class MinkRetargeting:
         self._turned = {
             role: segments[role] if segments[role] in figure.segments else roles.turns[role] for role in roles_used
         }
-        sites = {f"{role} at": own_frame(figure, roles.frames[role]) for role in roles_used}
+        sites = {f"{role} at": (joint, pin.SE3(np.eye(3), at)) for role, (joint, at) in roles.places(figure).items()}
         sites |= {f"{role} turned": own_frame(figure, self._turned[role]) for role in roles_used}
         model = mujoco.MjModel.from_xml_string(mjcf(wb.Scene(figure), sites))
         self._order, self._dt, self._configuration = Order(figure, model), model.opt.timestep, mink.Configuration(model)
@@ -319,8 +319,8 @@ def _rest_turn(role: str, own: dict[str, Array], rest: Array, joints: dict[str, 
             first, last = f"{side}_{start}", f"{side}_{end}"
             mine = role == first or (role == last and end == limb[2] and limb[0] == "shoulder")
             if mine and {first, last} <= own.keys() & joints.keys():
-                ways = own[last] - own[first], rest[joints[last]] - rest[joints[first]]
-                found: Array = pin.Quaternion.FromTwoVectors(*ways).toRotationMatrix()
+                bones = own[last] - own[first], rest[joints[last]] - rest[joints[first]]
+                found: Array = pin.Quaternion.FromTwoVectors(*bones).toRotationMatrix()
                 return found
     return np.eye(3)
 

@@ -91,7 +91,7 @@ def run(arguments: argparse.Namespace) -> int:
     clip = read_clip(file, scene.figure)
     with bar(clip.name) as tell:
         # it goes on: a bar says nothing
-        avoided = avoid(clip, scene, method=method, progress=lambda told: bool(tell(told.share, told.note)))
+        avoided = avoid(clip, scene, method=method, progress=lambda report: bool(tell(report.share, report.note)))
     _tell(avoided, avoided.clip.write(out))
     if arguments.html is not None:
         from wholebody.view.motion_curves import motion_curves
@@ -118,7 +118,7 @@ def _method(name: str, arguments: argparse.Namespace) -> Avoider:
     if arguments.dynamics:
         if not has_setting(method, "dynamics"):
             raise InputError(f"--dynamics: the method {method.name} does not take dynamics; leave out --method")
-        settings["dynamics"] = Strength(sex=arguments.sex or "male")
+        settings["dynamics"] = Strength(sex=arguments.sex)
     return replace(method, **settings) if settings else method  # type: ignore[type-var]
 
 
@@ -162,7 +162,7 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
     if arguments.scene is not None:
         raise InputError("--scene is for one motion with one equipment by one method; give one of each")
     folder = arguments.out or Path(FOLDER)
-    ways = [_method(name, arguments) for name in methods]
+    avoiders = [_method(name, arguments) for name in methods]
     count = len(arguments.files) * len(methods) * len(worn)
     try:
         with bar("reading the motions", count) as tell:
@@ -172,7 +172,7 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
                 tell(now.done, done)
 
             rows = avoid_many(
-                arguments.files, folder, figure=figure_of(arguments), equipment=worn, methods=ways,
+                arguments.files, folder, figure=figure_of(arguments), equipment=worn, methods=avoiders,
                 jobs=arguments.at_once, cluster=arguments.cluster, progress=said,
             )  # fmt: skip
     except KeyboardInterrupt:

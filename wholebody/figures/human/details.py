@@ -26,8 +26,12 @@ SPREAD = 3
 
 
 def solids(size: Dimensions) -> tuple[Solid, ...]:
-    """Return the pieces of a person: spheres, capsules and boxes."""
-    return (*_trunk(size), *_limbs(size))
+    """Return the pieces of a person: spheres, capsules and boxes; with clothing, capsules of trunk and limbs grow."""
+    found = (*_trunk(size), *_limbs(size))
+    for solid in found if size.body.clothing else ():
+        if isinstance(solid.geometry, coal.Capsule) and not solid.segment.endswith(("neck", "head", "hand")):
+            solid.geometry.radius += size.body.clothing
+    return found
 
 
 def _trunk(size: Dimensions) -> Iterator[Solid]:
@@ -137,14 +141,15 @@ def hand(size: Dimensions, side: str) -> Iterator[Solid]:
 
 
 def foot(size: Dimensions, side: str) -> Iterator[Solid]:
-    """Boxes for the foot and the toes, flush on the sole."""
+    """Boxes for the foot and the toes with the shoe's sole, flush below."""
     height, length = -1.0 * size.sole, size.toe_joint_x - size.heel_x
     box = coal.Box(length, 2.0 * size.foot_half_width, height)
     yield Solid(
         f"{side}_foot", f"{side}_foot", box, place(0.5 * (size.toe_joint_x + size.heel_x), 0.0, 0.5 * size.sole)
     )
-    toes = coal.Box(size.toe_length, 2.0 * size.foot_half_width, 2.0 * size.toe_half_height)
-    yield Solid(f"{side}_toes", f"{side}_toes", toes, place(0.5 * size.toe_length, 0.0, 0.0))
+    shoe = size.body.shoes
+    toes = coal.Box(size.toe_length, 2.0 * size.foot_half_width, 2.0 * size.toe_half_height + shoe)
+    yield Solid(f"{side}_toes", f"{side}_toes", toes, place(0.5 * size.toe_length, 0.0, -0.5 * shoe))
 
 
 class Slice(NamedTuple):
@@ -200,7 +205,8 @@ def polyhedra(size: Dimensions) -> tuple[Solid, ...]:
 
 def _trunk_hulls(size: Dimensions) -> Iterator[Solid]:
     for part in trunk_slices(size):
-        radii = (part.half_depth, part.half_breadth, part.half_height)
+        cloth = size.body.clothing
+        radii = (part.half_depth + cloth, part.half_breadth + cloth, part.half_height + cloth)
         yield _solid(part.segment, ellipsoid(radii, part.segment), part.x, part.z)
     neck, length = size.body.radius("neck"), size.body.length("neck")
     yield _solid("neck", tapered(neck, neck, 0.8 * length, "neck"), 0.0, 0.9 * length)
@@ -236,7 +242,8 @@ def spheres(size: Dimensions) -> tuple[Solid, ...]:
         x, y, z = (float(row[f"offset_{axis}"]) * person.stature for axis in "xyz")
         if segment.endswith("_foot"):
             z = size.sole + radius
-        found.append(Solid(name, segment, coal.Sphere(radius), place(x, y, z)))
+        cloth = 0.0 if segment.endswith(("neck", "head", "hand", "foot")) else person.clothing
+        found.append(Solid(name, segment, coal.Sphere(radius + cloth), place(x, y, z)))
     return tuple(found)
 
 

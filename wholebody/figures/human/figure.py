@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache, lru_cache, partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -31,18 +32,9 @@ _LIMBS = (("clavicle", "upper_arm", "forearm", "hand"), ("thigh", "shank", "foot
 _NEXT = {frozenset(pair) for limb in _LIMBS for pair in pairwise(limb)} | {frozenset(("shank", "toes"))}
 
 
-def human_figure(
-    sex: str = "male",
-    stature: float | None = None,
-    mass: float | None = None,
-    detail: str = "capsules",
-    percentile: float | None = None,
-    proportions: Mapping[str, float] | None = None,
-    age: float | None = None,
-    hands: str = "rigid",
-) -> Figure:
-    """Return the person; arguments and errors as for `wholebody.load`."""
-    person = make_person(sex, stature, mass, percentile, age, proportions)
+def human_figure(detail: str = "capsules", hands: str = "rigid", **who: Any) -> Figure:
+    """Return the person; arguments and errors as for `wholebody.load`, and as for `make_person`."""
+    person = make_person(**who)
     return figure_of(human_spec(person, detail, hands), detail, person.sex)
 
 
@@ -137,22 +129,13 @@ def avatar_spec(person: Person | None = None, detail: str = "capsules") -> BodyS
     return replace(whole, name="avatar", joints=joints)
 
 
-def avatar_figure(
-    sex: str = "male",
-    stature: float | None = None,
-    mass: float | None = None,
-    detail: str = "capsules",
-    percentile: float | None = None,
-    proportions: Mapping[str, float] | None = None,
-    age: float | None = None,
-) -> Figure:
+def avatar_figure(detail: str = "capsules", **who: Any) -> Figure:
     """Return the avatar; arguments as for the person.
 
     Two arms and two legs of seven joints and a neck of three, on a rigid torso (Schmidl & Lin): the person with spine,
     shoulder girdle and upper neck fixed.
     """
-    person = make_person(sex, stature, mass, percentile, age, proportions)
-    return figure_of(avatar_spec(person, detail), detail)
+    return figure_of(avatar_spec(make_person(**who), detail), detail)
 
 
 def body_pairs(solids: tuple[Solid, ...]) -> Pairs:

@@ -121,6 +121,7 @@ def landmarks(size: Dimensions) -> tuple[Landmark, ...]:
     ]
     for side, sign in (("left", 1.0), ("right", -1.0)):
         palm = palm_axes(side)
+        below = -size.toe_half_height - size.body.shoes
         length, thick, index, thumb = size.palm_length, size.palm_half_thickness, size.index, size.thumb
         marks += [
             Landmark(f"{side}_palm", f"{side}_hand", place(0.0, -sign * thick, -0.6 * length, palm)),
@@ -137,6 +138,6 @@ def landmarks(size: Dimensions) -> tuple[Landmark, ...]:
             Landmark(f"{side}_heel", f"{side}_foot", place(size.heel_x, 0.0, size.sole)),
             Landmark(f"{side}_sole", f"{side}_foot", place(0.5 * (size.heel_x + size.toe_joint_x), 0.0, size.sole)),
             Landmark(f"{side}_ball", f"{side}_foot", place(size.toe_joint_x, 0.0, size.sole)),
-            Landmark(f"{side}_toe_tip", f"{side}_toes", place(size.toe_length, 0.0, -size.toe_half_height)),
+            Landmark(f"{side}_toe_tip", f"{side}_toes", place(size.toe_length, 0.0, below)),
         ]
     return tuple(marks)

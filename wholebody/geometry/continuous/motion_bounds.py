@@ -115,7 +115,7 @@ def largest_approach(table: PairTable, centres: Array, most: Array) -> Array:
     parents = np.array(list(model.parents), dtype=np.intp)
     joint = table.joint[table.pairs]
     own, lever = (centres + table.reach)[table.pairs], np.zeros(joint.shape)
-    ways = np.zeros((len(joint), *most.shape[1:]))
+    approach = np.zeros((len(joint), *most.shape[1:]))
     with np.errstate(invalid="ignore"):  # an infinite lever of what does not turn
         # a joint comes after the one that carries it: the later of two is never an ancestor of the other
         while len(row := np.flatnonzero(joint[:, 0] != joint[:, 1])):
@@ -123,10 +123,10 @@ def largest_approach(table: PairTable, centres: Array, most: Array) -> Array:
             number = joint[later]
             slide, turn = moved[number].swapaxes(0, 1)
             far = (lever[later] + own[later]).reshape(-1, *[1] * (most.ndim - 1))
-            ways[row] += slide + np.where(turn > 0.0, turn * far, 0.0)
+            approach[row] += slide + np.where(turn > 0.0, turn * far, 0.0)
             lever[later] += lengths[number]
             joint[later] = parents[number]
-    return ways
+    return approach
 
 
 def _motion(model: pin.Model, joint: int, most: Array) -> Array:

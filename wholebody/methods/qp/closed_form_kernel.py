@@ -156,7 +156,7 @@ def _with_wrist(kind: int, slack: float, h: Array, o: Array, place: Array, found
 
 @compiled(inner=True)
 def _turned_wrist(h: Array, place: Array, first: Vector, slack: float, found: Array) -> None:
-    """The two ways (2, 6) to turn a wrist where the first three angles are known."""
+    """The two branches (2, 6) to turn a wrist where the first three angles are known."""
     h1, h2, h3, h4, h5, h6 = (
         _vector(h, 0), _vector(h, 1), _vector(h, 2), _vector(h, 3), _vector(h, 4), _vector(h, 5),
     )  # fmt: skip

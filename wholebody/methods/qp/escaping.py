@@ -21,7 +21,7 @@ from wholebody.methods.control import BUDGET
 from wholebody.methods.qp.settings import ESCAPE
 from wholebody.terms.linearisation import PackedLinearisation
 
-WAYS = (
+DIRECTIONS = (
     (1, 0, 0),
     (-1, 0, 0),
     (0, 1, 0),
@@ -81,7 +81,7 @@ def _starts(model: pin.Model, box: Array) -> Iterator[Array]:
         first = int(model.joints[joint].idx_v)
         place = slice(first, first + 3)
         if np.isfinite(box[:, place]).all() and box[:, place].any():
-            for way in WAYS:
+            for way in DIRECTIONS:
                 begun = np.zeros(model.nv)
                 begun[place] = [0.0 if sign == 0 else box[max(sign, 0), first + axis] for axis, sign in enumerate(way)]
                 yield begun

@@ -162,7 +162,7 @@ class NearestNumbers(NamedTuple):
 class SearchNumbers(NamedTuple):
     """A search over starts."""
 
-    # programs of a relaxed probe. More: surer along curved ways, and fewer starts within the budget.
+    # programs of a relaxed probe. More: surer along curved paths, and fewer starts within the budget.
     probe_programs: int = 40
     # m: depth that a relaxed probe may first have, from the start (of 31 postures of arms that cross it finds 7 with 0,
     # 18 with 0.07, 9 with 0.15) and from others. More: limbs change sides more easily, and are harder to separate.

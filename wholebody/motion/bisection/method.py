@@ -103,13 +103,13 @@ class Bisection(Checked):
         method = QP(restarts=0, iterations=50) if self.method == "qp" else method_for_motions(self.method)
         run = run.of(replace(run.terms, q=np.array([figure.clamp(q) for q in run.terms.q])))
         # what is frozen, and what else where a frame cannot be freed so
-        ways = ((tuple(figure.roots), ()) if figure.roots else ((),)) if self.frozen is None else (self.frozen,)
-        for frozen in ways:
+        choices = ((tuple(figure.roots), ()) if figure.roots else ((),)) if self.frozen is None else (self.frozen,)
+        for frozen in choices:
             given = (*run.terms.given, *([Freeze(*frozen)] if frozen else []))
             predictor = Predictor(run.of(replace(run.terms, given=given)), method, self.room)
             recursion = Recursion(predictor, self)
-            recursion.free(self._points(figure, run.terms.q, frozen), whole=frozen == ways[-1])
-            if frozen == ways[-1] or run.ended or not recursion.stuck:
+            recursion.free(self._points(figure, run.terms.q, frozen), whole=frozen == choices[-1])
+            if frozen == choices[-1] or run.ended or not recursion.stuck:
                 break
         hold_between(recursion, predictor)
         return MethodResult(recursion.q, repair=True, frozen=frozen)

@@ -97,8 +97,8 @@ class Predictor:
         problem.clearances[self._together(frame)] = 0.0
         if effort_from is not None:
             problem.measures = tuple(measure.resolve(scene, effort_from) for measure in self._measures)
-        told = itertools.count(1)
-        progress = None if most is None else lambda entry: next(told) >= most
+        steps = itertools.count(1)
+        progress = None if most is None else lambda entry: next(steps) >= most
         solution = self._method.solve(problem.with_start(start), progress)
         self.run.work.posture_solves += 1
         self.run.work.programs += sum(solution.programs.values())

@@ -1,4 +1,4 @@
-"""What formats share: what they write and read, and tables of numbers whose faults are told with their line."""
+"""What formats share: what they write and read, and tables of numbers whose errors name the line."""
 
 from __future__ import annotations
 

@@ -144,8 +144,8 @@ def _begins_with_rest(angles: Array) -> bool:
     # a tenth of the angles that change later are not zero in the rest postures of CMU, nine tenths in recorded frames
     if len(angles) < 3 or not moving.any() or turns[0][moving].mean() >= 0.25:
         return False
-    ways = np.abs(np.angle(np.exp(1j * np.diff(angles, axis=0)))).max(axis=(1, 2))
-    return bool(ways[0] > 3.0 * np.median(ways[1:]))
+    turned = np.abs(np.angle(np.exp(1j * np.diff(angles, axis=0)))).max(axis=(1, 2))
+    return bool(turned[0] > 3.0 * np.median(turned[1:]))
 
 
 def _columns(found: BvhText) -> list[dict[tuple[str, str], Array]]:

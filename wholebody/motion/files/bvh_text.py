@@ -36,7 +36,7 @@ class BvhText:
 
 
 def parsed(text: str, name: str) -> BvhText:
-    """Joints and numbers of the text of a file of a name; what is wrong is told with its line."""
+    """Joints and numbers of the text of a file of a name; an error names its line."""
     lines = [(number, line.strip()) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
     place = _Hierarchy(name, lines).read()
     frames, rest = _counted(name, lines, place.at, r"frames\s*:\s*(\S+)", "Frames:")

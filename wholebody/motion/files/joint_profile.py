@@ -45,7 +45,7 @@ def write(motion: Motion, path: Path) -> Path:
 
 
 def read(path: Path, figure: Figure) -> Frames:
-    """Read a joint profile; what is wrong is told with its line."""
+    """Read a joint profile; an error names its line."""
     _check_figure(figure)
     name = one_line(path.name)
     lines = enumerate(read_text(path, "joint profile", LARGEST_FILE).splitlines(), 1)

@@ -55,19 +55,19 @@ class NodeMotion(NamedTuple):
 
 def _joined(parents: Indices, joints: Collection[int]) -> list[int]:
     """The nodes, and those between them and the nearest one above all, parents before children."""
-    ways = []
+    chains = []
     for joint in joints:
         way = [joint]
         while parents[way[-1]] >= 0:
             way.append(int(parents[way[-1]]))
-        ways.append(way[::-1])
+        chains.append(way[::-1])
     common = 0
-    while len({way[common] if common < len(way) else -1 for way in ways}) == 1 and common < min(map(len, ways)):
+    while len({way[common] if common < len(way) else -1 for way in chains}) == 1 and common < min(map(len, chains)):
         common += 1
     if not common:
         raise FileFormatError("the joints of the skeleton hang on no common node; give each skeleton a file of its own")
-    depth = {node: level for way in ways for level, node in enumerate(way)}
-    return sorted({node for way in ways for node in way[common - 1 :]}, key=lambda node: (depth[node], node))
+    depth = {node: level for way in chains for level, node in enumerate(way)}
+    return sorted({node for way in chains for node in way[common - 1 :]}, key=lambda node: (depth[node], node))
 
 
 def rigid(matrices: Array) -> Array:

@@ -190,7 +190,7 @@ def _angles(figure: Figure, node: Node, turns: Array) -> Array | None:
 
 
 def _ranges(figure: Figure, node: Node) -> tuple[Array, Array]:
-    """Limits of a node's joints; half a turn both ways without."""
+    """Limits of a node's joints; half a turn in both directions without."""
     limits = {
         int(i): (low, high)
         for i, low, high in zip(figure.limits.idx_q, figure.limits.lower, figure.limits.upper, strict=True)

@@ -104,8 +104,8 @@ class Trajectory(Checked):
             other = np.array(q)
             for window in run.windows(changed, self.margin):
                 if beyond[window.first : window.end].any():
-                    told = run.watch.teller(1.0, 0.0, f"loads of frames {window.first} to {window.end - 1}")
-                    freed = windows.window(window, faults, told, q)
+                    report = run.watch.teller(1.0, 0.0, f"loads of frames {window.first} to {window.end - 1}")
+                    freed = windows.window(window, faults, report, q)
                     other[window.first : window.end] = freed.q
             again = loads.corrected(other)
             now = again.of(other).worst()
@@ -125,11 +125,11 @@ class Trajectory(Checked):
         found = run.windows(faults.frames if beyond is None else faults.frames | beyond, self.margin)
         total, done, missed = max(1, sum(map(len, found))), 0, list[str]()
         for window in found:
-            told = run.watch.teller(done / total, len(window) / total, f"frames {window.first} to {window.end - 1}")
+            report = run.watch.teller(done / total, len(window) / total, f"frames {window.first} to {window.end - 1}")
             if loads is None:
-                freed = _in_parts(run, windows, window, q, faults, told)
+                freed = _in_parts(run, windows, window, q, faults, report)
             else:  # loads of a frame are those of its neighbours too
-                freed = windows.window(window, faults, told)
+                freed = windows.window(window, faults, report)
             q[window.first : window.end] = freed.q
             if run.ended:
                 break
@@ -156,7 +156,7 @@ class Trajectory(Checked):
 
 
 def _in_parts(
-    run: Run, windows: ClipRun, window: Window, reference: Array, faults: Faults, told: Callable[[float], bool]
+    run: Run, windows: ClipRun, window: Window, reference: Array, faults: Faults, report: Callable[[float], bool]
 ) -> WindowResult:
     """A window freed part by part, each from where the one before it is; with that one where a part is not freed.
 
@@ -166,7 +166,7 @@ def _in_parts(
     q, firsts, end, missed = np.array(reference), [window.first], window.first, list[str]()  # of each part
 
     def part_told(done: float) -> bool:
-        return told((firsts[-1] - window.first + done * (length - shared)) / len(window))
+        return report((firsts[-1] - window.first + done * (length - shared)) / len(window))
 
     while firsts and not run.ended:
         first = firsts[-1]
@@ -184,4 +184,4 @@ def _in_parts(
         if last:
             return WindowResult(q[window.first : window.end], "; ".join(filter(None, missed)))
         firsts.append(end - shared)
-    return windows.window(window, faults, told)
+    return windows.window(window, faults, report)

@@ -37,14 +37,14 @@ MET = 2e-5  # m, rad: a row missed by no more is met; a fifth of what a check al
 FAR = 2e-3  # m, rad: with a shortfall no larger, a run that may end early goes on, and a rough run ends
 
 Cancel = Callable[[int, float], bool]
-"""Told the number of steps and the worst shortfall; true ends the iterations."""
+"""Called with the number of steps and the worst shortfall; true ends the iterations."""
 
 
 @dataclass(frozen=True)
 class SQPSettings:
     """Numbers of the iterations."""
 
-    # first trust region, radians and metres; larger = fewer programs on clear ways, more that are refused
+    # first trust region, radians and metres; larger = fewer programs on clear paths, more that are refused
     radius: float = 0.25
     largest: float = 0.5  # largest trust region
     smallest: float = 1e-4  # a smaller one ends the iterations, or raises the penalty
@@ -161,12 +161,12 @@ class WindowProgram:
 
         `early` ends where much is missed after ten steps, as there are other beginnings; `rough` as soon as little is.
         """
-        here, ways, programs, missed = self._at(x), _Filter(radius, largest), 0, list[float]()
+        here, filter_, programs, missed = self._at(x), _Filter(radius, largest), 0, list[float]()
         multipliers = [np.zeros(len(one.equal)) for one in here.rows]
-        counts, smallest = self._counts(here), 0.5 * ways.radius
+        counts, smallest = self._counts(here), 0.5 * filter_.radius
         for number in range(self._iterations):
             missed.append(here.worst)
-            vain = number >= 10 or ways.radius < smallest or _stalled(missed)
+            vain = number >= 10 or filter_.radius < smallest or _stalled(missed)
             if early and here.worst > FAR and vain:
                 return SQPResult(here.x, here.objective, here.worst, programs, End.EARLY)
             if cancel(number, here.worst):
@@ -176,16 +176,16 @@ class WindowProgram:
             if not counts.any():
                 break
             dofs: Indices = np.flatnonzero(counts).astype(np.intp)
-            there_x, solved = self._step(here, dofs, ways, multipliers)
+            there_x, solved = self._step(here, dofs, filter_, multipliers)
             programs += solved
             step = there_x - here.x
             longest = float(np.abs(step).max(initial=0.0))
             more, there = self._joined(here, step, counts), self._at(there_x)
             gained = abs(here.objective - there.objective)
             small = longest <= SETTINGS.still or gained <= SETTINGS.gain * max(here.objective, 1e-9)
-            taken = ways.takes(there, here)
+            taken = filter_.takes(there, here)
             if taken:
-                ways.accept(here, there, longest, small)
+                filter_.accept(here, there, longest, small)
                 multipliers = [
                     np.clip(old + one.equal, -0.05, 0.05) for old, one in zip(multipliers, there.rows, strict=True)
                 ]
@@ -193,18 +193,18 @@ class WindowProgram:
                 counts = counts | more | self._counts(here)
             if here.worst <= MET and small and not (more & ~counts).any():
                 break  # what another step could bring is less still
-            if not taken and not ways.refuse(here, longest):
+            if not taken and not filter_.refuse(here, longest):
                 break
         return SQPResult(here.x, here.objective, here.worst, programs)
 
-    def _step(self, here: _At, dofs: Indices, ways: _Filter, multipliers: Sequence[Array]) -> tuple[Array, int]:
+    def _step(self, here: _At, dofs: Indices, filter_: _Filter, multipliers: Sequence[Array]) -> tuple[Array, int]:
         """Deviations (n, nv) after the step of a program, and how many programs were solved for it."""
         # It begins with the near rows; those that its step would miss are added, the third time all within reach.
-        possible = [within_reach(one, dofs, ways.radius) for one in here.rows]
-        kept = [mask & likely(one, ways.radius) for one, mask in zip(here.rows, possible, strict=True)]
+        possible = [within_reach(one, dofs, filter_.radius) for one in here.rows]
+        kept = [mask & likely(one, filter_.radius) for one, mask in zip(here.rows, possible, strict=True)]
         solved = 0
         while True:
-            step = Step(here.x, here.rows, dofs, ways.radius, ways.penalty, multipliers, kept)
+            step = Step(here.x, here.rows, dofs, filter_.radius, filter_.penalty, multipliers, kept)
             layout = lay_out(self._objective, self._limits, step)
             x, solved = layout.deviations(minimise(layout.program).z, here.x), solved + 1
             left = [mask & ~keep for mask, keep in zip(possible, kept, strict=True)]

@@ -237,21 +237,21 @@ class ClipRun:
         program.add(begun.between)
         x, radius, near = begun.x, way.radius, list[Node]()
 
-        def told(count: int, worst: float) -> bool:
+        def report(count: int, worst: float) -> bool:
             return own.cancel(count / SETTINGS.iterations)
 
         for number in range(SETTINGS.rounds):
             # what passes a thing between two frames is on the wrong side: seen where little is missed in frames, long
             # before the optimum; from the third round on it is nearly free, and what is missed then seldom is
             early, rough = way.early and number < 2, way.early and not number
-            found = program.run(x, told, radius, way.largest, early, rough)
+            found = program.run(x, report, radius, way.largest, early, rough)
             work.programs += found.programs
             if found.end is End.ROUGH:
                 passed = self._passed(own, found.x)
                 if passed > ONE_STEP:  # rows there would push it on
                     return _Attempt(found.x, found.worst, 0, found.objective, True, program.between)
                 if passed <= PASSED:
-                    found = program.run(found.x, told, radius, way.largest, early)
+                    found = program.run(found.x, report, radius, way.largest, early)
                     work.programs += found.programs
             if found.end is End.CANCELLED:
                 return None

@@ -1,4 +1,4 @@
-"""Our own methods as they take part: qp with every QP solver, newton in three ways, ccd and dls."""
+"""Our own methods as they take part: qp with every QP solver, newton in three variants, ccd and dls."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ NEWTONS: dict[str, dict[str, Any]] = {
     "barrier": {"inequalities": "barrier"},
     "kkt": {"inequalities": "slack", "algebra": "kkt"},
 }
-"""The ways of newton, as arguments of `Newton`."""
+"""The variants of newton, as arguments of `Newton`."""
 
 
 def qp_settings(solver: str) -> dict[str, Any]:
@@ -77,7 +77,7 @@ def dls_adapter() -> Adapter:
 
 
 def newton_adapter(way: str) -> Adapter:
-    """Sparse Newton in full coordinates, in one of the ways of `NEWTONS`."""
+    """Sparse Newton in full coordinates, in one of the variants of `NEWTONS`."""
     make = partial(made, partial(wb.methods.Newton, **NEWTONS[way]), {"restarts": 0})
     return Adapter(f"newton/{way}", make, (*few(3, 6, 12, 25), *LADDER[1:]))
 

@@ -278,7 +278,7 @@ def way(figure: wb.Figure, rng: np.random.Generator) -> Array:
                 break
         else:
             return np.vstack(frames)
-    raise InputError("none of 50 ways is free; give another seed")
+    raise InputError("none of 50 motions is free; give another seed")
 
 
 def _span(control: Array) -> Array:

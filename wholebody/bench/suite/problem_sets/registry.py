@@ -55,7 +55,7 @@ TUNED_ON = MappingProxyType({name: numbers(name).beside for name in NAMED if num
 
 
 def beside(say: Callable[[str], object]) -> tuple[str, ...]:
-    """Names of the held-out sets and of those beside them; `say` is told why robots are left out, if they are."""
+    """Names of the held-out sets and of those beside them; `say` is called with why robots are left out."""
     names = list(TUNED_ON)
     try:
         robots.folder()

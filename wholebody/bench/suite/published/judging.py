@@ -68,7 +68,7 @@ class SetScore:
 
     Shares leave out the refused problems, and the unanswered are not solved. `worst`: median of the worst error [m or
     rad]; `overlap`: deepest of all answers [m]; `mean_seconds`: of all problems, failures counting `TIMEOUT`. Times are
-    NaN where none are told.
+    NaN where none are known.
     """
 
     set: str

@@ -77,6 +77,6 @@ def publish(verdicts: Sequence[Verdict], problems: Path, out: Path) -> list[str]
 
 
 def _in_kernels(verdict: Verdict) -> float:
-    """Median time in units of the reference kernel of the machine; NaN where either is not told."""
+    """Median time in units of the reference kernel of the machine; NaN where either is not known."""
     seconds = sorted(one.seconds for one in verdict.judged if isfinite(one.seconds))
     return seconds[len(seconds) // 2] / verdict.answers.kernel_seconds if seconds else float("nan")
