@@ -8,13 +8,15 @@ from presenting import OAK, command_line, picture, report
 
 import wholebody as wb
 
+HIGH = 0.38  # m: for popliteal heights from 0.365 m on; shorter legs need a lower chair or a footrest
 
-def build(figure: wb.Figure | None = None) -> wb.Problem:
+
+def build(figure: wb.Figure | None = None, high: float = HIGH) -> wb.Problem:
     """State the problem, of a woman if nobody is given; tasks/take_a_seat.toml states the same."""
     scene = wb.Scene(figure or wb.load("human", sex="female", stature=1.65))
     scene.add(wb.HalfSpace(), name="floor")
-    scene.add(wb.Box((0.44, 0.48, 0.04)), name="seat", at=(-0.35, 0.0, 0.36), color=OAK)
-    scene.add(wb.Box((0.03, 0.48, 0.36)), name="backrest", at=(-0.56, 0.0, 0.80), color=OAK)
+    scene.add(wb.Box((0.44, 0.48, 0.04)), name="seat", at=(-0.35, 0.0, high - 0.02), color=OAK)
+    scene.add(wb.Box((0.03, 0.48, 0.36)), name="backrest", at=(-0.56, 0.0, high + 0.42), color=OAK)
     return wb.Problem(
         scene,
         goals=[wb.Sit(on="seat", back="backrest")],

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import wholebody as wb
+from wholebody.figures.measuring import measure
 
 JUMP = radians(10.0)
 
@@ -30,7 +31,10 @@ def example(recipe: str) -> Any:
 
 def task(recipe: str, figure: wb.Figure, _target: Any = None, _layout: Any = None) -> wb.Problem:
     """The problem of a recipe, by the name of its example."""
-    made: wb.Problem = example(recipe).build(figure)
+    module = example(recipe)
+    # A seat is at most as high as the popliteal height (ISO 9241-5): who has short legs takes a lower chair.
+    sized = (min(module.HIGH, measure(figure)["popliteal_height"]),) if recipe == "take_a_seat" else ()
+    made: wb.Problem = module.build(figure, *sized)
     return made
 
 

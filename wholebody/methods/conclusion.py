@@ -36,6 +36,7 @@ class Ending:
     # number of quadratic programs that each solver closed; empty for a method without programs
     programs: Mapping[str, int] = field(default_factory=dict)
     method: str = ""  # what was run, where that says more than the method's name
+    unreached: str = "not reachable from here"  # what the search knows of goals that are missed
 
 
 def assessed_tolerance(tolerance: float) -> float:
@@ -99,7 +100,7 @@ def _message(problem: Problem, status: Status, judgement: Assessment, ending: En
     if ending.failure:
         return f"{ending.failure}: {left}"
     if status == "unreachable":
-        return f"not reachable from here: nothing is violated, {left}"
+        return f"{ending.unreached}: nothing is violated, {left}"
     if judgement.holds(enough):
         return f"ran out of {ending.unit}: {left}"
     name, missed = _worst(problem, judgement, ending.q)

@@ -314,3 +314,30 @@ def test_a_descent_goes_on_to_what_will_stop_it():
     assert answer.solved
     assert answer.assessment.measure < wb.assess(problem, begin).measure - 0.1
     assert answer.assessment.optimality < 1e-3
+
+
+def behind_a_panel(number):
+    """A standing man, a table, a panel, and a place behind it for a fingertip."""
+    scene = wb.Scene(wb.load("human", stature=1.75)).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Box((0.5, 1.2, 0.04)), name="table", at=(0.55, 0.0, 0.78))
+    scene.add(wb.Box((0.04, 0.5, 0.5)), name="panel", at=(0.45, -0.1, 1.25))
+    places = np.random.default_rng(11).uniform((0.5, -0.3, 0.95), (0.66, 0.12, 1.45), (number, 3))
+    goals, feet = [wb.Point("right_index_tip", places[-1])], [wb.Hold("left_foot"), wb.Hold("right_foot")]
+    return wb.Problem(scene, goals=goals, constraints=feet, clearance=0.002)
+
+
+@pytest.mark.parametrize(("seed", "number"), [(0, 21), (1, 1), (3, 8)])
+def test_places_behind_a_panel_are_not_called_out_of_reach(seed, number, honest):
+    """Random starts alone find none of these, and other seeds reach all: the way leads round the panel's edge."""
+    problem = behind_a_panel(number)
+    assert honest(problem, wb.solve(problem, wb.methods.QP(seed=seed))).status == "solved"
+
+
+def test_the_message_says_what_is_known_of_a_goal_that_is_not_met():
+    """Nothing reaches a metre above the head; behind the panel no start of one's own finds a way, others do."""
+    feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]
+    far = wb.Problem(wb.Scene(wb.load("human")), goals=[wb.Point("right_palm", (0.0, 0.0, 3.0))], constraints=feet)
+    assert wb.solve(far).message.startswith("out of reach: nothing is violated")
+    short = wb.solve(behind_a_panel(21), wb.methods.QP(restarts=0))
+    assert short.status == "unreachable"
+    assert short.message.startswith("not found from ")

@@ -140,7 +140,6 @@ class ReachTrials(NamedTuple):
     """What descents through everything tell of how near goals can come."""
 
     out_of_reach: bool  # whether enough of them rest at the same distance
-    ends: list[LocalSolution]  # where those rest that do not reach the goals
     reached: Array | None  # (nq,) where one from another start than the first reaches them
     spent: int  # programs
 
@@ -159,14 +158,14 @@ def reach_trials(
         spent += local.iterations
         met = local.violation.worst <= reach.tolerance
         if met or reach.shared.control.over:
-            return ReachTrials(False, [], local.q if met and number else None, spent)
+            return ReachTrials(False, local.q if met and number else None, spent)
         if local.violation.hold > SEARCH.held * local.violation.left:
             continue  # from there the constraints alone are too far
         ends.append(local)
         most = SEARCH.agree * min(nearest, *(end.violation.total for end in ends)) + tolerance
         if sum(end.violation.total <= most for end in ends) == agreeing:
-            return ReachTrials(True, ends, None, spent)
-    return ReachTrials(False, ends, None, spent)
+            return ReachTrials(True, None, spent)
+    return ReachTrials(False, None, spent)
 
 
 def _add_kinematic_hessian(total: Array, state: State, part: Wrench, force: Array) -> None:

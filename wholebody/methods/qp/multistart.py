@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from itertools import chain, takewhile
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -51,18 +51,17 @@ class Multistart:
         self.trace: list[TraceEntry] = []
         self._shared = Run(self.subproblem, self.lineariser, solver, self.trace, control)
         self.spent = 0
+        self.tried = 0  # starts of attempts
         self.how = "directly"
         self.contradictions: tuple[Contradiction, ...] = ()
         self._start = problem.scene.figure.clamp(problem.start)
         self._first: int | None = None  # programs of the first attempt, once it is made
-        self._without_gain = 0  # probes in a row that came no nearer, without contacts or relaxed
-        self._least_probed = np.inf  # least residual of the goals of these
         self._least = 0.0  # lower bound of the goals' residual, metres
         self._minima = Minima()  # where relaxed probes ended after the true clearances were required
         self._relaxed_minima = Minima()  # where the others ended
         self._through: list[Array] = []  # where a descent without contacts from another start reached the goals
         self._nearest_through = np.inf  # least violation of a relaxed probe: so near come the goals, if through things
-        self._out_of_reach = False  # which is known
+        self.out_of_reach = False  # which is known
         self._best: LocalSolution | None = None
 
     @property
@@ -80,7 +79,7 @@ class Multistart:
         self, begin: Array | None = None, other: Array | None = None, near: tuple[Array, ...] = ()
     ) -> LocalSolution:
         """The best of attempts from `begin` (nq,) and a descent from `other`; out of reach, the closest to `near`."""
-        self._out_of_reach = bool(near)
+        self.out_of_reach = bool(near)
         if not near:
             self._search(self._attempts(self._start if begin is None else begin))
         for q in near:
@@ -91,17 +90,19 @@ class Multistart:
         self._seek_lower(max(self.settings.restarts_for_measure, SEARCH.poor if self._descend_again() else 0))
         if self.best.violation.worst <= self.settings.tolerance:
             self.contradictions = ()  # by less than the tolerance
-        if self._out_of_reach:  # although a closer posture may be near
+        if self.out_of_reach:  # although a closer posture may be near
             self._best = with_values(self.best, converged=True)
         return with_values(self.best, converged=False) if self.control.reason else self.best
 
     def _search(self, attempts: Iterable[Attempt]) -> None:
         for attempt in attempts:
             for q in attempt.starts:
+                self.tried += 1
                 local = attempt.stage(q)
                 if local is not None and self._accept(local, attempt.how or self.how):
                     return
-                if self.control.over or self._left < 0 or self._proven():
+                enough = self._minima.complete or self._relaxed_minima.complete
+                if enough or self.control.over or self._left < 0 or self._proven():
                     return
 
     def _attempts(self, begin: Array) -> Iterator[Attempt]:
@@ -125,10 +126,9 @@ class Multistart:
         yield Attempt(self._before_contact(), lambda q: self._descend(q, full_step=True), "from before contact")
         yield Attempt(self._before_contact(grips=True), self._closing, "from before a grip")
         yield Attempt([start], self._closing, "by feasibility first")
-        # hands are no random starts
-        self._minima, self._relaxed_minima, self._without_gain, self._least_probed = Minima(), Minima(), 0, np.inf
-        self._out_of_reach = self._known_out_of_reach(self.best.q)
-        if self._out_of_reach or self._proven():
+        self._minima, self._relaxed_minima = Minima(), Minima()  # hands are no random starts
+        self.out_of_reach = self._known_out_of_reach(self.best.q)
+        if self.out_of_reach or self._proven():
             return
         if not held(self.best, self.settings.tolerance):
             apart = posture_apart(self.problem, self.lineariser.workspace, self.best.q)
@@ -138,9 +138,11 @@ class Multistart:
         count = min(self.settings.restarts, SEARCH.inside_probes) if least else self.settings.restarts
         if few := moving(self._shared, self.best.q) < SEARCH.few:
             self._minima, self._relaxed_minima = Minima(SEARCH.fewest_descents), Minima(SEARCH.fewest_descents)
+        elif self.problem.goals and not least:
+            yield Attempt(self._beside(min(count, SEARCH.beside)), self._free, "from beside the goals")
         others = (throughout if few else restarts)(self.problem, state, start, rng, count)
         starts = self.lineariser.defined(chain(self._through, others))
-        yield Attempt(self._while_open(starts), self._relaxed, "from another start")
+        yield Attempt(starts, self._relaxed, "from another start")
 
     def _without_measures(self, start: Array) -> LocalSolution | None:
         """Seek a feasible posture so that no measure changes what is reached, and descend; None: nothing but start."""
@@ -150,20 +152,19 @@ class Multistart:
         found._best = begin = found._ran(found._feasibility(found.lineariser, 0, ""), start)
         found._search(found._attempts_for_feasibility())
         self.spent += found.spent
+        self.tried += found.tried
         self.trace += found.trace
-        self._out_of_reach = found._out_of_reach
+        self.out_of_reach = found.out_of_reach
         if found.best is begin and begin.violation.worst > self.settings.tolerance:
             return None
         return self._descend(found.best.q) if self._accept(found.best, found.how) else found.best
 
-    def _while_open(self, starts: Iterable[Array]) -> Iterator[Array]:
-        """Starts of relaxed probes, until enough say that the goals are out of reach, or the budget is spent."""
-
-        def is_open(_: Array) -> bool:
-            complete = self._minima.complete or self._relaxed_minima.complete
-            return not complete and self._without_gain < SEARCH.no_nearer and self._left > 0
-
-        return takewhile(is_open, starts)
+    def _beside(self, count: int) -> Iterator[Array]:
+        """Postures whose goals are displaced at random, where descents that pass through nothing lead to (nq,)."""
+        rng, most = np.random.default_rng(self.settings.seed), self._at_most(SEARCH.probe_programs)
+        for away in rng.normal(0.0, SEARCH.displaced, (count, len(self.subproblem.terms.share))):
+            descent = self._descent(most, away, "beside the goals", measures=False, full_step=True)
+            yield self._ran(descent, self._start).q
 
     def _before_contact(self, grips: bool = False) -> Iterator[Array]:
         """Postures where surfaces are in front of the faces that they are to meet, or bars in front of palms."""
@@ -206,17 +207,20 @@ class Multistart:
         tolerance = self.settings.tolerance
         relaxed = self._probe(start, SEARCH.relaxation_depth)
         self._nearest_through = min(self._nearest_through, relaxed.violation.total)
-        nearer = relaxed.violation.left < (1.0 - SEARCH.nearer) * self._least_probed
-        self._without_gain = 0 if nearer else self._without_gain + 1
-        self._least_probed = min(self._least_probed, relaxed.violation.left)
         if relaxed.violation.worst > SEARCH.reached * tolerance:
             self._relaxed_minima.add(relaxed.violation.total, relaxed.converged)
             return None
-        probe = self._probe(relaxed.q, 0.0)
-        if not held(probe, tolerance) and not held(self.best, tolerance):
-            probe = self._probe(start, 0.0)  # nothing leads out from there; to be outside comes before the goals
+        return self._free(relaxed.q, start)
+
+    def _free(self, start: Array, other: Array | None = None) -> LocalSolution:
+        """A probe with the true clearances, and a descent from where it reaches the goals; `other` is (nq,)."""
+        tolerance = self.settings.tolerance
+        probe = self._probe(start, 0.0)
+        if other is not None and not held(probe, tolerance) and not held(self.best, tolerance):
+            probe = self._probe(other, 0.0)  # nothing leads out from there; to be outside comes before the goals
         if probe.violation.worst > tolerance:
-            self._minima.add(probe.violation.total, probe.converged)
+            if other is not None:  # ends from beside the goals are not of random starts
+                self._minima.add(probe.violation.total, probe.converged)
             return probe
         return self._descend(probe.q, "restart", most=max(self._left, 1))
 
@@ -304,14 +308,14 @@ class Multistart:
         tolerance = self.settings.tolerance
         if self.control.over:
             return
-        if self._out_of_reach:
+        if self.out_of_reach:
             local = self._ran(self._closest(), self.best.q)
             if not held(local, tolerance) and local.violation.total < self.best.violation.total:
                 local = self._descend(local.q, note="nearest", measures=False, most=SEARCH.coming_near)
             self._accept(local, self.how)
         if not held(self.best, tolerance):
             self._accept(self._stay(self.best), self.how)
-        if not self._out_of_reach and self.best.violation.worst > tolerance:
+        if not self.out_of_reach and self.best.violation.worst > tolerance:
             self._closest_from_best()
         if self.best.violation.left <= tolerance:
             return
@@ -339,8 +343,6 @@ class Multistart:
         found = reach_trials(reach, starts, self._nearest_through, agreeing, self.settings.tolerance)
         self.spent += found.spent
         self._through = [] if found.reached is None else [found.reached]
-        self._least_probed = min((end.violation.left for end in found.ends), default=np.inf)
-        self._without_gain = len(found.ends)  # as relaxed probes count
         return found.out_of_reach
 
     def _closest_from_best(self) -> None:

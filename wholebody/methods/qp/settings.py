@@ -168,13 +168,12 @@ class SearchNumbers(NamedTuple):
     # 18 with 0.07, 9 with 0.15) and from others. More: limbs change sides more easily, and are harder to separate.
     start_depth: float = 0.07
     relaxation_depth: float = 0.15
-    # probes in a row, without contacts or relaxed, that came no nearer before the goals are given up. Fewer: faster to
-    # know, rare branches of arms are missed.
-    no_nearer: int = 20
+    # probes from beside goals. More: goals behind things are found more often, and what none reaches takes longer.
+    beside: int = 24
+    displaced: float = 0.5  # m, rad: of goals along each axis, the standard deviation. Less: the same side of things.
     # tolerances within which such a relaxed probe must come for the second one to follow. More: more second ones in
     # vain.
     reached: float = 10.0
-    nearer: float = 0.02  # share of the residual that counts as nearer
     reach_trials: int = 10  # most descents without contacts that tell whether goals are out of reach
     reach_trial_programs: int = 60  # most programs of each
     # shares of the joints' ranges that their starts may be away by. Smaller: local minima are taken for the edge of
