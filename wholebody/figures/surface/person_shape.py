@@ -202,7 +202,7 @@ class PersonShape:
             legs = [self._limbs[f"{side}_thigh"], self._limbs[f"{side}_shank"], self._calf(side, sign)]
             solids.append(union(legs, 0.03))
             solids.append(self._buttock(sign))
-        body = grown(union(solids, 0.04 * scale), 0.003)  # m of cloth below the shirt
+        body = _tapered(grown(union(solids, 0.04 * scale), 0.003), self._belt() - 0.036 * scale)  # m of cloth
         cuts = [half_space((0.0, 0.0, self._belt()), (0.0, 0.0, 1.0))]
         for side, _ in SIDES:
             knee, ankle = self.at(f"{side}_shank"), self.at(f"{side}_foot")
@@ -331,6 +331,11 @@ class PersonShape:
 def _between(field: Field, low: float, high: float) -> Field:
     """Distance from the part of a solid between two heights."""
     return lambda points: np.maximum(field(points), 0.0) + _outside(points[:, 2], low, high)
+
+
+def _tapered(field: Field, height: float) -> Field:
+    """A solid that narrows above a height, so that it stays below the shirt whose hem is over it."""
+    return lambda points: field(points) + 0.4 * np.maximum(points[:, 2] - height, 0.0)
 
 
 def _slab(low: float, high: float) -> Field:
