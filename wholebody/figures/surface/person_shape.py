@@ -202,7 +202,7 @@ class PersonShape:
             legs = [self._limbs[f"{side}_thigh"], self._limbs[f"{side}_shank"], self._calf(side, sign)]
             solids.append(union(legs, 0.03))
             solids.append(self._buttock(sign))
-        body = grown(union(solids, 0.04 * scale), 0.003)  # m of cloth below the shirt
+        body = _tapered(grown(union(solids, 0.04 * scale), 0.003), self._belt() - 0.036 * scale)  # m of cloth
         cuts = [half_space((0.0, 0.0, self._belt()), (0.0, 0.0, 1.0))]
         for side, _ in SIDES:
             knee, ankle = self.at(f"{side}_shank"), self.at(f"{side}_foot")
@@ -239,10 +239,10 @@ class PersonShape:
         skin = union([placed(shape.skin, frame), neck], 0.022)
         low, high = bounds([bottom, top], 0.15 * scale)
         low[2], high[2] = bottom[2] - radius - 0.02, top[2] + 0.03
-        atlas = self.at("head")
+        root, atlas = self.at("neck")[2], self.at("head")
         claims = [
             Claim("thorax", half_space(self.at("neck"), (0.0, 0.0, 1.0)), 0.015),
-            Claim("neck", _slab(self.at("neck")[2], atlas[2]), 0.015),
+            Claim("neck", lambda points: _outside(points[:, 2], root, atlas[2]), 0.015),
             Claim("head", union([half_space(atlas, (0.0, 0.0, -1.0)), placed(shape.skin, frame)]), 0.012),
         ]
         rigid = [Claim("head", lambda points: np.zeros(len(points)))]
@@ -333,8 +333,9 @@ def _between(field: Field, low: float, high: float) -> Field:
     return lambda points: np.maximum(field(points), 0.0) + _outside(points[:, 2], low, high)
 
 
-def _slab(low: float, high: float) -> Field:
-    return lambda points: _outside(points[:, 2], low, high)
+def _tapered(field: Field, height: float) -> Field:
+    """A solid that narrows above a height, so that it stays below the shirt whose hem is over it."""
+    return lambda points: field(points) + 0.4 * np.maximum(points[:, 2] - height, 0.0)
 
 
 def _outside(heights: Array, low: float, high: float) -> Array:
