@@ -13,7 +13,7 @@ import pinocchio as pin
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Indices, as_dict
 from wholebody.base.errors import InputError, UnknownNameError
-from wholebody.base.pool import Pool
+from wholebody.base.pool import Loan, Pool
 from wholebody.figures.body_spec import geometry_of
 from wholebody.figures.description import Description, Mount, Place, followers_of, is_root, limits_of
 from wholebody.figures.joining import mounted_parts, posture_of_all
@@ -21,7 +21,7 @@ from wholebody.figures.model_archive import reduced
 from wholebody.figures.model_check import LARGEST, Turning, check_model, with_joint_frames
 from wholebody.figures.postures import grounded
 from wholebody.figures.reduction import reduced_parts
-from wholebody.figures.state import Posed, free_roots, root_freedoms
+from wholebody.figures.state import State, free_roots, root_freedoms
 from wholebody.geometry.placement import placement
 
 
@@ -108,7 +108,7 @@ class Figure(checks.FixedAttributes):
         self.loaded_as: tuple[str, dict[str, Any]] | None = None
         self.mount: Mount | None = None
         self.members = MappingProxyType(dict(description.members))
-        self._data = Pool(lambda: Posed(model), at_most=1)  # 6.5 MB for 55 freedoms, 27 MB for 95
+        self._states = Pool(lambda: State(model), at_most=2)  # 6.5 MB for 55 freedoms, 27 MB for 95
         self._description = description
         self._made: dict[str, Array] = {}
         self._outer: tuple[pin.GeometryObject, ...] | None = None
@@ -212,15 +212,16 @@ class Figure(checks.FixedAttributes):
 
     def placement(self, q: Array, name: str) -> pin.SE3:
         """Return the placement in the world, at the posture q (nq,), of a frame, a segment or a joint."""
-        frame, q = self.frame_id(name), self._checked(q)
-        with self._data.borrow() as posed:
-            return pin.updateFramePlacement(self.model, posed.at(q), frame).copy()
+        frame = self.frame_id(name)
+        with self.posed(q) as state:
+            return state.frame(frame).copy()
 
-    def joint_placements(self, q: Array, joints: Iterable[int]) -> dict[int, pin.SE3]:
-        """Return the placements in the world, at the posture q (nq,), of joints by their indices in the model."""
-        with self._data.borrow() as posed:
-            placed = posed.at(self._checked(q)).oMi
-            return {joint: placed[joint].copy() for joint in joints}
+    def posed(self, q: Array) -> Loan[State]:
+        """Return a context with a state at the posture q (nq,), kept for others: do not move it, copy what is to stay.
+
+        To make a state takes longer than to state the rest of a problem.
+        """
+        return self._states.borrow(lambda state: state.at(q))
 
     def joint_id(self, name: str) -> int:
         """Return the index of a joint in the model; "root", or "anna/root", is a free root."""

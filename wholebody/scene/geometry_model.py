@@ -162,14 +162,14 @@ class SceneGeometry:
         return self._pools.setdefault(kind, Pool(make)) if pool is None else pool
 
     def known(self, key: Hashable, make: Callable[[], T]) -> T:
-        """What follows from the model and a key alone, made the first time and read-only; the last 32 are kept."""
+        """What follows from the model and a key alone, made the first time and read-only; the last 64 are kept."""
         found: T | None = self._known.get(key)
         if found is None:
             found = make()
         with self.lock:
             self._known.pop(key, None)
             self._known[key] = found
-            if len(self._known) > 32:
+            if len(self._known) > 64:
                 del self._known[next(iter(self._known))]
         return found
 
