@@ -70,6 +70,24 @@ def test_a_blow_between_a_ball_and_a_hand_in_the_air_keeps_their_momentum() -> N
     assert np.linalg.norm(moving.momentum()[:3]) > 0.2
 
 
+def test_balls_that_hit_a_lighter_hand_from_all_sides_add_no_energy() -> None:
+    hand = wb.load("hand")
+    start, scene = hand.posture("relaxed"), wb.Scene(hand)
+    palm = hand.placement(start, "right_palm").translation
+    elastic = wb.dynamics.Material("elastic", {"human": (1.0, 0.3), "elastic": (1.0, 0.3)})
+    balls = (((0.0, 0.02, 0.2), 0.3, -2.0), ((0.05, 0.0, -0.25), 1.0, 3.0), ((-0.02, 0.05, 0.5), 0.02, -6.0))
+    for k, (off, mass, speed) in enumerate(balls):
+        body = wb.Body(mass=mass, velocity=(0.0, 0.0, speed), material=elastic)
+        scene.add(wb.Sphere(0.03), name=f"ball{k}", at=palm + off, body=body)
+    world = wb.World(scene, start, spring=wb.Actuated(hand, stiffness=0.0, damping=0.0))
+    energies, hits = [world.energy], 0
+    for _ in range(20):
+        hits += len(world.step().impulses)
+        energies.append(world.energy)
+    assert hits > 2
+    assert np.diff(energies).max() < 1e-6
+
+
 def test_a_ragdoll_falls_and_rests_and_its_energy_never_grows() -> None:
     scene = wb.Scene(wb.load("avatar")).add(wb.HalfSpace(), name="floor")
     start = scene.figure.posture("standing").copy()

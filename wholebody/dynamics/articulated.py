@@ -153,11 +153,13 @@ class Articulated:
         paid = float(motor @ moves) + float(work[points.driven].sum())
         motions = self._move(moves, segments, () if bearing.any() else drifted)
         motions |= {name: (way[0], pin.SE3.Interpolate(*way, time / planned)) for name, way in moved.items()}
-        self._settle(began + paid, 1.0 if impulse.any() or self.stiffness.any() else 1.05, drifted)
+        most = 1.0 if impulse.any() or self.stiffness.any() else 1.05
+        self._settle(began + paid, most, [one for one, _ in drifted])
         if engine is not None:
             frame = engine.advance(time, motions)
             self.frames.append(frame)
-            self._react(frame.wrenches, segments)
+            twists = {name: pin.log6(way[1] * way[0].inverse()).vector / time for name, way in motions.items()}
+            self._react(frame.wrenches, twists, segments)
         return time
 
     def _points(self, time: float, moved: Moved) -> Points:
@@ -310,7 +312,7 @@ class Articulated:
             found.append((then, centre + 0.5 * time / mass * (now.linear + then.linear)))
         return found
 
-    def _settle(self, energy: float, most: float, drifted: Sequence[tuple[pin.Force, Array]]) -> None:
+    def _settle(self, energy: float, most: float, momenta: Sequence[pin.Force]) -> None:
         """Give free roots their momenta, and scale the velocities beside those by at most a factor.
 
         Then kinetic and potential energy are at most `energy`.
@@ -319,7 +321,7 @@ class Articulated:
         pin.forwardKinematics(self._model, self._data, self.q)
         drift = np.zeros_like(velocity)
         if len(roots):
-            kept = [self._data.oMi[k].actInv(one).vector for k, (one, _) in zip(self._roots, drifted, strict=True)]
+            kept = [self._data.oMi[k].actInv(one).vector for k, one in zip(self._roots, momenta, strict=True)]
             locked = masses[np.ix_(roots, roots)]
             drift[roots] = np.linalg.solve(locked, np.concatenate(kept))
             velocity = velocity.copy()
@@ -333,20 +335,27 @@ class Articulated:
             drift = drift * np.sqrt(max(0.0, left) / kinetic[0])
         self.velocity = drift + velocity
 
-    def _react(self, wrenches: Mapping[str, Array], segments: Mapping[str, int]) -> None:
-        """Give the figure the impulses that things gave its segments while they went on."""
-        given = {name: wrench for name, wrench in wrenches.items() if name in segments}
+    def _react(self, wrenches: Mapping[str, Array], twists: Mapping[str, Array], segments: Mapping[str, int]) -> None:
+        """Give the figure the impulses that things gave its segments while they went on, and no energy beside.
+
+        For the things the segments are as heavy as anything; what weighs much more than they do would throw them.
+        """
+        given = {name: wrench for name, wrench in wrenches.items() if name in segments and wrench.any()}
         if not given:
             return
-        model = self._model
+        model, data, energy = self._model, self._data, self.energy()
         inertia = self._inertia(self.q)
-        pin.computeJointJacobians(model, self._data, self.q)
+        pin.computeJointJacobians(model, data, self.q)
         total = np.zeros(model.nv)
         for name, wrench in given.items():
             joint = model.frames[segments[name]].parentJoint
             if joint:
-                total += pin.getJointJacobian(model, self._data, joint, pin.WORLD).T @ wrench
+                total += pin.getJointJacobian(model, data, joint, pin.WORLD).T @ wrench
+                energy += float(wrench @ twists[name])
         self.velocity = self.velocity + np.linalg.solve(inertia, total)
+        pushed, first = inertia @ self.velocity, model.idx_vs
+        momenta = [data.oMi[k].act(pin.Force(pushed[first[k] : first[k] + 6])) for k in self._roots]
+        self._settle(energy, 1.0, momenta)
 
 
 def _axes(normal: Array) -> Array:
