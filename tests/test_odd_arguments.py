@@ -403,6 +403,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Soft", Call(wb.Soft, soft, solve_it)
     yield "State", Call(State, {"model": arm.model})
     yield "State.update", Call(state.update, {"q": q})
+    yield "State.at", Call(state.at, {"q": q})
     yield "State.frame", Call(state.frame, {"index": 1})
     for method in ("center_of_mass", "center_of_mass_jacobian"):
         yield f"State.{method}", Call(getattr(state, method), {})
@@ -908,7 +909,7 @@ BY_OWNERS = ("Trajectory.avoid", "PerFrame.avoid", "Bisection.avoid", "QP.batche
 DERIVATIVES = (
     "of_arms",
     "on_points",
-    "joint_placements",
+    "posed",
     "place_of",
     "companion",
     "folded",

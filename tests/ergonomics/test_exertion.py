@@ -72,9 +72,8 @@ def test_the_disc_bears_what_levers_say(person: wb.Figure) -> None:
     assert back_compression(person, standing) == pytest.approx(500.0, rel=0.25)
     ahead = person.with_joints(standing, {f"{side}_shoulder_flexion": 0.5 * np.pi for side in ("left", "right")})
     empty, loaded = (back_compression(person, ahead, forces) for forces in ((), CARRIED))
-    spine = person.model.getJointId("spine1_flexion")
     lever = person.placement(ahead, "left_palm").translation[0]
-    lever -= person.joint_placements(ahead, (spine,))[spine].translation[0]
+    lever -= person.placement(ahead, "spine1_flexion").translation[0]
     assert loaded - empty == pytest.approx(196.2 * lever / 0.06 + 196.2, rel=0.03)
 
 

@@ -212,7 +212,7 @@ def test_a_placement_is_right_where_another_thread_asks_for_one_in_the_middle_of
     """What a figure computes in is used again; two calls never share it."""
     rng = np.random.default_rng(7)
     first, second, third = (random_posture(HUMAN, rng) for _ in range(3))
-    forward, between = pin.forwardKinematics, []
+    forward, between = pin.computeJointJacobians, []
 
     def interrupted(*given):
         forward(*given)
@@ -220,7 +220,7 @@ def test_a_placement_is_right_where_another_thread_asks_for_one_in_the_middle_of
             between.append(None)
             between[0] = HUMAN.placement(second, "left_palm")
 
-    monkeypatch.setattr(pin, "forwardKinematics", interrupted)
+    monkeypatch.setattr(pin, "computeJointJacobians", interrupted)
     found = [HUMAN.placement(first, "left_palm"), *between, HUMAN.placement(third, "left_palm")]
     monkeypatch.undo()
     for q, one in zip((first, second, third), found, strict=True):

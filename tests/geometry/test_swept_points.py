@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.geometry.pieces import swept_points
+from wholebody.geometry.pieces import swept_points, swept_points_of
 
 DIRECTIONS = np.random.default_rng(0).normal(size=(200, 3))
 DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1)[:, None]
@@ -59,6 +59,17 @@ def supports_of_opposite(shape):
         centre = shape.pieces()[0].placement.translation
         return (-DIRECTIONS @ (POINTS - centre).T).max(axis=1)
     return supports(shape)
+
+
+def test_many_pieces_have_each_their_own_in_the_order_given():
+    sizes = [(0.4, 0.2, 0.1), (0.1, 0.3, 0.2)]
+    first, second = (coal.Box(*size) for size in sizes)
+    found = swept_points_of([second, coal.Sphere(0.1), first, coal.Capsule(0.05, 0.3), second])
+    assert [len(each.points) for each in found] == [8, 1, 8, 2, 8]
+    for each, size in ((found[0], sizes[1]), (found[2], sizes[0]), (found[4], sizes[1])):
+        assert each.points.max(axis=0) - each.points.min(axis=0) == pytest.approx(size)
+        assert each.faces[:3, 3] == pytest.approx(0.5 * np.array(size))
+        assert (each.reach, each.width) == (pytest.approx(0.5 * np.linalg.norm(size)), min(size))
 
 
 @pytest.mark.parametrize("shape", [SHAPES[2], SHAPES[4]], ids=["box", "hull"])

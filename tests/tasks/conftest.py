@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,6 +13,7 @@ import pytest
 
 from wholebody.base.errors import UnknownNameError
 from wholebody.figures.description import Place
+from wholebody.figures.state import State
 
 
 class StandInFigure:
@@ -36,10 +38,8 @@ class StandInFigure:
     def warn_of_angles(self, q: Any, what: str) -> bool:
         return False
 
-    def joint_placements(self, q: Any, joints: Any) -> dict[int, pin.SE3]:
-        data = self.model.createData()
-        pin.forwardKinematics(self.model, data, q)
-        return {joint: data.oMi[joint] for joint in joints}
+    def posed(self, q: Any) -> Any:
+        return nullcontext(State(self.model).update(q))
 
     def place_of(self, name: str) -> Place:
         frame = self.model.frames[self.frame_id(name)]

@@ -65,6 +65,19 @@ def test_derivative_of_every_contact(scene: wb.Scene, name: str, shift: float) -
         assert kinks <= 1  # where another piece becomes the nearest one within the difference
 
 
+@pytest.mark.parametrize("name", TERMS)
+def test_a_term_keeps_what_it_was_resolved_with_whatever_is_resolved_later(scene: wb.Scene, name: str) -> None:
+    figure, state, values = scene.figure, State(scene.figure.model), []
+    start, other = figure.posture("standing"), figure.posture("sitting")
+    for first in (start, other):
+        TERMS[name].resolve(scene, first)
+        term = TERMS[name].resolve(scene, start)
+        values.append(term.value(state.update(start)))
+        TERMS[name].resolve(scene, other)
+        np.testing.assert_array_equal(term.value(state.update(start)), values[0])
+    np.testing.assert_array_equal(values[1], values[0])
+
+
 @pytest.mark.parametrize("depth", [0.3, 0.02, 1e-4, -1e-4, -0.02, -0.1])
 def test_touch_is_the_signed_distance(depth: float) -> None:
     """A point and a ball: the distance is a formula, and the derivative is the direction."""
@@ -351,6 +364,20 @@ def test_knees_that_are_no_feet_are_refused(knees: Any) -> None:
         wb.InputError, match=r"knees (is .*, not a list|are of the feet, and (left_shank|\['a'\]) is not)"
     ):
         wb.Problem(scene, constraints=[wb.Stand("floor", knees=knees)])
+
+
+@pytest.mark.parametrize("percentile", [5, 50, 95])
+def test_who_kneels_on_one_knee_has_the_thigh_level_and_the_trunk_upright_from_any_start(percentile: int) -> None:
+    # The ankle of a small woman who stands is as near to the floor as a knee that is thick.
+    woman = wb.load("human", sex="female", percentile=percentile)
+    scene = wb.Scene(woman).add(wb.HalfSpace(), name="floor")
+    kneels = wb.Stand("floor", feet=["left_foot", "right_shank"], knees=["right_shank"])
+    for start in ("standing", "kneeling"):
+        solution = wb.solve(wb.Problem(scene, start, constraints=[kneels]))
+        assert solution.solved
+        hip, knee = (woman.placement(solution.q, f"left_{name}").translation for name in ("hip", "knee"))
+        assert abs(hip[2] - knee[2]) < 0.06
+        assert woman.placement(solution.q, "thorax").rotation[2, 2] > np.cos(np.radians(15.0))
 
 
 def test_a_person_kneels_in_balance() -> None:

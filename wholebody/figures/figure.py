@@ -13,15 +13,15 @@ import pinocchio as pin
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Indices, as_dict
 from wholebody.base.errors import InputError, UnknownNameError
-from wholebody.base.pool import Pool
+from wholebody.base.pool import Loan, Pool
 from wholebody.figures.body_spec import geometry_of
-from wholebody.figures.description import Description, Place, followers_of, is_root, limits_of
+from wholebody.figures.description import Description, Mount, Place, followers_of, is_root, limits_of
 from wholebody.figures.joining import mounted_parts, posture_of_all
 from wholebody.figures.model_archive import reduced
 from wholebody.figures.model_check import LARGEST, Turning, check_model, with_joint_frames
 from wholebody.figures.postures import grounded
 from wholebody.figures.reduction import reduced_parts
-from wholebody.figures.state import Posed, free_roots, root_freedoms
+from wholebody.figures.state import State, free_roots, root_freedoms
 from wholebody.geometry.placement import placement
 
 
@@ -67,6 +67,7 @@ class Figure(checks.FixedAttributes):
         notes: sentences on what had to be changed about the geometry of a file, or about stated dimensions.
         limits: joint limits as arrays.
         loaded_as: name or path and options by which `wb.load` or `adjustable` made it; None for others.
+        mount: of a figure that `mounted` made: both figures, frame, name and placement; otherwise None.
         followers: joint to the law by which it follows another (mimic).
         effort_weights: (nv,) weight of each degree of freedom in the effort.
         neutral_weights: (nv,) weight of each degree of freedom in the displacement from neutral: 1, and 0 for the root.
@@ -76,7 +77,7 @@ class Figure(checks.FixedAttributes):
         True
     """
 
-    _settable = frozenset({"loaded_as"})
+    _settable = frozenset({"loaded_as", "mount"})
     _correction = "a figure never changes: load another one with wb.load(...)"
 
     def __init__(
@@ -105,8 +106,9 @@ class Figure(checks.FixedAttributes):
         self.collision_groups = MappingProxyType(dict(description.collision_groups))
         self.excluded_pairs, self.notes = description.excluded, description.notes
         self.loaded_as: tuple[str, dict[str, Any]] | None = None
+        self.mount: Mount | None = None
         self.members = MappingProxyType(dict(description.members))
-        self._data = Pool(lambda: Posed(model), at_most=1)  # 6.5 MB for 55 freedoms, 27 MB for 95
+        self._states = Pool(lambda: State(model), at_most=2)  # 6.5 MB for 55 freedoms, 27 MB for 95
         self._description = description
         self._made: dict[str, Array] = {}
         self._outer: tuple[pin.GeometryObject, ...] | None = None
@@ -145,7 +147,7 @@ class Figure(checks.FixedAttributes):
         }
         visual = None if self.visual is self.geometry else self.visual
         made_from = (self.name, self.model, self.geometry, self.detail, Description(**known), visual)
-        return Figure, made_from, {"loaded_as": self.loaded_as}
+        return Figure, made_from, {"loaded_as": self.loaded_as, "mount": self.mount}
 
     @property
     def outer(self) -> tuple[pin.GeometryObject, ...]:
@@ -210,15 +212,16 @@ class Figure(checks.FixedAttributes):
 
     def placement(self, q: Array, name: str) -> pin.SE3:
         """Return the placement in the world, at the posture q (nq,), of a frame, a segment or a joint."""
-        frame, q = self.frame_id(name), self._checked(q)
-        with self._data.borrow() as posed:
-            return pin.updateFramePlacement(self.model, posed.at(q), frame).copy()
+        frame = self.frame_id(name)
+        with self.posed(q) as state:
+            return state.frame(frame).copy()
 
-    def joint_placements(self, q: Array, joints: Iterable[int]) -> dict[int, pin.SE3]:
-        """Return the placements in the world, at the posture q (nq,), of joints by their indices in the model."""
-        with self._data.borrow() as posed:
-            placed = posed.at(self._checked(q)).oMi
-            return {joint: placed[joint].copy() for joint in joints}
+    def posed(self, q: Array) -> Loan[State]:
+        """Return a context with a state at the posture q (nq,), kept for others: do not move it, copy what is to stay.
+
+        To make a state takes longer than to state the rest of a problem.
+        """
+        return self._states.borrow(lambda state: state.at(q))
 
     def joint_id(self, name: str) -> int:
         """Return the index of a joint in the model; "root", or "anna/root", is a free root."""
@@ -380,8 +383,11 @@ class Figure(checks.FixedAttributes):
         frame, prefix = self.frame_id(on), checks.text(other.name if name is None else name, "mounted: name")
         if "/" in prefix or prefix in {*self.groups, *self.joints}:
             raise InputError(f"mounted: {self.name} has a part {prefix!r}, or it has a slash; give it another name")
-        parts = mounted_parts(self, other, frame, f"{prefix}/", placement(at, "mounted: at"))
-        return Figure(f"{self.name} with {prefix}", *parts[:2], "own", *parts[2:])
+        place = placement(at, "mounted: at")
+        parts = mounted_parts(self, other, frame, f"{prefix}/", place)
+        made = Figure(f"{self.name} with {prefix}", *parts[:2], "own", *parts[2:])
+        made.mount = Mount(self, other, on, prefix, place)
+        return made
 
     def describe(self) -> Description:
         """Return the named parts of the figure, to build another one from them."""

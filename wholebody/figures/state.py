@@ -36,22 +36,6 @@ class Wrench(NamedTuple):
     against: int = 0
 
 
-class Posed:
-    """Pinocchio's data of a model with its joints at a posture, computed once while the same one is asked for."""
-
-    def __init__(self, model: pin.Model) -> None:
-        self._model, self._data, self._q = model, model.createData(), b""
-
-    def at(self, q: Array) -> pin.Data:
-        """The data at a posture (nq,)."""
-        asked = q.tobytes()
-        if asked != self._q:
-            self._q = b""
-            pin.forwardKinematics(self._model, self._data, q)
-            self._q = asked
-        return self._data
-
-
 class State:
     """Placements and Jacobians of a model at one posture, from a single pass of Pinocchio.
 
@@ -88,6 +72,7 @@ class State:
         self._centers: dict[range | None, Array] = {}
         self._spare: pin.Data | None = None
         self._companions: dict[object, State] = {}
+        self._asked = b""
         self.update(self.q)
 
     def __repr__(self) -> str:
@@ -106,12 +91,21 @@ class State:
             raise InputError(
                 "the posture's quaternion is not of unit length; normalise it with pin.normalize(model, q)"
             )
+        self._asked = b""
         pin.computeJointJacobians(self.model, self.data, q)
         self.q = q
         if not self._shared:
             self._take_jacobian()
         self._frames.clear()
         self._centers.clear()
+        return self
+
+    def at(self, q: Array) -> State:
+        """Move to the posture q as `update` does, unless `at` was asked for the same one last."""
+        q = posture(q, self._nq)
+        asked = q.tobytes()
+        if asked != self._asked:
+            self.update(q.copy())._asked = asked
         return self
 
     def _take_jacobian(self) -> None:

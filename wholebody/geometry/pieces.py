@@ -9,6 +9,7 @@ which parts of a piece can touch next when the posture changes; one witness poin
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -82,10 +83,7 @@ def swept_points(geometry: Any) -> SweptPoints:
         box = np.array([radius, radius, half + radius])
         return SweptPoints(points, radius, caps, half + radius, _ALONG, 2.0 * radius, box)
     if isinstance(geometry, coal.Box):
-        box = np.array(geometry.halfSide)
-        faces, lengths = _SIDES.copy(), box.tolist()
-        faces[:3, 3] = faces[3:, 3] = box
-        return SweptPoints(_CORNERS * box, 0.0, faces, math.hypot(*lengths), _NO_AXIS, 2.0 * min(lengths), box)
+        return next(_of_boxes([geometry]))
     if isinstance(geometry, coal.Ellipsoid):
         radii = np.array(geometry.radii)
         return SweptPoints(_NONE, 0.0, _NO_FACES, float(radii.max()), _NO_AXIS, 2.0 * float(radii.min()), radii)
@@ -97,6 +95,23 @@ def swept_points(geometry: Any) -> SweptPoints:
     raise InputError(
         f"{type(geometry).__name__} is not a convex piece; use Box, Sphere, Capsule, Ellipsoid, HalfSpace, Hull or Mesh"
     )
+
+
+def swept_points_of(geometries: Sequence[Any]) -> list[SweptPoints]:
+    """Those of many geometries; boxes, of which there may be thousands, are made at once."""
+    shapes = {id(shape): shape for shape in geometries}  # things of one size share them
+    boxes = [shape for shape in shapes.values() if isinstance(shape, coal.Box)]
+    known = dict(zip(map(id, boxes), _of_boxes(boxes), strict=True))
+    known |= {key: swept_points(shape) for key, shape in shapes.items() if key not in known}
+    return [known[id(shape)] for shape in geometries]
+
+
+def _of_boxes(geometries: Sequence[Any]) -> Iterator[SweptPoints]:
+    half = np.array([geometry.halfSide for geometry in geometries]).reshape(-1, 3)
+    points, faces = _CORNERS * half[:, None], np.tile(_SIDES, (len(half), 1, 1))
+    faces[:, :3, 3] = faces[:, 3:, 3] = half
+    for own, sides, box, lengths in zip(points, faces, half, half.tolist(), strict=True):
+        yield SweptPoints(own, 0.0, sides, math.hypot(*lengths), _NO_AXIS, 2.0 * min(lengths), box)
 
 
 @lru_cache(maxsize=64)  # scenes of one study share the hulls of their things; more would hold those of scenes gone

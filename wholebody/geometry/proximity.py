@@ -19,7 +19,7 @@ from wholebody.base.compiled import with_loops
 from wholebody.geometry.large_models import pairs_of
 from wholebody.geometry.memory_views import RESULT_DOUBLES, fields
 from wholebody.geometry.pair_distances import PairDistances
-from wholebody.geometry.pieces import COAL_ACCURACY, ENDLESS, SweptPoints, normal_across, swept_points
+from wholebody.geometry.pieces import COAL_ACCURACY, ENDLESS, SweptPoints, normal_across, swept_points_of
 
 PENETRATION = 1e-5  # m: deeper than this a pair is called inside of each other; what touches is solved to it
 
@@ -121,13 +121,10 @@ class PairTable:
     ) -> None:
         """Read the pieces, and the pairs and swept points that are not given; an InputError for no convex piece."""
         self.model, self.geometry = model, geometry
-        if swept is None:
-            shapes = [piece.geometry for piece in geometry.geometryObjects]  # things of one size share them
-            known = {id(shape): swept_points(shape) for shape in {id(shape): shape for shape in shapes}.values()}
-            swept = [known[id(shape)] for shape in shapes]
-        self.swept: Sequence[SweptPoints] = swept
+        pieces = list(geometry.geometryObjects)
+        self.swept = swept_points_of([piece.geometry for piece in pieces]) if swept is None else swept
         self.pairs: Indices = pairs_of(geometry) if pairs is None else pairs
-        self.joint: Indices = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
+        self.joint: Indices = np.array([piece.parentJoint for piece in pieces], dtype=np.intp)
         self.reach = np.array([swept.reach for swept in self.swept]).reshape(-1)
         self.half = np.minimum(np.array([swept.half for swept in self.swept]).reshape(-1, 3), ENDLESS)
         width = np.array([swept.width for swept in self.swept]).reshape(-1)

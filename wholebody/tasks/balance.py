@@ -59,7 +59,8 @@ def standing_corners(scene: Surroundings, q: Array, feet: Sequence[str]) -> tupl
     """The same, and the joints (n,) that carry them."""
     joints = tuple([inputs.find_place(scene, foot, "Balance").joint for foot in feet])
     soles = inputs.once(scene, ("soles", joints), partial(_soles_of, scene, feet, joints))
-    placed = scene.figure.joint_placements(q, soles.joints)
+    with scene.figure.posed(q) as state:
+        placed = {joint: state.data.oMi[joint].copy() for joint in soles.joints}
     places = np.array([placed[joint].homogeneous for joint in soles.joints])[soles.carrier]
     points = np.einsum("nij,nj->ni", places[:, :3, :3], soles.points)
     points += places[:, :3, 3]

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Callable, Sequence, Set
 from functools import partial
 
 import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
-from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.balance import Balance, standing_points
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings
@@ -28,7 +27,7 @@ FEET = ("left_foot", "right_foot")
 
 KNEELS = 0.05  # m, rad: a `Stand` that misses less at the start is of one who kneels there
 
-_effort = Effort()
+_effort, _rhythm = Effort(), Rhythm()
 
 
 def usual_measures(
@@ -71,11 +70,20 @@ def default_measures(
     shanks = {side for sides in stances for side in sides if side.endswith("_shank")}
     rest = _kneeling(scene, start, shanks) if shanks else start
     pairs = [feet for feet in stances if len(feet) == 2 and shanks.isdisjoint(feet)]
-    rhythm, hangs = Rhythm().resolve(scene, rest), [Hang(hanging).resolve(scene, rest)] if hanging else []
+    rhythm = _rhythm.resolve(scene, rest)
     if seated:
         joints = [scene.model.joints[joint] for body in seated for joint in scene.figure.bodies[body]]
         rhythm = rhythm.of_arms({int(joint.idx_v) for joint in joints})
-    return (_effort.resolve(scene, rest), rhythm, *(Stance(pair).resolve(scene, rest) for pair in pairs), *hangs)
+    # these are as in the first posture, whatever the start is
+    own = [*((Stance, pair) for pair in pairs), *([(Hang, tuple(hanging))] if hanging else [])]
+    made = (scene.built.known(each, partial(_resolved, scene, start, *each)) for each in own)
+    return (_effort.resolve(scene, rest), rhythm, *made)
+
+
+def _resolved(
+    scene: Surroundings, start: Array, kind: Callable[[Sequence[str]], Measure], names: Sequence[str]
+) -> Measure:
+    return kind(names).resolve(scene, start)
 
 
 def seated(scene: Surroundings, terms: Sequence[Constraint | Goal]) -> tuple[str, ...]:
@@ -97,8 +105,8 @@ def free_arms(
         if borne := _bearing(scene, term):
             bearing.update(borne)
         else:
-            state = State(scene.model).update(start)
-            moved.update(np.flatnonzero(state.dense_jacobian(term.jacobian(state)).any(axis=0)).tolist())
+            with scene.figure.posed(start) as state:
+                moved.update(np.flatnonzero(state.dense_jacobian(term.jacobian(state)).any(axis=0)).tolist())
     key = "free arms", frozenset(up), frozenset(bearing), frozenset(moved)
     return inputs.once(scene, key, partial(_free_arms, scene, up, bearing, moved))
 
@@ -139,8 +147,12 @@ def stances(scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal
     """The feet of each person that stands and balances, or kneels, but does not sit, lean or hold on."""
 
     def kneels(stand: Stand) -> bool:
-        at_start = stand.value(State(scene.model).update(start))
-        return float(np.maximum(np.maximum(stand.lower - at_start, at_start - stand.upper), 0.0).max()) <= KNEELS
+        with scene.figure.posed(start) as state:
+            at_start, shanks = stand.value(state), [inputs.find_place(scene, knee, "") for knee in stand.knees]
+            upright = [abs(state.frame(shank.frame).rotation[2, 2]) for shank in shanks]
+        missed = np.maximum(np.maximum(stand.lower - at_start, at_start - stand.upper), 0.0).max()
+        # The ankles of who stands are as near to the ground as knees.
+        return bool(missed <= KNEELS) and max(upright) < 0.5
 
     stand = (one for one in terms if isinstance(one, Stand))
     return tuple(tuple(one.feet) for one in stand if (one.balance or one.knees) and not (one.knees and kneels(one)))
@@ -236,6 +248,6 @@ def _stands(
     placed = [term for term in holds if term.at is not None]  # the others are where they are at the start
     if not placed:
         return True
-    state = State(scene.model).update(start)
-    # m, rad: a foot held this near to its place at the start stands where the support polygon is computed.
-    return all(np.abs(term.value(state)).max() <= 1e-3 for term in placed)
+    with scene.figure.posed(start) as state:
+        # m, rad: a foot held this near to its place at the start stands where the support polygon is computed.
+        return all(np.abs(term.value(state)).max() <= 1e-3 for term in placed)

@@ -146,10 +146,11 @@ class LoadedBalance(ComputedTogether):
         """Find the points on which the feet stand at the start."""
         points, joints = standing_corners(scene, start, self.feet)
         whole = Balance(self.feet, margin=self.margin or 0.0).on_points(points, scene, self.margin is None)
-        loads, state = resolved(self.forces, scene, "LoadedBalance: forces"), State(scene.model).update(start)
-        own = [state.data.oMi[joint].actInv(point) for joint, point in zip(joints.tolist(), points, strict=True)]
+        loads = resolved(self.forces, scene, "LoadedBalance: forces")
+        with scene.figure.posed(start) as state:
+            own = [state.data.oMi[joint].actInv(point) for joint, point in zip(joints.tolist(), points, strict=True)]
+            pressure(state, loads, whole.joints, 0.0)  # forces that lift are refused here
         soles = SolePolygon(np.array(own), joints, whole.joints)
-        pressure(state, loads, whole.joints, 0.0)  # forces that lift are refused here
         return filled(self, loads=loads, soles=soles, keeps=whole.margin)
 
     @property

@@ -116,13 +116,13 @@ class Grasp(ContactTerm):
         if not hand.pieces:
             raise InputError(f"{where}: the hand of {shown(self.frame)} has no pieces; name one with geometry")
         check_apart(hand, thing, where)
-        state = State(scene.model).update(start)
-        if self.kind == "palm":
-            parts = self._palm(scene, place, hand, thing, state, where)
-        elif self.kind == "power":
-            parts = self._power(scene, place, hand, thing, state, where)
-        else:
-            parts = self._fingers(scene, thing, state, where)
+        with scene.figure.posed(start) as state:
+            if self.kind == "palm":
+                parts = self._palm(scene, place, hand, thing, state, where)
+            elif self.kind == "power":
+                parts = self._power(scene, place, hand, thing, state, where)
+            else:
+                parts = self._fingers(scene, thing, state, where)
         if self.approach is not None:
             height = APPROACHES[self.approach]
             up = np.array((0.0, 0.0, height or 1.0))

@@ -53,9 +53,8 @@ class Hang(SumOfSquares):
     def resolve(self, scene: Surroundings, start: Array) -> Hang:
         """Find the upper arms, and how they hang in the first posture."""
         places, figure = tuple(inputs.find_place(scene, arm, "Hang") for arm in self.arms), scene.figure
-        joints = [place.joint for place in places]
-        at = figure.joint_placements(figure.posture(figure.postures[0]), joints)  # a state takes a third of a problem
-        down = np.array([-at[joint].rotation[2] for joint in joints])
+        with figure.posed(figure.neutral) as upright:
+            down = np.array([-upright.data.oMi[place.joint].rotation[2] for place in places])
         return filled(self, places=places, down=down)
 
     def squares(self, state: State) -> tuple[Array, Array]:

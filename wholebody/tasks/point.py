@@ -145,7 +145,7 @@ class Plane(Constraint):
         place = inputs.find_place(scene, self.frame, "Plane")
         point = self.resolved_point
         if point is None:
-            point = State(scene.model).update(start).frame(place.frame).translation
+            point = scene.figure.placement(start, self.frame).translation
         return filled(self, place=place, height=float(self.resolved_normal @ point))
 
     @property

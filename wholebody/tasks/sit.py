@@ -65,16 +65,19 @@ class Sit(ContactTerm):
 
     def resolve(self, scene: Surroundings, start: Array) -> Sit:
         """Find the surfaces and the seat's face."""
+        with scene.figure.posed(start) as state, scene.figure.posed(scene.figure.neutral) as rest:
+            return self._between(scene, state, rest)
+
+    def _between(self, scene: Surroundings, state: State, rest: State) -> Sit:
         where = f"Sit({shown(self.on)})"
         place, trunk = inputs.find_place(scene, self.pelvis, where), inputs.find_place(scene, self.trunk, where)
-        state = State(scene.model).update(start)
         seat = face(scene, self.on, UP, state, where)
-        bottom = joined(scene, self.pelvis, [self.pelvis, *_thighs(scene, place, trunk)])
+        thighs = scene.built.known(("thighs", place.joint, trunk.joint), lambda: _thighs(scene, place, trunk))
+        bottom = joined(scene, self.pelvis, [self.pelvis, *thighs])
         if not bottom.pieces:
             raise InputError(f"{where}: {shown(self.pelvis)} has no pieces to sit on; name a segment with geometry")
         thing = surface(scene, self.on, where)
         edge = np.maximum(seat.half - np.minimum(MARGIN, 0.5 * seat.half), 0.0)
-        rest = upright(scene)
         # m: how much higher than on the deepest point of the pelvis and thighs the pelvis may sit
         deep = _depth(scene, self.pelvis, place, rest) + 0.01
         over = Over(place, seat, np.append(-edge, -np.inf), np.append(edge, deep))
@@ -133,11 +136,6 @@ class AtAngles(NamedTuple):
         moves = np.zeros((len(self.idx_v), state.model.nv))
         moves[np.arange(len(self.idx_v)), self.idx_v] = 1.0
         return state.q[self.idx_q] - self.angles, moves
-
-
-def upright(scene: Surroundings) -> State:
-    """The state of the figure's first posture, in which it is upright."""
-    return State(scene.model).update(scene.figure.posture(scene.figure.postures[0]))
 
 
 def _trunk(scene: Surroundings, pelvis: inputs.Place, trunk: inputs.Place) -> list[str]:

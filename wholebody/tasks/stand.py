@@ -19,7 +19,7 @@ from wholebody.tasks.balance import FAR_INSIDE, STANDING_HEIGHT, STEADY, Feet, M
 from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.contact_parts import Facing, Gap, Over, Part, TermOfParts, between, owner_pairs, through
 from wholebody.tasks.distance import SumOfSquares
-from wholebody.tasks.sit import UP, upright
+from wholebody.tasks.sit import UP
 from wholebody.tasks.surfaces import Surface, face, joined, outermost, segments_beyond, segments_on, surface
 
 FLESH = 0.03  # m: how much farther ahead than the ankle a shin may be on which somebody kneels
@@ -62,17 +62,19 @@ class Stand(TermOfParts):
 
     def resolve(self, scene: Surroundings, start: Array) -> Stand:
         """Find the soles and the face that they stand on."""
+        with scene.figure.posed(start) as state, scene.figure.posed(scene.figure.neutral) as rest:
+            return self._between(scene, state, rest)
+
+    def _between(self, scene: Surroundings, state: State, rest: State) -> Stand:
         where = f"Stand({shown(self.on)})"
         if stray := [str(knee) for knee in self.knees if knee not in self.feet]:
             example = "feet=['left_foot', 'right_shank'], knees=['right_shank']"
             raise InputError(f"{where}: knees are of the feet, and {some(stray)} is not; give {example}")
-        state = State(scene.model).update(start)
         ground, thing = face(scene, self.on, UP, state, where), surface(scene, self.on, where)
         parts: list[Part] = []
         keeps = 0.0
         touches: tuple[tuple[str, str], ...] = ()
         corners, joints = [], []
-        rest = upright(scene)
         for foot in self.feet:
             place, sole = inputs.find_place(scene, foot, where), surface(scene, foot, where)
             if not sole.owners or place.joint == 0:
@@ -152,7 +154,8 @@ class Stance(SumOfSquares):
             raise InputError(f"Stance: feet has {len(self.feet)} names; give two")
         places = tuple(inputs.find_place(scene, foot, "Stance") for foot in self.feet)
         found = filled(self, places=places, rest=np.zeros(3))
-        return filled(found, rest=found.squares(upright(scene))[0] / np.sqrt(STANCE_WEIGHTS))
+        with scene.figure.posed(scene.figure.neutral) as upright:
+            return filled(found, rest=found.squares(upright)[0] / np.sqrt(STANCE_WEIGHTS))
 
     def squares(self, state: State) -> tuple[Array, Array]:
         """Residuals (3,) and their derivatives (3, nv)."""

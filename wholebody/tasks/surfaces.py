@@ -116,7 +116,11 @@ def _of_drawn(name: str, joint: int, drawn: Iterable[pin.GeometryObject]) -> Sur
 
 
 def _of_pieces(scene: Surroundings, name: str, indices: Sequence[int]) -> Surface:
-    return _made(name, tuple(dict.fromkeys(scene.piece_owner[k] for k in indices)), scene.geometry, indices)
+    def make() -> Surface:
+        return _made(name, tuple(dict.fromkeys(scene.piece_owner[k] for k in indices)), scene.geometry, indices)
+
+    found: Surface = scene.built.known(("surface", name, *indices), make)
+    return found
 
 
 def _made(name: str, owners: tuple[str, ...], geometry: pin.GeometryModel, indices: Sequence[int]) -> Surface:
@@ -240,4 +244,8 @@ def segments_on(scene: Surroundings, joints: Iterable[int]) -> list[str]:
 
 def segments_beyond(scene: Surroundings, joint: int) -> list[str]:
     """Segments on a joint and beyond it, such as a foot with its toes, or a hand with its fingers."""
-    return segments_on(scene, (k for k in range(scene.model.njoints) if joint in scene.model.supports[k]))
+    found: list[str] = scene.built.known(
+        ("beyond", joint),
+        lambda: segments_on(scene, [k for k in range(scene.model.njoints) if joint in scene.model.supports[k]]),
+    )
+    return found

@@ -113,9 +113,9 @@ class Lean(ContactTerm):
         place = inputs.find_place(scene, self.part, where)
         first, second = surface(scene, self.part, where), surface(scene, self.on, where)
         check_apart(first, second, where)
-        state = State(scene.model).update(start)
-        toward = state.frame(place.frame).rotation @ self.resolved_side
-        leaned_on = face(scene, self.on, -toward, state, where)
+        with scene.figure.posed(start) as state:
+            toward = state.frame(place.frame).rotation @ self.resolved_side
+            leaned_on = face(scene, self.on, -toward, state, where)
         facing = Facing(place, across(self.resolved_side), leaned_on, np.array((0.0, 0.0, -1.0)))
         parts = (Gap(first, second, leaned_on), facing)
         return filled(self, parts=parts, touches=owner_pairs(touched(scene, first), second.owners))

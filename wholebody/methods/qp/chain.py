@@ -107,7 +107,7 @@ def closed_form_postures(problem: Problem) -> Array | None:
         if entries is None or chain is None or chain.held >= 0 or len(chain.idx_v) < problem.scene.model.nv:
             return None
         asked, _ = Asked.by(problem, chain, entries)
-        if not chain.is_exact(asked.goals):
+        if chain.arm is None or not chain.is_guided(asked.goals):
             return None
         values = chain.branches(asked.goals, asked.nearest).least
         return chain.posture(values, np.tile(asked.at, (len(values), 1))) if len(values) else None
@@ -129,9 +129,11 @@ class Descents:
         """The answer of the batches in turn: the closed form's ends, its samples, random seeds; `first`: ends known."""
         if not self.settings.restarts:
             return self._ended(self.start[None].copy(), 1)
-        exact, finite, enough = self.rule[:3]
-        if exact:
-            ends, found = self._first_ended() if first is None else first
+        _, exact, finite, enough = self.rule[:4]
+        if first is None and self.rule.guided:
+            first = self._first_ended()
+        if exact and first is not None:
+            ends, found = first
             met, branches = self._chosen(ends, found), None
             if met is None and not self.control.over:
                 branches = self._branches()
@@ -159,8 +161,8 @@ class Descents:
                 (ends, found), first = first, None
                 met = self._chosen(ends, found)
                 if met is None and not self.control.over:
-                    seeds = np.concatenate([ends[found[:, 2] < 0.0], seeds[len(ends) :]])
-                    met = self._ended(seeds, enough, others=True)
+                    others = seeds if self.rule.guided else seeds[len(ends) :]
+                    met = self._ended(np.concatenate([ends[found[:, 2] < 0.0], others]), enough, others=True)
             if met is not None or self.control.over:
                 return met
         return None
@@ -284,7 +286,8 @@ def how_far(settings: Settings, enough: int, others: bool = False) -> Array:
 class Rule(NamedTuple):
     """How the first batch of seeds is descended from."""
 
-    exact: bool  # whether it is of the branches of a closed form
+    guided: bool  # whether it is of the branches of a closed form
+    exact: bool  # which has the postures themselves, not only near ones
     finite: bool  # whether ends are isolated too, and the closed form has all of them
     enough: int  # ends that meet the goals
     rows: int  # of the goals
@@ -294,11 +297,12 @@ class Rule(NamedTuple):
     @classmethod
     def of(cls, chain: PlainChain, goals: Goals, settings: Settings, measured: bool) -> Rule:
         """The rule for problems with such goals."""
-        exact, more = chain.is_exact(goals), 1 + settings.restarts_for_measure
+        guided, more = chain.is_guided(goals), 1 + settings.restarts_for_measure
+        exact = guided and chain.arm is not None
         finite = exact and chain.held < 0
         enough = 1 if finite or not measured else SEEDS.compared * more
         rows = sum(3 * int(each[3] + each[4]) for each in goals.entries)
-        return cls(exact, finite, enough, rows, SEEDS.together * more, measured)
+        return cls(guided, exact, finite, enough, rows, SEEDS.together * more, measured)
 
 
 def is_free(workspace: Workspace, q: Array, clearances: Array) -> bool:

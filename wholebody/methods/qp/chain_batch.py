@@ -172,7 +172,7 @@ class _First:
             nearest[:, 1] = distance_of(problem, chain).weights[chain.idx_v]  # type: ignore[union-attr]
         goals = chain.goals(entries)
         rule = Rule.of(chain, goals, settings, settings.measures)
-        together = 0 if rule.exact else rule.together
+        together = 0 if rule.guided else rule.together
         ends = np.empty((len(at), together or FIRST, nearest.shape[2]))
         for k in range(len(at) if together else 0):
             ends[k] = next(chain.seeds(chain.angles(at[k]), settings.seed, together))

@@ -19,6 +19,7 @@ from wholebody.methods.qp.chain_kernel import Chain
 from wholebody.methods.qp.closed_form_kernel import BRANCHES, CROSSING, PARALLEL, SLACK, THREE_PARALLEL, Arm
 
 ALIKE = 1e-4  # rad: axes that differ by less count as parallel; m: lines that pass each other nearer count as crossing
+NEARLY = 0.02  # the same of arms whose closed form is only near to their postures: a descent goes on from there
 HELD = (6, 0, 2)
 """Joints of seven that may be held; the elbow's angle does not change where an arm moves with its end at rest."""
 TRIED = (0.0, 0.7, -1.9)  # rad: of a joint that is held; what axes have in common at these they always have
@@ -38,16 +39,16 @@ class Branches(NamedTuple):
         return found
 
 
-def closed_form(chain: Chain) -> Arm | None:
-    """The arm that a chain is, where it has a closed form; else None."""
+def closed_form(chain: Chain, alike: float = ALIKE) -> Arm | None:
+    """The arm that a chain is, or with `alike` nearly is, where it has a closed form; else None."""
     size = len(chain.parents)
     if size not in (6, 7) or not chain.turns.any(axis=1).all() or (chain.parents != np.arange(size)).any():
         return None
-    return _arm(chain.places.tobytes(), chain.turns.tobytes())
+    return _arm(chain.places.tobytes(), chain.turns.tobytes(), alike)
 
 
 @lru_cache(maxsize=64)
-def _arm(placed: bytes, turned: bytes) -> Arm | None:
+def _arm(placed: bytes, turned: bytes, alike: float) -> Arm | None:
     """The arm of a serial chain of turning joints with these places (n, 4, 3) and axes (n, 3); every scene asks."""
     places, turns = np.frombuffer(placed).reshape(-1, 4, 3), np.frombuffer(turned).reshape(-1, 3)
     size = len(turns)
@@ -60,13 +61,13 @@ def _arm(placed: bytes, turned: bytes) -> Arm | None:
     for held, backwards, kind in product(HELD if size == 7 else (-1,), (0, 1), (THREE_PARALLEL, PARALLEL, CROSSING)):
         joints, sign = (there[::-1].copy(), -1.0) if backwards else (there, 1.0)
         place = size - 1 - held if backwards and held >= 0 else held
-        known = _solvable(Arm(sign * axes[joints], points[joints], joints, place, kind, backwards, end, SLACK))
+        known = _solvable(Arm(sign * axes[joints], points[joints], joints, place, kind, backwards, end, SLACK), alike)
         if known is not None:
             return known
     return None
 
 
-def _solvable(arm: Arm) -> Arm | None:
+def _solvable(arm: Arm, alike: float) -> Arm | None:
     """An arm with its points where axes cross, if its kind is as it says wherever its held joint is; else None."""
     first, last = [0, 1], [4, 5] if arm.kind == THREE_PARALLEL else [3, 4, 5]
     moved = np.delete(np.arange(len(arm.joints)), arm.held) if arm.held >= 0 else np.arange(6)
@@ -78,11 +79,11 @@ def _solvable(arm: Arm) -> Arm | None:
         h, o = _held_at(arm, points, value)
         _, there = _held_at(arm, arm.points, value)
         h, o, there = h[moved], o[moved], there[moved]
-        if any(np.linalg.norm(np.cross(h[1], h[k])) > ALIKE for k in parallel):
+        if any(np.linalg.norm(np.cross(h[1], h[k])) > alike for k in parallel):
             return None
         for group in (last, first) if arm.kind == CROSSING else (last,):
             away = np.cross(there[group] - o[group[-1]], h[group])
-            if (np.linalg.norm(away, axis=1) > ALIKE).any() or np.ptp(o[group], axis=0).max() > ALIKE:
+            if (np.linalg.norm(away, axis=1) > alike).any() or np.ptp(o[group], axis=0).max() > alike:
                 return None
     return with_values(arm, points=points)
 

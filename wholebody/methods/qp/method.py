@@ -13,7 +13,7 @@ from wholebody.methods.base import check_problem
 from wholebody.methods.conclusion import Ending, concluded, meets
 from wholebody.methods.control import Control
 from wholebody.methods.descents import Descends
-from wholebody.methods.qp.chain import from_seeds
+from wholebody.methods.qp.chain import Met, from_seeds
 from wholebody.methods.qp.chain_batch import Batch, batches
 from wholebody.methods.qp.multistart import Multistart
 from wholebody.methods.qp.settings import Settings
@@ -95,16 +95,22 @@ class QP(Settings, Descends):
     def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
         """See `Descends._descend`."""
         met = from_seeds(problem, workspace, self, control)
-        judgement = assess(problem, met.q) if met is not None and met.complete else None
-        if met is not None and judgement is not None and meets(judgement, self.tolerance):
-            return Ending(met.q, True, len(met.trace), met.trace, "directly", judgement=judgement)
+        if (ending := self._complete(problem, met)) is not None:
+            return ending
         search = Multistart(problem, workspace, self._qp_solver(), self, control)
-        begin, before = (None, ()) if met is None else (met.q if judgement is None else None, met.trace)
+        begin, before = (None, ()) if met is None else (None if met.complete else met.q, met.trace)
         best = search.run(begin, None if met is None else met.blocked, () if met is None else met.near)
         return Ending(
             best.q, best.converged, len(before) + search.spent, (*before, *search.trace), search.how,
             contradictions=search.contradictions, programs=search.solver.counted(),
         )  # fmt: skip
+
+    def _complete(self, problem: Problem, met: Met | None) -> Ending | None:
+        """The end of descents of a chain; None where they leave something to do."""
+        judgement = assess(problem, met.q) if met is not None and met.complete else None
+        if met is None or judgement is None or not meets(judgement, self.tolerance):
+            return None
+        return Ending(met.q, True, len(met.trace), met.trace, "directly", judgement=judgement)
 
     def batches(self, problems: Sequence[Problem], largest: int) -> list[Batch]:
         """Those of many problems that may be solved at once, in batches of at most so many: see `chain_batch`.
@@ -129,12 +135,15 @@ class QP(Settings, Descends):
         for given in begins:
             start = posture(given, problem.scene.model.nq, "QP.minima: a start")
             with Control(self.time_limit, None, self.longest) as control, problem.borrow() as workspace:
-                search = Multistart(problem, workspace, self._qp_solver(), alone, control)
-                end = search.feasibility_first(start) or search.directly(start)
-            ending = Ending(
-                end.q, end.converged, search.spent, tuple(search.trace), search.how,
-                programs=search.solver.counted(),
-            )  # fmt: skip
+                met = from_seeds(problem.with_start(problem.scene.figure.clamp(start)), workspace, alone, control)
+                ending = self._complete(problem, met)
+                if ending is None:
+                    search = Multistart(problem, workspace, self._qp_solver(), alone, control)
+                    end = search.feasibility_first(start) or search.directly(start)
+                    ending = Ending(
+                        end.q, end.converged, search.spent, tuple(search.trace), search.how,
+                        programs=search.solver.counted(),
+                    )  # fmt: skip
             yield concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control)
 
     def _qp_solver(self) -> QPSolver:

@@ -15,7 +15,7 @@ from wholebody.base.compiled import with_loops
 from wholebody.figures.description import Limits
 from wholebody.methods.qp import chain_kernel
 from wholebody.methods.qp.chain_kernel import Chain, Goals, Room
-from wholebody.methods.qp.closed_form import Branches, closed_form
+from wholebody.methods.qp.closed_form import NEARLY, Branches, closed_form
 from wholebody.methods.qp.closed_form import compiled_kernel as closed_form_kernel
 from wholebody.methods.qp.closed_form_kernel import BRANCHES, CROSSING, SLACK, Arm
 from wholebody.methods.qp.settings import SEEDS
@@ -35,7 +35,8 @@ class PlainChain:
         chain: the arrays.
         idx_v: (n,) place of each joint in the tangent.
         arm: the arm that they are, None where it has no closed form.
-        held: the joint that the closed form holds; -1 for none.
+        guide: the same, or an arm that they nearly are.
+        held: the joint that the closed form of the guide holds; -1 for none.
         samples: how many values of it are looked at, and how many where none of these is within limits.
     """
 
@@ -64,7 +65,8 @@ class PlainChain:
         self._far = np.where(self.chain.turns.any(axis=1), np.pi, np.where(limited, np.inf, 1.0))
         self._rooms: dict[int, Room] = {}
         self.arm = closed_form(self.chain)
-        self.held = -1 if self.arm is None or self.arm.held < 0 else int(self.arm.joints[self.arm.held])
+        self.guide = self.arm or closed_form(self.chain, NEARLY)
+        self.held = -1 if self.guide is None or self.guide.held < 0 else int(self.guide.joints[self.guide.held])
         self.samples = (1, 1) if self.held < 0 else (SEEDS.samples, SEEDS.finer)
 
     def angles(self, q: Array) -> Array:
@@ -153,9 +155,9 @@ class PlainChain:
             found.append(middle + np.clip(away[within], -half, half))
         return np.concatenate(found)
 
-    def is_exact(self, goals: Goals) -> bool:
-        """Whether the goals are one placement of a frame that the closed form has the postures of."""
-        return self.arm is not None and goals.entries[:, 2:].tolist() == [[0, 1, 1, 0]]
+    def is_guided(self, goals: Goals) -> bool:
+        """Whether the goals are one placement of a frame that the guide has postures of."""
+        return self.guide is not None and goals.entries[:, 2:].tolist() == [[0, 1, 1, 0]]
 
     def descents(
         self, tables: Array, goals: Goals, nearest: Array, asked: Array, ends: Array, seeds: int = 0
@@ -164,7 +166,7 @@ class PlainChain:
         # `tables` (k, e, 36) of goals. What was found (k, m, 4), how many (k,); -1 for more than there is room for.
         room = self.room(sum(3 * int(each[3] + each[4]) for each in goals.entries))
         found, counts = np.empty((*ends.shape[:2], 4)), np.full(len(ends), seeds)
-        arm = _NO_ARM if seeds or self.arm is None else self.arm
+        arm = _NO_ARM if seeds or self.guide is None else self.guide
         compiled_kernel().reach_all(
             (self.chain, arm, room), asked, (tables, goals.entries), self.samples, nearest, ends, found, counts
         )
