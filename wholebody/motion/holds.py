@@ -213,7 +213,7 @@ class Holds:
         Of every `span`-th frame the last one before a rest and the first one after it are at rest too, so that what
         lies between two of these frames is.
         """
-        down, strong = self._facing_down(paths[frame]), STRONG / self._dt**2 if again else FIRM / self._dt
+        down, strong = self._facing_down(paths[frame]), STRONG / self._dt**2 if again else FIRM / (span * self._dt)
         goals, weights = np.array(paths[frame]), np.zeros((len(self.points), 3))
         for number, stands in enumerate(self._stands):
             after = bisect_right([stand.first for stand in stands], frame)
@@ -230,7 +230,7 @@ class Holds:
                 if self.points[number].thing:
                     weights[number] = 0.0 if again and (number, frame) in self._gone else TOUCH
                 else:
-                    weights[number] = NEARING * BESIDE if frame == around[on[0]].first and not again else strong
+                    weights[number] = NEARING * BESIDE if frame <= around[on[0]].first and not again else strong
             else:
                 goals[number], share = self._swing(number, frame, nearest, places, paths)
                 weights[number] = (
@@ -276,15 +276,15 @@ class Holds:
             found[own] = up > FACING * ((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + up**2) ** 0.5
         return found
 
-    def landed(self, frame: int, places: Array, held: tuple[Array, Array]) -> None:
-        """Keep points where they came down, (h, 3), if a rest begins in this frame: contact may have kept them off.
+    def landed(self, frame: int, places: Array, held: tuple[Array, Array], span: int) -> None:
+        """Keep points where they came down, (h, 3), if a rest begins in the `span` frames from this one on.
 
-        What touches a thing goes on where the goals of the frame say.
+        Contact may have kept them off. What touches a thing goes on where the goals of the frame say.
         """
         for number, stands in enumerate(self._stands):
-            stand = next((each for each in stands if each.first == frame), None)
+            stand = next((each for each in stands if frame <= each.first < frame + span), None)
             if isinstance(stand, Foothold):
-                self._places[number, frame][:2] = places[number, :2]
+                self._places[number, stand.first][:2] = places[number, :2]
         for number, contact in self._touches(frame, held[1]):
             assert self._touched is not None
             at = self._touched.at(contact, frame)

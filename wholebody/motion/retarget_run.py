@@ -9,9 +9,9 @@ on the sum of all frames' costs and of |w d''|^2),
     d_k* = (4 (d_{k-1} + d_{k+1}) - (d_{k-2} + d_{k+2})) / 6,
 
 by successive over-relaxation (Young 1954): a sweep seeks d_k + omega (d_k* - d_k), the last one with omega = 1. The
-first sweeps take every second or fourth frame of a fast recording, so that a contact is felt equally far ahead at every
-rate; the frames between are interpolated, and swept after (nested iteration; Briggs, Henson and McCormick, A Multigrid
-Tutorial, 2000). The body begins to give way before a contact comes.
+first pass and first sweeps take every second or fourth frame of a fast recording, so that a contact is felt equally far
+ahead at every rate; the frames between are interpolated, and swept after (nested iteration; Briggs, Henson and
+McCormick, A Multigrid Tutorial, 2000). The body begins to give way before a contact comes.
 """
 
 from __future__ import annotations
@@ -66,12 +66,9 @@ class Run:
         dt: float,
         holds: Holds | None,
         workspace: Workspace,
-        free: list[Array] | None = None,
+        free: list[Array] | None = None,  # the free fit by frame, (nq,) each, where a run without holds found it
     ) -> None:
-        """Set up for goals like `targets`; without holds the skeleton alone is followed, and nothing is free.
-
-        `free` is the free fit, (nq,) of each frame, if it is known: that of a run without holds.
-        """
+        """Set up for goals like `targets`; without holds the skeleton alone is followed, and nothing is free."""
         self.free = list[Array]() if free is None else free
         self.figure, self.model, self.dt, self.holds = figure, figure.model, dt, holds
         points, turns = parts_of(targets, roles)
@@ -92,7 +89,8 @@ class Run:
         self.levers = levers(figure)
         self.none = (np.zeros((len(self.fitter.layout.held), 3)),) * 2
         self.every, self.slowing = (max(1, round(time / dt)) for time in (EVERY, SLOWING))
-        self.even, self.calm, self.spread = (normal(time, dt) for time in (EVEN, CALM, SPREAD))
+        self.span = 2 ** int(max(0.0, np.log2(SPAN / dt)))  # frames between those of the first pass and first sweeps
+        self.even, self.calm, self.spread = normal(EVEN, dt), normal(CALM, dt), normal(SPREAD, self.span * dt)
         # by frames: goals, free postures with their costs, those within speed limits, the free fit, where it has the
         # points that may be held, deviations of the first pass, what is held in sweeps, postures, deviations of the
         # sweeps
@@ -112,9 +110,9 @@ class Run:
         else:
             self._stages += [
                 (self._passed, holds.ahead + holds.over),
-                (self._spread, max(len(self.spread) // 2, holds.ahead)),
+                (self._spread, max(len(self.spread) // 2 * self.span, holds.ahead)),
             ]
-            span, sweeps = 2 ** int(max(0.0, np.log2(SPAN / dt))), SWEEPS
+            span, sweeps = self.span, SWEEPS
             while span:
                 self._stages += [(partial(self._swept, omega=omega, span=span), 2 * span) for omega in sweeps]
                 span, sweeps = span // 2, FINER
@@ -246,19 +244,19 @@ class Run:
     def _known(self, k: int) -> None:
         self._free[k], self._paths[k] = self.free[k], self.fitter.held(self.free[k])
 
-    def _mean(self, values: dict[int, Array], k: int, weights: Array) -> Array:
+    def _mean(self, values: dict[int, Array], k: int, weights: Array, span: int = 1) -> Array:
         """The value at a frame of the line that is nearest to those about it: inside, their mean.
 
         With positive weights a mean is within the limits that the values are within, and changes no faster: nothing is
         cut off afterwards, which would leave corners.
         """
         half, last = len(weights) // 2, self._came - 1
-        away = np.arange(max(-half, -k), (min(half, last - k) if self.ended else half) + 1)
+        away = np.arange(max(-half, -k // span), (min(half, (last - k) // span) if self.ended else half) + 1)
         near = weights[away + half]
         sums = near.sum(), near @ away, near @ away**2  # beside an end the line leans
         size = sums[0] * sums[2] - sums[1] ** 2
         near = near * (sums[2] - sums[1] * away) / size if size > 0.0 else near / sums[0]
-        return np.asarray(near @ np.array([values[k + j] for j in away.tolist()]))
+        return np.asarray(near @ np.array([values[k + span * j] for j in away.tolist()]))
 
     def _alone(self, k: int) -> None:
         q = self._free[k]
@@ -273,28 +271,32 @@ class Run:
     def _passed(self, k: int) -> None:
         """The posture of the first pass; it decides where points come down."""
         assert self.holds is not None
-        model, free, holds = self.model, self._free[k], self.holds
+        model, free, holds, span, dt = self.model, self._free[k], self.holds, self.span, self.span * self.dt
+        if k % span:
+            return
         deviation, change = self._latest
-        expected = np.exp(-self.dt / RETURN) * (deviation + np.exp(-self.dt / GOES_ON) * change)
+        expected = np.exp(-dt / RETURN) * (deviation + np.exp(-dt / GOES_ON) * change)
         reference = np.asarray(pin.integrate(model, free, expected))
         shift = deviation[:3] if self.figure.root == "free" else np.zeros(3)
         shift = pin.XYZQUATToSE3(free[:7]).rotation @ shift if self.figure.root == "free" else shift
-        before = np.asarray(pin.integrate(model, self._free[k - 1], self._first[k - 1])) if k else None
+        before = np.asarray(pin.integrate(model, self._free[k - span], self._first[k - span])) if k else None
         self.fitter.see(holds.moved(k))
-        q = self._reached(before, reference)
+        q = self._reached(before, reference, span)
         for _ in range(1 if k else STARTS):
-            held = holds.goals(k, self._paths, shift)
-            goals = self._goals(k, reference, CHANGE / self.dt**0.5 * self.levers, held)
+            held = holds.goals(k, self._paths, shift, span=span)
+            goals = self._goals(k, reference, CHANGE / dt**0.5 * self.levers, held)
             q = self._settled(q, goals, before)
             if holds.lost(k, q, self.fitter.held(q), held):
-                q = self._settled(self._reached(before, reference), goals, before)
+                q = self._settled(self._reached(before, reference, span), goals, before)
             holds.touch(k, q, self.fitter.held(q), held)
-            holds.landed(k, self.fitter.held(q), held)
+            holds.landed(k, self.fitter.held(q), held, span)
         self._first[k] = np.asarray(pin.difference(model, free, q))
         self._latest = self._first[k], self._first[k] - deviation if k else change
 
     def _spread(self, k: int) -> None:
-        self._deviation[k] = self._mean(self._first, k, self.spread)
+        if k % self.span:
+            return
+        self._deviation[k] = self._mean(self._first, k, self.spread, self.span)
         self._found[k] = self.figure.clamp(pin.integrate(self.model, self._free[k], self._deviation[k]))
 
     def _settled(self, q: Array, goals: Goals, before: Array | None) -> Array:
@@ -302,7 +304,7 @@ class Run:
         for _ in range(FIRST if before is None else PASS):
             if before is None:
                 goals = with_values(goals, posture=q)
-            following = self.fitter.step(q, goals, most=self._room(q, before))
+            following = self.fitter.step(q, goals, most=self._room(q, before, self.span))
             moved = float(np.abs(pin.difference(self.model, q, following)).max())
             q = following
             if moved < 1e-3:  # rad, m
