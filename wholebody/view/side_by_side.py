@@ -40,7 +40,7 @@ def beside(motion: SkeletonMotion | None, clips: Mapping[str, Clip], scene: Scen
         InputError: motions of other numbers of frames, or two names that differ in "/" and " " alone.
     """
     _check(motion, clips, scene)
-    wide = max(APART, 0.5 + max(_across(clip) for clip in clips.values()))
+    wide = max(APART, 0.5 + max(_way(clip)[1] for clip in clips.values()))
     count = len(clips) + (motion is not None)
     first = -0.5 * wide * (count - 1)  # what looks against the x axis has y on its right
     aside = {name: first + wide * (number + (motion is not None)) for number, name in enumerate(clips)}
@@ -61,7 +61,8 @@ def beside(motion: SkeletonMotion | None, clips: Mapping[str, Clip], scene: Scen
     dt = next(iter(clips.values())).dt
     viewer = Viewer(viewed, title=title, contact_distance=-1e-4)  # overlaps alone are shown
     middle = np.mean([_middle(clip) for clip in clips.values()], axis=0)
-    away = 1.2 + 1.1 * wide * count
+    ahead = [_way(clip)[0] for clip in clips.values()] + ([] if motion is None else [np.ptp(motion.positions[:, 0, 0])])
+    away = 1.2 + 1.1 * wide * count + 0.6 * max(ahead)  # half the way, and some, comes towards the camera
     viewer.look(tuple(middle + away * np.array([0.9, 0.1, 0.25])), tuple(middle))
     viewer.play(postures, dt)
     return viewer
@@ -120,9 +121,9 @@ def _figure(name: str) -> str:
     return name.replace("/", " ")
 
 
-def _across(clip: Clip) -> float:
-    """Metres that a clip goes to the left and right."""
-    return float(np.ptp(clip.q[:, 1])) if clip.figure.root == "free" else 0.0
+def _way(clip: Clip) -> Array:
+    """(3,) metres that a clip goes along each axis."""
+    return np.asarray(np.ptp(clip.q[:, :3], axis=0)) if clip.figure.root == "free" else np.zeros(3)
 
 
 def _middle(clip: Clip) -> Array:
