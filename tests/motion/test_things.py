@@ -287,7 +287,7 @@ def test_a_hand_rests_on_the_ground_before_and_after_it_touches_a_thing() -> Non
     contact = ThingContact("left_hand", 20, 30, "box", np.array([0.0, 0.15, 0.0]), np.array([0.0, 1.0, 0.0]))
     points = [HeldPoint("left_hand", "", 1, np.zeros(3)), HeldPoint("left_hand", "", 1, np.zeros(3), thing=True)]
     ground = replace(NOTHING, footholds=tuple(rests))
-    held = Holds(points, ground, 1.0, 1 / 30, None, Touched(scene.figure, Things(scene, {}), [contact], points))
+    held = Holds(points, ground, 1.0, 1 / 30, None, Touched(scene.figure, Things(scene, {}), [contact]))
     held.begin({20: scene.figure.neutral})
     paths = {frame: np.zeros((2, 3)) for frame in range(60)}
     weights = [held.goals(frame, paths, np.zeros(3))[1][:, 0] for frame in (3, 25, 45)]

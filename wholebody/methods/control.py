@@ -33,7 +33,12 @@ class _Budget(threading.local):
         """The share of it that has passed; 0 without a bound."""
         if self.seconds == np.inf:
             return 0.0
-        return 1.0 - (self.until - _now("thread_time")) / self.seconds
+        return 1.0 - self.left / self.seconds
+
+    @property
+    def left(self) -> float:
+        """Seconds of it that are left; infinite without a bound."""
+        return self.until - _now("thread_time")
 
     @property
     def over(self) -> bool:

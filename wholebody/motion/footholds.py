@@ -18,6 +18,7 @@ from wholebody.motion.windows import Window, long_runs, runs
 NEARBY = 0.8  # m: ground farther away than a step says nothing of the height here
 BEFORE = 0.4  # s: how long before and after a rest a point is looked at: half of a swing
 CAME_DOWN = 0.006  # m: by which a point that rests on higher ground was above it before and after
+SPAN = 1 / 30  # s before and after a frame between which its speed is that of a rest, whatever the rate of frames
 WAITED = 0.25  # s: a body that nothing lower bears for longer is borne by what rests higher
 
 
@@ -30,11 +31,17 @@ class RestLimits(NamedTuple):
     slid: float = 0.08  # m: a point that goes on farther while it is slow has made a step, and rests at two places
 
 
-def speeds(places: Array, dt: float) -> Array:
-    """(n, ...) speeds of places (n, ..., 3), `dt` seconds apart; central inside."""
+def speeds(places: Array, dt: float, span: float = 0.0) -> Array:
+    """(n, ...) speeds of places (n, ..., 3), `dt` seconds apart: from `span` seconds before a frame to after it.
+
+    It is a frame before and after at least; none is beyond the ends.
+    """
     if len(places) < 2:
         return np.zeros(places.shape[:-1])
-    return np.asarray(np.linalg.norm(np.gradient(places, dt, axis=0), axis=-1))
+    half, frames = max(1, round(span / dt)), np.arange(len(places))
+    first, last = np.maximum(frames - half, 0), np.minimum(frames + half, len(places) - 1)
+    times = dt * (last - first).reshape(-1, *(1,) * (places.ndim - 2))
+    return np.asarray(np.linalg.norm(places[last] - places[first], axis=-1) / times)
 
 
 def resting(places: Array, dt: float, limits: RestLimits, kinds: Sequence[int], allowed: Mask | None = None) -> Mask:
@@ -68,7 +75,7 @@ def resting(places: Array, dt: float, limits: RestLimits, kinds: Sequence[int], 
 
 def slow(places: Array, dt: float, limits: RestLimits) -> Mask:
     """(n,) rest frames of a point (n, 3) by speed alone; the fastest frames of a slow motion separate two rests."""
-    speed = speeds(places, dt)
+    speed = speeds(places, dt, SPAN)
     low, high = speed <= 2.0 / 3.0 * limits.speed, speed <= limits.speed
     kept = np.zeros(len(speed), dtype=bool)
     for run in runs(high):
@@ -117,17 +124,17 @@ class LiveRests:
     def __init__(self, lowest: Array, dt: float, back: int) -> None:
         """Take the heights (p,) at which the points rest, metres; a rest begins `back` frames ago at most."""
         self._lowest, self._dt, self._back, self._limits = lowest, dt, back, RestLimits()
-        self._least = max(1, round(self._limits.least / dt))
+        self._least, self._half = max(1, round(self._limits.least / dt)), max(1, round(SPAN / dt))
         self._places, self._frame = list[Array](), 0
         self._begun: list[tuple[int, Array, bool] | None] = [None] * len(lowest)  # frame, place, whether slow enough
         self._rests: Mask = np.zeros(len(lowest), dtype=bool)
 
     def push(self, places: Array) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
         """Take places (p, 3); rests that begin and that end, each as the number of a point and the frame."""
-        self._places = [*self._places[-2:], places]
-        if len(self._places) < 2:
+        self._places = [*self._places[-2 * self._half :], places]
+        if len(self._places) <= self._half:
             return [], []
-        span, here = self._places[-1] - self._places[0], self._places[-2]
+        span, here = self._places[-1] - self._places[0], self._places[-1 - self._half]
         speed = np.linalg.norm(span, axis=1) / (self._dt * (len(self._places) - 1))
         limits, begins, ends = self._limits, list[tuple[int, int]](), list[tuple[int, int]]()
         low = (speed <= limits.speed) & (here[:, 2] <= self._lowest + limits.height)

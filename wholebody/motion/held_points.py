@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,6 @@ from wholebody.motion.roles import Roles, figure_roles
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.motion.standing_ground import Ground
 from wholebody.motion.structure import upright
-from wholebody.motion.thing_contacts import ThingContact
 
 SOLE = 0.002  # m: what is lower than this above a foot's lowest point is its sole
 
@@ -33,6 +32,7 @@ class HeldPoint:
     edge: bool = False  # whether it is on the edge of a sole, so that its height alone counts: soles come down flat
     thing: bool = False  # whether it touches things, and not the ground
     share: float = 1.0  # of a hand that touches things: where it is between wrist and hand
+    base: int = 0  # index of the joint in whose axes it is held; 0 is the world
 
 
 def held_points(figure: Figure, roles: Roles, ground: Ground) -> list[HeldPoint]:
@@ -55,22 +55,27 @@ def held_points(figure: Figure, roles: Roles, ground: Ground) -> list[HeldPoint]
 
 
 def touching_points(
-    figure: Figure, roles: Roles, motion: SkeletonMotion, contacts: Sequence[ThingContact], joints: Mapping[str, str]
+    figure: Figure,
+    roles: Roles,
+    motion: SkeletonMotion,
+    wanted: Iterable[tuple[str, float, int]],
+    joints: Mapping[str, str],
 ) -> list[HeldPoint]:
     """The points of a figure that touch things: of a hand as far from the wrist as the skeleton's joint is.
 
-    `joints` are those of the skeleton's roles; the end of the arm touches of a figure without hands.
+    `wanted` are their roles, shares and bases, `joints` those of the skeleton's roles; the end of the arm touches of a
+    figure without hands.
     """
     found, data, own = [], figure.model.createData(), figure_roles(figure)
     pin.framesForwardKinematics(figure.model, data, upright(figure))
     placed = roles.places(figure)
     places = {role: np.array(data.oMi[joint].act(at)) for role, (joint, at) in placed.items()}
-    for role, share in dict.fromkeys((one.role, one.share) for one in contacts):
+    for role, share, base in dict.fromkeys(wanted):
         elbow, wrist, hand = (f"{role.split('_')[0]}_{part}" for part in ("elbow", "wrist", "hand"))
         carrier = role if role in places else wrist
         joint = placed[carrier][0]
         if carrier == wrist and hand not in own and wrist not in roles.ends:
-            found.append(HeldPoint(role, "", *_end(figure, joint), thing=True, share=share))
+            found.append(HeldPoint(role, "", *_end(figure, joint), thing=True, share=share, base=base))
             continue
         place = places[carrier]
         if role == hand and {elbow, wrist} <= places.keys():
@@ -78,7 +83,8 @@ def touching_points(
             far = _length(motion, joints, wrist, role) / _length(motion, joints, elbow, wrist) * forearm
             most = max(float(np.linalg.norm(way)), 1e-9)
             place = places[wrist] + share * min(far / most, 1.0) * way
-        found.append(HeldPoint(role, "", joint, np.array(data.oMi[joint].actInv(place)), thing=True, share=share))
+        within = np.array(data.oMi[joint].actInv(place))
+        found.append(HeldPoint(role, "", joint, within, thing=True, share=share, base=base))
     return found
 
 

@@ -29,7 +29,6 @@ STEP = 0.3  # m: a surface higher than this above the recording's ground is not 
 FACING = 0.3  # least cosine of the angle from up to the normal of a sole that faces the ground
 FOLLOW = 0.8  # share of the body's shift that a new place keeps; the rest goes back with time
 NEARLY = 3e-4  # m: by which the goal of a part that touches a thing is not moved
-APART = 0.1  # m: parts of the body that are farther apart do not meet
 LOST = 0.02  # m: points farther than this from their place on a thing cannot reach it
 OVER = 0.2  # s: in which a point goes over to where it rests
 AHEAD = 0.4  # s before a rest in which it is known: more leads longer swings to it, and postures come out later
@@ -38,36 +37,18 @@ AHEAD = 0.4  # s before a rest in which it is known: more leads longer swings to
 class Touched:
     """What a figure touches, and with which side."""
 
-    def __init__(
-        self, figure: Figure, things: Things, contacts: Sequence[ThingContact], points: Sequence[HeldPoint]
-    ) -> None:
+    def __init__(self, figure: Figure, things: Things, contacts: Sequence[ThingContact]) -> None:
         self.things, self.contacts, self._figure = things, contacts, figure
         self._data = figure.model.createData()
-        self.free: Mapping[int, Array] = {}  # postures of the free fit by frame
-        self._middles = dict[int, Array]()
-        self._parts = {(point.role, point.share): point for point in points}  # hands that touch each other
 
     def at(self, contact: ThingContact, frame: int) -> pin.SE3:
-        """Where a thing is in a frame; of two hands the middle between them in the free fit, z along the normal."""
-        if contact.normals is None:
-            return self.things.at(contact.thing, frame)
-        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), contact.normals[frame]).matrix()
-        pair = [self._parts[role, contact.share] for role in (contact.role, contact.thing)]
-        if frame not in self._middles:
-            data = self._figure.model.createData()
-            pin.forwardKinematics(self._figure.model, data, self.free[frame])
-            self._middles[frame] = np.mean([data.oMi[part.joint].act(part.place) for part in pair], axis=0)
-        return pin.SE3(turn, self._middles[frame])
-
-    def other(self, contact: ThingContact) -> Array:
-        """Where the hand that a hand touches was last, (3,) in the world."""
-        part = self._parts[contact.thing, contact.share]
-        return np.array(self._data.oMi[part.joint].act(part.place))
+        """Where a thing is in a frame; what is held in the axes of a part of the body stays in these."""
+        return pin.SE3.Identity() if contact.base else self.things.at(contact.thing, frame)
 
     def held(self, contact: ThingContact, point: HeldPoint, q: Array) -> Array:
         """(3,) where a point is held in a thing's axes, by the thickness of the part on the side that touches it."""
         pin.forwardKinematics(self._figure.model, self._data, q)
-        normal = self.at(contact, contact.first).rotation @ contact.normal
+        normal = self._data.oMi[contact.base].rotation @ self.at(contact, contact.first).rotation @ contact.normal
         pieces = [piece for piece in self._figure.geometry.geometryObjects if piece.parentJoint == point.joint]
         away = CLEARANCE + thickness(pieces, point.place, -self._data.oMi[point.joint].rotation.T @ normal)
         return contact.place + away * contact.normal
@@ -76,9 +57,9 @@ class Touched:
         """Signed distance of a point's part, with what its joint carries, to a thing at a posture (nq,), metres."""
         pin.forwardKinematics(self._figure.model, self._data, q)
         own = self._carried(point.joint)
-        if contact.normals is None:
+        if not contact.base:
             return least_distance(own, self.things.pieces(contact.thing, frame))
-        return least_distance(own, self._carried(self._parts[contact.thing, contact.share].joint, most=1))
+        return least_distance(own, self._carried(contact.base, most=int(contact.thing.endswith("hand"))))
 
     def _carried(self, joint: int, most: int = 100) -> list[Placed]:
         """Pieces on a joint and beyond it, over `most` joints with pieces at most."""
@@ -119,7 +100,7 @@ class Holds:
             if not any(one.role == rest.role and rest.first < one.end and one.first < rest.end for one in contacts)
         ]
         self._stands: list[list[Foothold | ThingContact]] = [
-            [one for one in contacts if (one.role, one.share) == (point.role, point.share)]
+            [one for one in contacts if (one.role, one.share, one.base) == (point.role, point.share, point.base)]
             if point.thing
             else [rest for rest in apart if rest.role == point.role]
             for point in points
@@ -138,9 +119,7 @@ class Holds:
         self._gone -= {each for each in self._gone if each[1] == frame}
         for number, stand in self._touches(frame, held[1]):
             normal, gap, off = self._met(number, stand, frame, q, places, held[0])
-            if np.hypot(np.linalg.norm(off - (off @ normal) * normal), gap) > (
-                LOST if stand.normals is None else APART
-            ):
+            if np.hypot(np.linalg.norm(off - (off @ normal) * normal), gap) > LOST:
                 held[1][number] = 0.0
                 self._gone.add((number, frame))
         return any(each[1] == frame for each in self._gone)
@@ -152,13 +131,10 @@ class Holds:
         """
         for number, stand in self._touches(frame, held[1]):
             normal, gap, way = self._met(number, stand, frame, q, places, held[0])
-            off, start = float(normal @ way) + CLEARANCE - gap, held[0][number]
-            if stand.normals is not None:
-                assert self._touched is not None
-                start, off = self._touched.at(stand, frame).translation, 0.5 * off
-            elif frame != stand.first:
+            off = float(normal @ way) + CLEARANCE - gap
+            if frame != stand.first:
                 off -= min(max(off, -NEARLY), NEARLY)
-            held[0][number] = start + off * normal
+            held[0][number] += off * normal
 
     def _touches(self, frame: int, weights: Array) -> list[tuple[int, ThingContact]]:
         """Points that are held at things in a frame, by their numbers, and where."""
@@ -172,15 +148,11 @@ class Holds:
     def _met(
         self, number: int, stand: ThingContact, frame: int, q: Array, places: Array, goals: Array
     ) -> tuple[Array, float, Array]:
-        """Of a contact in a frame its normal (3,), the distance of the parts, and the way (3,) from its goal.
-
-        Of parts of the body it is the way from one to the other.
-        """
+        """Of a contact in a frame its normal (3,), the distance of the parts, and the way (3,) from its goal."""
         assert self._touched is not None
         gap = self._touched.gap(stand, self.points[number], frame, q)
         normal = self._touched.at(stand, frame).rotation @ stand.normal
-        start = goals[number] if stand.normals is None else self._touched.other(stand)
-        return normal, gap, places[number] - start
+        return normal, gap, places[number] - goals[number]
 
     def give_up(self) -> str:
         """Split the contacts with things where points were let go of; says which, or nothing."""
@@ -232,8 +204,6 @@ class Holds:
     def begin(self, free: Mapping[int, Array]) -> None:
         """Take the postures (nq,) of the free fit by frame, which say which side of a part touches a thing."""
         self._free = free
-        if self._touched is not None:
-            self._touched.free = free
 
     def goals(
         self, frame: int, paths: Mapping[int, Array], shift: Array, again: bool = False, span: int = 1

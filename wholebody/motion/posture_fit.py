@@ -39,7 +39,7 @@ class Goals(NamedTuple):
 
     points: Array  # (p, 3) where the points are to be, metres, to a common shift but for the anchor's weight
     turns: Array  # (t, 3, 3) orientations that frames are to have
-    held: Array  # (h, 3) where held points are to be, metres
+    held: Array  # (h, 3) where held points are to be, in the axes of their bases, metres
     held_weights: Array  # (h, 3) weight of each, along the axes of the world; 0 for none
     posture: Array  # (nq,) a posture to stay near to
     posture_weights: Array  # (nv,) weight of each difference from it, metres per radian
@@ -53,7 +53,8 @@ class Layout(NamedTuple):
     bones: Array  # (b, p) combinations of points: a row has 1 and -1 for a bone, or positive shares for the anchor
     bone_weights: Array  # (b,) weight of each
     turn_weights: Array  # (t,) weight of each angle, metres per radian
-    held: list[tuple[int, Array]]  # joint and place (3,) in it of each point that may be held
+    # of each point that may be held its joint, its place (3,) in it, and the joint of its base, 0 for the world
+    held: list[tuple[int, Array, int]]
 
 
 class Fitter:
@@ -63,10 +64,13 @@ class Fitter:
         self.figure, self.model, self.layout, self._workspace = figure, figure.model, layout, workspace
         self._state = workspace.state
         points = [*layout.points, *layout.held]
-        self._place_joints = np.array([joint for joint, _ in points], dtype=np.intp)
-        self._local = np.array([place for _, place in points]).reshape(-1, 3)
+        self._place_joints = np.array([joint for joint, *_ in points], dtype=np.intp)
+        self._local = np.array([place for _, place, *_ in points]).reshape(-1, 3)
+        self._bases = np.array([base for _, _, base in layout.held], dtype=np.intp)
         self._turn_joints, self._turn_parts = self._carried(layout.turns)
-        self._moved = np.repeat(self._state.support[[*self._place_joints, *self._turn_joints]], 3, axis=0)
+        moved = self._state.support[[*self._place_joints, *self._turn_joints]]
+        moved[len(layout.points) : len(self._local)] -= self._state.support[self._bases]
+        self._moved = np.repeat(moved, 3, axis=0)
         places = 3 * len(self._local)
         self._wrenches = np.zeros((len(self._moved), 6))
         for axis in range(3):
@@ -102,9 +106,10 @@ class Fitter:
         self._workspace.place(things)
 
     def held(self, q: Array) -> Array:
-        """(h, 3) where the points are at a posture (nq,) that may be held."""
+        """(h, 3) where the points that may be held are at a posture (nq,), in the axes of their bases."""
         self._state.update(q)
-        return self._places()[len(self.layout.points) :]
+        base = self._state.joints[self._bases]
+        return np.asarray(np.einsum("hki,hi->hk", base[:, :3], self._places()[len(self.layout.points) :] - base[:, 3]))
 
     def outside(self, q: Array) -> bool:
         """Whether a posture (nq,) has a limb outside of its reach cone."""
@@ -186,8 +191,9 @@ class Fitter:
     def _errors(self, places: Array, goals: Goals) -> Array:
         """Weighted errors of bones, held points and orientations."""
         points = places[: len(goals.points)] - goals.points
-        held = goals.held_weights * (places[len(goals.points) :] - goals.held)
-        at = self._state.joints[self._turn_joints]
+        base, at = self._state.joints[self._bases], self._state.joints[self._turn_joints]
+        wanted = np.einsum("hki,hk->hi", base[:, :3], goals.held) + base[:, 3]
+        held = goals.held_weights * (places[len(goals.points) :] - wanted)
         turned = np.swapaxes(at[:, :3], 1, 2) @ self._turn_parts[:, :3] @ np.swapaxes(goals.turns, 1, 2)
         angles = self._turn_weights * np.array([pin.log3(turn) for turn in turned]).reshape(-1)
         return np.concatenate([self._bones @ points.ravel(), held.ravel(), angles])

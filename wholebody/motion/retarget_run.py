@@ -30,6 +30,7 @@ from wholebody.motion.posture_fit import Fitter, Goals, Layout, levers
 from wholebody.motion.retarget_targets import LIMBS, Targets, Wanted, has_trunk, known_bones, parts_of
 from wholebody.motion.roles import Roles
 from wholebody.motion.structure import upright
+from wholebody.motion.windows import normal
 from wholebody.scene.workspace import Workspace
 
 FIRST, FREE, PASS, SWEEP = 60, 2, 3, 1  # most steps of a first frame, a free one, one of the first pass, one of a sweep
@@ -58,9 +59,20 @@ class Run:
     """Postures of the frames of one skeleton, as these come."""
 
     def __init__(
-        self, figure: Figure, targets: Targets, roles: Roles, dt: float, holds: Holds | None, workspace: Workspace
+        self,
+        figure: Figure,
+        targets: Targets,
+        roles: Roles,
+        dt: float,
+        holds: Holds | None,
+        workspace: Workspace,
+        free: list[Array] | None = None,
     ) -> None:
-        """Set up for goals like `targets`; without holds the skeleton alone is followed, and nothing is free."""
+        """Set up for goals like `targets`; without holds the skeleton alone is followed, and nothing is free.
+
+        `free` is the free fit, (nq,) of each frame, if it is known: that of a run without holds.
+        """
+        self.free = list[Array]() if free is None else free
         self.figure, self.model, self.dt, self.holds = figure, figure.model, dt, holds
         points, turns = parts_of(targets, roles)
         self.fitter = Fitter(figure, _layout(points, turns, roles, figure, holds.points if holds else []), workspace)
@@ -94,7 +106,7 @@ class Run:
         self._stages: list[tuple[Callable[[int], None], int]] = [
             (self._fit, 0), (self._slowed, self.every + self.slowing), (self._evened, len(self.even) // 2),
             (self._calmed, len(self.calm) // 2),
-        ]  # fmt: skip
+        ] if free is None else [(self._known, 0)]  # fmt: skip
         if holds is None:
             self._stages.append((self._alone, 0))
         else:
@@ -231,6 +243,9 @@ class Run:
         q = self.figure.clamp(pin.normalize(self.model, self._mean(self._even, k, self.calm)))
         self._free[k], self._paths[k] = q, self.fitter.held(q)
 
+    def _known(self, k: int) -> None:
+        self._free[k], self._paths[k] = self.free[k], self.fitter.held(self.free[k])
+
     def _mean(self, values: dict[int, Array], k: int, weights: Array) -> Array:
         """The value at a frame of the line that is nearest to those about it: inside, their mean.
 
@@ -247,6 +262,7 @@ class Run:
 
     def _alone(self, k: int) -> None:
         q = self._free[k]
+        self.free.append(q)
         goals = self._goals(k, q, self.levers)
         for _ in range(8):
             if not self.fitter.outside(q):
@@ -377,12 +393,5 @@ def _layout(points: list[str], turns: list[str], roles: Roles, figure: Figure, h
     return Layout(
         [own[role] for role in points], [roles.turns[role] for role in turns], np.array(rows),
         np.array(weights), np.array([TURNS[role.split("_")[-1]] for role in turns]),
-        [(point.joint, point.place) for point in held],
+        [(point.joint, point.place, point.base) for point in held],
     )  # fmt: skip
-
-
-def normal(time: float, dt: float) -> Array:
-    """Weights of a normal distribution over frames, its standard deviation `time` [s]; their sum is 1."""
-    half = max(1, int(np.ceil(3.0 * time / dt)))
-    weights = np.exp(-0.5 * (np.arange(-half, half + 1) * dt / time) ** 2)
-    return np.asarray(weights / weights.sum())

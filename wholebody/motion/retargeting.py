@@ -17,6 +17,7 @@ from wholebody.geometry.shapes import HalfSpace
 from wholebody.motion.clip import Clip
 from wholebody.motion.held_points import held_points, touching_points
 from wholebody.motion.holds import Holds, Touched
+from wholebody.motion.own_contacts import hand_shares, own_contacts, own_rests
 from wholebody.motion.retarget_run import Run
 from wholebody.motion.retarget_targets import (
     LIMBS,
@@ -33,7 +34,7 @@ from wholebody.motion.skeleton import SkeletonMotion, checked_motion
 from wholebody.motion.stance import point_paths
 from wholebody.motion.standing_ground import NOTHING, Ground
 from wholebody.motion.standing_ground import ground as find_ground
-from wholebody.motion.thing_contacts import ThingContact, Things, meetings, still_things, surface_of
+from wholebody.motion.thing_contacts import ThingContact, Things, still_things, surface_of
 from wholebody.motion.thing_tracks import thing_tracks
 from wholebody.scene.scene import Scene
 
@@ -114,25 +115,27 @@ def retarget(
     world = Scene(figure) if scene is None else scene
     if scene is None and ground is not None and figure.root == "free":
         world.add(HalfSpace(), name="floor")
-    holds = None
-    if ground is not None or scene is not None:
-        held = NOTHING if ground is None else found
-        surface = None if scene is None else surface_of(scene, tracks)
-        recorded, contacts = Things(world, tracks), list[ThingContact]()
-        tracks = {name: recorded.scaled(name, proportions.path) for name in tracks}
-        joints = skeleton_roles(motion, names)
-        if ground is not None and figure.root == "free":
-            touching = _touching(joints, roles)
-            contacts = meetings(motion, touching, recorded.contacts(motion, touching))
-        parts = touching_points(figure, roles, motion, contacts, joints)
-        touched = Touched(figure, Things(world, tracks), contacts, parts)
-        points = held_points(figure, roles, held) + parts
-        holds = Holds(points, held, proportions.path, motion.dt, surface, touched)
     frames, lost = wanted_of(wanted, roles), ""
     with world.borrow() as workspace:
-        q = _postures(Run(figure, wanted, roles, motion.dt, holds, workspace), frames, progress)
-        if holds is not None and (lost := holds.give_up()):
-            q = _postures(Run(figure, wanted, roles, motion.dt, holds, workspace), frames, progress)
+        alone = Run(figure, wanted, roles, motion.dt, None, workspace)
+        alone.led_by(frames)
+        q = _postures(alone, frames, progress, 0.0)
+        if ground is not None or scene is not None:
+            held = NOTHING if ground is None else found
+            surface = None if scene is None else surface_of(scene, tracks)
+            recorded, contacts = Things(world, tracks), list[ThingContact]()
+            tracks = {name: recorded.scaled(name, proportions.path) for name in tracks}
+            joints = skeleton_roles(motion, names)
+            if ground is not None and figure.root == "free":
+                contacts = _contacts(motion, roles, joints, recorded, found, alone)
+            parts = ((one.role, one.share, one.base) for one in contacts)
+            points = held_points(figure, roles, held) + touching_points(figure, roles, motion, parts, joints)
+            touched = Touched(figure, Things(world, tracks), contacts)
+            holds = Holds(points, held, proportions.path, motion.dt, surface, touched)
+            runs = (Run(figure, wanted, roles, motion.dt, holds, workspace, alone.free) for _ in range(2))
+            q = _postures(next(runs), frames, progress, 0.3)
+            if lost := holds.give_up():
+                q = _postures(next(runs), frames, progress, 0.3)
     clip = Clip(figure, q, motion.dt, motion.name, tracks)
     if lost:
         warn(f"retarget: {motion.name}: {lost}, which it lets go of there; things keep their places and sizes")
@@ -141,18 +144,31 @@ def retarget(
     return clip
 
 
-def _postures(run: Run, frames: list[Wanted], tell: Callable[[float], object] | None) -> Array:
-    """Postures (n, nq) of all frames."""
+def _postures(run: Run, frames: list[Wanted], tell: Callable[[float], object] | None, done: float) -> Array:
+    """Postures (n, nq) of all frames; tells how much is done, where it was `done` before."""
     found = list[Array]()
-    run.led_by(frames)
     for number, wanted in enumerate(frames):
         found += run.push(wanted)
         if tell is not None and number % 20 == 0:
-            tell((number + len(found)) / (2 * len(frames)))
+            tell(done + (1.0 - done) * (number + len(found)) / (2 * len(frames)))
     found += run.finish()
     if tell is not None:
         tell(1.0)
     return np.array(found)
+
+
+def _contacts(
+    motion: SkeletonMotion, roles: Roles, joints: Mapping[str, str], things: Things, ground: Ground, alone: Run
+) -> list[ThingContact]:
+    """What a figure touches with what: things, and with its hands its own body; `alone` has its free fit."""
+    touching, figure = _touching(joints, roles), alone.figure
+    contacts = things.contacts(motion, touching)
+    busy = [one[:3] for one in contacts] + [one[:3] for one in ground.footholds]
+    if rests := own_rests(motion, joints, shares := hand_shares(touching), busy):
+        parts = ((role, share, 0) for role, share in shares.items())
+        hands = {point.role: point for point in touching_points(figure, roles, motion, parts, joints)}
+        contacts += own_contacts(rests, figure, roles, hands, alone.free)
+    return sorted(contacts, key=lambda one: one.first)
 
 
 def _tracks(

@@ -14,7 +14,7 @@ from wholebody.base.arrays import Array, Indices, Mask, with_values
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range
 from wholebody.base.files import checked_target
-from wholebody.motion.footholds import RestLimits, lowest, resting, speeds
+from wholebody.motion.footholds import SPAN, RestLimits, lowest, resting, speeds
 from wholebody.motion.roles import ROLES, skeleton_roles
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
 from wholebody.motion.windows import long_runs, runs
@@ -263,7 +263,7 @@ def _others(
     middles, floors = np.array([each.place[:2] for each in feet]), np.array([each.height for each in feet])
     nearest = np.linalg.norm(at[:, None, :2] - middles[None], axis=2).argmin(axis=1)
     floor = floors[nearest] + min(above.values())
-    low = (speeds(at, motion.dt) <= limits.speed) & (at[:, 2] <= floor + NEAR_GROUND)
+    low = (speeds(at, motion.dt, SPAN) <= limits.speed) & (at[:, 2] <= floor + NEAR_GROUND)
     mask = long_runs(low, max(1, round(limits.least / motion.dt)))
     return mask, [
         Foothold(role, *run, at[run.first : run.end].mean(axis=0), float(floors[nearest[run.first]]))

@@ -25,10 +25,8 @@ from wholebody.scene.scene import Scene
 NEAR = {"hand": 0.05, "wrist": 0.06, "elbow": 0.07, "knee": 0.09, "pelvis": 0.16}
 """Metres from a joint of these parts to what touches the skin over it, at most; feet stand on the ground."""
 
-SHARES = (1.0, 0.5)
+SHARES = (1.0, 0.5, 0.0)
 """Places of a hand that touch, from its wrist at 0 to its joint, which may be at the knuckles or beyond the fingers."""
-
-MEETING = 0.08  # m between hands that touch each other, at most
 
 GOES_ON = 1.4  # times as far away as a contact may begin, it ends
 THICKEST = 0.25  # m: of a part from its joint to its skin
@@ -45,7 +43,7 @@ class ThingContact(NamedTuple):
     place: Array  # (3,) on the thing's surface, in its axes, metres
     normal: Array  # (3,) of unit length, out of the thing, in its axes
     share: float = 1.0  # of a hand: where between its wrist and its joint it touches
-    normals: Array | None = None  # (n, 3) normals of unit length, in the world, where the thing is the other hand
+    base: int = 0  # joint of the figure whose axes these are, where the thing is a part of its body; else 0
 
 
 def still_things(scene: Scene) -> list[str]:
@@ -92,8 +90,6 @@ class Things:
             ]
             for name in (*self._moving, *self._still)
         }
-        self._ball = coal.Sphere(1e-6)
-        self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
 
     def scaled(self, name: str, scale: float) -> Array:
         """Placements (n, 7) of a thing that moves, on a way of another scale.
@@ -140,58 +136,39 @@ class Things:
                     np.array([here.actInv(one) for here, one in zip(at, start + share * (path - start), strict=True)])
                     for share in shares
                 ]
-                mask = np.any([self._touching(pieces, each, NEAR[part], motion.dt) for each in local], axis=0) & free
+                away = [np.array([nearest(pieces, one, GOES_ON * NEAR[part])[0] for one in each]) for each in local]
+                touches = zip(local, away, strict=True)
+                mask = np.any([near_and_slow(*each, NEAR[part], motion.dt) for each in touches], axis=0) & free
                 for run in runs(long_runs(mask, max(1, round(RestLimits().least / motion.dt)))):
                     middles = [each[run.first : run.end].mean(axis=0) for each in local]
-                    nearest = [self._nearest(pieces, middle, np.inf) for middle in middles]
-                    share, (_, place, normal) = min(zip(shares, nearest, strict=True), key=lambda one: abs(one[1][0]))
+                    ends = [nearest(pieces, middle) for middle in middles]
+                    share, (_, place, normal) = min(zip(shares, ends, strict=True), key=lambda one: abs(one[1][0]))
                     found.append(ThingContact(role, *run, name, place, normal, share))
                     free[run.first : run.end] = False
         return sorted(found, key=lambda one: one.first)
 
-    def _touching(self, pieces: Sequence[Piece], local: Array, most: float, dt: float) -> Mask:
-        """(n,) when a point (n, 3) in a thing's axes is near and slow."""
-        away = np.array([self._nearest(pieces, place, GOES_ON * most)[0] for place in local])
-        near: Mask = np.zeros(len(local), dtype=bool)
-        for run in runs(away <= GOES_ON * most):
-            near[run.first : run.end] = bool((away[run.first : run.end] <= most).any())
-        return slow(local, dt, RestLimits()) & near
 
-    def _nearest(self, pieces: Sequence[Piece], point: Array, within: float) -> tuple[float, Array, Array]:
-        """Signed distance of a point (3,) to a thing, the nearest place on its surface, and its normal out of it."""
-        best = np.inf, point, np.array([0.0, 0.0, 1.0])
-        ball = coal.Transform3s(np.eye(3), point)
-        for shape, at, reach in pieces:
-            if np.linalg.norm(at.translation - point) - reach > min(within, best[0]):
-                continue
-            self._result.clear()
-            where = coal.Transform3s(at.rotation, at.translation)
-            gap = float(coal.distance(shape, where, self._ball, ball, self._request, self._result))
-            normal = np.array(self._result.normal)
-            if gap < best[0] and np.isfinite(normal).all() and normal.any():
-                best = gap, np.array(self._result.getNearestPoint1()), normal
-        return best
+def near_and_slow(places: Array, away: Array, most: float, dt: float) -> Mask:
+    """(n,) when a point (n, 3) in the axes of a thing, and as far away (n,) from it, touches it."""
+    near: Mask = np.zeros(len(places), dtype=bool)
+    for run in runs(away <= GOES_ON * most):
+        near[run.first : run.end] = bool((away[run.first : run.end] <= most).any())
+    return slow(places, dt, RestLimits()) & near
 
 
-def meetings(motion: SkeletonMotion, joints: Mapping[str, str], others: Sequence[ThingContact]) -> list[ThingContact]:
-    """The contacts known, and where both hands touch each other and nothing else; `joints` are those of roles."""
-    at, found = {role: motion.positions[:, motion.names.index(joint)] for role, joint in joints.items()}, list(others)
-    hands = [f"{side}_hand" if f"{side}_hand" in at else f"{side}_wrist" for side in ("left", "right")]
-    share = 0.5 if hands[0].endswith("hand") else 1.0
-    if not at.keys() >= {*hands}:
-        return found
-    left, right = (at[role] + share * (at[role.replace("hand", "wrist")] - at[role]) for role in hands)
-    free: Mask = np.ones(len(motion), dtype=bool)
-    for one in others:
-        if one.role.endswith(("hand", "wrist")):
-            free[one.first : one.end] = False
-    far = np.linalg.norm(left - right, axis=1)
-    directions, z = (left - right) / (far[:, None] + 1e-9), np.array([0.0, 0.0, 1.0])
-    mask = slow(left - right, motion.dt, RestLimits()) & (far <= MEETING) & (far > 1e-3) & free
-    for run in runs(long_runs(mask, max(1, round(RestLimits().least / motion.dt)))):
-        for (hand, other), sign in ((hands, 1.0), (hands[::-1], -1.0)):
-            found.append(ThingContact(hand, *run, other, np.zeros(3), z, share, sign * directions))
-    return sorted(found, key=lambda one: one.first)
+def nearest(pieces: Sequence[Piece], point: Array, within: float = np.inf) -> tuple[float, Array, Array]:
+    """Signed distance of a point (3,) to a thing, the nearest place on its surface, and its normal out of it."""
+    best = np.inf, point, np.array([0.0, 0.0, 1.0])
+    center, ball, request = coal.Transform3s(np.eye(3), point), coal.Sphere(1e-6), coal.DistanceRequest()
+    for shape, at, reach in pieces:
+        if np.linalg.norm(at.translation - point) - reach > min(within, best[0]):
+            continue
+        result, where = coal.DistanceResult(), coal.Transform3s(at.rotation, at.translation)
+        gap = float(coal.distance(shape, where, ball, center, request, result))
+        normal = np.array(result.normal)
+        if gap < best[0] and np.isfinite(normal).all() and normal.any():
+            best = gap, np.array(result.getNearestPoint1()), normal
+    return best
 
 
 def thickness(pieces: Sequence[pin.GeometryObject], start: Array, along: Array) -> float:

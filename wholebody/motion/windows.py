@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.base.arrays import Mask
+from wholebody.base.arrays import Array, Mask
 
 
 class Window(NamedTuple):
@@ -41,3 +41,10 @@ def windows(wrong: Mask, margin: int) -> list[Window]:
     for run in runs(wrong):
         near[max(0, run.first - margin) : min(count, run.end + margin)] = True
     return runs(near)
+
+
+def normal(time: float, dt: float) -> Array:
+    """Weights of a normal distribution over frames, its standard deviation `time` [s]; their sum is 1."""
+    half = max(1, int(np.ceil(3.0 * time / dt)))
+    weights = np.exp(-0.5 * (np.arange(-half, half + 1) * dt / time) ** 2)
+    return np.asarray(weights / weights.sum())

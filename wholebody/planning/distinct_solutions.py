@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain
 from typing import overload
 
@@ -93,7 +93,7 @@ def solutions(
         method: settings of the descents; `QP()` if left out.
         starts: most descents.
         seed: of the random postures.
-        time_limit: seconds after which no descent begins; None for no limit.
+        time_limit: seconds after which it ends, the last descent too; None for no limit.
 
     Raises:
         InputError: a value of the wrong kind or out of range, or the scene changed after the problem was stated.
@@ -111,13 +111,17 @@ def solutions(
     known: list[Solution] = []
     begun = descents = 0
     branches, complete = _branches(problem), False
-    for answer in method.minima(problem, _starts(problem, starts, seed) if branches is None else branches[:starts]):
+    for start in _starts(problem, starts, seed) if branches is None else branches[:starts]:
+        if (left := ends - time.perf_counter()) <= 0.0:
+            break
+        timed = method if time_limit is None else replace(method, time_limit=min(left, method.time_limit or np.inf))
+        answer = next(timed.minima(problem, [start]))
         begun += 1
         if answer.solved:
             descents += 1
             known = _with(problem, known, answer, apart)
         complete = all_found(len(known), descents, LEAST) if branches is None else begun == len(branches)
-        if complete or time.perf_counter() > ends:
+        if complete:
             break
     ordered = sorted(known, key=lambda answer: answer.assessment.measure)
     return Solutions(tuple(ordered[:most]), len(known), descents, begun, complete)

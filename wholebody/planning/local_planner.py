@@ -9,15 +9,15 @@ held (as projections do, Berenson and others 2011).
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import ClassVar, Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 import pinocchio as pin
 
-from wholebody.assessment.posture import largest_violation
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.errors import InputError
 from wholebody.geometry.continuous.motion_bounds import largest_approach
+from wholebody.geometry.continuous.moved_pairs import kept_apart
 from wholebody.methods.control import BUDGET
 from wholebody.methods.qp.method import QP
 from wholebody.planning.sampling import holds
@@ -25,6 +25,7 @@ from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks import Posture
 from wholebody.tasks.base import filled
+from wholebody.terms.linearisation import ConstraintValues
 from wholebody.tracking.qp_strategy import Attraction
 
 WITHIN = 0.02  # m: distance within which pairs are looked at; larger = fewer and dearer queries
@@ -32,7 +33,7 @@ MARGIN = 2e-3  # m: distance that motions keep beyond the clearance, where their
 NOISE = 1e-5  # m: by which distances of one posture differ from query to query
 REACHED = 1e-3  # rad, m: difference from a posture that counts as reached by steps of the tracker
 JUMP = 1.5  # of the distance of two postures: above it their projections are on two sides of something
-ALLOWED = 1e-5  # m, rad: by which postures of a geodesic may miss constraints
+INSIDE = 5e-3  # rad, m: by which postures are within the bounds of constraints, where ends are; motions are curved
 GAIN = 5e-3  # rad, m: by which a step comes nearer at least; smaller = longer motions along things
 
 
@@ -43,6 +44,7 @@ class LocalPlanner(Protocol):
     samples: ClassVar[int]  # of trees that look for a shorter path after the first; more = shorter paths, later
     rounds: ClassVar[int]  # samples of trees until they get another end
     tries: ClassVar[int]  # shortcuts in a row that fail; more = shorter paths, later
+    spacing: ClassVar[float]  # rad, m: between postures that are smoothed; smaller = nearer to the free path, dearer
     partial: bool  # whether one joint may move in another way than before, and all others as they did
 
     def admit(self, q: Array) -> None:
@@ -61,7 +63,17 @@ class LocalPlanner(Protocol):
         """Postures of a path (n, nq) without the first, where all motions between are free and allowed; else none."""
 
     def settled(self, path: Array) -> tuple[Array, Mask]:
-        """Postures (n, nq) near those of a path that keep constraints, and which of the motions between are blocked."""
+        """Postures (n, nq) near those of a path that keep constraints, and which of the motions between are blocked.
+
+        Those that it has no time for stay as they are and count as blocked.
+        """
+
+
+class Seen(NamedTuple):
+    """What is seen at a posture that keeps the distances."""
+
+    room: Array  # (pairs,) by how much distances exceed what is required at least, metres
+    placed: Array  # (n, 4, 3) where the pieces are
 
 
 class Geodesics:
@@ -71,6 +83,7 @@ class Geodesics:
     samples: ClassVar[int] = 600
     rounds: ClassVar[int] = 50
     tries: ClassVar[int] = 30
+    spacing: ClassVar[float] = 0.015
 
     def __init__(self, problem: Problem, workspace: Workspace) -> None:
         self._workspace, self._model = workspace, workspace.model
@@ -81,6 +94,11 @@ class Geodesics:
         centres = np.array([np.linalg.norm(piece.placement.translation) for piece in pieces])
         # of every pair by every freedom
         self._approach = np.asarray(largest_approach(workspace.table, centres, np.eye(self._model.nv)))
+        self._between = (self._approach > 0.0).astype(float)
+        state, terms = workspace.state.update(problem.start), problem.constraints
+        self._values = ConstraintValues(terms, state)
+        sides = [np.broadcast_arrays(term.lower, term.upper, term.value(state))[:2] for term in terms]
+        self._sides = np.hstack([np.zeros((2, 0)), *sides]) + INSIDE * np.array([[1.0], [-1.0]])
         unbounded = np.flatnonzero(~np.isfinite(self._approach).all(axis=1))
         if len(unbounded):
             names = [workspace.owners[piece] for piece in workspace.table.pairs[unbounded[0]]]
@@ -93,82 +111,95 @@ class Geodesics:
         """See `LocalPlanner`."""
         near = self._workspace.near(q, self._clearance + MARGIN + NOISE)
         self._required[near.number] = np.minimum(self._required[near.number], near.distance - NOISE)
+        values = self._values.at(self._workspace.state)
+        self._sides[0] = np.minimum(self._sides[0], values - NOISE)
+        self._sides[1] = np.maximum(self._sides[1], values + NOISE)
 
     def free(self, q: Array) -> bool:
         """Whether a posture (nq,) keeps the distances."""
-        return self._room(q) is not None
+        return self._seen(q) is not None
 
     def towards(self, q: Array, target: Array) -> tuple[list[Array], bool]:
         """See `LocalPlanner`."""
         motion, way = np.asarray(pin.difference(self._model, q, target)), list[Array]()
-        parts, room, here = self._parts(motion), None, q
+        parts, seen, here = self._parts(motion), None, q
         for part in range(1, parts + 1):
             there = target if part == parts else np.asarray(pin.integrate(self._model, q, part / parts * motion))
-            ahead = self._room(there)  # most motions end here, so the room at q is asked for afterwards
-            room = self._room(q) if ahead is not None and room is None else room
-            if not self._joins(here, motion / parts, room, ahead):
+            ahead = self._seen(there)  # most motions end here, so q is looked at afterwards
+            seen = self._seen(q) if ahead is not None and seen is None else seen
+            if not self._joins(here, motion / parts, seen, ahead):
                 return way, False
             way.append(there)
-            here, room = there, ahead
+            here, seen = there, ahead
         return way, True
 
     def joined(self, q: Array, target: Array, most: float) -> list[Array]:
         """See `LocalPlanner`."""
         motion = np.asarray(pin.difference(self._model, q, target))
-        if np.linalg.norm(motion) > most or not self._joins(q, motion, self._room(q), self._room(target)):
+        if np.linalg.norm(motion) > most or not self._joins(q, motion, self._seen(q), self._seen(target)):
             return []
         parts = self._parts(motion)
         return [*(np.asarray(pin.integrate(self._model, q, k / parts * motion)) for k in range(1, parts)), target]
 
     def through(self, path: Array) -> list[Array]:
         """See `LocalPlanner`."""
-        room = self._room(path[0])
+        seen = self._seen(path[0])
         for q, there in pairwise(path):
-            ahead = self._room(there)
-            if not self._joins(q, np.asarray(pin.difference(self._model, q, there)), room, ahead):
+            ahead = self._seen(there)
+            if not self._joins(q, np.asarray(pin.difference(self._model, q, there)), seen, ahead):
                 return []
-            room = ahead
+            seen = ahead
         return list(path[1:])
 
     def settled(self, path: Array) -> tuple[Array, Mask]:
         """See `LocalPlanner`."""
-        rooms, blocked = [self._room(q) for q in path], []
+        blocked, seen = np.ones(len(path) - 1, dtype=bool), self._seen(path[0])
         for k, pair in enumerate(pairwise(path)):
-            blocked.append(not self._joins(path[k], np.asarray(pin.difference(self._model, *pair)), *rooms[k : k + 2]))
-        return path, np.array(blocked)
+            if BUDGET.over:
+                break
+            ahead = self._seen(pair[1])
+            blocked[k] = not self._joins(pair[0], np.asarray(pin.difference(self._model, *pair)), seen, ahead)
+            seen = ahead
+        return path, blocked
 
     def _parts(self, motion: Array) -> int:
         # rad, m: length of a part of a motion
         return max(1, int(np.ceil(np.abs(motion).max(initial=0.0) / 0.2)))
 
-    def _room(self, q: Array) -> Array | None:
-        """(pairs,) by how much distances exceed what is required at least, metres; None where one does not."""
-        room = self._workspace.proximity.least(self._workspace.state.update(q).data, WITHIN) - self._required
-        return room if room.min(initial=0.0) >= 0.0 else None
+    def _seen(self, q: Array) -> Seen | None:
+        """What is seen at a posture (nq,); None where a pair is nearer than is required, or a constraint is missed."""
+        proximity, state = self._workspace.proximity, self._workspace.state.update(q)
+        values = self._values.at(state)
+        if (values < self._sides[0]).any() or (values > self._sides[1]).any():
+            return None
+        room = proximity.least(state.data, WITHIN) - self._required
+        return Seen(room, proximity.distances.placed.copy()) if room.min(initial=0.0) >= 0.0 else None
 
-    def _joins(self, q: Array, motion: Array, room: Array | None, ahead: Array | None) -> bool:
-        return (
-            room is not None
-            and ahead is not None
-            and self._clear(q, motion, (room, ahead, self._approach @ np.abs(motion)))
-        )
-
-    def _clear(self, q: Array, motion: Array, known: tuple[Array, Array, Array]) -> bool:
+    def _joins(self, q: Array, motion: Array, seen: Seen | None, ahead: Seen | None) -> bool:
         """Whether the motion by a tangent (nv,) from q (nq,) is free, by halves, the longest ones first.
 
-        `known` (pairs,) is the room at both ends, and by how much it can change in between. The least room on the way
-        is half of what the ends have together less that change.
+        With c the chord of a pair's motion against each other and A a bound of its acceleration, the least room on the
+        way is half of what both ends have together less c, and less A / 8. By all freedoms between the two, that turn
+        by w and move a point by v, A <= 2 sum(w) sum(v); sum(v) bounds the chord too.
         """
-        asked = [(q, motion, *known)]
-        for here, whole, first, last, change in asked:  # grows while it is read
-            if (first + last + 2.0 * MARGIN >= change).all():
+        if seen is None or ahead is None:
+            return False
+        most = np.abs(motion)
+        way = self._approach @ most
+        asked = [(q, motion, seen, ahead, way, 0.5 * way * (self._between @ most))]
+        for here, whole, first, last, far, bent in asked:  # grows while it is read
+            room = first.room + last.room + 2.0 * MARGIN
+            if kept_apart(self._workspace.table, first.placed, last.placed, (room, far, bent)):
                 continue
             half = 0.5 * whole
             middle = np.asarray(pin.integrate(self._model, here, half))
-            room = self._room(middle)
-            if room is None:
+            between = self._seen(middle)
+            if between is None:
                 return False
-            asked += [(here, half, first, room, 0.5 * change), (middle, half, room, last, 0.5 * change)]
+            asked += [
+                (here, half, first, between, 0.5 * far, 0.25 * bent),
+                (middle, half, between, last, 0.5 * far, 0.25 * bent),
+            ]
         return True
 
 
@@ -183,6 +214,7 @@ class TrackedMotions:
     samples: ClassVar[int] = 12
     rounds: ClassVar[int] = 2  # a sample takes about as long as another end
     tries: ClassVar[int] = 12
+    spacing: ClassVar[float] = 0.015
 
     def __init__(self, problem: Problem, workspace: Workspace) -> None:
         self.geodesics = Geodesics(problem, workspace)
@@ -210,19 +242,14 @@ class TrackedMotions:
 
     def joined(self, q: Array, target: Array, most: float) -> list[Array]:
         """See `LocalPlanner`; a geodesic if it may be, as it costs a tenth of steps."""
-        if not self._held and (way := self._allowed(self.geodesics.joined(q, target, most))):
+        if not self._held and (way := self.geodesics.joined(q, target, most)):
             return way
         way, met = self.towards(q, target, most)
         return way if met else []
 
     def through(self, path: Array) -> list[Array]:
         """See `LocalPlanner`; by geodesics."""
-        return self._allowed(self.geodesics.through(path))
-
-    def _allowed(self, way: list[Array]) -> list[Array]:
-        """Postures (nq,) of a motion that keep the constraints; none where one does not."""
-        states = (self._problem.scene.state(at) for at in way)
-        return way if all(largest_violation(self._problem, at) <= ALLOWED for at in states) else []
+        return self.geodesics.through(path)
 
     def towards(self, q: Array, target: Array, most: float = np.inf) -> tuple[list[Array], bool]:
         """See `LocalPlanner`; ends where the motion is longer than `most`, radians and metres."""
@@ -240,14 +267,16 @@ class TrackedMotions:
 
     def settled(self, path: Array) -> tuple[Array, Mask]:
         """See `LocalPlanner`."""
-        found = [path[0]]
-        for q in path[1:-1]:
+        found, late = path.copy(), np.zeros(len(path), dtype=bool)
+        for k, q in enumerate(path[1:-1], start=1):
+            if BUDGET.over:
+                late[k:] = True
+                break
             for _ in range(2):  # what is held is missed by the square of a step
                 q = self._settling.step(q, measures=False).q
-            found.append(q)
-        steps = [self._apart(*pair) for pair in pairwise([*found, path[-1]])]
-        usual = [self._apart(*pair) for pair in pairwise(path)]
-        return np.array([*found, path[-1]]), np.array(steps) > JUMP * np.array(usual) + REACHED
+            found[k] = q
+        steps, usual = (np.array([self._apart(*pair) for pair in pairwise(each)]) for each in (found, path))
+        return found, (steps > JUMP * usual + REACHED) | late[1:]
 
     def _apart(self, q: Array, target: Array) -> float:
         return float(np.linalg.norm(pin.difference(self._model, q, target)))

@@ -6,6 +6,7 @@ ends -> straight motion, else steps along things, else two trees -> shortcuts ->
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -27,7 +28,7 @@ from wholebody.motion.clip import Clip
 from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
 from wholebody.planning.rrt_connect import RRTConnect
 from wholebody.planning.sampling import Sampler, holds
-from wholebody.planning.smoothing import SPACING, length, resampled, shortcut, smooth
+from wholebody.planning.smoothing import length, resampled, shortcut, smooth
 from wholebody.planning.timing import Pace, Timing
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
@@ -38,7 +39,9 @@ PASSED = 5e-4  # m: overlap between two frames that counts
 OVER = 1.001  # of the limits of velocity and acceleration: the last slowing may end a little above them
 ENDS = 8  # postures that meet goals; more = ends that are reached more easily, for a solve each
 NEARER = 0.95  # of the length of the best motion: what others are shorter than
-SEARCHED = 0.75  # of the time limit: for searches; the rest is for shortcuts, as long motions take longer to judge
+SEARCHED = 0.75  # of the time limit: for the first path; the rest is for shortcuts, smoothing and the judgement
+AGAIN = 0.4  # of the time limit: for shorter paths; more = shorter, later
+LEAST = 0.1  # s: a time limit below it counts as it; the straight motion of an arm takes less
 
 
 @dataclass(frozen=True, repr=False)
@@ -99,9 +102,8 @@ def plan(
         clearance: least distance of every pair, metres; pairs that are nearer at an end may be as near on the way.
         pace: limits of velocity and acceleration, and the time step; None for `wb.planning.Pace()`.
         seed: of the random postures.
-        time_limit: seconds of the processor after which solves, searches, shortcuts and smoothing end; what was found
-            by then is judged, and straight motions are tried whatever it is. Free roots are looked for within a metre
-            of the way between the ends.
+        time_limit: seconds of the processor that all of it may take, the judgement too; at least 0.1. Free roots are
+            looked for within a metre of the way between the ends.
 
     Raises:
         InputError: the start or the goal overlaps something, or misses a limit or a constraint, or an argument is not
@@ -119,23 +121,23 @@ def plan(
     limit = checks.number(time_limit, "plan: time_limit", 0.0, np.inf, "s")
     rng = np.random.default_rng(checks.whole(seed, "plan: seed", 0, 2**63 - 1))
     goals = _goals(goal)
-    problem = Problem(scene, start, goals=goals, constraints=constraints, clearance=clearance)
-    _check_end(problem, problem.start, "start")
-    sampler = Sampler(problem, rng)
-    ends = _answers(problem, sampler) if goals else iter([_End(_posture(problem, goal))])
-    found = None
-    with problem.borrow() as workspace:
-        tracked = bool(problem.constraints or problem.bounds or scene.figure.followers)
-        slides = TrackedMotions(problem, workspace)
-        local: LocalPlanner = slides if tracked else slides.geodesics
-        search = _Search(problem, (local, slides), ends, (sampler, rng))
-        with within_budget(max(limit, 1e-9)):  # what is compiled or built at the first plan is no part of it
-            path, message = search.shortest()
-            while path is not None:
-                found = _smoothed(problem, local, path, pace)
-                if found.solved or BUDGET.over:
+    with within_budget(max(limit, LEAST)):
+        problem = Problem(scene, start, goals=goals, constraints=constraints, clearance=clearance)
+        _check_end(problem, problem.start, "start")
+        sampler = Sampler(problem, rng)
+        ends = _answers(problem, sampler) if goals else iter([_End(_posture(problem, goal))])
+        judge = _Judge(problem, pace)
+        found = None
+        with problem.borrow() as workspace:
+            tracked = holds(problem) or bool(problem.bounds or scene.figure.followers)
+            slides = TrackedMotions(problem, workspace)
+            local: LocalPlanner = slides if tracked else slides.geodesics
+            search = _Search(judge, (local, slides), ends, (sampler, rng))
+            while found is None or not (found.solved or BUDGET.over):
+                path, message = search.shortest()
+                if path is None:
                     break
-                path, _ = search.shortest()
+                found = _smoothed(judge, local, path)
     if found is None:
         found = Plan(Clip(scene.figure, problem.start[None], pace.dt, "plan"), False, message)
     return replace(found, message=message if found.solved else found.message, seconds=processor_time() - began)
@@ -207,12 +209,13 @@ class _Search:
 
     def __init__(
         self,
-        problem: Problem,
+        judge: _Judge,
         planners: tuple[LocalPlanner, TrackedMotions],
         ends: Iterator[_End],
         random: tuple[Sampler, np.random.Generator],
     ) -> None:
-        self._problem, self._ends, self._begun = problem, ends, False
+        self._judge, self._ends, self._begun = judge, ends, False
+        problem = self._problem = judge.problem
         self._local, self._slides = planners
         self._sampler, self._rng = random
         self._reached: list[Array] = []
@@ -226,14 +229,15 @@ class _Search:
         """The shortest of some paths, with shortcuts, and how it was found; or None and why there is none."""
         model, best, most, samples, runs = self._problem.scene.model, None, np.inf, 0, 0
         enough = self._local.samples
-        while not runs or (runs < self._local.searches and samples < enough and BUDGET.spent < SEARCHED):
+        while not runs or (runs < self._local.searches and samples < enough and BUDGET.spent < AGAIN):
             path, trees = self._path(NEARER * most, np.inf if not runs else enough - samples)
             runs, samples = runs + 1, samples + trees.samples * (runs > 0)
             if path is None:
                 break
             if self._straight:
                 return path, "the straight motion"
-            path = shortcut(model, path, self._local, self._rng)
+            with self._judge.in_time(path):
+                path = shortcut(model, path, self._local, self._rng)
             if (found := length(model, path)) < most:
                 best, most = path, found
         if best is not None:
@@ -250,11 +254,12 @@ class _Search:
         """
         start, model, rounds = self._problem.start, self._problem.scene.model, 0
         self._straight = False
-        trees = RRTConnect(self._local, model, start)
+        sliding = self._problem.scene.figure.roots and self._local is not self._slides
+        trees = RRTConnect(self._local, self._slides if sliding else None, model, start)
         ends = [q for q in self._reached if self._apart(start, q) < most]
         for reached in ends:
             trees.add_end(reached)
-        while rounds < samples and (BUDGET.spent < SEARCHED or not self._begun):
+        while rounds < samples and (BUDGET.spent < (SEARCHED if most == np.inf else AGAIN) or not self._begun):
             self._begun = True
             if rounds % self._local.rounds == 0 or not ends:
                 end = next(self._ends, None)
@@ -290,8 +295,7 @@ class _Search:
         Most narrow places are around ends, and steps towards the start lead out of them.
         """
         start = self._problem.start
-        with within_budget(np.inf):  # it is tried whatever the limit
-            way, self._straight = self._local.towards(start, end)
+        way, self._straight = self._local.towards(start, end)
         if self._straight:
             return [start, *way[:-1], end]
         way, met = self._slides.towards(end, start)
@@ -301,41 +305,65 @@ class _Search:
         return float(np.linalg.norm(pin.difference(self._problem.scene.model, q, other)))
 
 
-def _smoothed(problem: Problem, local: LocalPlanner, path: list[Array], pace: Pace) -> Plan:
+def _smoothed(judge: _Judge, local: LocalPlanner, path: list[Array]) -> Plan:
     """The motion along a smooth path beside a free one; along the free one itself where that one fails."""
-    figure = problem.scene.figure
-    even = resampled(figure.model, path, int(np.clip(length(figure.model, path) / SPACING, 20, 1000)))
-    found = None if BUDGET.over else _judged(problem, smooth(figure.model, even, local), pace)
-    return found if found is not None and found.solved else _judged(problem, local.settled(even)[0], pace)
+    model = judge.problem.scene.model
+    count = int(np.clip(length(model, path) / local.spacing, 20, 1000))
+    with judge.in_time(path):
+        even, _ = local.settled(resampled(model, path, count))
+        paths = smooth(model, even, local), even
+    plans = map(judge.judged, paths)
+    found = next(plans)
+    return found if found.solved or BUDGET.over else next(plans)
 
 
-def _between(problem: Problem, end: Array) -> Problem:
-    """The problem with clearances of pairs that are nearer at an end (nq,) as they are there."""
-    result, least = problem.with_start(problem.start), np.array(problem.clearances)
-    with problem.borrow() as workspace:
-        near = workspace.near(end, problem.clearance + KEPT)
-    least[near.number] = np.minimum(least[near.number], np.maximum(near.distance, 0.0))
-    result.clearances = least
-    return result
+class _Judge:
+    """Judges motions from their postures alone."""
 
+    def __init__(self, problem: Problem, pace: Pace) -> None:
+        self.problem, self._pace = problem, pace
+        began = processor_time()
+        assess(problem, problem.start)
+        self._frame = 2.0 * (processor_time() - began)  # s: each is also swept from the one before
 
-def _judged(problem: Problem, path: Array, pace: Pace) -> Plan:
-    """The motion along a path (m, nq) as fast as it may be, and what it is worth, from its postures alone."""
-    scene = problem.scene
-    q, use = Timing(scene.figure, path, pace).within()
-    asked, worst = _between(problem, q[-1]), _moved(problem, q)
-    for frame in q:  # as far as the first that misses something
-        if worst <= KEPT:
+    def in_time(self, path: list[Array]) -> AbstractContextManager[None]:
+        """Inside it the budget ends early enough to judge a motion along postures (nq,), of half a second at least."""
+        figure = self.problem.scene.figure
+        steps = np.array([pin.difference(figure.model, *pair) for pair in pairwise(path)]).reshape(-1, figure.model.nv)
+        fastest = float((np.abs(steps) / self._pace.fastest(figure)).max(axis=1).sum())
+        return within_budget(max(BUDGET.left - self._frame * (0.5 + 1.2 * fastest) / self._pace.dt, 1e-9))
+
+    def judged(self, path: Array) -> Plan:
+        """The motion along a path (m, nq) as fast as it may be, and what it is worth."""
+        scene, pace = self.problem.scene, self._pace
+        q, use = Timing(scene.figure, path, pace).within()
+        asked, worst = self._between(q[-1]), _moved(self.problem, q)
+        for frame in q:  # as far as the first that misses something
+            if not worst <= KEPT or BUDGET.over:
+                break
             one = assess(asked, frame)
             worst = max(worst, one.limit_violation, one.constraint_violation, one.clearance_violation)
-    faults = [
-        f"a frame misses what must hold by {worst:.3g} m or rad" if not worst <= KEPT else "",
-        f"velocities reach {use.velocity:.3g} of their limits" if not use.velocity <= OVER else "",
-        f"accelerations reach {use.acceleration:.3g} of their limit" if not use.acceleration <= OVER else "",
-    ]
-    if not any(faults):
-        motions, sweep = enumerate(pairwise(q), 1), Sweep(scene.model, scene.geometry)
-        passed = next((k for k, motion in motions if sweep.first_contact(*motion, tolerance=PASSED) is not None), 0)
-        faults.append(f"something is passed through before frame {passed}" if passed else "")
-    said = "; ".join(fault for fault in faults if fault)
-    return Plan(Clip(scene.figure, q, pace.dt, "plan"), not said, said, length(scene.model, list(q)), worst, *use)
+        faults = [
+            f"a frame misses what must hold by {worst:.3g} m or rad" if not worst <= KEPT else "",
+            f"velocities reach {use.velocity:.3g} of their limits" if not use.velocity <= OVER else "",
+            f"accelerations reach {use.acceleration:.3g} of their limit" if not use.acceleration <= OVER else "",
+        ]
+        if not any(faults):
+            sweep = Sweep(scene.model, scene.geometry)
+            free = (not BUDGET.over and sweep.first_contact(*pair, tolerance=PASSED) is None for pair in pairwise(q))
+            passed = next((k for k, kept in enumerate(free, 1) if not kept), 0)
+            faults.append(f"something is passed through before frame {passed}" if passed else "")
+        if BUDGET.over:
+            faults = ["the time limit ended the judgement of a motion"]
+        said = "; ".join(fault for fault in faults if fault)
+        return Plan(Clip(scene.figure, q, pace.dt, "plan"), not said, said, length(scene.model, list(q)), worst, *use)
+
+    def _between(self, end: Array) -> Problem:
+        """The problem with clearances of pairs that are nearer at an end (nq,) as they are there."""
+        problem = self.problem
+        result, least = problem.with_start(problem.start), np.array(problem.clearances)
+        with problem.borrow() as workspace:
+            near = workspace.near(end, problem.clearance + KEPT)
+        least[near.number] = np.minimum(least[near.number], np.maximum(near.distance, 0.0))
+        result.clearances = least
+        return result

@@ -6,7 +6,9 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.planning.local_planner import LocalPlanner
+from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
+
+SLID = 2.0  # rad, m: of a branch along things; more = longer branches, for 2 ms a step
 
 
 class Tree:
@@ -46,15 +48,19 @@ class Tree:
 
 
 class RRTConnect:
-    """A tree from the start and one from the ends, which `local` lets grow.
+    """A tree from the start and one from the ends, which `local` lets grow, and `slides` where that is blocked at once.
+
+    So branches go along things where no straight ones leave (as by retraction, Zhang and Manocha 2008).
 
     Attributes:
         samples: how many they were extended towards.
     """
 
-    def __init__(self, local: LocalPlanner, model: pin.Model, start: Array) -> None:
+    def __init__(
+        self, local: LocalPlanner, slides: TrackedMotions | None, model: pin.Model, start: Array
+    ) -> None:  # fmt: skip
         """Take the posture (nq,) at which the motion begins."""
-        self._local = local
+        self._local, self._slides = local, slides
         self._trees = [Tree(model, start), Tree(model, start)]
         self._trees[0].add(start)
         self.samples = 0
@@ -86,6 +92,8 @@ class RRTConnect:
         """Add the motion from the nearest posture towards a target; the last of it, and whether it is there."""
         number = tree.nearest(target)
         way, met = self._local.towards(tree.postures[number], target)
+        if not (way or met) and self._slides is not None:
+            way, met = self._slides.towards(tree.postures[number], target, SLID)
         for q in way:
             number = tree.add(q, number)
         return (number if way or met else None), met

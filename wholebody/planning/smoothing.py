@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.ndimage import gaussian_filter1d
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Mask
 from wholebody.methods.control import BUDGET
 from wholebody.planning.local_planner import LocalPlanner
 
@@ -18,7 +18,6 @@ LEAST = 0.01  # rad, m: by which a part becomes shorter where one joint moves ev
 CORNER = 2.0  # points: width of the filter of what is left of corners; larger = rounder, less exact
 MIXTURES = 8  # of the filtered path and the free one; more = smoother beside things, and later
 SPREAD = 0.05  # of the length of a path: width of the filter; larger = smoother, farther off
-SPACING = 0.015  # rad, m: between postures of a path; smaller = nearer to the free path, and dearer
 
 
 def length(model: pin.Model, path: Sequence[Array]) -> float:
@@ -78,17 +77,34 @@ def places(model: pin.Model, path: Sequence[Array] | Array) -> Array:
 
 
 def smooth(model: pin.Model, path: Array, local: LocalPlanner) -> Array:
-    """A smooth path (n, nq) beside a free one: a Gaussian filters it, less so where that would not be free."""
+    """A smooth path (n, nq) beside a free one: a Gaussian filters it, less so where that would not be free.
+
+    It is the free path where the time for it ends before.
+    """
     free = places(model, path)
-    wide, share, found = _filtered(free, SPREAD * len(path)), np.ones(len(path)), path
+    wide, share, found = _filtered(free, SPREAD * len(path)), np.ones(len(path)), path.copy()
+    blocked, anew = np.zeros(len(path) - 1, dtype=bool), np.ones(len(path), dtype=bool)
     for _ in range(MIXTURES):
         share[[0, -1]] = 0.0
-        found, blocked = local.settled(_postures(model, path, free + share[:, None] * (wide - free)))
-        if not blocked.any() or BUDGET.over:
+        mixed = _postures(model, path, free + share[:, None] * (wide - free))
+        for part in _runs(anew):
+            mixed[[part.start, part.stop - 1]] = found[[part.start, part.stop - 1]]
+            found[part], blocked[part.start : part.stop - 1] = local.settled(mixed[part])
+        if BUDGET.over or not blocked.any():
             break
         near = gaussian_filter1d(np.convolve(blocked, [1.0, 1.0]), 0.5 * SPREAD * len(path), mode="nearest")
-        share *= 1.0 - 0.6 * near / near.max()
-    return local.settled(_postures(model, path, _filtered(places(model, found), CORNER)))[0]
+        anew = near > 0.01 * near.max()
+        share -= 0.6 * share * np.where(anew, near / near.max(), 0.0)
+    rounded, cut = local.settled(_postures(model, path, _filtered(places(model, found), CORNER)))
+    if BUDGET.over:
+        return path
+    return found if (cut & ~blocked).any() else rounded
+
+
+def _runs(marked: Mask) -> list[slice]:
+    """Where marks (n,) are side by side, with one more place on either side."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]))).reshape(-1, 2)
+    return [slice(max(first - 1, 0), min(last + 1, len(marked))) for first, last in edges.tolist()]
 
 
 def _filtered(free: Array, spread: float) -> Array:

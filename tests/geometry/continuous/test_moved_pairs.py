@@ -8,7 +8,7 @@ import pytest
 
 import wholebody as wb
 from tests.reference import moved_pairs as reference
-from wholebody.geometry.continuous.moved_pairs import QueryResult, compiled_kernel, far_moved, separated
+from wholebody.geometry.continuous.moved_pairs import QueryResult, compiled_kernel, far_moved, kept_apart, separated
 
 WITHIN = 0.05
 
@@ -98,3 +98,20 @@ def distances(scene, q):
     data, results = scene.model.createData(), pin.GeometryData(scene.geometry)
     pin.computeDistances(scene.model, data, scene.geometry, results, q)
     return np.maximum([result.min_distance for result in results.distanceResults], 0.0)
+
+
+def test_pairs_are_kept_apart_by_the_chord_of_what_one_sees_of_the_other(free_bodies):
+    """A box goes along with another one and turns about its own middle: a corner moves by 2 sin(angle / 2) times r."""
+    figure = free_bodies(wb.Box((0.2, 0.2, 0.2)), wb.Box((0.3, 0.4, 0.5)))
+    table, angle, shift = wb.Scene(figure).built.table, 0.7, np.array((0.3, -0.2, 0.5))
+    before = np.tile(np.eye(4)[:, :3], (2, 1, 1))
+    before[1, 3] = (2.0, 0.0, 0.0)
+    after = before.copy()
+    after[:, 3] += shift
+    after[1, :3] = pin.exp3(angle * np.array((0.0, 0.0, 1.0))).T
+    chord = 2.0 * np.sin(0.5 * angle) * 0.5 * np.linalg.norm((0.3, 0.4, 0.5))
+    endless, none = np.array([9.0]), np.zeros(1)
+    assert kept_apart(table, before, after, (np.array([1.001 * chord]), endless, none))
+    assert not kept_apart(table, before, after, (np.array([0.999 * chord]), endless, none))
+    assert not kept_apart(table, before, after, (np.array([1.001 * chord]), endless, np.array([0.01 * chord])))
+    assert kept_apart(table, before, after, (np.array([0.5 * chord]), np.array([0.4 * chord]), endless))

@@ -49,6 +49,15 @@ def separated(table: PairTable, before: QueryResult, after: QueryResult, pairs: 
     return found
 
 
+def kept_apart(table: PairTable, before: Array, after: Array, known: tuple[Array, Array, Array]) -> bool:
+    """Whether all pairs keep their distances between two placements (n, 4, 3) of the pieces.
+
+    `known` (pairs,) metres: how far each may move, how far it moves at most, and how far its way leaves the chord.
+    """
+    free: bool = compiled_kernel().kept_apart(before, after, (table.pairs, table.reach), known)
+    return free
+
+
 @with_loops("wholebody.geometry.continuous.moved_pairs_kernel")
 def compiled_kernel(moved_pairs_kernel: Any) -> None:
     """The module of compiled loops, compiled or loaded from the cache, before a solve."""
@@ -59,6 +68,7 @@ def compiled_kernel(moved_pairs_kernel: Any) -> None:
     moved_pairs_kernel.separated(
         places, placements, placements, (places, pairs, lines, lines, lines), (lines, one, none, none), 0.0
     )
+    moved_pairs_kernel.kept_apart(placements, placements, (pairs, none), (none, none, none))
 
 
 def distances(placed: QueryResult, count: int) -> Array:

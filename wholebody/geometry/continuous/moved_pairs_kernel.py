@@ -53,13 +53,29 @@ def far_moved(
         room += max(_between(after, first, second) - radii, apart_after[p])
         if way <= room:
             continue
-        if _seen(before, after, first, second, reach[second]) <= room:
+        if ARC * _seen(before, after, first, second, reach[second]) <= room:
             continue
-        if _seen(before, after, second, first, reach[first]) <= room:
+        if ARC * _seen(before, after, second, first, reach[first]) <= room:
             continue
         found[kept] = p
         kept += 1
     return found[:kept]
+
+
+@compiled()
+def kept_apart(before: Array, after: Array, table: tuple[Indices, Array], known: tuple[Array, Array, Array]) -> bool:
+    """Whether each pair moves by no more than it may; see `moved_pairs.kept_apart`."""
+    pairs, reach = table
+    room, most, bent = known
+    for p in range(len(pairs)):
+        if most[p] > room[p]:
+            if bent[p] >= room[p]:
+                return False
+            a, b = pairs[p, 0], pairs[p, 1]
+            left = room[p] - bent[p]
+            if _seen(before, after, a, b, reach[b]) > left and _seen(before, after, b, a, reach[a]) > left:
+                return False
+    return True
 
 
 Outline: TypeAlias = tuple[Array, Indices, Array, Array]
@@ -157,4 +173,4 @@ def _seen(before: Array, after: Array, carrier: int, other: int, reach: float) -
     angle = np.sqrt(0.5 * turn)
     if angle <= 1e-12:
         angle = 0.0
-    return float(ARC * (np.sqrt(shift) + angle * (reach if np.isfinite(reach) else ENDLESS)))
+    return float(np.sqrt(shift) + angle * (reach if np.isfinite(reach) else ENDLESS))
