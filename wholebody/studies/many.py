@@ -186,9 +186,9 @@ def run_cases(
     leading = [firsts] if linked and len(firsts) > 1 else []
     for runs_now in (leading, waiting, alone):  # the cases of a run whose process ended are done again, one by one
         starts, work = dict[int, int | None](), list[Sequence[int]]()
-        for run in runs_now:
-            if left := [k for k in run if k not in done]:
-                led = [*firsts, *run] if len(run) > 1 else []
+        for part in runs_now:
+            if left := [k for k in part if k not in done]:
+                led = [*firsts, *part] if len(part) > 1 else []
                 starts[left[0]] = _solved_before(left[0], led, done)
                 work.append(left)
         if not over and work:
