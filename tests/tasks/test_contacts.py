@@ -366,6 +366,20 @@ def test_knees_that_are_no_feet_are_refused(knees: Any) -> None:
         wb.Problem(scene, constraints=[wb.Stand("floor", knees=knees)])
 
 
+@pytest.mark.parametrize("percentile", [5, 50, 95])
+def test_who_kneels_on_one_knee_has_the_thigh_level_and_the_trunk_upright_from_any_start(percentile: int) -> None:
+    # The ankle of a small woman who stands is as near to the floor as a knee that is thick.
+    woman = wb.load("human", sex="female", percentile=percentile)
+    scene = wb.Scene(woman).add(wb.HalfSpace(), name="floor")
+    kneels = wb.Stand("floor", feet=["left_foot", "right_shank"], knees=["right_shank"])
+    for start in ("standing", "kneeling"):
+        solution = wb.solve(wb.Problem(scene, start, constraints=[kneels]))
+        assert solution.solved
+        hip, knee = (woman.placement(solution.q, f"left_{name}").translation for name in ("hip", "knee"))
+        assert abs(hip[2] - knee[2]) < 0.06
+        assert woman.placement(solution.q, "thorax").rotation[2, 2] > np.cos(np.radians(15.0))
+
+
 def test_a_person_kneels_in_balance() -> None:
     shanks = ("left_shank", "right_shank")
     person = wb.load("human")
