@@ -69,8 +69,12 @@ class Vector:
 
     def __call__(self, value: object, what: str) -> tuple[float, ...]:
         """The numbers; an InputError if the value is of another shape, or one of them is out of range."""
+        low, high, floats = self.each.low, self.each.high, not self.each.whole
+        plain = floats and type(value) is tuple and len(value) == self.count  # told in a fifth of the time
+        if plain and all(type(one) is float and low <= one <= high for one in value):  # type: ignore[attr-defined]
+            return value  # type: ignore[return-value]
         found = tuple(checks.numbers(value, (self.count,), what).tolist())
-        within = not self.each.whole and self.each.low <= min(found) and max(found) <= self.each.high
+        within = floats and low <= min(found) and max(found) <= high
         return found if within else tuple(self.each(one, what) for one in found)
 
 

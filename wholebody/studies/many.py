@@ -98,7 +98,8 @@ def solve_many(
         jobs: problems at a time.
         cluster: address of a dask scheduler that runs them; None for this machine.
         warm_start: begin each problem at the answer of the last one before it that is solved, if of the same figure.
-            One that is not solved from there is solved from its own start. Runs of 16 problems in the order given are
+            One that is not solved from there is solved from its own start, and so are goals of arms that are answered
+            many at a time: the least of their branches is known at once. Runs of 16 problems in the order given are
             linked so, and their first ones, whatever `jobs` is. Where neighbours differ by more than 10 degrees in a
             joint, both are solved from their own starts and each other's answers, and the lower measure stays: at most
             four more solves of a problem. `SolveRecord.change` names the jumps that are left. An answer may be another
@@ -166,31 +167,34 @@ def run_cases(
         return tell is not None and tell(SolveProgress(len(done), len(order), record)) is True
 
     over = tell is not None and tell(SolveProgress(len(done), len(order), None)) is True
-    single = [run[0] for run in numbered if len(run) == 1 and run[0] not in done]
-    if not over and hasattr(running.method, "batches") and _is_quick([order[k] for k in single], running):
+    waiting = [run for run in numbered if any(k not in done for k in run)]
+    asked = [k for run in waiting for k in run if k not in done]
+    if not over and hasattr(running.method, "batches") and _is_quick([order[k] for k in asked], running):
         with closing(
-            at_once([order[k].make() for k in single], running.method, running.jobs, running.cluster)
+            at_once([order[k].make() for k in asked], running.method, running.jobs, running.cluster)
         ) as answers:
             for place, answer in answers:
-                record = order[single[place]].record  # `replace` would take three times as long
-                over = keep(single[place], SolveRecord(record.name, factors=record.factors, **answer))
+                record = order[asked[place]].record  # `replace` would take three times as long
+                over = keep(asked[place], SolveRecord(record.name, factors=record.factors, **answer))
                 if over:
                     break
-    waiting = [run for run in numbered if any(k not in done for k in run)]
+    settled = done.keys() & asked
     # The first of each run begin at each other's answers, one after the other, and the rest of a run at its first: so
     # all runs are of one family of postures, whatever `jobs` is.
     linked = [run for run in waiting if len(run) > 1]
     firsts, alone = [run[0] for run in numbered if len(run) > 1], list[Sequence[int]]()
     leading = [firsts] if linked and len(firsts) > 1 else []
-    heads = [left for run in leading if (left := [k for k in run if k not in done])]
-    tails = [run[1:] if leading else run for run in linked] + [run for run in waiting if len(run) == 1]
-    for work in (heads, tails, alone):  # the cases of a run whose process ended are done again, one by one
+    for runs_now in (leading, waiting, alone):  # the cases of a run whose process ended are done again, one by one
+        starts, work = dict[int, int | None](), list[Sequence[int]]()
+        for part in runs_now:
+            if left := [k for k in part if k not in done]:
+                led = [*firsts, *part] if len(part) > 1 else []
+                starts[left[0]] = _solved_before(left[0], led, done)
+                work.append(left)
         if not over and work:
-            led = firsts if leading and work is not alone else []
-            starts = {run[0]: _solved_before(run[0], led, done) for run in work}
             over = _run(work, order, running, keep, alone, {k: done[j].q for k, j in starts.items() if j is not None})
     if not over and waiting:
-        family = Family(order, done, partial(_computed, order, running), keep)
+        family = Family(order, done, partial(_computed, order, running), keep, settled)
         starts = {k: _solved_before(k, run, done) for run in (*leading, *linked) for k in run[1:]}
         before_it = {k: j for k, j in starts.items() if j is not None}
         _ = solve_from_neighbours(family, before_it) or (linked and lowers and (lower(family) or name_changes(family)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import replace
 from math import radians
 from types import MappingProxyType
@@ -33,6 +33,7 @@ class Family(NamedTuple):
     # None, or whose process ended, are left out.
     compute: Callable[[Callable[..., Any], Work], dict[Any, Any]]
     keep: Callable[[int, SolveRecord], bool]  # puts a record into its place; whether the caller ends the run
+    settled: Set[int] = frozenset()  # cases that no other start gives a lower measure
 
 
 def solve_from_neighbours(family: Family, linked: Mapping[int, int] = MappingProxyType({})) -> bool:
@@ -40,7 +41,7 @@ def solve_from_neighbours(family: Family, linked: Mapping[int, int] = MappingPro
 
     `linked` are cases that warm-started at the answer of another one, by number: that is not tried again.
     """
-    order, done, compute, keep = family
+    order, done, compute, keep = family[:4]
     tried: dict[int, dict[int, int]] = {k: {} for k, one in done.items() if one.q is not None and not one.solved}
     for k, j in linked.items():
         if k in tried and j in done and done[j].solved:
@@ -82,7 +83,7 @@ def lower(family: Family) -> bool:
     lower spreads from case to case, each at most `TRIES` times. A round takes the answers of the one before, so the
     order in which solves end does not matter.
     """
-    order, done, compute, keep = family
+    order, done, compute, keep = family[:4]
     pairs = _neighbours(order)
     beside: dict[int, list[int]] = {k: [] for k in range(len(order))}
     for a, b in pairs:
@@ -91,7 +92,9 @@ def lower(family: Family) -> bool:
     tried: dict[int, set[tuple[int, bytes]]] = {k: set() for k in beside}
     while True:
         work: dict[tuple[int, int], tuple[int, Array | None]] = {}
-        for k in sorted({k for pair in pairs if _jumps(done, *pair) for k in pair if done[k].measure != 0.0}):
+        for k in sorted(
+            {k for pair in pairs if _jumps(done, *pair) for k in {*pair} - family.settled if done[k].measure}
+        ):
             for j in (-1, *(j for j in beside[k] if _alike(done, k, j))):
                 q = None if j < 0 else done[j].q
                 mark = j, b"" if q is None else q.tobytes()
@@ -114,7 +117,7 @@ def lower(family: Family) -> bool:
 
 def name_changes(family: Family) -> bool:
     """Write into the later case of each jump that is left which joint turns, how far, and from where; see `lower`."""
-    order, done, compute, keep = family
+    order, done, compute, keep = family[:4]
     work = {(a, b): (b, done[a].q, done[b].q) for a, b in _neighbours(order) if _jumps(done, a, b)}
     largest: dict[int, tuple[float, str]] = {}
     for (a, b), (joint, angle) in sorted(compute(most_turned, work).items()):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Sequence, Set
 from functools import partial
 
 import numpy as np
@@ -55,7 +55,7 @@ def default_measures(
     start: Array,
     stances: Sequence[tuple[str, ...]],
     seated: Sequence[str],
-    hanging: Sequence[str],
+    hanging: tuple[str, ...],
     *,
     ranges: bool,
 ) -> tuple[Measure, ...]:
@@ -74,16 +74,10 @@ def default_measures(
     if seated:
         joints = [scene.model.joints[joint] for body in seated for joint in scene.figure.bodies[body]]
         rhythm = rhythm.of_arms({int(joint.idx_v) for joint in joints})
-    # these are as in the first posture, whatever the start is
-    own = [*((Stance, pair) for pair in pairs), *([(Hang, tuple(hanging))] if hanging else [])]
-    made = (scene.built.known(each, partial(_resolved, scene, start, *each)) for each in own)
-    return (_effort.resolve(scene, rest), rhythm, *made)
-
-
-def _resolved(
-    scene: Surroundings, start: Array, kind: Callable[[Sequence[str]], Measure], names: Sequence[str]
-) -> Measure:
-    return kind(names).resolve(scene, start)
+    # whatever the start is, these are the same
+    stance = [inputs.once(scene, (Stance, pair), partial(Stance(pair).resolve, scene, rest)) for pair in pairs]
+    hang = [inputs.once(scene, (Hang, arms), partial(Hang(arms).resolve, scene, rest)) for arms in (hanging,) if arms]
+    return (_effort.resolve(scene, rest), rhythm, *stance, *hang)
 
 
 def seated(scene: Surroundings, terms: Sequence[Constraint | Goal]) -> tuple[str, ...]:

@@ -72,7 +72,7 @@ class Sit(ContactTerm):
         where = f"Sit({shown(self.on)})"
         place, trunk = inputs.find_place(scene, self.pelvis, where), inputs.find_place(scene, self.trunk, where)
         seat = face(scene, self.on, UP, state, where)
-        thighs = scene.built.known(("thighs", place.joint, trunk.joint), lambda: _thighs(scene, place, trunk))
+        thighs = inputs.once(scene, ("thighs", place.joint, trunk.joint), lambda: _thighs(scene, place, trunk))
         bottom = joined(scene, self.pelvis, [self.pelvis, *thighs])
         if not bottom.pieces:
             raise InputError(f"{where}: {shown(self.pelvis)} has no pieces to sit on; name a segment with geometry")

@@ -21,6 +21,7 @@ from wholebody.figures.state import State
 from wholebody.geometry.pieces import SweptPoints, swept_points
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import Surroundings
+from wholebody.tasks.inputs import once
 
 POINT = 1e-9  # m: radius of the ball that stands for a point
 ACCURACY = 1e-9  # m: to which coal computes a distance; coarser, and a normal is noise
@@ -116,11 +117,8 @@ def _of_drawn(name: str, joint: int, drawn: Iterable[pin.GeometryObject]) -> Sur
 
 
 def _of_pieces(scene: Surroundings, name: str, indices: Sequence[int]) -> Surface:
-    def make() -> Surface:
-        return _made(name, tuple(dict.fromkeys(scene.piece_owner[k] for k in indices)), scene.geometry, indices)
-
-    found: Surface = scene.built.known(("surface", name, *indices), make)
-    return found
+    owners = tuple(dict.fromkeys(scene.piece_owner[k] for k in indices))
+    return once(scene, ("surface", name, *indices), lambda: _made(name, owners, scene.geometry, indices))
 
 
 def _made(name: str, owners: tuple[str, ...], geometry: pin.GeometryModel, indices: Sequence[int]) -> Surface:
@@ -244,8 +242,5 @@ def segments_on(scene: Surroundings, joints: Iterable[int]) -> list[str]:
 
 def segments_beyond(scene: Surroundings, joint: int) -> list[str]:
     """Segments on a joint and beyond it, such as a foot with its toes, or a hand with its fingers."""
-    found: list[str] = scene.built.known(
-        ("beyond", joint),
-        lambda: segments_on(scene, [k for k in range(scene.model.njoints) if joint in scene.model.supports[k]]),
-    )
-    return found
+    joints = (k for k in range(scene.model.njoints) if joint in scene.model.supports[k])
+    return once(scene, ("beyond", joint), lambda: segments_on(scene, joints))

@@ -220,3 +220,21 @@ def test_the_nearest_of_a_goal_inside_of_a_thing_is_chosen_among_all_ends(monkey
     around = wb.Scene(figure).add(wb.Sphere(0.08), name="ball", at=place.translation)
     assert wb.solve(wb.Problem(around, goals=[wb.Frame("tool", place)])).status == "unreachable"
     assert counted[-1] == (SEEDS.together, SEEDS.together)
+
+
+def test_descents_of_an_arm_whose_axes_nearly_cross_begin_near_all_its_postures():
+    figure, start = known_arm("gen3")
+    chain, rng = PlainChain(figure.model, figure.limits, tuple(range(1, 8))), np.random.default_rng(2)
+    assert chain.arm is None
+    near = 0
+    for _ in range(20):
+        known = rng.uniform(-1.5, 1.5, 7)
+        place = figure.placement(known, "tool")
+        problem = wb.Problem(wb.Scene(figure), start, goals=[wb.Frame("tool", place)])
+        goals, found = chain.goals(goal_entries(problem)), np.empty((1, BRANCHES, 7))
+        compiled_kernel().branches(chain.guide, goals.tables[0], known[[chain.held]], found)
+        away = np.abs(np.angle(np.exp(1j * (found[0] - known)))).max(axis=1)
+        near += bool(np.nanmin(away, initial=9.0) < 0.2)
+        end = figure.placement(wb.solve(problem).q, "tool")
+        np.testing.assert_allclose(end.homogeneous, place.homogeneous, atol=2e-5)
+    assert near >= 15
