@@ -150,13 +150,13 @@ def test_a_half_space_that_is_carried_is_refused(planar_arm: Callable[..., wb.Fi
 def test_the_nearest_posture_of_a_tree_is_that_of_all_differences() -> None:
     rng = np.random.default_rng(0)
     problem, _ = shelf(8)
-    figure = problem.scene.figure
-    tree = Tree(figure.model, problem.start)
+    figure, shares = problem.scene.figure, rng.uniform(0.1, 1.0, problem.scene.model.nv)
+    tree = Tree(figure.model, problem.start, shares)
     drawn = rng.uniform(figure.limits.lower, figure.limits.upper, (200, figure.model.nq))
     for number, q in enumerate(drawn):
         tree.add(q, number - 1)
     at = rng.uniform(figure.limits.lower, figure.limits.upper)
-    assert tree.nearest(at) == int(np.argmin(np.linalg.norm(drawn - at, axis=1)))
+    assert tree.nearest(at) == int(np.argmin(np.linalg.norm(shares * (drawn - at), axis=1)))
     np.testing.assert_array_equal(tree.path(5), drawn[:6])
 
 

@@ -16,12 +16,12 @@ from wholebody.base.arrays import Array
 from wholebody.methods.base import TIME_LIMIT, check_problem
 from wholebody.methods.qp.chain import closed_form_postures
 from wholebody.methods.qp.method import QP
-from wholebody.methods.starts import all_found, restarts, throughout
+from wholebody.methods.starts import all_found, throughout
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 
-FEW = 20  # degrees of freedom up to which starts are spread over the whole range of every joint at once
-LEAST = 12  # descents before a search counts as complete
+FEW = 20  # degrees of freedom up to which starts are so many that the answers they lead to can count as all
+LEAST = 12, 36  # descents before a search counts as complete, of few degrees of freedom and of more
 SINGULAR = 1e-3  # m or rad per rad: least singular value of the goals at a branch of a closed form that stands alone
 
 
@@ -35,7 +35,8 @@ class Solutions(Sequence[Solution]):
         descents: how many descents ended in a posture that solves the problem.
         starts: how many were made.
         complete: whether all answers count as found, by the rule of `methods.starts.all_found`: an estimate, no proof;
-            of an arm of six joints with a closed form, whether all of its branches were descended from.
+            of an arm of six joints with a closed form, whether all of its branches were descended from; of figures
+            with more than 20 degrees of freedom never.
 
     Examples:
         >>> found = wb.solutions(problem, most=2, starts=4)
@@ -81,9 +82,9 @@ def solutions(
     """Return distinct answers of a problem: local minima of its measures that meet its goals and keep what must hold.
 
     Descents begin at the branches of the closed form of an arm of six joints that has one, if none is singular.
-    Otherwise they begin at the problem's start and at random postures, for up to 20 degrees of freedom all over the
-    limits (a Latin hypercube), else as far from the start as other starts of `QP`. Measures count from the problem's
-    start. The search ends where all answers count as found, or after as many starts or seconds.
+    Otherwise they begin at the problem's start and at random postures all over the limits (a Latin hypercube). Measures
+    count from the problem's start. The search ends where all answers count as found, or after as many starts or
+    seconds.
 
     Args:
         problem: as for `wb.solve`.
@@ -110,7 +111,7 @@ def solutions(
     ends = np.inf if time_limit is None else time.perf_counter() + TIME_LIMIT(time_limit, "solutions: time_limit")
     known: list[Solution] = []
     begun = descents = 0
-    branches, complete = _branches(problem), False
+    branches, complete, few = _branches(problem), False, problem.scene.model.nv <= FEW
     for start in _starts(problem, starts, seed) if branches is None else branches[:starts]:
         if (left := ends - time.perf_counter()) <= 0.0:
             break
@@ -120,9 +121,10 @@ def solutions(
         if answer.solved:
             descents += 1
             known = _with(problem, known, answer, apart)
-        complete = all_found(len(known), descents, LEAST) if branches is None else begun == len(branches)
+        complete = all_found(len(known), descents, LEAST[not few]) if branches is None else begun == len(branches)
         if complete:
             break
+    complete &= few
     ordered = sorted(known, key=lambda answer: answer.assessment.measure)
     return Solutions(tuple(ordered[:most]), len(known), descents, begun, complete)
 
@@ -141,8 +143,7 @@ def _branches(problem: Problem) -> Array | None:
 def _starts(problem: Problem, count: int, seed: int) -> Iterator[Array]:
     """The start, and random postures (nq,)."""
     state, rng = problem.scene.state(problem.start), np.random.default_rng(seed)
-    spread = throughout if problem.scene.model.nv <= FEW else restarts
-    others = spread(problem, state, problem.start, rng, count - 1) if count > 1 else iter(())
+    others = throughout(problem, state, problem.start, rng, count - 1) if count > 1 else iter(())
     return chain([problem.scene.figure.clamp(problem.start)], others)
 
 

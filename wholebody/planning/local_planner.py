@@ -33,6 +33,7 @@ MARGIN = 2e-3  # m: distance that motions keep beyond the clearance, where their
 NOISE = 1e-5  # m: by which distances of one posture differ from query to query
 REACHED = 1e-3  # rad, m: difference from a posture that counts as reached by steps of the tracker
 JUMP = 1.5  # of the distance of two postures: above it their projections are on two sides of something
+LEVER = 0.05  # m: least that a freedom counts as moving a point by, a radian or metre
 INSIDE = 5e-3  # rad, m: by which postures are within the bounds of constraints, where ends are; motions are curved
 GAIN = 5e-3  # rad, m: by which a step comes nearer at least; smaller = longer motions along things
 
@@ -45,6 +46,7 @@ class LocalPlanner(Protocol):
     rounds: ClassVar[int]  # samples of trees until they get another end
     tries: ClassVar[int]  # shortcuts in a row that fail; more = shorter paths, later
     spacing: ClassVar[float]  # rad, m: between postures that are smoothed; smaller = nearer to the free path, dearer
+    shares: Array  # (nv,) by which freedoms count in the distance of two postures, as far as they move a point
     partial: bool  # whether one joint may move in another way than before, and all others as they did
 
     def admit(self, q: Array) -> None:
@@ -83,7 +85,7 @@ class Geodesics:
     samples: ClassVar[int] = 600
     rounds: ClassVar[int] = 50
     tries: ClassVar[int] = 30
-    spacing: ClassVar[float] = 0.015
+    spacing: ClassVar[float] = 0.03
 
     def __init__(self, problem: Problem, workspace: Workspace) -> None:
         self._workspace, self._model = workspace, workspace.model
@@ -106,6 +108,8 @@ class Geodesics:
                 f"plan: how much a motion brings {names[0]} and {names[1]} together has no bound; attach a box in "
                 "place of a half-space, and give limits to what slides"
             )
+        levers = np.maximum(self._approach.max(axis=0, initial=0.0), LEVER)
+        self.shares = levers / levers.max()
 
     def admit(self, q: Array) -> None:
         """See `LocalPlanner`."""
@@ -221,8 +225,9 @@ class TrackedMotions:
         self._problem = problem.with_start(problem.start)
         self._model = problem.scene.model
         self._goal = Posture(problem.start).resolve(problem.scene, problem.start)
-        self._attraction = Attraction(problem.start, np.ones(self._model.nv))
         self._held = holds(problem)
+        self.shares = np.ones(self._model.nv) if self._held else self.geodesics.shares
+        self._attraction = Attraction(problem.start, self.shares**2)
         self.partial = not self._held  # what is held takes all joints along
         self._problem.goals = (self._goal,) if self._held else ()
         self._problem.measures = () if self._held else (self._attraction,)
@@ -253,14 +258,14 @@ class TrackedMotions:
 
     def towards(self, q: Array, target: Array, most: float = np.inf) -> tuple[list[Array], bool]:
         """See `LocalPlanner`; ends where the motion is longer than `most`, radians and metres."""
-        way, left, gone = list[Array](), self._apart(q, target), 0.0
+        way, left, gone, rest = list[Array](), self._apart(q, target), 0.0, self._rest(q, target)
         self._attraction.toward(target)
         if self._held:
             self._problem.goals = (filled(self._goal, target=target, resolved_target=target),)
         while left > REACHED:
-            here, before, q = q, left, self._tracker.step(q).q
-            left, gone = self._apart(q, target), gone + self._apart(here, q)
-            if left > max(before - GAIN, REACHED) or gone + left > most or BUDGET.over:
+            here, before, q = q, rest, self._tracker.step(q).q
+            left, gone, rest = self._apart(q, target), gone + self._apart(here, q), self._rest(q, target)
+            if (rest > before - GAIN and left > REACHED) or gone + left > most or BUDGET.over:
                 return way, False
             way.append(q)
         return way, True
@@ -280,3 +285,6 @@ class TrackedMotions:
 
     def _apart(self, q: Array, target: Array) -> float:
         return float(np.linalg.norm(pin.difference(self._model, q, target)))
+
+    def _rest(self, q: Array, target: Array) -> float:
+        return float(np.linalg.norm(self.shares * pin.difference(self._model, q, target)))

@@ -40,7 +40,7 @@ OVER = 1.001  # of the limits of velocity and acceleration: the last slowing may
 ENDS = 8  # postures that meet goals; more = ends that are reached more easily, for a solve each
 NEARER = 0.95  # of the length of the best motion: what others are shorter than
 SEARCHED = 0.75  # of the time limit: for the first path; the rest is for shortcuts, smoothing and the judgement
-AGAIN = 0.4  # of the time limit: for shorter paths; more = shorter, later
+AGAIN = 0.35  # of the time limit: for shorter paths; more = shorter, later
 LEAST = 0.1  # s: a time limit below it counts as it; the straight motion of an arm takes less
 
 

@@ -14,9 +14,9 @@ SLID = 2.0  # rad, m: of a branch along things; more = longer branches, for 2 ms
 class Tree:
     """Postures that free motions join to its roots."""
 
-    def __init__(self, model: pin.Model, origin: Array) -> None:
-        """Take the posture (nq,) from which differences count; their length is how far postures are apart."""
-        self._model, self._origin = model, origin
+    def __init__(self, model: pin.Model, origin: Array, shares: Array) -> None:
+        """Take the posture (nq,) from which differences count, and (nv,) weights of these in the distance of two."""
+        self._model, self._origin, self._shares = model, origin, shares
         self.postures: list[Array] = []
         self._parents: list[int] = []
         self.grown = 0  # how many postures it has beyond its roots
@@ -27,7 +27,7 @@ class Tree:
         number = len(self.postures)
         if number == len(self._places):
             self._places = np.concatenate([self._places, np.zeros_like(self._places)])
-        self._places[number] = pin.difference(self._model, self._origin, q)
+        self._places[number] = self._place(q)
         self.postures.append(q)
         self._parents.append(parent)
         self.grown += parent >= 0
@@ -35,8 +35,11 @@ class Tree:
 
     def nearest(self, q: Array) -> int:
         """The number of the posture that is nearest to q (nq,)."""
-        apart = self._places[: len(self.postures)] - np.asarray(pin.difference(self._model, self._origin, q))
+        apart = self._places[: len(self.postures)] - self._place(q)
         return int(np.argmin(np.einsum("ij,ij->i", apart, apart)))
+
+    def _place(self, q: Array) -> Array:
+        return np.asarray(self._shares * pin.difference(self._model, self._origin, q))
 
     def path(self, number: int) -> list[Array]:
         """Postures from a root to one of the tree."""
@@ -61,7 +64,7 @@ class RRTConnect:
     ) -> None:  # fmt: skip
         """Take the posture (nq,) at which the motion begins."""
         self._local, self._slides = local, slides
-        self._trees = [Tree(model, start), Tree(model, start)]
+        self._trees = [Tree(model, start, local.shares), Tree(model, start, local.shares)]
         self._trees[0].add(start)
         self.samples = 0
 

@@ -60,8 +60,8 @@ class Sampler:
     def near(self, q: Array, spread: float) -> Array:
         """A posture (nq,) whose joints are a share of the way from q (nq,) to a random posture.
 
-        A free root is within `ROOM` of that of q; where nothing is held it turns about the vertical in
-        half of the postures.
+        A free root is within `ROOM` of that of q. Where nothing is held it is a random share of that away, as narrow
+        places are small, and in half of the postures it turns about the vertical.
         """
         model, rng = self._figure.model, self._rng
         away = spread * np.asarray(pin.difference(model, q, self.turns.nearest(self.anywhere(), q)))
@@ -69,7 +69,8 @@ class Sampler:
             here = pin.XYZQUATToSE3(q[joint.idx_q : joint.idx_q + 7])
             turns = not self._held and rng.uniform() < 0.5
             turn = pin.exp3(np.array((0.0, 0.0, rng.uniform(-np.pi, np.pi)))) if turns else np.eye(3)
-            moved = (spread if self._held else 1.0) * rng.uniform(-ROOM, ROOM, 3)
+            far = spread if self._held else 10.0 ** rng.uniform(-1.0, 0.0)
+            moved = far * rng.uniform(-ROOM, ROOM, 3)
             there = pin.SE3(turn @ here.rotation, here.translation + moved)
             away[joint.idx_v : joint.idx_v + 6] = pin.log6(here.actInv(there)).vector
         away[self._frozen] = 0.0
