@@ -51,6 +51,8 @@ def test_every_public_name_loads_and_is_documented(name: str) -> None:
 def test_an_unknown_name_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="no_such_name"):
         _ = wholebody.no_such_name  # type: ignore[attr-defined]
+    with pytest.raises(AttributeError, match=r"it is wholebody\.tasks\.Lean$"):
+        _ = wholebody.Lean  # type: ignore[attr-defined]
 
 
 STUBS = sorted(Path(wholebody.__path__[0]).rglob("__init__.pyi"))

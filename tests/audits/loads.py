@@ -86,7 +86,7 @@ def rows(clips: Mapping[str, Path | None], equipment: Sequence[str], longest: fl
                 freed = avoid(clip, scene, dynamics=dynamics)
                 spent = time.process_time() - began
                 report = freed.report
-                change = load_change(old, Clip(scene.figure, freed.clip.q, clip.dt), None, strength, feet)
+                change = load_change(old, Clip(scene.figure, freed.clip.q, clip.dt), None, strength, feet, scene)
                 if not dynamics:
                     same = LoadChange(change.before, change.before, change.times)
                     yield _row(name, worn, WAYS[0], clip, clip, same, report.before, False, 0.0)

@@ -110,6 +110,22 @@ def test_datagrams_move_handles_on_the_page_and_bad_ones_are_told(live: LiveWorl
             LivePage(live, tmp_path, port)  # type: ignore[arg-type]
 
 
+def test_a_tracker_that_has_lost_a_hand_still_gives_the_head() -> None:
+    receiver = Receiver(0, ("head_top", "right_palm"))
+    sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        for lost in (b"[NaN, NaN, NaN]", b"null", b"[Infinity, 0, 0]"):
+            sender.sendto(b'{"right_palm": %b, "head_top": [0.1, 0.0, 1.7]}' % lost, ("127.0.0.1", receiver.port))
+            found = receiver.latest()
+            assert found.keys() == {"head_top"}
+            assert found["head_top"].tolist() == [0.1, 0.0, 1.7]
+    finally:
+        sender.close()
+        receiver.close()
+    assert receiver.refused == 3
+    assert "right_palm" in receiver.note
+
+
 def test_a_released_handle_moves_with_the_figure_and_the_mouse_takes_one_from_a_tracker() -> None:
     live = LiveWorld(wb.Scene(wb.load("avatar")))
     pelvis, hand = live.place("pelvis"), live.place("right_palm")

@@ -41,6 +41,18 @@ def test_stated_dimensions_are_measured_on_the_figure(size, proportions):
         assert abs(usual[name] - value) > 0.003, name
 
 
+def test_without_a_stature_it_is_likely_for_the_proportions():
+    """Five dimensions that regress to a tall or a short stature; the standard deviation is 69 mm."""
+    names = ("sitting_height", "popliteal_height", "span", "knee_height_sitting", "hip_breadth_sitting")
+    for stature, mass in ((1.90, 95.0), (1.62, 60.0)):
+        whole = measure(load("human", stature=stature, mass=mass))
+        person = load("human", proportions={name: whole[name] for name in names}).describe().person
+        assert person.stature == pytest.approx(stature, abs=0.02)
+        assert person.mass == pytest.approx(mass, abs=8.0)
+        stated = load("human", mass=80.0, proportions={name: whole[name] for name in names}).describe().person
+        assert stated.mass == 80.0
+
+
 def test_hands_and_feet_have_the_stated_sizes():
     figure = load("human", proportions={"hand_length": 0.205, "foot_length": 0.285})
     place = {name: figure.model.frames[figure.model.getFrameId(name)].placement.translation for name in figure.frames}
@@ -55,7 +67,7 @@ def test_hands_and_feet_have_the_stated_sizes():
 
 def test_the_others_follow_as_they_go_together_in_people():
     # A long trunk at the same stature means short legs and arms: all correlations of residuals are negative there.
-    usual, found = usual_dimensions(), measure(load("human", proportions={"sitting_height": 0.96}))
+    usual, found = usual_dimensions(), measure(load("human", stature=1.755, proportions={"sitting_height": 0.96}))
     assert found["eye_height_sitting"] - usual["eye_height_sitting"] == pytest.approx(0.037, abs=0.008)
     for name in ("buttock_knee_length", "popliteal_height", "knee_height_sitting", "span"):
         assert found[name] < usual[name] - 0.005, name
@@ -72,7 +84,8 @@ def test_without_proportions_the_body_is_the_same(options):
 
 def test_a_usual_dimension_changes_nothing():
     usual = usual_dimensions()
-    found = measure(load("human", proportions={"sitting_height": usual["sitting_height"]}))
+    proportions = {"sitting_height": usual["sitting_height"]}
+    found = measure(load("human", stature=1.755, mass=84.6, proportions=proportions))
     assert found == pytest.approx(usual, abs=2e-4)
 
 
@@ -84,13 +97,13 @@ def test_the_avatar_has_the_proportions_of_its_person():
 @pytest.mark.parametrize(
     ("proportions", "error", "words"),
     [
-        ({"sitting_height": 1.2}, InputError, r"12\.\d standard deviations from that of men of 1.755 m"),
+        ({"sitting_height": 1.2}, InputError, r"7\.\d standard deviations from that of men; give 0.7\d\d to 1.0\d\d m"),
         ({"sitting_height": 93}, InputError, "sitting_height is 93; give a number between 0 and 3 m"),
         ({"sitting_height": math.nan}, InputError, "sitting_height is nan"),
         (
             {"sitting_height": 0.97, "eye_height_sitting": 0.79},
             InputError,
-            "standard deviations from that of men of 1.755 m and .* kg with the others; give .* m, or change another",
+            "standard deviations from that of men with the others; give .* m, or change another",
         ),
         ({"siting_height": 0.93}, UnknownNameError, "sitting_height"),
         (0.93, InputError, "give metres by dimension"),

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.motion.inverse_dynamics import InverseDynamics, zero_moment_point
+from wholebody.motion.inverse_dynamics import InverseDynamics, Touches, zero_moment_point
 
 GRAVITY = 9.81
 
@@ -91,16 +91,43 @@ def wandering(figure: wb.Figure, seed: int) -> tuple[np.ndarray, np.ndarray, np.
     return q, 0.1 * random.normal(size=figure.model.nv), 0.3 * random.normal(size=figure.model.nv)
 
 
-@pytest.mark.parametrize("feet", [(True, True), (True, False), (False, False)])
-def test_derivatives_are_those_of_finite_differences(feet: tuple[bool, bool]) -> None:
+def leaning(human: wb.Figure) -> tuple[InverseDynamics, Touches]:
+    """A person who may touch something with the right hand, on two points of a slope."""
+    hand = human.model.frames[human.frame_id("right_hand")].parentJoint
+    points = np.array([[0.4, -0.3, 0.9], [0.45, -0.3, 0.9]])
+    touches = Touches(points, np.array([2, 2]), np.tile([-0.6, 0.0, 0.8], (2, 1)))
+    return InverseDynamics(human, ("left_foot", "right_foot"), 0.8, [hand]), touches
+
+
+def test_parts_of_loads_add_up_where_a_hand_bears_too() -> None:
+    human = wb.load("human")
+    dynamics, touches = leaning(human)
+    q, v, a = wandering(human, 3)
+    stand = dynamics.stand(q, (True, True), touches).shifted([np.array([0.01, 0.0, 0.0]), np.zeros(3)])
+    np.testing.assert_array_equal(stand.points[stand.owner == 2], touches.points)
+    np.testing.assert_array_equal(stand.axes[stand.owner == 2], touches.axes)
+    whole = dynamics.loads(q, v, a, stand)
+    still = dynamics.free_torque(q, 0.0 * v, 0.0 * a)
+    parts, wrenches = dynamics.grounded(
+        q, np.array([still, dynamics.free_torque(q, v, a) - still]), np.ones(2), stand
+    )  # fmt: skip
+    assert np.linalg.norm(whole.ground.forces[stand.owner == 2]) > 1.0
+    np.testing.assert_allclose(parts.sum(axis=0)[6:], whole.torque[6:], atol=1e-6)
+    np.testing.assert_allclose(wrenches.sum(axis=0), whole.wrench, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("feet", "touching"), [((True, True), False), ((True, False), False), ((False, False), False), ((True, True), True)]
+)
+def test_derivatives_are_those_of_finite_differences(feet: tuple[bool, bool], touching: bool) -> None:
     """While the points of the soles stay, and the same edges of friction bear.
 
     On one foot the ground cannot give all; the least squares then change a little with the centre of mass.
     """
     human = wb.load("human")
-    dynamics = InverseDynamics(human, ("left_foot", "right_foot"), 0.8)
+    dynamics, touches = leaning(human)
     q, v, a = wandering(human, 3)
-    stand = dynamics.stand(q, feet)
+    stand = dynamics.stand(q, feet, touches if touching else None)
     found = dynamics.derivatives(q, v, a, stand)
     bears = dynamics.loads(q, v, a, stand).ground.split.any(axis=1)
     step, model = 1e-6, human.model

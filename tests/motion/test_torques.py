@@ -136,6 +136,17 @@ def test_hands_on_a_box_bear_a_part_and_the_feet_the_rest(human: wb.Figure) -> N
     np.testing.assert_allclose(pin.aba(human.model, data, clip.q[1], none, torque, outer), 0.0, atol=1e-6)
 
 
+def test_what_hands_bear_counts_where_a_clip_is_freed_within_strength(human: wb.Figure) -> None:
+    clip, scene = leaning(human)
+    loads = wb.avoid(clip, scene, dynamics=True).report.loads
+    assert loads is not None
+    found = torques(clip, scene)
+    assert loads.before.feet == found.feet != ("left_foot", "right_foot")
+    np.testing.assert_array_equal(loads.before.torque, found.torque)
+    assert loads.after.outside.max() < 1e-3  # on feet alone the person would fall
+    assert not loads.missed
+
+
 def test_a_hand_at_a_wall_is_pushed_out_of_it(human: wb.Figure) -> None:
     """Two points that bear: the ground below, and a wall before it, which pushes back along its normal."""
     points, ways = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 1.0]]), np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])

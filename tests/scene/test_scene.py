@@ -77,6 +77,16 @@ def test_what_leans_on_a_segment_at_rest_is_not_tested_against_it_and_said_so(sc
     assert not [pair for pair in found.pair if {"pack", "watch"} & {owner[i] for i in pair}]
 
 
+def test_a_carried_half_space_meets_everything_but_another_half_space(human: wb.Figure) -> None:
+    scene = wb.Scene(human).add(wb.HalfSpace(), name="floor").add(wb.Sphere(0.1), name="ball", at=(1.0, 0.0, 1.0))
+    scene.attach(wb.HalfSpace(), name="sole", to="left_foot", at=(0.0, 0.0, -0.3))
+    assert "no end" in scene.excluded_pairs["sole", "floor"]
+    owners = scene.piece_owner
+    pairs = {frozenset((owners[pair.first], owners[pair.second])) for pair in scene.geometry.collisionPairs}
+    assert frozenset(("sole", "ball")) in pairs
+    assert frozenset(("sole", "floor")) not in pairs
+
+
 def test_moving_keeps_the_geometry_and_the_revision(scene):
     scene.add(wb.Box((0.2, 0.2, 0.2)), name="box", at=(1.0, 0.0, 1.0))
     scene.attach(wb.Sphere(0.05), to="right_hand", name="ball", at=(0.2, 0.0, 0.0))

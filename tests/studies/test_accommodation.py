@@ -161,6 +161,22 @@ def test_who_sits_as_people_are_measured_fits_by_the_thighs() -> None:
     assert fits == {"183": True, "187": False}
 
 
+def between_armrests(figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:
+    scene = wb.Scene(figure).add(wb.Box((0.40, 0.6, 0.04)), name="seat", at=(0.2, 0.0, 0.58))
+    scene.add(wb.Box((0.03, 0.6, 0.6)), name="back", at=(-0.015, 0.0, 1.0))
+    for name, y in (("left rest", 0.22), ("right rest", -0.22)):  # 0.40 m apart
+        scene.add(wb.Box((0.3, 0.04, 0.18)), name=name, at=(0.2, y, 0.691))
+    return wb.Problem(scene, "sitting", constraints=[wb.Sit(on="seat", back="back", erect=True)])
+
+
+def test_who_sits_as_people_are_measured_fits_by_the_hips() -> None:
+    hips = (0.398, 0.402)
+    people = {f"{1e3 * one:g}": {"sex": "female", "proportions": {"hip_breadth_sitting": one}} for one in hips}
+    found = wb.accommodation(between_armrests, people)
+    fits = {one.factors["person"]: good for one, good in zip(found.records, found.fits, strict=True)}  # type: ignore[index]
+    assert fits == {"398": True, "402": False}
+
+
 def test_people_are_the_same_for_the_same_seed_and_load_as_drawn() -> None:
     first, again, other = (wb.people(3, "female", seed=seed) for seed in (4, 4, 5))
     assert first == again

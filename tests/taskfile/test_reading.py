@@ -212,7 +212,7 @@ def test_a_figure_is_mounted_on_another_one(write: Callable[[str], Path]) -> Non
     assert both.members.keys() == {"anna", "ben"}
     assert "ben/tool/right_index_tip" in both.frames
     for text, said in (
-        (anna + HAND + '"anna/right_pal"', "figure 2.*right_palm"),
+        (anna + HAND + '"anna/right_pal"', ":8, figure 2, key on.*right_palm"),
         (anna + HAND + '"right_palm"', "figure 2, key on: no figure is called 'right_palm'; known: anna"),
         (HAND + '"right_palm"', "figure 1, key on: no figure has the frame"),
     ):

@@ -138,6 +138,19 @@ def test_proportions_age_shoes_and_clothing_are_written(tmp_path: Path) -> None:
     assert again.describe().person.age == 50.0
 
 
+def test_mounted_figures_go_round(tmp_path: Path, root: Path) -> None:
+    arm = wb.load(root / "examples" / "tasks" / "arm.urdf")
+    tip, hand = arm.segments[-1], wb.load("hand", side="left")
+    held = arm.mounted(hand, on=tip, name="grip", at=(0.0, 0.02, 0.1, 0.0, 0.6, 0.0, 0.8))
+    more = held.mounted(arm, on="grip/left_palm", name="more")
+    for scene in (wb.Scene(more), wb.Scene({"a": (held, (0.0, 2.0, 0.0)), "b": wb.load("avatar"), "c": more})):
+        problem = wb.Problem(scene)
+        path = wb.taskfile.write_task(problem, tmp_path / "again.toml")
+        again = wb.read_task(path).problem
+        assert again.scene.figure.joints == scene.figure.joints
+        same(problem, again)
+
+
 def test_what_a_task_file_cannot_say_is_named(tmp_path: Path) -> None:
     figure = wb.load("human")
     with pytest.raises(wb.InputError, match="reduced"):

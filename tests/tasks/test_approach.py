@@ -23,10 +23,10 @@ def test_a_sole_under_a_board_is_as_far_from_its_plane_as_it_is_below(problem: w
     standing = approached(problem.constraints[0], IN_FRONT)
     state = State(problem.scene.model).update(problem.start)  # the soles are on z = 0, under the board
     values = standing.value(state)
-    np.testing.assert_allclose(values[[0, 5]], -(BOARD + IN_FRONT), atol=1e-6)
+    np.testing.assert_allclose(values[[0, 6]], -(BOARD + IN_FRONT), atol=1e-6)
     q = problem.start.copy()
     q[2] += BOARD + IN_FRONT
-    np.testing.assert_allclose(standing.value(state.update(q))[[0, 5]], 0.0, atol=1e-6)
+    np.testing.assert_allclose(standing.value(state.update(q))[[0, 6]], 0.0, atol=1e-6)
 
 
 def test_its_derivative_leads_to_the_open_side(problem: wb.Problem) -> None:

@@ -366,6 +366,34 @@ def test_knees_that_are_no_feet_are_refused(knees: Any) -> None:
         wb.Problem(scene, constraints=[wb.Stand("floor", knees=knees)])
 
 
+@pytest.mark.parametrize("percentile", [5, 50, 95])
+def test_who_kneels_on_one_knee_has_the_thigh_level_and_the_trunk_upright_from_any_start(percentile: int) -> None:
+    # The ankle of a small woman who stands is as near to the floor as a knee that is thick.
+    woman = wb.load("human", sex="female", percentile=percentile)
+    scene = wb.Scene(woman).add(wb.HalfSpace(), name="floor")
+    kneels = wb.Stand("floor", feet=["left_foot", "right_shank"], knees=["right_shank"])
+    for start in ("standing", "kneeling"):
+        solution = wb.solve(wb.Problem(scene, start, constraints=[kneels]))
+        assert solution.solved
+        hip, knee = (woman.placement(solution.q, f"left_{name}").translation for name in ("hip", "knee"))
+        assert abs(hip[2] - knee[2]) < 0.06
+        assert woman.placement(solution.q, "thorax").rotation[2, 2] > np.cos(np.radians(15.0))
+
+
+@pytest.mark.parametrize("sex", ["female", "male"])
+def test_a_foot_stands_on_a_rung_with_the_middle_of_its_sole(sex: str) -> None:
+    person, level = wb.load("human", sex=sex), (0.5**0.5, 0.0, 0.0, 0.5**0.5)
+    scene = wb.Scene(person).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Cylinder(0.015, 0.5), name="rung", at=(0.3, -0.1, 0.3, *level))
+    stands = [wb.Stand("floor", feet=["left_foot"]), wb.Stand("rung", feet=["right_foot"], balance=False)]
+    solution = wb.solve(wb.Problem(scene, constraints=stands))
+    assert solution.solved
+    heel, ball = (person.placement(solution.q, f"right_{end}").translation for end in ("heel", "ball"))
+    # On the rung and not under it, within the 7 mm of its face in front of and behind its middle.
+    assert 0.5 * (heel + ball)[2] == pytest.approx(0.315, abs=1e-4)
+    assert abs(0.5 * (heel + ball)[0] - 0.3) < 0.0072
+
+
 def test_a_person_kneels_in_balance() -> None:
     shanks = ("left_shank", "right_shank")
     person = wb.load("human")

@@ -18,7 +18,10 @@ def exported(package: str, file: str) -> tuple[Callable[[str], object], Callable
 
     def load(name: str) -> object:
         if name not in home:
+            rooms = [one for one, where in home.items() if where == package and not name.startswith("_")]
+            found = (one for one in rooms if name in dir(import_module(f"{package}.{one}")))
             message = f"module {package!r} has no attribute {name!r}"
+            message += "".join(f"; it is {package}.{one}.{name}" for one in found)
             raise AttributeError(message, name=name, obj=sys.modules[package])  # Python names the nearest
         room = home[name] == package
         value = import_module(f"{package}.{name}") if room else getattr(import_module(home[name]), name)

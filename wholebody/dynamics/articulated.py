@@ -8,12 +8,13 @@ e from the figure to the tracker, c the forces of motion and weight. The springs
 impulses p are equation 9 of Schmidl and Lin with the whole articulated body in it, J M^-1 J^T in place of its mass and
 inertia: what is hit anywhere moves all joints. Impacts come first, without forces; a step ends where the next begins.
 M and c are those half way (midpoint rule); joints without springs, in a step without contacts, move by the mean of v
-and v+. Where nothing drives or touches the figure, its velocities are scaled so that energy is conserved.
+and v+. A root without spring and damper ends a step with the momentum that impulses and weight gave what it carries;
+the velocities beside that are scaled so that energy is conserved where nothing drives or touches the figure.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +28,7 @@ from wholebody.dynamics.frame import EngineFrame
 from wholebody.dynamics.pieces import surface_of
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
 from wholebody.dynamics.step_program import SKIN
+from wholebody.figures.state import free_roots
 from wholebody.geometry.contact_rows import ContactRowBuilder, compiled_kernel
 from wholebody.scene.scene import Scene
 
@@ -81,6 +83,10 @@ class Articulated:
         self._model.armature += np.where(light, 1e-5, 0.0)
         self.stiffness, self.damping = actuated.gains(self._inertia(self.q).diagonal())
         free = [joint for joint in self._model.joints[1:] if joint.nq == joint.nv == 1]  # the first is the world
+        driven = (self.stiffness > 0.0) | (self.damping > 0.0)
+        freedoms = {k: np.arange(6) + self._model.idx_vs[k] for k in free_roots(self._model)}
+        self._roots = [k for k in freedoms if not driven[freedoms[k]].any()]
+        self._adrift: Indices = np.concatenate([np.zeros(0, dtype=np.intp), *(freedoms[k] for k in self._roots)])
         self._limited: Indices = np.array([(joint.idx_q, joint.idx_v) for joint in free], dtype=np.intp).reshape(-1, 2)
         impulse_kernel.compiled_kernel()
         compiled_kernel()
@@ -121,7 +127,8 @@ class Articulated:
         """Advance by at most a time, to the next impact if that comes first; by how much."""
         model, engine = self._model, self._engine
         planned, points, began, start = time, self._points(time, moved), self.energy(), self.velocity.copy()
-        impulse = self._bounce(self._inertia(self.q), points)
+        masses_begun = self._inertia(self.q)
+        impulse = self._bounce(masses_begun, points)
         time = self._until_impact(points, time)
         begin, apart = self.velocity, np.asarray(pin.difference(model, self.q, aim))
         soft = time * self.damping + time * time * self.stiffness
@@ -137,15 +144,16 @@ class Articulated:
             middle = np.asarray(pin.integrate(model, self.q, 0.5 * time * mean))
         bearing = self._bear(driven, points, time)
         impulse = impulse + bearing
+        drifted = self._drifted(masses_begun @ start + points.figure.T @ impulse.ravel(), time)
         after = self.velocity
         motor = self.stiffness * (apart + time * (steady - after)) + self.damping * (steady - after) + borne
         work = np.einsum("ij,ij->i", impulse, (points.figure @ (0.5 * (start + after))).reshape(-1, 3))
         # springs and contacts are implicit; what is free of them moves by the mean of both velocities
         moves = time * np.where((self.stiffness > 0.0) | bearing.any(), after, mean)
         paid = float(motor @ moves) + float(work[points.driven].sum())
-        motions = self._move(moves, segments)
+        motions = self._move(moves, segments, () if bearing.any() else drifted)
         motions |= {name: (way[0], pin.SE3.Interpolate(*way, time / planned)) for name, way in moved.items()}
-        self._settle(began + paid, 1.0 if impulse.any() or self.stiffness.any() else 1.05)
+        self._settle(began + paid, 1.0 if impulse.any() or self.stiffness.any() else 1.05, drifted)
         if engine is not None:
             frame = engine.advance(time, motions)
             self.frames.append(frame)
@@ -272,10 +280,16 @@ class Articulated:
                 self.impulses[name] = self.impulses.get(name, np.zeros(3)) + push
         return impulse
 
-    def _move(self, way: Array, segments: Mapping[str, int]) -> dict[str, tuple[pin.SE3, pin.SE3]]:
-        """Move the joints by a way (nv,); the motions of the segments."""
-        before = self._placements(segments)
-        self.q = np.asarray(pin.integrate(self._model, self.q, way))
+    def _move(
+        self, way: Array, segments: Mapping[str, int], drifted: Sequence[tuple[pin.Force, Array]]
+    ) -> dict[str, tuple[pin.SE3, pin.SE3]]:
+        """Move the joints by a way (nv,), and centres of mass to their places; the motions of the segments."""
+        model, data, before = self._model, self._data, self._placements(segments)
+        self.q = np.array(pin.integrate(model, self.q, way))
+        pin.centerOfMass(model, data, self.q)
+        for root, (_, centre) in zip(self._roots if drifted else (), drifted, strict=True):
+            first, seat = model.idx_qs[root], model.jointPlacements[root].rotation
+            self.q[first : first + 3] += seat.T @ (centre - data.oMi[root].act(data.com[root]))
         after = self._placements(segments)
         return {name: (before[name], after[name]) for name in segments}
 
@@ -283,11 +297,41 @@ class Articulated:
         state = self._workspace.state.update(self.q)
         return {name: pin.SE3(state.frame(number)) for name, number in segments.items()}
 
-    def _settle(self, energy: float, most: float) -> None:
-        """Scale the velocities by at most a factor, so that kinetic and potential energy are at most `energy`."""
-        excess, kinetic = self.energy() - energy, self._kinetic()
-        if kinetic > 0.0:
-            self.velocity = self.velocity * min(most, np.sqrt(max(0.0, 1.0 - excess / kinetic)))
+    def _drifted(self, momentum: Array, time: float) -> list[tuple[pin.Force, Array]]:
+        """Momenta about the origin and centres (3,) of what free roots carry, a time after the momenta (nv,)."""
+        model, data, found = self._model, self._data, list[tuple[pin.Force, Array]]()
+        pin.centerOfMass(model, data, self.q)
+        for root in self._roots:
+            first, place = model.idx_vs[root], data.oMi[root]
+            now = place.act(pin.Force(momentum[first : first + 6]))
+            mass, centre = data.mass[root], place.act(data.com[root])
+            weight, mean = time * mass * self._gravity, centre + 0.5 * time / mass * now.linear
+            then = now + pin.Force(weight, cross(mean, weight))
+            found.append((then, centre + 0.5 * time / mass * (now.linear + then.linear)))
+        return found
+
+    def _settle(self, energy: float, most: float, drifted: Sequence[tuple[pin.Force, Array]]) -> None:
+        """Give free roots their momenta, and scale the velocities beside those by at most a factor.
+
+        Then kinetic and potential energy are at most `energy`.
+        """
+        masses, roots, velocity = self._inertia(self.q), self._adrift, self.velocity
+        pin.forwardKinematics(self._model, self._data, self.q)
+        drift = np.zeros_like(velocity)
+        if len(roots):
+            kept = [self._data.oMi[k].actInv(one).vector for k, (one, _) in zip(self._roots, drifted, strict=True)]
+            locked = masses[np.ix_(roots, roots)]
+            drift[roots] = np.linalg.solve(locked, np.concatenate(kept))
+            velocity = velocity.copy()
+            velocity[roots] = 0.0
+            velocity[roots] = -np.linalg.solve(locked, masses[roots] @ velocity)
+        kinetic = [0.5 * float(part @ masses @ part) for part in (drift, velocity)]
+        left = energy - float(pin.computePotentialEnergy(self._model, self._data, self.q))
+        if kinetic[1] > 0.0:
+            velocity = velocity * min(most, np.sqrt(max(0.0, (left - kinetic[0]) / kinetic[1])))
+        if kinetic[0] > max(0.0, left):
+            drift = drift * np.sqrt(max(0.0, left) / kinetic[0])
+        self.velocity = drift + velocity
 
     def _react(self, wrenches: Mapping[str, Array], segments: Mapping[str, int]) -> None:
         """Give the figure the impulses that things gave its segments while they went on."""

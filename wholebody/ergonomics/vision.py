@@ -25,7 +25,6 @@ NEAR = 0.02  # m: at both ends of a line of sight that is not looked at: the thi
 TINY = 1e-12  # m^2, m^3: no direction is straight up or down exactly
 BLURRED = 0.05  # m: nearer points are not seen
 
-
 BORDER = 1e-3  # share by which a point may be beyond a field's border, which who turns the head meets to a tolerance
 NEAREST = 1e-3  # m: a nearer point has no direction from the eyes
 

@@ -41,7 +41,6 @@ _ENDS = {
 }  # fmt: skip
 """Joints at the ends of segments whose length is a size."""
 
-
 MEDIAN = {"male": (1.755, 84.6), "female": (1.626, 66.8)}
 """Stature, metres, and mass, kilograms, of half of all 4,082 men and 1,986 women of ANSUR II."""
 
@@ -187,9 +186,8 @@ def make_person(
 
     Args:
         sex: "male" or "female".
-        stature: metres; the median of the sex if left out.
-        mass: kilograms; if left out, the median of the sex, or the mass that is likely for a stature that was given and
-            the proportions.
+        stature: metres; if left out, the one that is likely for the proportions, or the median of the sex without any.
+        mass: kilograms; if left out, the one that is likely for stature and proportions, or the median without any.
         percentile: 1 to 99: stature and mass, unless one of them is given, are this percentile of the sex; the other
             dimensions are likely for them, and not of this percentile.
         age: years, 17 to 69, for the ranges of motion, and for dimensions that change with it; those of all adults if
@@ -214,36 +212,38 @@ def make_person(
         share = 0.01 * PERCENTILE(percentile, "percentile")
         stature = people.quantile("stature", share) if stature is None else stature
         mass = people.quantile("mass", share) if mass is None else mass
-    years = {} if age is None else {"age": AGE(age, "age")}
-    follows = mass is None and stature is not None
-    height = STATURE(MEDIAN[people.sex][0] if stature is None else stature, "stature")
-    if follows:
-        mass = people.likely({"stature": height, **years, **stated})["mass"]
-    weight = MASS(MEDIAN[people.sex][1] if mass is None else mass, "mass")
-    # kg of body mass indices, kg / m^2, outside of which nobody lives; most likely a unit is wrong
-    low, high = 13.0 * height**2, 50.0 * height**2
-    if not low <= weight <= high:
-        raise InputError(
-            f"mass {weight:g} kg does not go with stature {height:g} m; give a mass between {low:.0f} and {high:.0f} kg"
-        )
-    person = _made(people.sex, height, weight, years.get("age"), tuple(sorted(stated.items())))
+    height = None if stature is None else STATURE(stature, "stature")
+    weight = None if mass is None else MASS(mass, "mass")
+    years = None if age is None else AGE(age, "age")
+    person = _made(people.sex, height, weight, years, tuple(sorted(stated.items())))
     sole, cloth = SHOES(shoes, "shoes"), CLOTHING(clothing, "clothing")
     return replace(person, shoes=sole, clothing=cloth) if sole or cloth else person
 
 
 @lru_cache(maxsize=256)
-def _made(sex: str, stature: float, mass: float, age: float | None, stated: tuple[tuple[str, float], ...]) -> Person:
-    size = {"stature": stature, "mass": mass}
-    values = dict(stated)
+def _made(
+    sex: str, stature: float | None, mass: float | None, age: float | None, stated: tuple[tuple[str, float], ...]
+) -> Person:
+    size = {name: value for name, value in (("stature", stature), ("mass", mass)) if value is not None}
+    known, values = size | ({} if age is None else {"age": age}), dict(stated)
     if values and (odd := population(sex).unlikely(values, size)):
         name, deviation, low, high = odd
-        people = f"{SEXES[sex]} of {stature:g} m and {mass:.3g} kg" + (" with the others" if len(values) > 1 else "")
+        sizes = " and ".join(f"{value:.4g} {UNITS.get(name, 'm')}" for name, value in size.items())
+        people = SEXES[sex] + (f" of {sizes}" if sizes else "") + (" with the others" if len(values) > 1 else "")
         raise InputError(
             f"proportions: {name} {values[name]:g} m is {deviation:.1f} standard deviations from that of {people}; "
             f"give {low:.3f} to {high:.3f} m, or change another one"
         )
-    known_years = {} if age is None else {"age": age}
-    all_of = population(sex).likely({**size, **known_years, **values})
+    usual = {} if values or stature is not None else dict(zip(("stature", "mass"), MEDIAN[sex], strict=True))
+    all_of = population(sex).likely({**usual, **known, **values})
+    stature, mass = STATURE(all_of["stature"], "stature"), MASS(all_of["mass"], "mass")
+    # kg of body mass indices, kg / m^2, outside of which nobody lives; most likely a unit is wrong
+    lightest, heaviest = 13.0 * stature**2, 50.0 * stature**2
+    if not lightest <= mass <= heaviest:
+        raise InputError(
+            f"mass {mass:g} kg does not go with stature {stature:g} m; give a mass between {lightest:.0f} and "
+            f"{heaviest:.0f} kg"
+        )
     person = Person(sex, stature, mass, tuple((name, all_of[name]) for name in dimension_names()), tuple(values), age)
     for name, value in person.built[1].items():
         # metres within which a stated dimension must be met; `notes` says an overhead reach

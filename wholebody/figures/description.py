@@ -126,6 +126,16 @@ class Member(NamedTuple):
     at: pin.SE3
 
 
+class Mount(NamedTuple):
+    """What a figure was mounted from; see `Figure.mounted`."""
+
+    base: Articulated
+    other: Articulated
+    on: str
+    name: str
+    at: pin.SE3
+
+
 class Description(NamedTuple):
     """The named parts of a figure, in addition to its model and geometry."""
 

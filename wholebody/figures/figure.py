@@ -15,7 +15,7 @@ from wholebody.base.arrays import Array, Indices, as_dict
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.pool import Loan, Pool
 from wholebody.figures.body_spec import geometry_of
-from wholebody.figures.description import Description, Place, followers_of, is_root, limits_of
+from wholebody.figures.description import Description, Mount, Place, followers_of, is_root, limits_of
 from wholebody.figures.joining import mounted_parts, posture_of_all
 from wholebody.figures.model_archive import reduced
 from wholebody.figures.model_check import LARGEST, Turning, check_model, with_joint_frames
@@ -67,6 +67,7 @@ class Figure(checks.FixedAttributes):
         notes: sentences on what had to be changed about the geometry of a file, or about stated dimensions.
         limits: joint limits as arrays.
         loaded_as: name or path and options by which `wb.load` or `adjustable` made it; None for others.
+        mount: of a figure that `mounted` made: both figures, frame, name and placement; otherwise None.
         followers: joint to the law by which it follows another (mimic).
         effort_weights: (nv,) weight of each degree of freedom in the effort.
         neutral_weights: (nv,) weight of each degree of freedom in the displacement from neutral: 1, and 0 for the root.
@@ -76,7 +77,7 @@ class Figure(checks.FixedAttributes):
         True
     """
 
-    _settable = frozenset({"loaded_as"})
+    _settable = frozenset({"loaded_as", "mount"})
     _correction = "a figure never changes: load another one with wb.load(...)"
 
     def __init__(
@@ -105,6 +106,7 @@ class Figure(checks.FixedAttributes):
         self.collision_groups = MappingProxyType(dict(description.collision_groups))
         self.excluded_pairs, self.notes = description.excluded, description.notes
         self.loaded_as: tuple[str, dict[str, Any]] | None = None
+        self.mount: Mount | None = None
         self.members = MappingProxyType(dict(description.members))
         self._states = Pool(lambda: State(model), at_most=2)  # 6.5 MB for 55 freedoms, 27 MB for 95
         self._description = description
@@ -145,7 +147,7 @@ class Figure(checks.FixedAttributes):
         }
         visual = None if self.visual is self.geometry else self.visual
         made_from = (self.name, self.model, self.geometry, self.detail, Description(**known), visual)
-        return Figure, made_from, {"loaded_as": self.loaded_as}
+        return Figure, made_from, {"loaded_as": self.loaded_as, "mount": self.mount}
 
     @property
     def outer(self) -> tuple[pin.GeometryObject, ...]:
@@ -381,8 +383,11 @@ class Figure(checks.FixedAttributes):
         frame, prefix = self.frame_id(on), checks.text(other.name if name is None else name, "mounted: name")
         if "/" in prefix or prefix in {*self.groups, *self.joints}:
             raise InputError(f"mounted: {self.name} has a part {prefix!r}, or it has a slash; give it another name")
-        parts = mounted_parts(self, other, frame, f"{prefix}/", placement(at, "mounted: at"))
-        return Figure(f"{self.name} with {prefix}", *parts[:2], "own", *parts[2:])
+        place = placement(at, "mounted: at")
+        parts = mounted_parts(self, other, frame, f"{prefix}/", place)
+        made = Figure(f"{self.name} with {prefix}", *parts[:2], "own", *parts[2:])
+        made.mount = Mount(self, other, on, prefix, place)
+        return made
 
     def describe(self) -> Description:
         """Return the named parts of the figure, to build another one from them."""

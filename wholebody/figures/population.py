@@ -30,7 +30,6 @@ RARE = 1e-6
 """Share of people by the normal distribution: who differs more from those of the same stature and mass is nobody. Its
 tails are thinner than people's, of whom up to one in 200 would differ by more than one in 16,000 does."""
 
-
 RANKED = 50
 """People of a sample from which on each dimension has the shares of all people; of fewer, ranks would tear apart
 dimensions that go together."""

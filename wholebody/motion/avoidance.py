@@ -166,7 +166,7 @@ class _Judge:
         self._clip = Clip(scene.figure, clip.q, clip.dt, clip.name)  # with what the figure carries
         self._loads = None
         if self._strength is not None:
-            self._loads = torques(self._clip, feet=self.feet, strength=self._strength)
+            self._loads = torques(self._clip, scene, feet=self.feet, strength=self._strength)
         self._was = check(clip, scene, depth=COLLISION)
         terms = frame_terms(scene, clip.q, clip.dt, given, method.clearance)
         self.asked = _bounds(given, self._was, terms, keep_ends)
@@ -178,7 +178,8 @@ class _Judge:
         change = None
         if self._loads is not None and self._strength is not None:
             places = None if result.times is None else result.times / self._clip.dt
-            change = load_change(self._loads, self._clip.with_q(result.q), places, self._strength, self.feet)
+            after = self._clip.with_q(result.q)
+            change = load_change(self._loads, after, places, self._strength, self.feet, self.terms.scene)
         report = judged(self._was, self.terms, self.asked, result, run.work, self._name, change)
         more = ["the caller ended it" if run.ended else "", run.work.left_out, "" if report.solved else self.foreseen]
         return replace(report, message="; ".join(filter(None, [report.message, *more])))

@@ -14,8 +14,8 @@ from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
 from wholebody.motion.clip import Clip, same_joints
-from wholebody.motion.inverse_dynamics import ROOT, InverseDynamics, Touches, foot_wrenches
-from wholebody.motion.load_contacts import touching_parts
+from wholebody.motion.inverse_dynamics import FRICTION, ROOT, foot_wrenches
+from wholebody.motion.load_contacts import bearing
 from wholebody.motion.stance import FEET, own_feet, standing_feet
 from wholebody.motion.strength import Strength, torque_limits
 from wholebody.motion.thing_tracks import steady
@@ -137,7 +137,7 @@ def torques(
     *,
     feet: Sequence[str] = FEET,
     strength: Strength | None = None,
-    friction: float = 0.8,
+    friction: float = FRICTION,
     cutoff: float | None = CUTOFF,
 ) -> Torques:
     """Torques of a clip by inverse dynamics (recursive Newton-Euler, Featherstone 2008, chapter 5; `pin.rnea`).
@@ -183,24 +183,19 @@ def torques(
     if not sum(inertia.mass for inertia in figure.model.inertias[1:]) > 0.0:
         raise InputError(f"torques: {figure.name} has no mass; give its segments masses")
     stands = standing_feet(clip, feet)
-    names, touches = tuple(stands), list[Touches]()
     if scene is not None:
         checks.instance(scene, Scene, "torques: scene", "make one with wb.Scene(clip.figure)")
         same_joints(clip, scene.figure, "torques")
-        more, touches = touching_parts(clip, scene, names) if figure.root == "free" else ((), touches)
-        names += more
     calm = smoothed(clip, cutoff)
     v, a = calm.velocities(), calm.accelerations()
-    joints = [figure.model.frames[figure.frame_id(name)].parentJoint for name in names[len(stands) :]]
-    dynamics = InverseDynamics(figure, tuple(stands), friction, joints)
+    dynamics, names, places = bearing(clip, calm.q, stands, scene, friction)
     count, nv = len(clip), figure.model.nv
     torque, missing = np.zeros((count, nv)), np.zeros((count, ROOT))
     force, moment, pressure = (np.zeros((count, len(names), 3)) for _ in range(3))
     both, outside = np.zeros((count, 3)), np.zeros(count)
     marks: Mask = np.zeros((count, len(names)), dtype=bool)
     marks[:, : len(stands)] = np.array(list(stands.values()), dtype=bool).reshape(len(stands), count).T
-    for k in range(count):
-        stand = dynamics.stand(calm.q[k], marks[k, : len(stands)].tolist(), touches[k] if touches else None)
+    for k, stand in enumerate(places):
         marks[k, stand.owner] = True
         loads = dynamics.loads(calm.q[k], v[k], a[k], stand)
         torque[k] = loads.torque

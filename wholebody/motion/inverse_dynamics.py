@@ -22,6 +22,7 @@ from wholebody.tasks.balance import DOWN, convex_polygon
 from wholebody.tasks.surfaces import outermost
 
 ROOT = 6  # degrees of freedom of a free root
+FRICTION = 0.8  # coefficient of friction where none is stated
 LIGHT = 0.2
 """Share of the weight: with less vertical force, in a take-off or landing, the zero moment point says little."""
 
@@ -133,10 +134,17 @@ class Stand(NamedTuple):
     axes: Array  # (p, 3) of the cones of friction: normals of unit length at the points, out of what bears
 
     def shifted(self, shifts: Sequence[Array]) -> Stand:
-        """The same with each foot (3,) farther, metres."""
+        """The same with each foot (3,) farther, metres; what touches things stays."""
         if not any(shift.any() for shift in shifts):
             return self
-        return _standing(self.points + np.array(shifts)[self.owner], self.owner)
+        sole = self.owner < len(shifts)
+        found = _standing(self.points[sole] + np.array(shifts)[self.owner[sole]], self.owner[sole])
+        return found.touching(Touches(self.points[~sole], self.owner[~sole], self.axes[~sole]))
+
+    def touching(self, touches: Touches) -> Stand:
+        """The same that touches things too, by which the support does not change."""
+        parts = zip(("points", "owner", "axes"), (self.points, self.owner, self.axes), touches, strict=True)
+        return with_values(self, **{name: np.concatenate(both) for name, *both in parts})
 
     def margins(self, place: Array) -> Array:
         """(e,) distances of a place (2,) from the edges, metres; positive inside."""
@@ -184,10 +192,7 @@ class InverseDynamics:
         pin.forwardKinematics(self._model, self._data, q)
         points, owner = self.soles.points(self._data, list(feet))
         found = _standing(points, owner)
-        if touches is None:
-            return found
-        both = (np.concatenate(pair) for pair in zip((points, owner, found.axes), touches, strict=True))
-        return with_values(found, **dict(zip(("points", "owner", "axes"), both, strict=True)))
+        return found if touches is None else found.touching(touches)
 
     def loads(self, q: Array, v: Array, a: Array, stand: Stand) -> Loads:
         """Loads of a posture (nq,) with its velocity and acceleration (nv,)."""
@@ -209,7 +214,7 @@ class InverseDynamics:
         return np.array(pin.rnea(self._model, self._data, q, v, a))
 
     def grounded(self, q: Array, torques: Array, shares: Array, stand: Stand) -> tuple[Array, Array]:
-        """Parts of torques (k, nv) in the air, after the ground's forces, and the wrenches (k, 6) of the parts."""
+        """Parts of torques (k, nv) in the air, after all forces, and of the wrench (k, 6) that feet have to give."""
         # The forces are linear while the same edges of friction bear: those at the sum with shares (k,).
         model, data = self._model, self._data
         if not self.free:
@@ -218,14 +223,15 @@ class InverseDynamics:
         pin.computeJointJacobians(model, data, q)
         wrenches = np.array([data.oMi[1].act(pin.Force(part[:ROOT])).vector for part in torques])
         split = self.split(shares @ wrenches, center, stand).split
-        left = torques.copy()
+        left, feet = torques.copy(), wrenches.copy()
         for foot, joint in enumerate(self.joints):
             mine = stand.owner == foot
             if mine.any():
                 jacobian = pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.WORLD)
-                given = point_map(stand.points[mine]) @ split[np.repeat(mine, 3)] @ moving(center)
-                left -= wrenches @ (jacobian.T @ given).T
-        return left, wrenches
+                given = wrenches @ (point_map(stand.points[mine]) @ split[np.repeat(mine, 3)] @ moving(center)).T
+                left -= given @ jacobian
+                feet -= given if foot >= len(self.feet) else 0.0
+        return left, feet
 
     def split(self, wrench: Array, center: Array, stand: Stand) -> GroundForces:
         """The ground's forces for a wrench (6,) about the world's origin."""
@@ -256,19 +262,21 @@ class InverseDynamics:
         J = np.array(pin.computeJointJacobians(model, data, q))
         action = np.asarray(data.oMi[1].toDualActionMatrix())
         wrenches = [action @ part[:ROOT] for part in parts]
+        bent = foot_wrenches(here.ground.forces, stand, len(self.joints))
+        total = here.wrench + np.sum(bent[len(self.feet) :], axis=0)  # what things give too
         for column in range(ROOT):  # the axes of the root turn with it
             twist = pin.Motion(J[:, column])
-            wrenches[0][:, column] += twist.cross(pin.Force(here.wrench)).vector
-        shift = moving(here.center)
-        bent = foot_wrenches(here.ground.forces, stand, len(self.joints))
+            wrenches[0][:, column] += twist.cross(pin.Force(total)).vector
+        shift, whole = moving(here.center), [wrench.copy() for wrench in wrenches]
         for foot, joint in enumerate(self.joints):
             mine = np.repeat(stand.owner == foot, 3)
             if not mine.any():
                 continue
             jacobian = np.array(pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.WORLD))
-            given = jacobian.T @ point_map(stand.points[stand.owner == foot]) @ here.ground.split[mine] @ shift
-            for part, wrench in zip(parts, wrenches, strict=True):
-                part -= given @ wrench
+            given = point_map(stand.points[stand.owner == foot]) @ here.ground.split[mine] @ shift
+            for part, wrench, feet in zip(parts, whole, wrenches, strict=True):
+                part -= jacobian.T @ given @ wrench
+                feet -= given @ wrench if foot >= len(self.feet) else 0.0
             parts[0] -= self._turning(J, joint, bent[foot])
         return Derivatives((parts[0], parts[1], parts[2]), _place_derivatives(here.wrench, wrenches, stand.height))
 

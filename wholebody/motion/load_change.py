@@ -10,11 +10,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.lib.stride_tricks import sliding_window_view
 
-from wholebody.base.arrays import Array, brief
+from wholebody.base.arrays import Array, Mask, brief
 from wholebody.base.charts import new_chart, plain
 from wholebody.motion.clip import Clip
 from wholebody.motion.clip_torques import Torques, torques
 from wholebody.motion.strength import Strength
+from wholebody.scene.scene import Scene
 
 TORQUE = 0.02
 """Share of its bound by which a torque may be beyond it: what filters and the frames in which feet stand change."""
@@ -56,11 +57,12 @@ class LoadChange:
         """(m,) by how much farther the zero moment point is outside of the support than it was before, metres.
 
         A frame between two of those before is compared with the worse of both, and a foot stands there before if it
-        stands in both. It is 0 where other feet stand than before: the support is another one.
+        stands in both. It is 0 where other feet stand than before, or other parts touch: the support is another one.
         """
         old, last = self.before, len(self.before.outside) - 1
         first, second = (np.clip(near(self.times).astype(int), 0, last) for near in (np.floor, np.ceil))
-        same = ((old.stands[first] & old.stands[second]) == self.after.stands).all(axis=1)
+        was, now = (_marks(loads, (*old.feet, *self.after.feet)) for loads in (old, self.after))
+        same = ((was[first] & was[second]) == now).all(axis=1)
         past = self.after.outside - np.maximum(old.outside[first], old.outside[second])
         found: Array = np.where(same, np.maximum(past, 0.0), 0.0)
         return found
@@ -186,9 +188,18 @@ def load_curves(loads: Torques, columns: Sequence[int]) -> tuple[LoadCurves, Loa
     )
 
 
+def _marks(loads: Torques, names: Sequence[str]) -> Mask:
+    """(n, names) which of these feet and other parts bear in each frame."""
+    found: Mask = np.zeros((len(loads.stands), len(names)), dtype=bool)
+    for number, name in enumerate(names):
+        if name in loads.feet:
+            found[:, number] = loads.stands[:, loads.feet.index(name)]
+    return found
+
+
 def load_change(
-    before: Torques, after: Clip, places: Array | None, strength: Strength, feet: Sequence[str]
+    before: Torques, after: Clip, places: Array | None, strength: Strength, feet: Sequence[str], scene: Scene
 ) -> LoadChange:
     """Compare the loads of a clip before and after a change, whose frames are at places (m,) of those before."""
     places = np.arange(len(after), dtype=np.float64) if places is None else places
-    return LoadChange(before, torques(after, feet=feet, strength=strength), places)
+    return LoadChange(before, torques(after, scene, feet=feet, strength=strength), places)

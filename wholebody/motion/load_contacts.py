@@ -6,19 +6,45 @@ Feet are left out: they stand by height and speed, on whatever is below them.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Mask
 from wholebody.geometry.proximity import Contacts
 from wholebody.motion.clip import Clip
 from wholebody.motion.footholds import RestLimits
-from wholebody.motion.inverse_dynamics import Touches
+from wholebody.motion.inverse_dynamics import InverseDynamics, Stand, Touches
 from wholebody.scene.scene import Scene
 
 TOUCHING = 0.005  # m: the farthest of what touches; retargeted hands are up to 1 mm away, and avoiders keep a clearance
+
+
+class Bearing(NamedTuple):
+    """What bears a figure in a clip."""
+
+    dynamics: InverseDynamics  # on the feet, and on the joints of the segments that touch
+    names: tuple[str, ...]  # of the feet, and after them of these segments
+    stands: list[Stand]  # of each frame
+
+
+def bearing(clip: Clip, q: Array, feet: Mapping[str, Mask], scene: Scene | None, friction: float) -> Bearing:
+    """What bears the frames of a clip at smoothed postures q (n, nq), on feet in frames (n,) where they stand.
+
+    Without a scene, or with a root that is fixed, nothing else touches.
+    """
+    figure, names, touches = clip.figure, tuple[str, ...](), list[Touches]()
+    if scene is not None and figure.root == "free":
+        names, touches = touching_parts(clip, scene, feet)
+    joints = [figure.model.frames[figure.frame_id(name)].parentJoint for name in names]
+    dynamics = InverseDynamics(figure, tuple(feet), friction, joints)
+    stands = [
+        dynamics.stand(posture, [bool(marks[k]) for marks in feet.values()], touches[k] if touches else None)
+        for k, posture in enumerate(q)
+    ]
+    return Bearing(dynamics, (*feet, *names), stands)
 
 
 def touching_parts(clip: Clip, scene: Scene, feet: Collection[str]) -> tuple[tuple[str, ...], list[Touches]]:

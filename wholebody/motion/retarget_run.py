@@ -347,7 +347,8 @@ class Run:
             if number >= SWEEP and not (self.fitter.outside(q) or self.fitter.overlaps(q)):
                 break
             q = self.fitter.step(q, goals, most=self._room(q, before, span))
-        self.holds.touch(k, q, self.fitter.held(q), held)
+        if self.holds.touches:
+            self.holds.touch(k, q, self.fitter.held(q), held)
         self._found[k], self._deviation[k] = q, np.asarray(pin.difference(self.model, self._free[k], q))
 
     def _room(self, q: Array, before: Array | None, span: int = 1) -> Array | None:

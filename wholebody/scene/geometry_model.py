@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
+from itertools import combinations
 from threading import Lock
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -225,6 +226,10 @@ def assemble(figure: Figure, objects: Iterable[SceneObject], excluded: dict[tupl
     joints = np.array([piece.parentJoint for piece in pieces], dtype=int)
     carried = {thing.name: thing for thing in things if thing.segment is not None}
     excluded.update(_leaning(figure, pieces, owners, carried))
+    endless = [thing for thing in things if any(np.isinf(part.volume) for part in made[id(thing.shape)])]
+    for one, other in combinations(endless, 2):
+        if one.name in carried:
+            excluded[one.name, other.name] = "two half-spaces, which have no end"
     met = _pairs_of_things(body, joints, owners, excluded)
     if body > own:
         outer, standing = (met[:, 0] >= own) & (met[:, 0] < body), joints[met[:, 1]] == 0

@@ -35,7 +35,6 @@ SHIFTING = ("JointModelP", "JointModelTranslation")
 Run = tuple[Any, Sequence[Make]]
 """The posture (nq,) from which the first of some problems is tried, None for its own start; and the problems."""
 
-
 NEAR = 50  # programs of a solve from another's answer. Of 61 that succeeded none took over 20; more cost misses alone.
 LARGEST = 256  # problems of a batch. Larger: fewer calls; smaller: earlier progress, processes end together.
 

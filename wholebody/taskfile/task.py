@@ -156,6 +156,8 @@ def _figure(contents: Contents) -> Figure:
 def _mounted(figure: Figure, mount: Entry, on: str) -> Figure:
     """A figure with that of an entry on a frame of it."""
     other, at = _loaded(mount), mount.values.get("at", (0.0, 0.0, 0.0))
+    with mount.where.at("on").named():
+        figure.frame_id(on)
     with mount.where.named():
         return figure.mounted(other, on=on, name=mount.values.get("called"), at=at)
 

@@ -87,11 +87,24 @@ def _measure(term: Any, number: int) -> str:
 
 def _figures(figure: Figure, target: Path) -> list[str]:
     if not figure.members:
-        return [_table("[figure]", _figure(figure, target))]
-    return [
-        _table("[[figure]]", {"called": name, **_figure(one, target), "at": _seven(at)})
-        for name, (one, at) in figure.members.items()
-    ]
+        tables = _with_mounts(figure, target, "", {})
+    else:
+        named = figure.members.items()
+        tables = [
+            table
+            for name, (one, at) in named
+            for table in _with_mounts(one, target, f"{name}/", {"called": name, "at": _seven(at)})
+        ]
+    return [_table("[figure]" if len(tables) == 1 else "[[figure]]", table) for table in tables]
+
+
+def _with_mounts(figure: Figure, target: Path, prefix: str, named: dict[str, Any]) -> list[dict[str, Any]]:
+    """The tables of a figure, which is named so, and of what is mounted on it one after the other."""
+    if figure.mount is None:
+        return [{**named, **_figure(figure, target)}]
+    base, other, on, name, at = figure.mount
+    mounted = {"called": name, **_figure(other, target), "on": prefix + on, "at": _seven(at)}
+    return [*_with_mounts(base, target, prefix, named), mounted]
 
 
 def _figure(figure: Figure, target: Path) -> dict[str, Any]:

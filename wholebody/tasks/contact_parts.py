@@ -205,12 +205,13 @@ class Level(NamedTuple):
 
 
 class Over(NamedTuple):
-    """The origin of a frame within a box that stands on a face: rows are zero within, and its distances outside [m]."""
+    """A point of a frame within a box that stands on a face: rows are zero within, and its distances outside [m]."""
 
     place: Place  # the frame and its joint
     face: Face  # the face
     low: Array  # (k,) ends along the face's first k axes: across it and, with three, along its normal
     high: Array
+    offset: Array = np.zeros(3)  # (3,) the point in the frame
 
     @property
     def in_radians(self) -> tuple[bool, ...]:
@@ -226,10 +227,10 @@ class Over(NamedTuple):
         return ends(*self._along(state), self.low, self.high)
 
     def _along(self, state: State) -> tuple[Array, Array]:
-        """Coordinates (k,) of the origin along the axes, and their derivative (k, nv)."""
+        """Coordinates (k,) of the point along the axes, and their derivative (k, nv)."""
         center, axes = self.face.at(state)
         axes = axes[: len(self.low)]
-        point = state.frame(self.place.frame).translation
+        point = state.frame(self.place.frame).act(self.offset)
         return axes @ (point - center), between(state, through(point, axes), self.place.joint, self.face.joint)
 
 

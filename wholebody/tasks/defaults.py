@@ -148,8 +148,11 @@ def stances(scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal
 
     def kneels(stand: Stand) -> bool:
         with scene.figure.posed(start) as state:
-            at_start = stand.value(state)
-        return float(np.maximum(np.maximum(stand.lower - at_start, at_start - stand.upper), 0.0).max()) <= KNEELS
+            at_start, shanks = stand.value(state), [inputs.find_place(scene, knee, "") for knee in stand.knees]
+            upright = [abs(state.frame(shank.frame).rotation[2, 2]) for shank in shanks]
+        missed = np.maximum(np.maximum(stand.lower - at_start, at_start - stand.upper), 0.0).max()
+        # The ankles of who stands are as near to the ground as knees.
+        return bool(missed <= KNEELS) and max(upright) < 0.5
 
     stand = (one for one in terms if isinstance(one, Stand))
     return tuple(tuple(one.feet) for one in stand if (one.balance or one.knees) and not (one.knees and kneels(one)))

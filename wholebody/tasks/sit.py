@@ -30,9 +30,9 @@ class Sit(ContactTerm):
     With a back, the trunk touches it, the pelvis is near it, and the figure looks away from it. Use it as a goal or as
     a constraint. Hold the feet, or add `Stand(on=..., balance=False)`.
 
-    Erect is as people are measured: hips, spine and neck are as in the figure's posture "sitting", and the pelvis is
-    square to the seat, so that thighs are level on a level one. What has to be free above the thighs or before the
-    knees is then what dimensions of sitting people say; who may slouch or tilt the thighs fits where less is free.
+    Erect is as people are measured: hips, spine and neck are as in the posture "sitting", the thighs parallel, and the
+    pelvis square to the seat, so that thighs are level on a level one. What has to be free above or beside the thighs
+    or before the knees is then what dimensions of sitting people say; who may slouch or spread fits elsewhere too.
 
     Attributes:
         on: the seat: a thing, or a piece of one such as "chair:2".
@@ -105,7 +105,7 @@ class Sit(ContactTerm):
         return filled(self, parts=tuple(parts), touches=touches)
 
     def _measured(self, scene: Surroundings, place: inputs.Place, where: str) -> AtAngles:
-        """Hips, spine and neck as in the posture of people who are measured."""
+        """Hips, spine and neck as in the posture of people who are measured: sitting, with parallel thighs."""
         figure, body = scene.figure, self.pelvis.removesuffix("pelvis")
         names = [f"{body}spine", f"{body}neck", *(f"{body}{side}_leg" for side in ("left", "right"))]
         posture = f"{body}sitting"
@@ -116,7 +116,8 @@ class Sit(ContactTerm):
         idx_q, idx_v = (
             np.array(each, dtype=np.intp) for each in zip(*((k.idx_q, k.idx_v) for k in known), strict=True)
         )
-        return AtAngles(idx_q, idx_v, figure.posture(posture)[idx_q])
+        parallel = dict.fromkeys((one for one in joints if "hip_abduction" in one), 0.0)
+        return AtAngles(idx_q, idx_v, figure.with_joints(figure.posture(posture), parallel)[idx_q])
 
 
 class AtAngles(NamedTuple):

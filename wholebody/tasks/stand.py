@@ -80,6 +80,7 @@ class Stand(TermOfParts):
             if not sole.owners or place.joint == 0:
                 raise InputError(f"{where}: {foot!r} has no pieces to stand on; name segments with geometry as feet")
             toes = [owner for owner in segments_beyond(scene, place.joint) if owner != foot]
+            middle = np.zeros(3)
             if foot in self.knees:
                 bears, end = _knee(scene, place, foot), joined(scene, f"{foot}'s foot", toes)
                 parts += [Gap(bears, thing, ground), Gap(end, thing, ground)]
@@ -90,7 +91,13 @@ class Stand(TermOfParts):
                 up = rest.frame(place.frame).rotation.T @ UP
                 parts += [Gap(sole, thing, ground), Facing(place, across(up), ground, UP)]
                 lows = [_lows(sole, rest, -UP, STANDING_HEIGHT)]
-            parts.append(Over(place, ground, -ground.half, ground.half))
+                under = [rest.data.oMi[joint].act(point) for point, joint in zip(*lows[0], strict=True)]
+                middle = rest.frame(place.frame).actInv(np.mean(under, axis=0))
+            # On a thing that ends the sole is not below the face, where the back of the foot would touch.
+            low, high = (-ground.half, ground.half) if np.isinf(ground.half).all() else (
+                np.append(-ground.half, -STANDING_HEIGHT), np.append(ground.half, np.inf)
+            )  # fmt: skip
+            parts.append(Over(place, ground, low, high, middle))
             touches += owner_pairs([*bears.owners, *toes], thing.owners)
             for each in lows:
                 corners += each[0]

@@ -21,7 +21,7 @@ class Receiver:
 
     Attributes:
         port: where datagrams arrive.
-        refused: number of datagrams that were not understood.
+        refused: number of datagrams that were not understood, or not all of them.
         note: what was wrong with the last of these; "" if there was none.
     """
 
@@ -46,10 +46,7 @@ class Receiver:
                 data = self._socket.recv(LONGEST)
             except BlockingIOError:
                 break
-            try:
-                found.update(self._read(data))
-            except InputError as error:
-                self.refused, self.note = self.refused + 1, str(error)
+            found |= self._read(data)
         return found
 
     def close(self) -> None:
@@ -57,19 +54,25 @@ class Receiver:
         self._socket.close()
 
     def _read(self, data: bytes) -> dict[str, Array]:
-        """Places of one datagram; raises InputError where it is not understood."""
+        """The places of one datagram that are understood: a tracker may have lost one of its handles."""
         try:
             given = json.loads(data)
         except (ValueError, RecursionError):
             given = None
+        found, wrong = dict[str, Array](), ""
         if not isinstance(given, dict):
-            raise InputError('a datagram is no JSON object; send {"head_top": [0.1, 0.0, 1.7]}')
+            wrong = 'is no JSON object; send {"head_top": [0.1, 0.0, 1.7]}'
+            given = {}
         for name, place in given.items():
             if name not in self._handles:
-                raise InputError(f"a datagram names {shown(name)}; send {', '.join(sorted(self._handles))}")
-            if not _is_place(place):
-                raise InputError(f"a datagram gives {name} the place {shown(place)}; send three finite numbers, metres")
-        return {name: np.array(place, dtype=float) for name, place in given.items()}
+                wrong = f"names {shown(name)}; send {', '.join(sorted(self._handles))}"
+            elif not _is_place(place):
+                wrong = f"gives {name} the place {shown(place)}; send three finite numbers, metres"
+            else:
+                found[name] = np.array(place, dtype=float)
+        if wrong:
+            self.refused, self.note = self.refused + 1, f"a datagram {wrong}"
+        return found
 
 
 def _is_place(value: object) -> bool:

@@ -184,3 +184,21 @@ def test_a_ball_joint_is_refused_by_name(free_bodies: Callable[..., wb.Figure]) 
     figure = free_bodies(wb.Sphere(0.1), wb.Sphere(0.1))
     with pytest.raises(InputError, match="free1"):
         wb.methods.Placo().solve(wb.Problem(wb.Scene(figure)))
+
+
+def test_two_free_roots_move_or_are_frozen() -> None:
+    avatar = wb.load("avatar")
+    pair = wb.Scene({"anna": avatar, "ben": (avatar, (1.2, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0))})
+    figure, start = pair.figure, pair.figure.neutral
+    away = [figure.placement(start, f"{name}/pelvis") * pin.SE3(np.eye(3), np.full(3, 0.2)) for name in ("anna", "ben")]
+    free = [wb.Frame("anna/pelvis", away[0]), wb.Frame("ben/pelvis", away[1])]
+    with pytest.warns(UserWarning, match="nothing holds"):
+        both = wb.solve(wb.Problem(pair, goals=free, balance=False, range_of_motion=False), "placo")
+    assert both.status == "solved", both.message
+    reach = wb.Point("ben/left_palm", figure.placement(start, "ben/left_palm").translation + (-0.2, 0.0, 0.3))
+    kept = wb.Problem(
+        pair, goals=[free[0], reach], constraints=[wb.Freeze("ben/root")], balance=False, range_of_motion=False
+    )
+    one = wb.solve(kept, "placo")
+    assert one.status == "solved", one.message
+    assert figure.part("ben", one.q)[:7] == pytest.approx(figure.part("ben", start)[:7], abs=1e-12)

@@ -28,7 +28,6 @@ from wholebody.geometry.meshes import check_content
 FREE, BALL, SLIDE, HINGE = range(4)
 """Types of joints, as MuJoCo numbers them."""
 
-
 RGB = 1
 """What a texture of a material is for: its colour, as MuJoCo numbers it."""
 

@@ -20,7 +20,6 @@ from wholebody.figures.surface.fields import Field, intersection
 BLOCK = 4
 """Cells along the side of a block; blocks that the surface cannot cross are looked at in their middle alone."""
 
-
 STEEPEST = 1.8
 """Largest slope of a field near its surface; of a distance it is 1."""
 

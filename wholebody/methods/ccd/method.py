@@ -59,10 +59,10 @@ class CCD(Checked, Descends):
 
     Takes Point, Frame, Orientation and Relative goals. A goal on a chain of the figure moves the joints of that chain
     up to its frame; any other goal moves all joints between its frame and the root; the root itself stays. A Relative
-    goal moves the joints of both frames by turns, but for those that move both and those of other goals. Limits hold,
-    reach cones and ranges of motion if the problem has `ReachCones` and `RangeOfMotion`, clearances by the loop of
-    Schmidl and Lin, which may turn other chains too. `Hold` is taken if no moving joint can move its frame; `Freeze`
-    and `StepLimit` are taken. Balance, which a person keeps by default, is left to the assessment.
+    goal moves the joints of both frames by turns, but for those that move both. Limits hold, reach cones and ranges of
+    motion if the problem has `ReachCones` and `RangeOfMotion`, clearances by the loop of Schmidl and Lin, which may
+    turn other chains too. `Hold` is taken if no moving joint can move its frame; `Freeze` and `StepLimit` are taken.
+    Balance, which a person keeps by default, is left to the assessment.
 
     Other terms (Balance, Plane, Axis, CenterOfMass, measures) are refused by name. The method
     has no objective beside the goals. A problem without measures is taken although its default is `Effort()`: the

@@ -67,19 +67,16 @@ class _Reader:
 
     def goals(self) -> tuple[GoalPlace, ...]:
         """The goals; their joints are among `joints` then."""
-        found, relative = list[GoalPlace](), list[tuple[str, Relative]]()
+        found = list[GoalPlace]()
         for number, goal in enumerate(self._problem.goals):
             where = f"goals[{number}], {type(goal).__name__}"
             if isinstance(goal, (Point, Frame, Orientation)):
                 self._move(where, goal.frame, reaching(self._figure, goal.frame))
                 found.append(_goal_place(goal))
             elif isinstance(goal, Relative):
-                relative.append((where, goal))
+                found += self._relative(where, goal)
             else:
                 self.refused.append(where)
-        placed = frozenset(self.joints)
-        for where, goal in relative:
-            found += self._relative(where, goal, placed)
         return tuple(found)
 
     def _move(self, where: str, frame: str, joints: Iterable[int]) -> None:
@@ -88,15 +85,13 @@ class _Reader:
             self.refused.append(f"{where}({frame!r}), which no joint moves that may turn (the root stays)")
         self.joints.update(path)
 
-    def _relative(self, where: str, goal: Relative, placed: frozenset[int]) -> list[GoalPlace]:
-        """A goal between two frames: the joints of both move, but for those that move both or are placed already."""
+    def _relative(self, where: str, goal: Relative) -> list[GoalPlace]:
+        """A goal between two frames: the joints of both move, but for those that move both."""
         place, base = goal.residual.place.joint, goal.residual.base.joint
         apart = set.symmetric_difference(*(set(self._figure.model.supports[joint]) for joint in (place, base)))
         paths = [apart.intersection(reaching(self._figure, name)) for name in (goal.frame, goal.to)]
-        kept = [path.isdisjoint(placed) and not path <= self.fixed for path in paths]
-        moving = [keeps or not any(kept) for keeps in kept]
-        self._move(where, goal.frame, set().union(*(path for path, moves in zip(paths, moving, strict=True) if moves)))
-        return [one for one, moves in zip(_ends(goal), moving, strict=True) if moves]
+        self._move(where, goal.frame, set().union(*paths))
+        return [one for one, path in zip(_ends(goal), paths, strict=True) if not path <= self.fixed]
 
     def constraints(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Names of the reach cones and of the ranges of motion; call `goals` first."""

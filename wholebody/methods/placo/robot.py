@@ -18,6 +18,7 @@ from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import MissingPackageError
 from wholebody.figures.description import Follower
 from wholebody.figures.figure import Figure
+from wholebody.figures.state import free_roots
 from wholebody.figures.urdf.writing import ANY_LIMIT, add_joint, urdf_axis
 from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.differential import TOOL
@@ -52,7 +53,7 @@ class Robot:
             raise MissingPackageError(
                 f"placo cannot be imported ({error}); install what it was built for: pip install 'wholebody[placo]'"
             ) from None
-        self.frames, self._root = dict(frames), figure.root
+        self.frames, self._floating, self._roots = dict(frames), figure.root == "free", _jointed(figure)
         self._clearances = np.zeros(0)
         self._pairs = np.zeros(0, dtype=np.intp)
         text = ElementTree.tostring(_skeleton(figure, self.frames), encoding="unicode")
@@ -62,13 +63,16 @@ class Robot:
 
     @property
     def floating(self) -> bool:
-        """Whether the figure moves its root too."""
-        return self._root == "free"
+        """Whether placo's base moves, as the one free root."""
+        return self._floating
 
     def move(self, q: Array) -> None:
         """Move to our posture q (nq,)."""
         theirs = pin.neutral(self.wrapper.model)
-        theirs[self._idx_q] = q
+        theirs[self._idx_q[self._alike]] = q[self._alike]
+        for joint, at in self._seats.items():
+            place = at * pin.XYZQUATToSE3(q[self._first[joint] : self._first[joint] + 7])
+            self.wrapper.model.jointPlacements[self._id(self.joint_names(joint)[0])] = place
         for place, law in self._followers.items():
             theirs[place] = law.slope * q[law.idx_q] + law.offset
         self.wrapper.state.q = theirs
@@ -76,7 +80,7 @@ class Robot:
             self.wrapper.update_kinematics()
 
     def posture(self) -> Array:
-        """Our posture (nq,) where it is now."""
+        """Our posture (nq,) where it is now, of a figure with at most one free root."""
         return np.array(self.wrapper.state.q)[self._idx_q]
 
     def couple(self, solver: Any) -> None:
@@ -102,15 +106,25 @@ class Robot:
         return np.asarray(theirs, dtype=float)[self._idx_v]
 
     def joint_name(self, joint: int) -> str:
-        """Name in placo of a joint of our model."""
+        """Name in placo of a joint of our model that has one axis."""
         return f"j{joint:05d}"
+
+    def joint_names(self, joint: int) -> tuple[str, ...]:
+        """Names in placo of what stands for a joint of our model: of a free root of several figures six."""
+        return _six(joint) if joint in self._roots else (self.joint_name(joint),)
 
     def joint(self, ours: int) -> int:
         """Index of our joint in placo's model."""
         if ours == 0:
             return 0
-        root = self.floating and ours == 1
-        return 1 if root else int(self.wrapper.model.getJointId(self.joint_name(ours)))
+        return 1 if self.floating and ours == 1 else self._id(self.joint_names(ours)[-1])
+
+    def _id(self, name: str) -> int:
+        return int(self.wrapper.model.getJointId(name))
+
+    def link(self, joint: int) -> str:
+        """Name of the link that a free root moves."""
+        return f"l{joint:05d}" if joint in self._roots else BASE
 
     def _copy_model(self, figure: Figure) -> None:
         ours, theirs = figure.model, self.wrapper.model
@@ -118,12 +132,23 @@ class Robot:
         lower, upper = theirs.lowerPositionLimit.copy(), theirs.upperPositionLimit.copy()
         self._laws, self._ids = figure.followers, {name: index for index, name in enumerate(ours.names)}
         self._followers: dict[int, Follower] = {}
+        # free roots of several figures: six joints at zero, whose seat moves with the posture
+        self._seats = {joint: pin.SE3(ours.jointPlacements[joint]) for joint in self._roots}
+        self._first = {joint: int(ours.idx_qs[joint]) for joint in self._seats}
+        self._alike = np.ones(ours.nq, dtype=bool)
         for index in range(1, ours.njoints):
             joint, other = ours.joints[index], theirs.joints[self.joint(index)]
+            theirs.inertias[other.id] = ours.inertias[index]
+            if index in self._seats:
+                self._alike[joint.idx_q : joint.idx_q + 7] = False
+                six = [theirs.joints[self._id(name)] for name in self.joint_names(index)]
+                idx_v[joint.idx_v : joint.idx_v + 6] = [one.idx_v for one in six]
+                places = [one.idx_q for one in six]
+                lower[places], upper[places] = -ENDLESS, ENDLESS
+                continue
             idx_q[joint.idx_q : joint.idx_q + joint.nq] = np.arange(other.idx_q, other.idx_q + joint.nq)
             idx_v[joint.idx_v : joint.idx_v + joint.nv] = np.arange(other.idx_v, other.idx_v + joint.nv)
             theirs.jointPlacements[other.id] = ours.jointPlacements[index]
-            theirs.inertias[other.id] = ours.inertias[index]
             if ours.names[index] in figure.followers:
                 self._followers[int(other.idx_q)] = figure.followers[ours.names[index]]
                 lower[other.idx_q], upper[other.idx_q] = -ENDLESS, ENDLESS
@@ -163,12 +188,22 @@ def _skeleton(figure: Figure, frames: Mapping[str, tuple[int, pin.SE3]]) -> Elem
     """URDF of links and joints without placements, and of a link for every frame."""
     model = figure.model
     robot = ElementTree.Element("robot", name="figure")
-    root = 1 if figure.root == "free" else 0
+    root, roots = 1 if figure.root == "free" else 0, _jointed(figure)
     link = {0: BASE, root: BASE}
     ElementTree.SubElement(robot, "link", name=BASE)
     for index in range(root + 1, model.njoints):
         link[index] = f"l{index:05d}"
         ElementTree.SubElement(robot, "link", name=link[index])
+        if index in roots:
+            before = BASE
+            for k, name in enumerate(_six(index)):
+                after = link[index] if k == 5 else f"to {name}"
+                if k < 5:
+                    ElementTree.SubElement(robot, "link", name=after)
+                kind = "prismatic" if k < 3 else "revolute"
+                add_joint(robot, name, kind, before, after, axis=np.eye(3)[k % 3], limit=ANY_LIMIT)
+                before = after
+            continue
         known = urdf_axis(model, index)
         if known is None:
             raise UnsupportedTermError("placo", [_refused(model, index)])
@@ -181,13 +216,23 @@ def _skeleton(figure: Figure, frames: Mapping[str, tuple[int, pin.SE3]]) -> Elem
     return robot
 
 
+def _jointed(figure: Figure) -> tuple[int, ...]:
+    """The free roots of several figures, for which six joints stand: placo's own base is one root."""
+    return () if figure.root == "free" else free_roots(figure.model)
+
+
+def _six(root: int) -> tuple[str, ...]:
+    """Names of the six joints that stand for a free root."""
+    return tuple(f"j{root:05d} {k}" for k in range(6))
+
+
 def unsupported_joints(figure: Figure) -> list[str]:
     """The first joint of a kind that placo's robots do not have, with the reason; empty if there is none."""
     model = figure.model
-    for index in range(2 if figure.root == "free" else 1, model.njoints):
+    for index in sorted(set(range(1, model.njoints)) - set(free_roots(model))):
         name = model.names[index]
         if urdf_axis(model, index) is None:
-            return [f"{_refused(model, index)} (its robots have turning and sliding joints and one root)"]
+            return [f"{_refused(model, index)} (its robots have turning and sliding joints, and free roots)"]
         if name in figure.followers and figure.followers[name].offset:
             return [f"joint {name!r}, which mimics another with an offset (its gears have none)"]
     return []

@@ -142,9 +142,12 @@ def _posture(solver: Any, robot: Robot, problem: Problem, name: str, goal: Postu
         task = solver.add_joints_task()
         task.set_joints(values)
         task.configure(name, "soft", goal.weight)
-    if robot.floating and 0 in dofs:
-        base = figure.model.jointPlacements[1] * pin.XYZQUATToSE3(goal.resolved_target[:7])
-        solver.add_frame_task("base", base.homogeneous).configure(f"{name}, root", "soft", goal.weight, goal.weight)
+    for root, joint in figure.roots.items():
+        moved = figure.model.joints[joint]
+        if moved.idx_v in dofs:
+            target = pin.XYZQUATToSE3(goal.resolved_target[moved.idx_q : moved.idx_q + 7])
+            task = solver.add_frame_task(robot.link(joint), (figure.model.jointPlacements[joint] * target).homogeneous)
+            task.configure(f"{name}, {root}", "soft", goal.weight, goal.weight)
 
 
 def _constraint(solver: Any, name: str, term: Any, holding: float) -> None:
@@ -186,7 +189,8 @@ def _freeze(solver: Any, robot: Robot, problem: Problem, bound: Freeze) -> None:
         if robot.floating and joint == 1:
             solver.mask_fbase(True)
         else:
-            solver.mask_dof(robot.joint_name(joint))
+            for one in robot.joint_names(joint):
+                solver.mask_dof(one)
 
 
 def _measure(solver: Any, robot: Robot, problem: Problem, measure: Effort | Displacement, tasks: Tasks) -> None:

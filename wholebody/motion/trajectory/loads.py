@@ -21,11 +21,21 @@ from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.clip_torques import CUTOFF, smoothed
 from wholebody.motion.frame_terms import FrameTerms, between
-from wholebody.motion.inverse_dynamics import LIGHT, Derivatives, InverseDynamics, Loads, Stand, zero_moment_point
+from wholebody.motion.inverse_dynamics import (
+    FRICTION,
+    LIGHT,
+    Derivatives,
+    InverseDynamics,
+    Loads,
+    Stand,
+    zero_moment_point,
+)
+from wholebody.motion.load_contacts import bearing
 from wholebody.motion.stance import standing_feet
 from wholebody.motion.strength import Strength, torque_limits
 from wholebody.motion.trajectory.deviations import Chart
 from wholebody.motion.trajectory.retiming import TimedRows
+from wholebody.scene.scene import Scene
 
 LENGTH = 0.1
 """Metres that stand for a whole strength: one hundredth of it is weighed like a millimetre of the support."""
@@ -67,6 +77,7 @@ class ClipLoads:
     """Loads of the frames of a clip and of deviations from it."""
 
     clip: Clip
+    scene: Scene
     dynamics: InverseDynamics
     stands: Sequence[Stand]  # of each frame
     bounds: LoadBounds  # that the loads keep to
@@ -93,15 +104,13 @@ class ClipLoads:
         cls, clip: Clip, feet: Mapping[str, Mask], strength: Strength, terms: FrameTerms, stretch: float = 1.0
     ) -> ClipLoads:
         """Those of an original clip on its feet (foot -> (n,)) that may be slowed; its own loads are bounds too."""
-        dynamics = InverseDynamics(clip.figure, tuple(feet), 0.8)  # the friction of `wb.motion.torques`
-        base = smoothed(clip, CUTOFF).q
+        dynamics, _, own = bearing(clip, smoothed(clip, CUTOFF).q, feet, terms.scene, FRICTION)
         lower, upper = torque_limits(clip.figure, strength)
         # Where a foot is held beside its place, the original stands in its own.
-        own = [dynamics.stand(q, [bool(marks[k]) for marks in feet.values()]) for k, q in enumerate(base)]
         joints = dynamics.soles.joints
         stands = [stand.shifted([terms.shift(k, joint) for joint in joints]) for k, stand in enumerate(own)]
         inside = tuple(np.zeros(len(each.normals)) for each in own)
-        found = cls(clip, dynamics, own, LoadBounds(lower, upper, np.array([lower, upper]), inside))
+        found = cls(clip, terms.scene, dynamics, own, LoadBounds(lower, upper, np.array([lower, upper]), inside))
         bounds = found._widened(stretch)
         outside = [
             far if here is stand else np.full(len(stand.normals), far.max(initial=0.0))
@@ -143,23 +152,26 @@ class ClipLoads:
             return replace(self, changed=q)
         places = times / self.clip.dt
         clip = Clip(self.figure, between(self.figure.model, self.clip.q, places), self.clip.dt)
-        feet = np.array([len(np.unique(stand.owner)) for stand in self.stands])
+        feet = np.array([len(np.unique(stand.owner)) for stand in self.stands])  # and parts that touch
         frames = standing_frames(places, feet).tolist()
         bounds = with_values(self.bounds, outside=tuple(self.bounds.outside[frame] for frame in frames))
-        return ClipLoads(clip, self.dynamics, [self.stands[frame] for frame in frames], bounds, q)
+        return ClipLoads(clip, self.scene, self.dynamics, [self.stands[frame] for frame in frames], bounds, q)
 
     def corrected(self, q: Array) -> ClipLoads:
         """The same with rows whose loads at postures (n, nq) are those that `wb.motion.torques` measures."""
         # The measurement filters and sees which feet stand; the difference is nearly the same for postures nearby.
         own, clip = self.of(q), Clip(self.figure, q, self.clip.dt)
-        steady, marks = smoothed(clip, CUTOFF).q, standing_feet(clip, self.dynamics.feet)
+        steady = smoothed(clip, CUTOFF).q
+        dynamics, _, stands = bearing(clip, steady, standing_feet(clip, self.dynamics.feet), self.scene, FRICTION)
         torque, place = np.zeros((len(q), self.figure.model.nv)), np.zeros((len(q), 2))
         pressed: Mask = np.zeros(len(q), dtype=bool)
         for frame in range(1, len(q) - 1):
-            here = self.dynamics.stand(steady[frame], [bool(mark[frame]) for mark in marks.values()])
             recorded, seen = (
-                self.dynamics.loads(postures[frame], *self.motion(*postures[frame - 1 : frame + 2]), stand)
-                for postures, stand in ((own.base, self.stands[frame]), (steady, here))
+                bears.loads(postures[frame], *self.motion(*postures[frame - 1 : frame + 2]), stand)
+                for bears, postures, stand in (
+                    (self.dynamics, own.base, self.stands[frame]),
+                    (dynamics, steady, stands[frame]),
+                )
             )
             torque[frame] = seen.torque - recorded.torque
             pressed[frame] = seen.wrench[2] >= LIGHT * self.dynamics.weight and recorded.wrench[2] > 0.0
