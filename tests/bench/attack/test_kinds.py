@@ -62,7 +62,7 @@ def test_things_that_overlap_are_told_and_others_are_not(arm: wb.Scene, monkeypa
         (0.0, 0.0, "1 places of the support"),
         (-0.05, 0.0, "frame 0: the body sleeps 0.05 m from what bore it"),
         (0.01, 0.01, "frame 30: the body is 0.01 m inside of what bears it"),
-        (0.01, 0.0, "frame 0: the body is 0.01 m deep, 0 m are told"),
+        (0.01, 0.0, "frame 0: the body is 0.01 m deep, reported as 0 m"),
     ],
 )
 def test_a_body_that_sleeps_in_the_air_or_in_its_support_is_wrong(
