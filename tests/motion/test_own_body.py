@@ -84,3 +84,8 @@ def test_a_hand_that_rests_on_the_body_does_so(part: str, stature: float, tmp_pa
     if stature < 1.7:  # larger people happen to come near
         loose = to_part(wb.retarget(motion, figure, ground=None), part)[HELD][2:-2, 0]
         assert np.abs(loose).max() > 2e-3
+
+
+def test_hands_of_a_walk_swing_past_the_thighs(shared_data: Path) -> None:
+    motion = wb.motion.read_skeleton(shared_data / "mocap" / "cmu_35_01.bvh")
+    assert to_part(wb.retarget(motion, wb.load("human")), "right_thigh")[:, 0].min() > 0.02

@@ -18,19 +18,20 @@ from wholebody.motion.footholds import RestLimits
 from wholebody.motion.held_points import HeldPoint
 from wholebody.motion.roles import Roles
 from wholebody.motion.skeleton import SkeletonMotion
-from wholebody.motion.thing_contacts import NEAR, Piece, ThingContact, near_and_slow, nearest
+from wholebody.motion.thing_contacts import Piece, ThingContact, near_and_slow, nearest
 from wholebody.motion.windows import long_runs, runs
 
 BODY = {
     "head": ("head", "head", 0.13),
     "trunk": ("hips", "shoulders", 0.13),
     "pelvis": ("left_hip", "right_hip", 0.11),
-    "left thigh": ("left_hip", "left_knee", 0.08),
-    "right thigh": ("right_hip", "right_knee", 0.08),
+    "left thigh": ("left_hip", "left_knee", 0.1),
+    "right thigh": ("right_hip", "right_knee", 0.1),
 }
-"""Of parts that hands touch both ends of a bone, and the metres of flesh about it."""
+"""Of parts that hands touch both ends of a bone, and how far a hand that touches them is from it, metres."""
 
-HAND = 0.03  # m: the flesh about a hand
+HAND = 0.06  # m: as far from each other are hands that touch
+SLACK = 0.02  # m: farther away than that by more than this nothing is touched: hands that swing past hips do not
 ARM = ("shoulder", "elbow", "wrist", "hand")
 OUTSIDE = 0.1  # m: so far outside of a part the nearest place on it is on the side that the hand came from
 
@@ -70,13 +71,13 @@ def own_rests(
     parts = {role: (wrists[role], role, HAND) for role in shares} | BODY
     for role, share in shares.items():
         place = at[wrists[role]] + share * (at[role] - at[wrists[role]])
-        for name, (start, end, flesh) in parts.items():
+        for name, (start, end, reach) in parts.items():
             if name == role or not {start, end} <= at.keys():
                 continue
             way = place - _on_bone(place, at[start], at[end])
             far = np.linalg.norm(way, axis=1)
             local = np.einsum("nji,nj->ni", turns[start], place - at[start])
-            near = near_and_slow(local, far - flesh, NEAR["hand"], motion.dt) & free[role] & (far > 1e-3)
+            near = near_and_slow(local, far - reach, SLACK, motion.dt) & free[role] & (far > 1e-3)
             near &= free.get(name, near)
             for run in runs(long_runs(near, max(1, round(RestLimits().least / motion.dt)))):
                 normal = way[(run.first + run.end) // 2]
