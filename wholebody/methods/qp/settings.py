@@ -17,7 +17,7 @@ class Settings(Checked):
     hot_start: bool = True
     tolerance: Tolerance = 1e-5
     iterations: Iterations = 150
-    budget: Annotated[int, BUDGET] = 1000
+    budget: Annotated[int, BUDGET] = 1500
     restarts: Restarts = 40
     restarts_for_measure: Restarts = 0
     seed: Seed = 0
@@ -169,7 +169,7 @@ class SearchNumbers(NamedTuple):
     start_depth: float = 0.07
     relaxation_depth: float = 0.15
     # probes from beside goals. More: goals behind things are found more often, and what none reaches takes longer.
-    beside: int = 24
+    beside: int = 40
     displaced: float = 0.5  # m, rad: of goals along each axis, the standard deviation. Less: the same side of things.
     # tolerances within which such a relaxed probe must come for the second one to follow. More: more second ones in
     # vain.
