@@ -216,7 +216,7 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         ),
         "probes without relaxation": (search, "_relaxed", plain),
         "relaxed probes": (search, "_relaxed", lambda self, start: None),
-        "test of out of reach": (search, "_known_out_of_reach", lambda self, q: False),
+        "test of out of reach": (search, "_seems_out_of_reach", lambda self, q: False),
         "closest posture to goals that are not met": (search, "_find_closest", lambda self: None),
         "closest posture among things": (search, "_closest_from_best", lambda self: None),
     }

@@ -249,6 +249,23 @@ def test_a_figure_in_the_air_keeps_its_energy_and_momentum() -> None:
     assert ended == pytest.approx(centre + time * began[:3] / mass + 0.5 * time**2 * weight / mass, abs=1e-9)
 
 
+@pytest.mark.parametrize("free", [0.0, {"root": 0.0}])
+def test_a_person_who_falls_keeps_the_angular_momentum_at_joint_limits_too(free: Any) -> None:
+    figure = wb.load("human")
+    model, data = figure.model, figure.model.createData()
+    moving = Articulated(wb.Scene(figure), figure.neutral, wb.Actuated(figure, stiffness=free, damping=free), None)
+    moving.velocity = 0.5 * np.random.default_rng(5).normal(size=model.nv)
+    began = np.array(pin.computeCentroidalMomentum(model, data, moving.q, moving.velocity).angular)
+    limited = False
+    for _ in range(15):
+        moving.advance(figure.neutral, DT, {}, {})
+        limited |= moving.points > 0
+        ended = pin.computeCentroidalMomentum(model, data, moving.q, moving.velocity).angular
+        assert ended == pytest.approx(began, abs=1e-6)  # N m s, of some to begin with
+    assert limited
+    assert np.linalg.norm(began) > 1.0
+
+
 def test_what_drives_a_joint_is_given_by_its_name() -> None:
     figure = wb.load("avatar")
     driven = wb.Actuated(figure, stiffness={"root": 500.0, "left_arm": 20.0}, damping={"left_elbow_flexion": 3.0})

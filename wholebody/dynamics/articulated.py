@@ -154,7 +154,7 @@ class Articulated:
         motions = self._move(moves, segments, () if bearing.any() else drifted)
         motions |= {name: (way[0], pin.SE3.Interpolate(*way, time / planned)) for name, way in moved.items()}
         most = 1.0 if impulse.any() or self.stiffness.any() else 1.05
-        self._settle(began + paid, most, [one for one, _ in drifted])
+        self._settle(began + paid, most, self._brought(drifted))
         if engine is not None:
             frame = engine.advance(time, motions)
             self.frames.append(frame)
@@ -310,6 +310,18 @@ class Articulated:
             weight, mean = time * mass * self._gravity, centre + 0.5 * time / mass * now.linear
             then = now + pin.Force(weight, cross(mean, weight))
             found.append((then, centre + 0.5 * time / mass * (now.linear + then.linear)))
+        return found
+
+    def _brought(self, drifted: Sequence[tuple[pin.Force, Array]]) -> list[pin.Force]:
+        """The momenta of what free roots carry, about the origin, with its centre where the posture has it.
+
+        In a step with contacts that is not quite where it drifts to; what turns about the centre stays the same.
+        """
+        model, data, found = self._model, self._data, list[pin.Force]()
+        pin.centerOfMass(model, data, self.q)
+        for root, (momentum, centre) in zip(self._roots, drifted, strict=True):
+            off = data.oMi[root].act(data.com[root]) - centre
+            found.append(momentum + pin.Force(np.zeros(3), cross(off, momentum.linear)))
         return found
 
     def _settle(self, energy: float, most: float, momenta: Sequence[pin.Force]) -> None:

@@ -202,3 +202,21 @@ def test_two_free_roots_move_or_are_frozen() -> None:
     one = wb.solve(kept, "placo")
     assert one.status == "solved", one.message
     assert figure.part("ben", one.q)[:7] == pytest.approx(figure.part("ben", start)[:7], abs=1e-12)
+
+
+def test_the_balance_of_one_of_two_people_is_left_to_the_assessment_or_refused(human: wb.Figure) -> None:
+    pair = wb.Scene({"anna": human, "ben": (human, (1.2, 0.3, 0.0))})
+    held = [wb.Hold("anna/left_foot"), wb.Hold("anna/right_foot")]
+    problem = wb.Problem(pair, goals=[wb.Point("anna/right_palm", (0.5, -0.2, 1.1))], constraints=held)
+    assert any(isinstance(term, wb.Balance) for term in problem.defaults)
+    solution = wb.solve(problem, "placo")
+    assert solution.solved, solution.message
+    honest(problem, solution)
+    feet_of_ben = wb.Balance(("ben/left_foot", "ben/right_foot"))
+    for terms in ({"constraints": [feet_of_ben]}, {"goals": [wb.CenterOfMass((1.2, 0.3, 1.0), figure="ben")]}):
+        kind = "Balance" if "constraints" in terms else "CenterOfMass"
+        message = wb.methods.Placo().accepts(wb.Problem(pair, **terms))
+        assert message is not None
+        assert f"{kind} (placo" in message
+    of_both = wb.CenterOfMass((0.6, 0.15, 0.0), axes="xy")
+    assert wb.methods.Placo().accepts(wb.Problem(pair, goals=[of_both], balance=False)) is None

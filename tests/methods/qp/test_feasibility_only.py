@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.figures.figure import Figure
 from wholebody.methods.qp.rows import StepSize
 from wholebody.methods.qp.subproblem import Subproblem
 
@@ -106,3 +108,13 @@ def test_a_preference_does_not_make_a_goal_unreachable():
     for weight in (0.1, 6.0, 1e4):
         measures = [wb.Effort(), wb.tasks.Rhythm(), wb.tasks.Hang(["left_upper_arm"], weight=weight)]
         assert wb.solve(behind_a_panel(measures)).status == "solved"
+
+
+@pytest.mark.parametrize(("posture", "offset"), [("standing", (0.0, 0.1, 0.0)), ("arms_forward", (0.0, 0.1, 0.1))])
+def test_a_finger_beside_the_head_is_reached(human: Figure, posture: str, offset: tuple[float, ...]) -> None:
+    beside = pin.SE3(np.eye(3), np.array(offset))
+    goal = wb.Relative("left_index_tip", "head_top", beside)
+    found = wb.solve(wb.Problem(wb.Scene(human), human.posture(posture), goals=[goal]))
+    assert found.solved
+    tip, head = (human.placement(found.q, name) for name in ("left_index_tip", "head_top"))
+    assert np.abs((beside.inverse() * head.inverse() * tip).homogeneous - np.eye(4)).max() < 1e-4

@@ -34,8 +34,10 @@ class Placo(Checked, Descends):
     programs.
 
     Takes Point, Frame, Orientation, Axis(direction=...), CenterOfMass, Posture and Relative goals; Hold, Plane with
-    side "on", Balance and Freeze; Effort and Displacement. All other terms are refused by name. There is one
-    start. If placo finds no solution of a program, the answer is the posture before it, and the message quotes placo.
+    side "on", Balance and Freeze; Effort and Displacement. All other terms are refused by name, and Balance and
+    CenterOfMass of one figure among several; the balance that each person keeps by default there is left to the
+    assessment. There is one start. If placo finds no solution of a program, the answer is the posture before it, and
+    the message quotes placo.
 
     Attributes:
         tolerance: metres and radians to which goals and constraints are met.

@@ -35,6 +35,8 @@ Frames = dict[str, tuple[int, pin.SE3]]
 
 REASONS = {
     "Axis": "placo aligns an axis with a direction, not with a place",
+    "Balance": "placo's centre of mass is of all figures together",
+    "CenterOfMass": "placo's is of all figures together",
     "Plane": "placo has no half-spaces for frames",
     "ReachCones": "placo's cones are circular",
 }
@@ -58,19 +60,27 @@ def unsupported(problem: Problem) -> list[str]:
     """Terms and joints without a class in placo, each with the reason."""
     refused = []
     for where, term in named_terms(problem):
-        if not _takes(term):
+        if not _takes(problem, term):
             kind = type(term).__name__
             refused.append(where + (f" ({REASONS[kind]})" if kind in REASONS else ""))
     return refused + unsupported_joints(problem.scene.figure)
 
 
-def _takes(term: object) -> bool:
+def _takes(problem: Problem, term: object) -> bool:
+    if isinstance(term, (Balance, CenterOfMass)):
+        return _of_all(problem, term)
     if isinstance(term, Axis):
         return term.toward is None
     if isinstance(term, Plane):
         return term.side == "on"
-    kinds = (Point, Frame, Orientation, CenterOfMass, Posture, Relative, Hold, Balance, Freeze, StepLimit)
-    return isinstance(term, (*kinds, Effort, Displacement))
+    kinds = (Point, Frame, Orientation, Posture, Relative, Hold, Freeze, StepLimit, Effort, Displacement)
+    return isinstance(term, kinds)
+
+
+def _of_all(problem: Problem, term: Balance | CenterOfMass) -> bool:
+    """Whether a term is of the centre of mass of all that moves, not of one figure among several."""
+    joints, inertias = term.joints, problem.scene.model.inertias
+    return joints is None or not any(inertias[k].mass > 0.0 for k in range(1, len(inertias)) if k not in joints)
 
 
 def named_frames(problem: Problem) -> Frames:
@@ -105,7 +115,8 @@ def add_terms(solver: Any, robot: Robot, problem: Problem, holding: float) -> Ta
     for number, goal in enumerate(problem.goals):
         _goal(solver, robot, problem, f"goal {number}", goal)
     for number, term in enumerate(problem.constraints):
-        _constraint(solver, f"constraint {number}", term, holding)
+        if not isinstance(term, Balance) or _of_all(problem, term):  # others are defaults
+            _constraint(solver, f"constraint {number}", term, holding)
     for bound in problem.bounds:
         if isinstance(bound, Freeze):  # a solve has no time step, so a step limit bounds nothing
             _freeze(solver, robot, problem, bound)

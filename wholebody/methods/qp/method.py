@@ -103,7 +103,7 @@ class QP(Settings, Descends):
         return Ending(
             best.q, best.converged, len(before) + search.spent, (*before, *search.trace), search.how,
             contradictions=search.contradictions, programs=search.solver.counted(),
-            unreached="out of reach" if search.out_of_reach else f"not found from {search.tried} starts",
+            unreached="seems out of reach" if search.out_of_reach else f"not found from {search.tried} starts",
         )  # fmt: skip
 
     def _complete(self, problem: Problem, met: Met | None) -> Ending | None:

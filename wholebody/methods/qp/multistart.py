@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from itertools import chain
+from itertools import chain, islice
 from typing import NamedTuple
 
 import numpy as np
@@ -50,8 +50,7 @@ class Multistart:
         self.lineariser = problem.lineariser(workspace)
         self.trace: list[TraceEntry] = []
         self._shared = Run(self.subproblem, self.lineariser, solver, self.trace, control)
-        self.spent = 0
-        self.tried = 0  # starts of attempts
+        self.spent = self.tried = 0  # iterations, and starts of attempts
         self.how = "directly"
         self.contradictions: tuple[Contradiction, ...] = ()
         self._start = problem.scene.figure.clamp(problem.start)
@@ -61,7 +60,7 @@ class Multistart:
         self._relaxed_minima = Minima()  # where the others ended
         self._through: list[Array] = []  # where a descent without contacts from another start reached the goals
         self._nearest_through = np.inf  # least violation of a relaxed probe: so near come the goals, if through things
-        self.out_of_reach = False  # which is known
+        self.out_of_reach = False  # as it seems
         self._best: LocalSolution | None = None
 
     @property
@@ -127,7 +126,7 @@ class Multistart:
         yield Attempt(self._before_contact(grips=True), self._closing, "from before a grip")
         yield Attempt([start], self._closing, "by feasibility first")
         self._minima, self._relaxed_minima = Minima(), Minima()  # hands are no random starts
-        self.out_of_reach = self._known_out_of_reach(self.best.q)
+        self.out_of_reach = self._seems_out_of_reach(self.best.q)
         if self.out_of_reach or self._proven():
             return
         if not held(self.best, self.settings.tolerance):
@@ -138,11 +137,12 @@ class Multistart:
         count = min(self.settings.restarts, SEARCH.inside_probes) if least else self.settings.restarts
         if few := moving(self._shared, self.best.q) < SEARCH.few:
             self._minima, self._relaxed_minima = Minima(SEARCH.fewest_descents), Minima(SEARCH.fewest_descents)
-        elif self.problem.goals and not least:
-            yield Attempt(self._beside(min(count, SEARCH.beside)), self._free, "from beside the goals")
         others = (throughout if few else restarts)(self.problem, state, start, rng, count)
         starts = self.lineariser.defined(chain(self._through, others))
-        yield Attempt(starts, self._relaxed, "from another start")
+        beside = self._beside(0 if few or least or not self.problem.goals else min(count, SEARCH.beside))
+        for _ in range(count + len(self._through)):  # in turn: neither kind uses up the budget
+            yield Attempt(islice(beside, SEARCH.turn), self._free, "from beside the goals")
+            yield Attempt(islice(starts, SEARCH.turn), self._relaxed, "from another start")
 
     def _without_measures(self, start: Array) -> LocalSolution | None:
         """Seek a feasible posture so that no measure changes what is reached, and descend; None: nothing but start."""
@@ -329,7 +329,7 @@ class Multistart:
         near = self.best.violation.left <= NEAREST * self._least
         return near and bool(self._least) and held(self.best, self.settings.tolerance)
 
-    def _known_out_of_reach(self, q: Array) -> bool:
+    def _seems_out_of_reach(self, q: Array) -> bool:
         """Whether the goals are out of reach of q (nq,): descents through everything all rest at the same distance."""
         if not (self.problem.goals and self.problem.scene.model.nv):
             return False

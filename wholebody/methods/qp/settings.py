@@ -170,6 +170,7 @@ class SearchNumbers(NamedTuple):
     relaxation_depth: float = 0.15
     # probes from beside goals. More: goals behind things are found more often, and what none reaches takes longer.
     beside: int = 40
+    turn: int = 2  # probes of one kind before those of another. More: what one kind finds comes earlier, or later.
     displaced: float = 0.5  # m, rad: of goals along each axis, the standard deviation. Less: the same side of things.
     # tolerances within which such a relaxed probe must come for the second one to follow. More: more second ones in
     # vain.
@@ -182,7 +183,7 @@ class SearchNumbers(NamedTuple):
     # share of the goals' residual by which constraints may be missed where one ends that counts. Less: ends far from
     # the goals do not count, and probes go on in vain.
     held: float = 1e-2
-    agreeing: int = 3  # of them that must come to rest equally near. Fewer: faster, and reachable goals are given up.
+    agreeing: int = 7  # of them that must come to rest equally near. Fewer: faster, and reachable goals are given up.
     # degrees of freedom that move the goals; with fewer, minima lie apart, programs are cheap, and starts are all over
     # the limits
     few: int = 12
